@@ -10,7 +10,7 @@ _HOMES = {**_KEYS, "Problem": "met.diagnostic"}
 
 
 def __getattr__(name: str) -> Any:
-    """What is offered here is imported when it is first asked for."""
+    """Import a name of this module when it is first used."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(_HOMES[name]), name)

@@ -1,4 +1,4 @@
-"""How anyone complains: one type for every message a user sees, whoever noticed.
+"""Diagnostics: the one type of every message that a user sees, whoever noticed.
 
 A diagnostic is a code, a severity, one sentence, the place it is about, other places involved, and the remedy.
 Functions that find a user's mistake raise `Problem` (carrying one or more); the command line catches it, renders
@@ -54,7 +54,7 @@ class Label:
 
 @frozen
 class Diagnostic:
-    """What is wrong, where, why, and what to do."""
+    """One message for a user: what is wrong, where, why, and what to do."""
 
     code: str
     message: str

@@ -10,7 +10,7 @@ import numpy as np
 
 
 def distinct(values: np.ndarray) -> np.ndarray:
-    """Of any shape, rising; not-a-number once, last."""
+    """The different values of an array of any shape, rising; not-a-number once, last."""
     ordered = np.sort(values, axis=None)
     new = np.ones(len(ordered), dtype=bool)
     new[1:] = ordered[1:] != ordered[:-1]

@@ -1,4 +1,4 @@
-"""Whether a time has come: written times are computed and rounded, and so are instants, and both mean round numbers.
+"""Comparison of times: written times are computed and rounded, and so are instants, and both mean round numbers.
 
 `(0.1 + 0.2) s` is 4e-17 s after the instant at 0.3 s, and means it. Without this, what is to happen then would wait for
 the next step or tick.
@@ -13,5 +13,5 @@ ROUNDING = 1e-12
 
 
 def has_come(now: Real, time: Real) -> Truth:
-    """Whether it is this time, or later: s, from the start of the run."""
+    """True where `now` is not before `time`, to rounding; both in s from the start of the run."""
     return now >= time * (1.0 - ROUNDING)

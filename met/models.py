@@ -1,4 +1,4 @@
-"""Where models are found: MET's own tuples, and the entry points of other installed packages.
+"""Models by kind and name: MET's own tuples, and the entry points of other installed packages.
 
 A package of your own offers a model by an entry point in one of the groups below, whose object is the declaration:
 
@@ -35,14 +35,14 @@ OF_ONES_OWN = (
 )
 
 HELD = ("memory", "outputs", "integrals", "states", "signals")
-"""Where declarations say what a model holds and shows."""
+"""Fields of declarations that list the numbers which a model holds and shows."""
 
 FAULTS = "faults"
 """The parameter of a bed that a deck writes as a word: what its presets are called."""
 
 
 class Model(Protocol):
-    """What all declarations have."""
+    """The fields that all declarations have."""
 
     @property
     def name(self) -> str: ...
@@ -157,7 +157,7 @@ def available(kind: Kind) -> dict[str, Any]:
 
 
 def _check_names(kind: Kind, model: Any, found_at: str) -> None:
-    """What a model holds and shows is recorded under its name, so names are apart, and from those of the engine."""
+    """Raise Problem where names of a model's numbers are the same, or the engine's: each is recorded under its name."""
     from met.plan.channel import OF_BED, OF_LAW, OF_OBSERVER
 
     own = {"bed": OF_BED, "law": OF_LAW + OF_OBSERVER}.get(kind, ())
@@ -254,24 +254,24 @@ def written(model: Any) -> tuple[Parameter, ...]:
 
 
 def has_motor(servo: Any) -> bool:
-    """Whether a bed may take the place of this servo's motor: it has one, and its computer sets the voltage."""
+    """True where a bed may take the place of this servo's motor: it has one, and its computer sets the voltage."""
     return servo.motor is not None and any(output.name == "voltage" for output in servo.outputs)
 
 
 def quantities(use: ServoUse) -> dict[str, str]:
-    """What a sensor of this servo may be of, with declared units: the joint's motion, states of the servo."""
+    """Quantities that a sensor of this servo may read, with declared units: the joint's motion, the servo's states."""
     return {"q": "joint", "qd": "joint/s", **{state.name: state.unit for state in servo_parts(use).natural}}
 
 
 def sensor_parts(use: SensorUse | LinkSensor, group: str) -> tuple[Any, ...]:
-    """Those of a sensor's `parameters`, `states` or `memory` that are there under this use's words."""
+    """The parts of a sensor's `parameters`, `states` or `memory` that are present under this use's words."""
     sensor = find("sensor", use.model, use.place)
     defaults = {each.name: each.default for each in sensor.parameters if isinstance(each.default, str)}
     return tuple(part for part in getattr(sensor, group) if is_present(part, defaults | dict(use.words)))
 
 
 def servo_parts(use: ServoUse) -> Parts:
-    """What there is of a servo in this use of it."""
+    """The parts of a servo that are present in this use of it."""
     from met.servos.servo import parts
 
     return parts(find("servo", use.model, use.place), dict(use.words), continuous=use.continuous)

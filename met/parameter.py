@@ -1,4 +1,4 @@
-"""What a model declares of itself: its parameters, what it holds, what it shows.
+"""Declarations in a model: its parameters, the numbers it holds, the numbers it shows.
 
 Checking, `met doc`, error messages, plans and archives all read these declarations, so a number's unit, range,
 meaning and source are written once, in the model's own file.
@@ -26,7 +26,7 @@ ZEROS = (0.0, 0.0, 0.0)
 Shape = Literal["number", "vector", "list", "word", "text"]
 
 Only = tuple[str, tuple[str, ...]]
-"""Where a part of a servo is there: the name of one of its parameters that is a word, and under which words."""
+"""Condition under which a part of a servo is present: the name of a word parameter, and the words that admit it."""
 
 
 @frozen(kw_only=True)
@@ -80,7 +80,7 @@ class Parameter:
 
 
 def is_present(part: Parameter | Memory | State | Signal, words: Mapping[str, str]) -> bool:
-    """Whether a part of a servo is there under these words, by the names of their parameters."""
+    """True where a part of a servo is present under these words, given by the names of their parameters."""
     return part.only is None or words.get(part.only[0]) in part.only[1]
 
 

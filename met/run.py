@@ -23,15 +23,15 @@ from met.trace.recorder import record
 from met.trace.recording import Recording
 
 DONE, FAILED, TIMED_OUT, LOST = range(4)
-"""How a case ended: at its end; by its own numbers; cut off for taking too long; with whatever ran it, each time."""
+"""Status of a case: done; failed by its own numbers; cut off for taking too long; lost with its worker each time."""
 
 STOPPED = 3.0
-"""Of the output `failure`, beside the engine's own: something else ended the case, and a fate says why."""
+"""The output `failure` of a case that something else than the engine ended; a fate says why."""
 
 
 @frozen
 class Run:
-    """What the engine gives back for some cases of one experiment; the first axis of every array is the case.
+    """Results of some cases of one experiment; the first axis of every array is the case.
 
     case         row of the case table
     status       DONE, FAILED, TIMED_OUT or LOST;  cause: why, with time and joint, empty where done
@@ -117,12 +117,12 @@ class Prepared:
         return hashlib.sha256(emit(self.recording, 8).encode()).hexdigest()
 
     def is_work(self, key: str) -> bool:
-        """Whether a key of all that a case gives, of this version of keys or the one before, is that of this work."""
+        """True where the key is this work's, in this version of keys or the one before."""
         return key == self.work_key or key == self.old_code_key
 
 
 KEY_VERSION = 2
-"""Of code keys, which they begin with: of what they are made. Keys of before have no version."""
+"""The version that code keys begin with: it says what they are made of. Keys of before have none."""
 
 
 def _code_key(of: str) -> str:
@@ -131,7 +131,7 @@ def _code_key(of: str) -> str:
 
 
 def comparable(key: str | None, other: str | None) -> bool:
-    """Whether two code keys are both there, and are made of the same."""
+    """True where two code keys are both there, and are made of the same."""
     return key is not None and other is not None and key.partition(":")[1] == other.partition(":")[1]
 
 
@@ -168,7 +168,7 @@ def compute(
     record: bool = True,
     progress: Callable[[int], None] | None = None,
 ) -> tuple[np.ndarray | None, np.ndarray]:
-    """What the kernel gives of these rows, as `results` takes it: histories [case, row, column], where they are kept
+    """The kernel's answer for these rows, as `results` takes it: histories [case, row, column], where they are kept
     and there are any, and outputs [case, output], in the order of the program's."""
     history, outputs = prepared.kernel.run(
         inputs(prepared.experiment, rows),
@@ -181,7 +181,7 @@ def compute(
 
 
 def inputs(experiment: Experiment, rows: np.ndarray) -> np.ndarray:
-    """What the kernel takes of these rows of the case table, [case, input]."""
+    """The kernel's inputs for these rows of the case table, [case, input]."""
     cases = experiment.cases
     values = np.empty((len(rows), len(cases.coordinates) + len(cases.noise)))
     for column, coordinate in enumerate(cases.coordinates):
@@ -202,7 +202,7 @@ def results(
     outputs: np.ndarray,
     fates: Mapping[int, tuple[int, str]] | None = None,
 ) -> Run:
-    """What came of these rows, of what `compute` gave of them. Writes not-a-number into `history` after a failure.
+    """Results of these rows, from the answer of `compute`. Writes not-a-number into `history` after a failure.
 
     fates  of rows (by their place in `rows`) for which nothing was computed: TIMED_OUT or LOST, and why; or FAILED,
            where something else than the engine ended them at the tick that `failure.tick` says
@@ -313,7 +313,7 @@ def _cause(experiment: Experiment, failure: float, number: float, tick: float) -
 
 
 def _of_guide(experiment: Experiment, joint: str) -> str:
-    """Where the guide that a joint follows gives it no number, in words; empty where there is none that may."""
+    """In words, where the guide that a joint follows gives it no number; empty where there is no such guide."""
     for use in experiment.structure.guides:
         undefined = models.find("guide", use.model, use.place).undefined
         if joint in use.joints and undefined:

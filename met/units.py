@@ -55,7 +55,7 @@ _PI_BELOW = 10**75
 
 @frozen
 class Measure:
-    """What a unit means: its dimension, and how many SI units one of it is, exactly: over / under * pi^turns.
+    """The meaning of a unit: its dimension, and how many SI units one of it is, exactly: over / under * pi^turns.
 
     hertz  the exponent of the hertz in it: Hz and 1/s are one dimension, but only Hz says that it counts cycles
     """
@@ -219,7 +219,7 @@ _SPOKEN = (
 
 
 def is_unit(name: str) -> bool:
-    """Whether a deck's word is the name of a unit, and so cannot name a value."""
+    """True where a deck's word is the name of a unit, and so cannot name a value."""
     return name in UNITS
 
 
@@ -241,7 +241,7 @@ def counted(dimension: Dimension) -> Dimension:
 
 
 def same(a: Dimension, b: Dimension) -> bool:
-    """Whether a quantity of dimension `a` may stand where `b` is wanted."""
+    """True where a quantity of dimension `a` may stand where `b` is wanted."""
     return counted(a) == counted(b)
 
 

@@ -24,7 +24,7 @@ IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def constant(x: object) -> TypeGuard[float]:
-    """Whether x is known when the tree is built: a plain Python number.
+    """True where x is known when the tree is built: a plain Python number.
 
     A Scalar is not, nor is numpy's float64, which stands for a case's value where the plain run must take exactly
     the same path as the traced one.

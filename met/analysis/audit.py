@@ -1,4 +1,4 @@
-"""What a sweep varies to no effect: the program is recorded, and followed back from all that it gives.
+"""Inputs of a sweep that change nothing: the program is recorded, and followed back from all that it gives.
 
 Nothing is compiled. A number of a case has an effect where something that the program records, gives or decides by is
 computed from it, through however many steps; that is a question about the program, not about values.

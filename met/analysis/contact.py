@@ -1,4 +1,4 @@
-"""How many steps of the dynamics a joint's contact with a stop takes: half a swing of the arm on the stop's spring."""
+"""The duration of a joint's contact with a stop, in steps: half a swing of the arm on the stop's spring."""
 
 from __future__ import annotations
 
@@ -27,8 +27,11 @@ class Contact:
 
 
 def contacts(experiment: Experiment, case: int = 0) -> tuple[Contact, ...]:
-    """Of every stop that may push its joint, for the arm as it begins in this case: the inertia that the joint feels
-    where all others keep their modes, and its rotor's. Not of a joint that feels none."""
+    """The contacts with every stop that may push its joint, for the arm as it begins in this case.
+
+    `inertia` is what the joint feels where all others keep their modes, and its rotor's. A joint that feels none is
+    left out.
+    """
     system = System(experiment)
     stops = [(name, model) for name, model in system.environment if model.springs]
     if not stops:

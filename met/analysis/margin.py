@@ -1,4 +1,4 @@
-"""Whether a motor on a bed stays stable: how heavy, and how light, the arm may be for its law, rate and delay.
+"""Stability of a motor on a bed: how heavy, and how light, the arm may be for its law, rate and delay.
 
 The measure is r = J_eff/(N^2 J_m), the arm's inertia at the joint against the rotor's. The loop of bed, filter,
 converter-free wire, servo and law is taken round once by the functions that run it, at a steady rate of the shaft where
@@ -62,17 +62,17 @@ class Margin:
 
     @property
     def heavier(self) -> float | None:
-        """How many times heavier the arm might be; None where no limit was found."""
+        """The factor by which the arm might be heavier; None where no limit was found."""
         return None if self.limit is None else self.limit / self.together
 
     @property
     def lighter(self) -> float | None:
-        """How many times lighter it might be; None where it may be as light as any."""
+        """The factor by which the arm might be lighter; None where it may be as light as any."""
         return self.least / self.lower if self.lower > 0.0 else None
 
     @property
     def factor(self) -> float | None:
-        """How many times heavier, or lighter, the arm might be, whichever is less; below 1 where it is unstable."""
+        """The smaller of `heavier` and `lighter`; below 1 where the loop is unstable."""
         return min((each for each in (self.heavier, self.lighter) if each is not None), default=None)
 
     @property
@@ -83,7 +83,7 @@ class Margin:
 
     @property
     def too_light(self) -> bool:
-        """Whether it is for its lightness that the arm is not stable."""
+        """True where the loop is unstable because the arm is too light."""
         return self.least <= self.lower and not self.too_heavy
 
     @property
@@ -92,7 +92,7 @@ class Margin:
 
     @property
     def stable(self) -> bool:
-        """Of an arm whose r is no number nothing is known: False."""
+        """True where the loop is stable with this arm; False where its r is no number, so that nothing is known."""
         return self.lower < self.least and self.together < (self.searched if self.limit is None else self.limit)
 
 
@@ -119,8 +119,8 @@ def margins(
 
 @frozen
 class _Known:
-    """Of a loop: the stretches of r in which it is stable (from 0: any; to None: as far as searched), and whether it
-    grows at the r of arms so far."""
+    """One loop's results: the stretches of r in which it is stable (from 0: any; to None: as far as searched), and
+    whether it grows at the r of arms so far."""
 
     stretches: _Stretches
     grows: dict[float, bool]
@@ -289,9 +289,10 @@ class _Loop:
         return self.radius(r) > GROWS
 
     def stretches(self, lightest: float, heaviest: float, also: Sequence[float] = ()) -> _Stretches:
-        """Where in this range the loop does not grow, rising: from and to which r, to a hundredth.
+        """The ranges of r within these bounds in which the loop does not grow, rising, to a hundredth of r.
 
-        From 0 where it does not at the lightest, to None where it does not at the heaviest. also: r to look at besides
+        A range begins at 0 where the loop does not grow at the lightest arm, and ends at None where it does not at the
+        heaviest. also: r to look at besides
         """
         looked_at = sorted({*np.geomspace(lightest, heaviest, STEPS).tolist(), *also})
         growing = [self.grows(r) for r in looked_at]

@@ -1,4 +1,4 @@
-"""What a servo's functions use in one use of it, found by recording them once, with names for numbers: no engine.
+"""Uses of a servo's inputs, found by recording its functions once with names for numbers: no engine is built.
 
 For what a compiler says before any program is built. A model that cannot be recorded so says nothing here: what is
 wrong with it is told where its program is built.
@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 
 def reads(use: ServoUse, values: Mapping[str, Any]) -> frozenset[str] | None:
-    """Of what the law of this use could see (`met.models.quantities`), what its outputs and integrals are made of.
+    """Quantities that the law's outputs and integrals depend on, among those it could see (`met.models.quantities`).
 
     values  of the servo's parameters, for its words and lists;  None: the law could not be recorded
     """
@@ -42,7 +42,7 @@ def reads(use: ServoUse, values: Mapping[str, Any]) -> frozenset[str] | None:
 
 
 def accelerates(use: ServoUse, values: Mapping[str, Any]) -> bool | None:
-    """Whether the servo gives its joint's acceleration, at least at times. None: it could not be recorded."""
+    """True where the servo gives its joint's acceleration, at least at times. None: it could not be recorded."""
     servo, parts, graph = models.find("servo", use.model, use.place), models.servo_parts(use), Graph()
     q, qd, time, begin = (graph.input(name) for name in ("q", "qd", ":time", ":begin"))
     joint = JointMotion(q, qd, time, begin, use.command.kind if use.command is not None else "none")
@@ -71,7 +71,7 @@ def _named(graph: Graph, parts: Iterable[Any]) -> SimpleNamespace:
 
 
 def _tried(function: Callable[..., T], *arguments: Any) -> T | None:
-    """What a model gives back; None of one that raises anything, for it is its author's code."""
+    """Call a model's function; None where it raises anything, for it is its author's code."""
     try:
         return function(*arguments)
     except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""Where a run's time goes: operations and time of each part of its kernel, and the share of what the core can do.
+"""Run time of a kernel: operations and time of each part, and the share of what the core can do.
 
 How a part's time is found. The kernel is made of sections, pieces of straight code. Each is compiled alone, called
 again and again from a state that the run went through, and its best time taken; times how often the run calls it a
@@ -47,7 +47,7 @@ WORK = {
     "carry": "integrator", "slope": "further stages", "split": "friction splits", "metrics_": "metrics",
     "record": "recorder",
 }  # fmt: skip
-"""What a phase's work is called, by the beginning of its name; in the order of an instant and the step after it."""
+"""Names of kinds of work by the beginning of a phase's name, in the order of an instant and the step after it."""
 
 WITHIN = ("servo physics", "environment", "dynamics", "sensors")
 """Parts of a stage (met/program/evaluation.py), in order."""
@@ -98,7 +98,7 @@ class Input:
 
 @frozen
 class RunProfile:
-    """What is told of an experiment's kernel.
+    """Measurements of an experiment's kernel, as `met profile` shows them.
 
     lanes         cases a block; vector: cases a register;  cpu: LLVM's name of the processor
     code_bytes    of machine code, in `pieces` functions
@@ -129,7 +129,7 @@ class RunProfile:
 
     @property
     def flops(self) -> float:
-        """Of a step and case, friction's events included as often as they were."""
+        """Floating-point operations of a step and case, friction's events included as often as they were."""
         return sum(part.flops for part in self.parts)
 
     @property
@@ -218,7 +218,7 @@ def _chains() -> tuple[Work, int]:
 
 
 def hoisted(experiment: Experiment, recording: Recording) -> Iterator[Input]:
-    """What of the work that depends on each coordinate is done before the first step, and what is left to a step."""
+    """For each coordinate, the work that is done before the first step, and what is left to a step."""
     sections = {step.section for step in _all(recording.start) if isinstance(step, RunSection)}
     ticking = {step.section for step in _all(recording.tick) if isinstance(step, (RunSection, RecordSection))}
     for coordinate in experiment.cases.coordinates:
@@ -285,12 +285,12 @@ def _parts(
 
 
 def _work(phase: str) -> str:
-    """What a phase's work is called; its own name where it is no phase of a step's."""
+    """The kind of a phase's work, as `WORK` names it; the phase's own name where it is no phase of a step."""
     return next((work for begin, work in WORK.items() if phase.startswith(begin)), phase)
 
 
 def _place(part: WorkCost) -> tuple[bool, int, int]:
-    """Where a part stands in the table: in the order of a step, what is none of a stage's parts after those."""
+    """The sort key of a row: rows stand in the order of a step, work outside a stage's parts after those."""
     works = list(WORK.values())
     return (
         part.event,
@@ -300,7 +300,7 @@ def _place(part: WorkCost) -> tuple[bool, int, int]:
 
 
 def _calls(made: Kernel, cases: np.ndarray, ticks: int) -> dict[tuple[int, bool], float]:
-    """How often each section was called in a run, by (section, whether within a loop), on average over the blocks."""
+    """Mean number of calls of each section in a run, over the blocks, by (section, whether within a loop)."""
     program, loops = counting(made.program)
     counter = backends.load(record(program), made.lanes)
     _, outputs = counter.run(cases, ticks, record=False, threads=1)

@@ -1,4 +1,4 @@
-"""What a back end offers (`Backend`), and what it makes of a recorded program (`Kernel`, `Block`).
+"""Protocols of a back end (`Backend`) and of what it makes of a recorded program (`Kernel`, `Block`).
 
 Three implement it: `LlvmKernel` and `LlvmBlock`, `Library` and `CBlock` in C, `Interpreter` and `InterpretedBlock`.
 """
@@ -46,11 +46,11 @@ class Kernel(Protocol):
 
     @property
     def recording(self) -> Recording:
-        """What it was made of."""
+        """The recording that the kernel was made of."""
 
     @property
     def program(self) -> Program:
-        """What it runs."""
+        """The program that the kernel runs."""
 
     @property
     def lanes(self) -> int: ...
@@ -114,7 +114,7 @@ class Backend(Protocol):
         """The program as text, as `load` would compile it here; for people, and for `met dump kernel`."""
 
     def listing(self, recording: Recording) -> str:
-        """What the processor is given, as text, for `met dump assembly`; `emit`'s text where there is no other."""
+        """The processor's code as text, for `met dump assembly`; `emit`'s text where there is no other."""
 
     def load(self, recording: Recording, *, lanes: int | None = None, inline: bool = True) -> Kernel:
         """The program, ready to run. inline: False where the time of each section by itself is asked for."""

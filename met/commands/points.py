@@ -77,6 +77,6 @@ def clamped_slopes(times: Sequence[float], values: Sequence[float]) -> Numbers:
 
 
 def _held(times: Numbers, values: Numbers, t: Real, value: Real, slope: Real) -> tuple[Real, Real]:
-    """What a curve gives between its ends, and the ends' own values, exactly, before and after."""
+    """Value and slope of a curve between its ends; outside of them the ends' own values, exactly, and slope 0."""
     value = where(t >= times[-1], values[-1], where(t < times[0], values[0], value))
     return value, where(both(t >= times[0], t < times[-1]), slope, 0.0)

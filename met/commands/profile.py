@@ -1,4 +1,4 @@
-"""What a command profile is to the engine: a course in time of whatever is commanded.
+"""The declaration of a command profile: a course in time of whatever is commanded.
 
 In a deck a profile stands inside the kind of command: `rate(step(to = slow, at = 1 s))`; a bare value is the
 constant profile. The engine evaluates it at the servo's ticks.
@@ -40,7 +40,7 @@ class Profile:
     from_file: bool = False
 
     def jump(self, p: Any) -> Jump:
-        """What may jump, with these parameters."""
+        """The part of the course that may jump with these parameters: `value`, `rate` or `none`."""
         return self.jumps(p) if callable(self.jumps) else self.jumps
 
     @property

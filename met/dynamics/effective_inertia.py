@@ -1,4 +1,4 @@
-"""What a motor feels: the arm behind one joint as an inertia and a torque (docs/physics.md, section 1).
+"""The effective inertia of a joint: the arm behind it as an inertia and a torque (docs/physics.md, section 1).
 
 One outward sweep serves all joints. Y_i is link i's answer to a wrench on it, everything outboard of it cut away
 and all joints in their modes: a six by six from wrench to acceleration.

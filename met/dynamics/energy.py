@@ -25,7 +25,7 @@ from met.dynamics.tree import Tree
 
 
 class Energy(NamedTuple):
-    """Of everything that the joints move. Links fixed to the base, its own included, count where it moves freely.
+    """Energy and momentum of all that the joints move; of the base, and of links fixed to it, where it moves freely.
 
     kinetic    J, 1/2 rotor qd^2 included
     potential  J, of uniform gravity, zero at the world's origin

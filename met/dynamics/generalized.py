@@ -1,4 +1,4 @@
-"""What a base that moves freely does when the joints move and nothing pushes: the generalized Jacobian's own part.
+"""Motion of a free base that follows from joint rates where nothing pushes: its part of the generalized Jacobian.
 
     H V_b + sum_i h_i qd_i = P          V_b the base's twist, P the momentum, H of all bodies together
 

@@ -1,4 +1,4 @@
-"""Where the links are and how they move, in the world, by their own (the deck's) frames."""
+"""Poses and motions of the links in the world, by their own (the deck's) frames."""
 
 from __future__ import annotations
 

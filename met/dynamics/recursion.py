@@ -59,7 +59,7 @@ SINGULAR = 1e-13
 
 @frozen
 class Solved:
-    """What a pass gives. Sequences have one entry a moving joint, in the tree's order of joints.
+    """Results of one pass. Sequences have one entry a moving joint, in the tree's order of joints.
 
     qdd         joint accelerations, rad/s^2 (m/s^2): given or solved
     tau         joint torques, N m (N), the rotor's share included: given or solved

@@ -98,12 +98,12 @@ def settled(x: Real) -> Real:
 
 
 def all_constant(*groups: tuple[object, ...]) -> bool:
-    """Whether every number of these tuples (of tuples) is known when the tree is built."""
+    """True where every number of these tuples (of tuples) is known when the tree is built."""
     return all(all_constant(x) if isinstance(x, tuple) else constant(x) for group in groups for x in group)
 
 
 def is_zero(x: Real) -> bool:
-    """Whether x is known to be nothing at all."""
+    """True where x is known to be exactly zero when the tree is built."""
     return bool(constant(x) and x == 0.0)
 
 
@@ -215,7 +215,7 @@ def _others(axis: int) -> tuple[int, int]:
 
 
 def _quarter(turn: Turn) -> int | None:
-    """How many quarter turns this is, or None."""
+    """The number of quarter turns that this turn is, exactly; None where it is no whole number of them."""
     c, s = turn
     if not (constant(c) and constant(s)):
         return None

@@ -1,4 +1,4 @@
-"""What an environment model is to the engine: loads on the arm, from where it is and how it moves.
+"""The declaration of an environment model: loads on the arm, from where it is and how it moves.
 
 Evaluated at every stage of every step (`docs/physics.md`, "Rates"), as ordinary functions over numbers that may be
 traced.
@@ -18,7 +18,7 @@ from met.vectors import Matrix, Vector
 
 
 class World(Protocol):
-    """What an environment model may ask of the arm at a stage.
+    """The questions that an environment model may ask of the arm at a stage.
 
     time                 of the stage, s
     begin, step          time at which the dynamics step began that the stage is part of, and its length, s
@@ -71,7 +71,7 @@ class Force:
 
 @frozen
 class Loads:
-    """What one environment model does: loads of several models add up.
+    """Loads of one environment model; those of several add up.
 
     gravity  acceleration of free fall, world axes (m/s^2)
     torques  torque on joints by name (N m; N)

@@ -51,7 +51,7 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
 
 
 def _intervals(switches: tuple[float, ...]) -> list[tuple[float, float]]:
-    """From on to off; the last without end where it is not switched off again."""
+    """Pairs of switch-on and switch-off times, s; the last has no end where it is not switched off again."""
     if not switches:
         return [(-math.inf, math.inf)]
     return list(itertools.zip_longest(switches[::2], switches[1::2], fillvalue=math.inf))

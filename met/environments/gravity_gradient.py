@@ -57,7 +57,7 @@ def _around(p: Any, world: World) -> tuple[Matrix, Vector]:
 
 
 def _acceleration(p: Any, field: Matrix, turning: Vector, position: Vector, velocity: Vector) -> Vector:
-    """Of a part there that moves so, world axes; `field` and `turning` of `_around`."""
+    """Acceleration of a part at this position and velocity, world axes, m/s^2; `field`, `turning`: see `_around`."""
     found = turn_vector(field, position)
     if p.frame == "orbital":
         found = add(found, scale(-2.0, cross(turning, velocity)))

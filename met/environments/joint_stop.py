@@ -41,7 +41,7 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
 
 
 def _push(p: Any, beyond: Real, deeper: Real) -> Real:
-    """What a stop pushes the joint back with, N m (N): how far the joint is beyond it, and how fast it goes further."""
+    """The stop's push on the joint, N m (N), from how far the joint is beyond it, and how fast it goes further."""
     inside = beyond <= 0.0  # also where there is no stop, infinitely far away
     return where(inside, 0.0, p.stiffness * where(inside, 0.0, beyond) * maximum(0.0, 1.0 + p.dissipation * deeper))
 

@@ -40,7 +40,7 @@ def passed(world: Step, time: Real) -> Real:
 
 
 def open_at(p: Any, now: Real) -> Truth:
-    """Whether an instant lies in the window of a model that declares one: from <= now < until."""
+    """True where an instant lies in the window of a model that declares one: from <= now < until."""
     return both(has_come(now, getattr(p, "from")), not_(has_come(now, p.until)))
 
 

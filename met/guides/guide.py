@@ -1,4 +1,4 @@
-"""What a guide is to the engine: it commands several joints together, which servos of theirs then follow.
+"""The declaration of a guide: it commands several joints together, which servos of theirs then follow.
 
 In a deck a guide stands in a run, `guide tip = resolved_rate { ... }`, and moves the joints whose servos name it:
 `command = rate(tip)`, `command = position(tip)`. A guide is one of two things. A computer that ticks (`steer`) sees
@@ -46,7 +46,7 @@ class Arm(Protocol):
 
 @frozen
 class Sight:
-    """What a guide's computer sees at its tick.
+    """The inputs of a guide's computer at its tick.
 
     time     s
     slides   of each of its joints, whether it is prismatic
@@ -64,7 +64,7 @@ class Sight:
 
 @frozen
 class Steered:
-    """What a guide's computer gives: each joint's rate, in order, rad/s (m/s), and all its memory by name."""
+    """The answer of a guide's computer: each joint's rate, in order, rad/s (m/s), and all its memory by name."""
 
     rates: Sequence[Real]
     memory: Mapping[str, Real] = field(default_factory=dict)

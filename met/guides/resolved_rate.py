@@ -97,7 +97,7 @@ def steer(p: Any, joints: Sequence[Any], seen: Sight) -> Steered:
 
 
 def _behind(wanted: Stance, there: Stance) -> tuple[Vector, Vector]:
-    """How far the path is ahead: a way and a turn (axis times angle), world axes, m and rad."""
+    """The error of a frame against its path: displacement, m, and turn (axis times angle), rad, world axes."""
     return sub(wanted.p, there.p), rotation_vector(product(wanted.R, transposed(there.R)))
 
 

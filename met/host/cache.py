@@ -26,8 +26,8 @@ _MARK = b"met object 2\n"
 
 
 def folder() -> Path | None:
-    """Where objects are kept: $MET_CACHE_DIR, else ~/.cache/met (under $XDG_CACHE_HOME where that is set). None for who
-    has no home; HOME counts only where it names one whole."""
+    """The folder of compiled objects: $MET_CACHE_DIR, else ~/.cache/met (under $XDG_CACHE_HOME where that is set). None
+    for who has no home; HOME counts only where it names one whole."""
     own = os.environ.get("MET_CACHE_DIR")
     if own:
         return Path(own)
@@ -62,8 +62,8 @@ def within(*parts: str) -> Path | None:
 
 
 def _is_ours(path: Path, status: os.stat_result) -> bool:
-    """Whether nobody but this user, and the machine's administrator, can have written what has this status; it is told
-    where not."""
+    """True where nobody but this user, and the machine's administrator, can have written the file of this status. Where
+    it is not, stderr says so."""
     if status.st_uid != os.geteuid():
         _tell(path, "it is another user's")
         return False

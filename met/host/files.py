@@ -96,7 +96,7 @@ def whole_file(path: str | os.PathLike[str], *, mode: int | None = None) -> Iter
 
 
 def read_json(path: str | os.PathLike[str], most: int = MOST_JSON_BYTES) -> Any:
-    """What is in a file of JSON. Raises OSError; ValueError as `parse_json`."""
+    """The value of a file of JSON. Raises OSError; ValueError as `parse_json`."""
     return parse_json(read_regular(path, most))
 
 
@@ -112,7 +112,7 @@ def parse_json(text: str | bytes) -> Any:
 
 
 def is_count(value: Any, most: float = math.inf) -> bool:
-    """Whether it is a whole number from 0 on, `most` at most."""
+    """True for a whole number from 0 to `most`."""
     return type(value) is int and 0 <= value <= most
 
 

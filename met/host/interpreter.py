@@ -1,4 +1,4 @@
-"""How MET starts another Python: with the packages of this one, and nothing of the folder that it stands in.
+"""Other Pythons that MET starts: with the packages of this one, and nothing of the working folder.
 
 `python -m` and `python -c` look for every module in the working folder first, so a `json.py` beside a deck would be
 run. A child finds what Python itself finds, what the user named in PYTHONPATH, and MET where this process has it. All

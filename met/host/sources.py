@@ -1,4 +1,4 @@
-"""What the name of a source on the command line says that it is: a plan, an archive, else a deck."""
+"""Kinds of sources on the command line, by their names: a plan, an archive, else a deck."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ ARCHIVES = (".h5", ".hdf5", ".nc")
 
 
 def names_plan(source: str) -> bool:
-    """Whether a name is that of a plan file."""
+    """True for the name of a plan file."""
     return source.endswith(".json")
 
 
 def names_archive(source: str) -> bool:
-    """Whether a name is that of an archive."""
+    """True for the name of an archive."""
     return source.endswith(ARCHIVES)

@@ -1,4 +1,4 @@
-"""What an integrator is to the engine: a way from the state at the start of a step to the state at its end.
+"""The declaration of an integrator: a way from the state at the start of a step to the state at its end.
 
 The first stage's slopes are given (they are what is recorded at an instant), the rest is the integrator's.
 Friction modes are fixed during a step, so the slope is smooth in it; the engine finds the crossing of a rate

@@ -142,7 +142,7 @@ def suggest(name: str) -> str | None:
 
 
 def _one_slip(word: str, unit: str) -> bool:
-    """Whether one letter too many, too few or wrong parts the two, or two letters that changed places."""
+    """True where one letter too many, too few or wrong parts the two, or two letters that changed places."""
     same = next((i for i, pair in enumerate(zip(word, unit, strict=False)) if pair[0] != pair[1]),
                 min(len(word), len(unit)))  # fmt: skip
     a, b = word[same:], unit[same:]
@@ -150,7 +150,7 @@ def _one_slip(word: str, unit: str) -> bool:
 
 
 def remedy(name: str, number: str = "", *, alone: bool = True) -> tuple[str, ...]:
-    """What to write for a word that is no unit, as lines of help; none where nothing is known of it.
+    """Lines of help that say what to write for a word that is no unit; none where nothing is known of it.
 
     number  what stands before it, as written; "" where none does
     alone   whether the word is the whole of the unit, or its first factor without an exponent

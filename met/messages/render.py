@@ -57,12 +57,12 @@ def count_line(diagnostics: Iterable[Diagnostic]) -> str:
 
 
 def wants_colour(stream: TextIO, environ: Mapping[str, str] = os.environ) -> bool:
-    """Whether to colour what is written there: a terminal, and nobody said NO_COLOR."""
+    """True where output to this stream should be coloured: a terminal, and NO_COLOR is not set."""
     return stream.isatty() and not environ.get("NO_COLOR") and environ.get("TERM") != "dumb"
 
 
 def shown_place(place: Place) -> Place:
-    """Where the deck's author should look: the place itself, or the outermost use of the macro that made it.
+    """The place where the deck's author should look: the place itself, or the outermost use of the macro that made it.
 
     A macro's body stands before its uses, or in another file; what stands behind the use is one of its arguments.
     """

@@ -1,4 +1,4 @@
-"""What a metric is to the engine: one number about one channel over a whole run, gathered as the run goes.
+"""The declaration of a metric: one number about one channel over a whole run, gathered as the run goes.
 
 It sees its channel at every tick of the channel's owner (the dynamics' for motion and torque, the servo's for what
 its computer holds), whatever is recorded, so its value does not depend on the record.

@@ -55,7 +55,7 @@ BASE = "base"
 """The link that the arm stands on. It has no joint, and matter only where a deck gives it some."""
 
 COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
-"""Of the pose of a prescribed base, and of a guide's path: m, and rad about fixed x, y, z."""
+"""Components of the pose of a prescribed base, and of a guide's path: m, and rad about fixed x, y, z."""
 
 INSTANT = 1e-6
 """Share of a step of the dynamics by which a written time may lie after the instant that it means: rounding."""
@@ -66,7 +66,7 @@ REPEAT, SEED = "noise:repeat", "noise:seed"
 
 @frozen
 class Origin:
-    """Where a value comes from: the place that wrote it, the places it overrode (latest first), and in words.
+    """The origin of a value: the place that wrote it, the places it overrode (latest first), and in words.
 
     kind: "deck", "default" (a model's declaration; place is None), "case" (a sweep varies it, at `place`) or
     "derived" (computed from others, such as a rod's inertia; `note` says how).
@@ -132,7 +132,7 @@ class Base:
 
     @property
     def turns(self) -> bool:
-        """Whether it may turn: it is free, or one of its angles is no constant."""
+        """True where the base may turn: it is free, or one of its angles is no constant."""
         return self.kind == "free" or any(
             course.component in COMPONENTS[3:] and course.model != "constant" for course in self.courses
         )
@@ -140,7 +140,7 @@ class Base:
 
 @frozen
 class Command:
-    """What a servo is told: "rate", "position", "torque" or "acceleration", and the model of its course in time.
+    """A servo's command: "rate", "position", "torque" or "acceleration", and the model of its course in time.
 
     guide  the guide that tells it, by its name in the deck; then there is no model, ""
     """
@@ -255,7 +255,7 @@ class Payload:
 
     @property
     def flies(self) -> bool:
-        """Whether it moves freely for a time: it is otherwise a part of its link."""
+        """True where the payload moves freely for a time; otherwise it is a part of its link."""
         return self.grappled or self.released
 
 
@@ -343,7 +343,7 @@ class Recorded:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the variable at one instant: joints, components, each where there are some."""
+        """The shape of the variable at one instant: (joints, components), each where there are some."""
         return tuple(len(names) for names in (self.joints, self.components) if names)
 
 
@@ -374,7 +374,7 @@ class Structure:
 
     @property
     def free(self) -> bool:
-        """Whether the base moves freely."""
+        """True where the base moves freely."""
         return self.base is not None and self.base.kind == "free"
 
     @property
@@ -452,7 +452,7 @@ class Cases:
 
     @property
     def noise(self) -> tuple[str, ...]:
-        """What of a case's noise is its own: inputs of the program, after the coordinates."""
+        """Inputs of the program that make a case's noise its own; they follow the coordinates."""
         return (*([REPEAT] if self.repeats is not None else []), *([SEED] if self.seeds == "independent" else []))
 
     @property
@@ -487,7 +487,7 @@ class Experiment:
 
     @property
     def varies(self) -> bool:
-        """Whether it is a sweep, or a group of one."""
+        """True for a sweep, or a group of one."""
         return bool(self.sweep or self.cases.coordinates or self.cases.choices or self.cases.repeats is not None)
 
 
@@ -502,7 +502,7 @@ class Source:
 
 @frozen
 class Plan:
-    """What a deck means. `deck` names the root file; `sources` holds every file that was read.
+    """A deck resolved. `deck` names the root file; `sources` holds every file that was read.
 
     selected: how the runs and sweeps were asked for, by name or `all`; none where the deck's own choice was taken.
     An archive is called after it.

@@ -50,7 +50,7 @@ MOTION = (
 
 XYZ, WXYZ = ("x", "y", "z"), ("w", "x", "y", "z")
 DIMENSIONS = {XYZ: "axis", WXYZ: "quaternion"}
-"""What the components of a vector are, as a dimension."""
+"""Names of the archive's dimensions by the components of a vector."""
 
 JOINT_AXIS = "about or along the joint's axis"
 WORLD_AXES = "world axes"
@@ -270,7 +270,7 @@ def _carrying(structure: Structure, link: str) -> list[Joint]:
 
 
 def carries(structure: Structure, link: str, joint: str) -> bool:
-    """Whether a moving joint lies between the link and the base."""
+    """True where a moving joint lies between the link and the base."""
     return joint in {each.name for each in _carrying(structure, link)}
 
 
@@ -317,7 +317,7 @@ def recordable(structure: Structure, names: Iterable[str] = ()) -> dict[str, tup
 
 
 def _of_all(name: str, channel: Channel) -> str:
-    """What the same of all joints is called; a single component of a jacobian has no such name."""
+    """The name of a channel of one joint among all joints' signals; "" for a single component of a jacobian."""
     if not channel.path.startswith("links."):
         return name.removeprefix(channel.joint + ".")
     return name.removesuffix("." + channel.joint) if name != channel.path else ""

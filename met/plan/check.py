@@ -1,4 +1,4 @@
-"""What the types of a plan cannot say: that its parts fit together, and that its numbers are possible.
+"""Checks of a plan that its types cannot make: that its parts fit together, and that its numbers are possible.
 
 Whoever writes a plan by hand, or with another program, is told where it is wrong, by the path in the JSON; what gets
 past here runs. Everything raises `Damaged`.
@@ -35,7 +35,7 @@ from met.plan.outputs import tolerable
 from met.trace.graph import TRUTHS, Formulas
 
 GROUP = re.compile(r"[\w+-]+(\.[\w+-]+)*")
-"""What a group of a sweep is called by, behind the sweep's name."""
+"""The name of a group of a sweep, behind the sweep's name."""
 
 TABLES = {"table": 1, "trajectory": 2}
 """Profiles of points, and how many points each needs."""
@@ -283,7 +283,7 @@ def _check_bounds(values: tuple[float, ...], parameter: Parameter, where: str, h
 
 
 def _bounds(parameter: Parameter) -> list[tuple[Callable[[np.ndarray], np.ndarray], str]]:
-    """What each bound of a declaration asks of values [case, 1], and how to say it."""
+    """Tests of values [case, 1] against each bound of a declaration, and how to say the bound."""
     written: tuple[tuple[float | None, str, np.ufunc], ...] = (
         (parameter.above, "above", np.greater),
         (parameter.at_least, "at least", np.greater_equal),

@@ -174,7 +174,7 @@ def _check_formulas(values: dict[str, Any], where: str) -> None:
 
 
 def _is_rest(op: str, rest: tuple[Any, ...]) -> bool:
-    """Whether this stands behind a node's operands: a constant's number, an input's name, a bit's place, a table."""
+    """True for what stands behind a node's operands: a constant's number, an input's name, a bit's place, a table."""
     if op == "const":
         return len(rest) == 1 and _is_number(rest[0])
     if op == "input":

@@ -1,4 +1,4 @@
-"""Which parameters an experiment must have, by the declarations of its models, and what those it lacks default to."""
+"""Parameters that an experiment must have, by the declarations of its models, and the defaults of those it lacks."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from met.plan.channel import channels, joint_unit, watched_unit
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 OF_FREE_BASE = (("position", "m"), ("rpy", "rad"), ("velocity", "m/s"), ("rate", "rad/s"))
-"""Of the initial state of a free base: vectors, world axes."""
+"""Vectors of the initial state of a free base, with units; world axes."""
 
 OF_FLIGHT = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("rate", "rad/s"))
-"""Of a payload that flies first: vectors, world axes."""
+"""Vectors of the initial state of a payload that flies first, with units; world axes."""
 
 
 def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity | None]]:
@@ -45,7 +45,7 @@ def unknown_parameters(experiment: Experiment) -> Iterator[tuple[str, str | None
 
 
 def heads_of_models(structure: Structure) -> tuple[str, ...]:
-    """What the paths of parameters begin with that a model of the structure declares."""
+    """Prefixes of the paths of parameters that a model of the structure declares."""
     return (
         *(f"{use.joint}.servo." for use in structure.servos),
         *(f"{use.joint}.{kind}." for use in structure.substitutions for kind in ("bed", "law")),
@@ -62,7 +62,7 @@ Declared = tuple[str, str, float | tuple[float, ...] | str | None, Parameter | N
 
 
 def of_environment(structure: Structure) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
-    """What the paths of each environment model's parameters begin with, and their declarations."""
+    """The prefix of the paths of each environment model's parameters, and their declarations."""
     for use in structure.environment:
         yield f"environment.{use.name}", models.find("environment", use.model, use.place).parameters
 
@@ -152,7 +152,7 @@ def _of_payloads(structure: Structure) -> Iterator[Declared]:
 
 
 def _of_base(structure: Structure) -> Iterator[Declared]:
-    """Of a base that moves: its initial state, or its courses."""
+    """Declared parameters of a base that moves: its initial state, or its courses."""
     if structure.free:
         for name, unit in OF_FREE_BASE:
             for axis in "xyz":
@@ -162,7 +162,7 @@ def _of_base(structure: Structure) -> Iterator[Declared]:
 
 
 def _of_guides(structure: Structure) -> Iterator[Declared]:
-    """Of the guides: their own, those of each joint, and those of their paths' courses."""
+    """Declared parameters of the guides: their own, those of each joint, and those of their paths' courses."""
     kinds = {joint.name: joint for joint in structure.joints}
     for use in structure.guides:
         head, guide = f"guides.{use.name}", models.find("guide", use.model, use.place)

@@ -1,4 +1,4 @@
-"""What a plan says of its guides, held against their declarations and against the servos that follow them."""
+"""Checks of a plan's guides, against their declarations and the servos that follow them."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def check(structure: Structure, where: str) -> None:
 
 
 def check_paths(experiment: Experiment, where: str) -> None:
-    """What is guided can be: the joints carry the link, and are as many as the components. Raises Damaged."""
+    """Raise Damaged unless the joints of each guide carry its link, and are as many as the guided components."""
     structure = experiment.structure
     for use in structure.guides:
         found = guided_components(experiment, use)

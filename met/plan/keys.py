@@ -37,7 +37,7 @@ def structure_key(structure: Structure, inputs: Iterable[str] = ()) -> str:
 
 
 def inputs(experiment: Experiment) -> tuple[str, ...]:
-    """What each case of an experiment brings: its coordinates, and the parameters that follow from them by formulas."""
+    """Numbers that each case brings: coordinates, and the parameters that follow from them by formulas."""
     coordinates = [coordinate.path for coordinate in experiment.cases.coordinates]
     followers = sorted(path for path, q in experiment.parameters.items() if isinstance(q.value, Formula))
     return (*coordinates, *followers, *experiment.cases.noise)

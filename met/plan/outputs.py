@@ -1,4 +1,4 @@
-"""What comes out of a case, and in which units: recorded signals, joints' parts of them, metrics."""
+"""Outputs of a case and their units: recorded signals, joints' parts of them, metrics."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from met.plan import MetricUse, Recorded, Structure
 from met.plan.channel import channel_paths, channels, watched_unit
 
 OF_ALL = {"rel": "1", "time": "s"}
-"""What a tolerance may allow of everything: a share of the value; how much earlier or later. With units."""
+"""Tolerances of everything, with units: a share of the value; how much earlier or later."""
 
 
 def metric_units(structure: Structure) -> dict[str, str]:
@@ -23,13 +23,13 @@ def _metric_unit(use: MetricUse, of: str) -> str:
 
 
 def joint_parts(name: str, joints: tuple[str, ...]) -> tuple[str, ...]:
-    """What each joint's part of a signal is called: `shoulder.qd`, `links.tip.jacobian.linear.shoulder`."""
+    """Names of each joint's part of a signal: `shoulder.qd`, `links.tip.jacobian.linear.shoulder`."""
     return channel_paths(name, joints, ()) if joints else ()
 
 
 def tolerable(structure: Structure) -> dict[str, tuple[str, ...]]:
-    """What a tolerance may be of, with its unit, or units where a signal's joints have several: signals, a joint's part
-    of one, metrics (`metrics.<name>` where a signal has the name too), `rel` and `time`."""
+    """Names that a tolerance may have, with the unit, or units where a signal's joints have several: signals, a joint's
+    part of one, metrics (`metrics.<name>` where a signal has the name too), `rel` and `time`."""
     out = {name: units for recorded in structure.record for name, units in _signal(recorded)}
     for name, unit in metric_units(structure).items():
         out[f"metrics.{name}" if name in out else name] = (unit,)

@@ -1,4 +1,4 @@
-"""What a declaration says of parameters together, held against a plan; the compiler tells decks the same."""
+"""Checks of parameters against each other, as declarations ask; the compiler makes the same ones for decks."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def check_uses(experiment: Experiment, uses: Iterable[tuple[str, tuple[Parameter
 
 
 def named(structure: Structure, parameter: Parameter) -> tuple[str, ...]:
-    """What a word that names something of the arm may be."""
+    """The words that a parameter which names something of the arm may be."""
     bodies = (*(link.name for link in structure.links), *(payload.name for payload in structure.payloads))
     of_arm = bodies if parameter.names == "link" else tuple(joint.name for joint in structure.moving)
     return (*of_arm, *parameter.words)
@@ -49,7 +49,7 @@ def named(structure: Structure, parameter: Parameter) -> tuple[str, ...]:
 def tests(
     experiment: Experiment, uses: Iterable[tuple[str, tuple[Parameter, ...]]]
 ) -> Iterator[tuple[str, list[str], Holds, str]]:
-    """What must hold of numbers in every case: path, the numbers' paths, the test, and what to say."""
+    """Conditions on numbers in every case: path, the numbers' paths, the test, and what to say where it fails."""
     for prefix, parameters in uses:
         for parameter in parameters:
             path = f"{prefix}.{parameter.name}"

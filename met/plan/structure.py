@@ -1,4 +1,4 @@
-"""That the parts of a plan's structure fit together: arm, base, payloads, schedule, servos, records."""
+"""Checks that the parts of a plan's structure fit together: arm, base, payloads, schedule, servos, records."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from met.plan.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.plan.codec import Damaged
 
 NAME = re.compile(r"[^\W\d]\w*")
-"""What a deck can name: a name is part of paths, of messages, of files' names."""
+"""A name in a deck: it is part of paths, of messages, of files' names."""
 
 MOST_TICKS = 10**12
-"""Of a run: thirty years at a kilohertz. A divisor may not be larger either."""
+"""The most ticks of a run: thirty years at a kilohertz. A divisor may not be larger either."""
 
 
 def check(structure: Structure, where: str) -> None:

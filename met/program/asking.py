@@ -58,7 +58,7 @@ def advance_with(integrator: Integrator, settled: Sequence[Slope], h: Real, y: M
 
 
 def question_count(integrator: Integrator, joints: int, states: int, h: float) -> int:
-    """How many slopes it asks for on its way through a step of h s, the first stage's aside."""
+    """The number of slopes that the integrator asks for in a step of h s, without the first stage's."""
     graph = Graph()
 
     def numbers(name: str, count: int) -> tuple[Scalar, ...]:
@@ -93,7 +93,7 @@ def changed_count(integrator: Integrator) -> Problem:
 
 
 def _wrong(y: object, like: Motion) -> str:
-    """What is wrong with a state: what it is, and what it should be; empty where nothing is."""
+    """The reason why a value is no state like this one, in words; empty where it is one."""
     if not isinstance(y, Motion):
         return f"a {type(y).__name__}, not a Motion"
     sizes, wanted = ([len(part) for part in (m.q, m.qd, m.x)] for m in (y, like))

@@ -1,4 +1,4 @@
-"""From an experiment to its program: which phase runs when (docs/physics.md, "An instant").
+"""An experiment's program: which phase runs when (docs/physics.md, "An instant").
 
 At an instant t_k, in this order: the step that ends there is finished; payloads are grappled and released; sensors of
 links read; guides tick; servos tick (their commands first); friction modes are decided; derivatives are taken, which is
@@ -119,7 +119,7 @@ class Builder:
                 tape.write(f"{METRIC}{name}.{memory.name}", memory.start)
 
     def _begin_servo(self, tape: Tape, actuator: Actuator) -> dict[str, Real]:
-        """What a servo holds, and its states, where a run begins, by name; they are written, too."""
+        """Write a servo's memory and states where a run begins, and return them by name."""
         parts, servo = actuator.parts, actuator.servo
         starts: dict[str, Real] = {part.name: part.start for part in (*parts.memory, *parts.states)}
         if servo.begin is not None:
@@ -131,7 +131,7 @@ class Builder:
         return starts
 
     def _begin_sensors(self, tape: Tape, actuator: Actuator) -> None:
-        """What the servo's sensors hold, and what was seen, where a run begins."""
+        """Write the memory of the servo's sensors, and what was seen, where a run begins."""
         natural = {state.name: tape.read(f"{actuator.path}.{state.name}") for state in actuator.parts.natural}
         states = NamedValues(actuator.owner, natural)
         p, state = self.system.servo_values(actuator, tape.read), self._state_of(tape, self.joints[actuator.index])
@@ -210,12 +210,12 @@ class Builder:
         time: Real,
         states: Mapping[str, Real] | None = None,
     ) -> Seen:
-        """How things are with a servo's joint at a tick."""
+        """The quantities of a servo's joint at a tick, not yet through its sensors."""
         period = actuator.use.divisor / self.schedule.base_hz
         return Seen(q, qd, setpoint, period, time, NamedValues(actuator.owner, states or {}))
 
     def compute(self, tape: Tape, actuator: Actuator, seen: Seen) -> None:
-        """What the servo's computer does with what it sees and is asked: new outputs, integrals a tick on."""
+        """Run the servo's computer once on what it sees: new outputs, integrals a tick on."""
         parts, period = actuator.parts, seen.period
         held = NamedValues(
             actuator.owner, {part.name: tape.read(f"{actuator.path}.{part.name}") for part in parts.memory}

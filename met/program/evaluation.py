@@ -25,7 +25,7 @@ from met.vectors import Vector
 
 @frozen
 class Derivative:
-    """What holds at one stage.
+    """The derivative at one stage, and what goes with it.
 
     slope    derivative of the state
     tau      torque of the servo on each moving joint, its rotor's share included (N m; N); of dry friction that a brake
@@ -171,7 +171,7 @@ class ServoResponse:
 def servo_response(
     system: System, actuator: Actuator, read: ReadCell, y: Motion, held: NamedValues, time: Real, begin: Real
 ) -> ServoResponse:
-    """What a servo does at state y with this memory, its answers checked against its declaration.
+    """A servo's physics at state y with this memory, its answers checked against its declaration.
 
     A continuous law is asked here, for this stage; `held` is then not read.
     """
@@ -215,7 +215,7 @@ def servo_response(
 
 
 def law(actuator: Actuator, p: NamedValues, held: NamedValues, seen: Seen) -> Control:
-    """What a servo's control law gives, checked against its declaration."""
+    """Outputs and slopes of a servo's control law, checked against its declaration."""
     owner, parts = actuator.owner, actuator.parts
     assert actuator.servo.control is not None
     found = answer(owner, actuator.servo.control, p, held, seen)
@@ -267,7 +267,7 @@ def level_of(system: System, joint: int, drive: Drive | None, loads: _Loads) -> 
 
 
 def _of_brakes(system: System, joint: int, drive: Drive | None, loads: _Loads, friction: Real) -> Real:
-    """Of a joint's dry friction, against the motion, what its brakes bear: their share of the level."""
+    """The brakes' share of a joint's dry friction, against the motion, N m (N)."""
     name = system.joints[joint].name
     if name not in loads.dry:
         return 0.0

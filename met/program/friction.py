@@ -49,7 +49,7 @@ def decide(s: Real, at_rest: Truth, need: Real, dry: Real, qdd: Real) -> Real:
 
 
 def crossings(s: Sequence[Real | None], y_new: Motion) -> list[Truth]:
-    """Which sliding rates have come to zero, or beyond, at the step's end.
+    """For each rate, true where a sliding one has come to zero, or beyond, at the step's end.
 
     s  one for each of qd and then x; None: no dry friction
     """
@@ -61,7 +61,7 @@ def crossings(s: Sequence[Real | None], y_new: Motion) -> list[Truth]:
 
 @frozen
 class Split:
-    """Where a (sub)step with a crossing stops: the state, what crosses at rest, and the share of the step done."""
+    """The stop of a (sub)step at a crossing: the state there, what crosses at rest, and the share of the step done."""
 
     y: Motion
     share: Real

@@ -66,7 +66,7 @@ class Observed:
         return self._of_joint(channel.joint, parts[1:]) if channel.joint else self._of_arm(parts)
 
     def orientation(self, name: str) -> Quaternion:
-        """That of a link or a payload, `links.tip.orientation`, with w >= 0."""
+        """The orientation of a link or a payload, `links.tip.orientation`, with w >= 0."""
         kind, own, _ = name.split(".")
         return quaternion((self.motions if kind == "links" else self.seen)[own].pose.R)
 
@@ -145,7 +145,7 @@ class Observed:
 
     @cached_property
     def energy(self) -> Energy:
-        """Of the arm, and of each payload that flies for a time, whoever carries it."""
+        """Energy and momentum of the arm, and of each payload that flies for a time, whoever carries it."""
         found, base = self.derivative, self.base
         total = energy(
             self.tree,

@@ -69,7 +69,7 @@ class StepPhases:
         self._split = WhileAny("crossing", 1, (RunPhase(Phase("split", self.split)),))
 
     def begin(self) -> tuple[Control, ...]:
-        """What happens at an instant once the servos have ticked: modes, then the step's first stage."""
+        """Phases at an instant once the servos have ticked: modes, then the step's first stage."""
         decide = self._decide if self.sticking else ()
         judge = WhileAny("suspect", 1, (RunPhase(Phase("judge", self.judge)),))
         modes, due = RunPhase(Phase("modes", self.modes)), self.schedule.dynamics
@@ -93,7 +93,7 @@ class StepPhases:
     # Modes.
 
     def modes(self, tape: Tape) -> None:
-        """What begins at an instant: held values for the first stage, friction modes from the rates."""
+        """Begin an instant: held values for the first stage, friction modes from the rates."""
         for actuator in self.system.ticking_between:
             for memory in actuator.parts.memory:
                 channel = f"{actuator.path}.{memory.name}"
@@ -139,7 +139,7 @@ class StepPhases:
         return found
 
     def has_dry_friction(self, tape: Tape, name: str) -> Truth:
-        """Whether what has this name has dry friction, as `modes` found it; False for a case whose level is zero."""
+        """True where the joint or state of this name has dry friction, as `modes` found it: a level above zero."""
         found = next((each for each in self.sticking if each.name == name), None)
         if found is None:
             return False
@@ -255,7 +255,7 @@ class StepPhases:
         cells.keep(tape, news, "failure", cause)
 
     def loads(self, tape: Tape) -> tuple[list[list[Real]], list[Real]]:
-        """What the arm is to the substituted joints: tau_load = Lambda qdd + b_0, all other joints in their modes."""
+        """The arm's load on the substituted joints: tau_load = Lambda qdd + b_0, all other joints in their modes."""
         y, numbers = self.state(tape), [each.index for each in self.beds.mounted]
         at_rest = self._derivative(tape, y, 0.0, dict.fromkeys(numbers, 0.0)).solved.tau_load
         columns = []
@@ -297,7 +297,7 @@ class StepPhases:
         return tape.read("instant") + fraction * self.schedule.step
 
     def _held(self, tape: Tape, actuator: Actuator, fraction: Real) -> NamedValues:
-        """What the servo's computer holds; between the first and last tick of a step for a servo that is faster."""
+        """The servo's memory at a share of the step; for a faster servo between the step's first and last tick."""
         numbers: dict[str, Real] = {}
         for memory in actuator.parts.memory:
             channel = f"{actuator.path}.{memory.name}"
@@ -412,7 +412,7 @@ class StepPhases:
                 tape.write(f"carry:{name}", where(both(self.has_dry_friction(tape, name), now == 0.0), 0.0, slope))
 
     def _carried(self, actuator: Actuator) -> list[tuple[str, str]]:
-        """What of a servo's joint is carried forward between instants, and the cells: its rate, the servo's states."""
+        """Rates that are carried forward between instants, and their cells: the joint's rate, the servo's states."""
         joint = self.joints[actuator.index]
         return [(joint, f"{joint}.qd"), *((name, name) for name in actuator.states)]
 

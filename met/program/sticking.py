@@ -1,4 +1,4 @@
-"""What has dry friction in a system: joints, and rates on the motor's side of their servos (docs/physics.md)."""
+"""Rates of a system that have dry friction: of joints, and on the motor's side of servos (docs/physics.md)."""
 
 from __future__ import annotations
 

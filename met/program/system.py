@@ -86,7 +86,7 @@ class Actuator:
 
     @property
     def ticks(self) -> bool:
-        """Whether it has a computer that ticks."""
+        """True where the servo has a computer that ticks."""
         return self.servo.control is not None and not self.parts.continuous
 
     @property
@@ -188,7 +188,7 @@ class System:
 
     @cached_property
     def ticking_between(self) -> tuple[Actuator, ...]:
-        """Those that tick between instants: faster than the dynamics, or slower and no multiple of them."""
+        """Servos that tick between instants: faster than the dynamics, or slower and no multiple of them."""
         step = self.structure.schedule.dynamics
         return tuple(each for each in self.working if each.ticks and each.use.divisor % step)
 
@@ -208,7 +208,7 @@ class System:
 
     @cached_property
     def courses(self) -> Formulas:
-        """Of a prescribed base: how it moves, as formulas of time (`met.program.motion.courses`)."""
+        """The motion of a prescribed base, as formulas of time (`met.program.motion.courses`)."""
         return recorded(self.experiment)
 
     @cached_property
@@ -222,7 +222,7 @@ class System:
         return read(PARAMETER + path) if isinstance(value, Formula) else value
 
     def mass(self, link: str, read: ReadCell) -> Real:
-        """Of a link or payload, kg."""
+        """Mass of a link or payload, kg."""
         mass: Real = self.value(f"{self._head(link)}.mass", read)
         return mass
 
@@ -244,14 +244,14 @@ class System:
         return x, y, z
 
     def _head(self, link: str) -> str:
-        """What the paths of a link's or payload's parameters begin with."""
+        """Prefix of the paths of a link's or payload's parameters."""
         return f"payloads.{link}" if any(each.name == link for each in self.structure.payloads) else f"links.{link}"
 
     def servo_values(self, actuator: Actuator, read: ReadCell) -> NamedValues:
         return parameters(actuator.owner, actuator.path, actuator.parts.parameters, lambda path: self.value(path, read))
 
     def setpoint(self, actuator: Actuator, read: ReadCell, time: Real) -> Setpoint:
-        """What the joint's command asks at a time; kind "none" where it has none."""
+        """The setpoint of a joint at a time; kind "none" where it has no command."""
         if actuator.use.command is not None and actuator.use.command.guide:
             guide = next(use for use in self.structure.guides if use.name == actuator.use.command.guide)
             return guided.setpoint(self, actuator.use.joint, actuator.command_kind, guide, read, time)

@@ -1,4 +1,4 @@
-"""What passes between the engine and a model's functions: numbers by name, `p.kp`, `held.voltage`; their answers."""
+"""Values between the engine and a model's functions: numbers by name, `p.kp`, `held.voltage`; their answers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from met.trace import Real
 T = TypeVar("T")
 
 Read = Callable[[str], Any]
-"""From a parameter's path to its value: a number (float or traced), a list or a word."""
+"""A function from a parameter's path to its value: a number (float or traced), a list or a word."""
 
 
 class NamedValues:
@@ -54,11 +54,11 @@ def parameters(owner: str, prefix: str, declared: Iterable[Parameter], read: Rea
 
 
 class Passing(BaseException):
-    """What the engine raises in the midst of a model's function, to be out of it: no mistake of the model's."""
+    """Raised by the engine in the midst of a model's function, to leave it: no mistake of the model's."""
 
 
 def answer(owner: str, function: Callable[..., T], *arguments: Any) -> T:
-    """What a model's function gives back. Whatever it raises is said at the model's own line, Problem E213: `sys.exit`
+    """The answer of a model's function. Whatever it raises is said at the model's own line, Problem E213: `sys.exit`
     too, but for an interrupt, which is the user's."""
     try:
         with np.errstate(all="ignore"):  # what comes of constants is in the program, as what comes of a run is
@@ -82,7 +82,7 @@ def answer(owner: str, function: Callable[..., T], *arguments: Any) -> T:
 def returned(
     owner: str, what: str, given: Mapping[str, Real], declared: Iterable[str], *, all_of_them: bool = True
 ) -> Mapping[str, Real]:
-    """What a model's function gave back, checked to hold just the names that the model declares, or some of them."""
+    """The answer of a model's function, checked to hold just the names that the model declares, or some of them."""
     names = list(declared)
     missing = [name for name in names if name not in given] if all_of_them else []
     unknown = [name for name in given if name not in names]

@@ -24,7 +24,7 @@ def states(only: Only | None = None) -> tuple[State, ...]:
 
 
 def slopes(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
-    """Of its states, with this value before it."""
+    """Slopes of the filter's states, with this value at its input."""
     w = 2.0 * math.pi * p.cutoff
     bend = w * w * (value - states.filtered) - math.sqrt(2.0) * w * states.filtered_slope
     return {"filtered": states.filtered_slope, "filtered_slope": bend}

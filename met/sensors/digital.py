@@ -1,4 +1,4 @@
-"""What becomes of a number on its way into a computer: noise, steps of a converter, and ticks of delay."""
+"""Steps of a number on its way into a computer: noise, steps of a converter, and ticks of delay."""
 
 from __future__ import annotations
 

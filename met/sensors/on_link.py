@@ -1,4 +1,4 @@
-"""What sensors of links have in common: the link, a direction on it, a scale and a bias."""
+"""Common parts of sensors of links: the link, a direction on it, a scale and a bias."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BIAS = Parameter(name="bias", unit="of", default=0.0, doc="reading where there i
 
 
 def component(along: Vector, vector: Vector) -> Real:
-    """Of a vector, along a direction of any length."""
+    """The component of a vector along a direction of any length."""
     return dot(scale(1.0 / sqrt(dot(along, along)), along), vector)
 
 
@@ -30,5 +30,5 @@ def reading(p: Any, held: Any, value: Real, sensed: Sensed) -> Reading:
 
 
 def at_rest(p: Any, value: Real) -> Real:
-    """What a reading is where a run begins: without noise."""
+    """The reading where a run begins: without noise."""
     return converted(p.scale * value + p.bias, p.resolution)

@@ -37,6 +37,6 @@ def settled(p: Any, value: Real) -> Mapping[str, Real]:
 
 
 def behind(p: Any, states: Any, sensed: Sensed) -> Real:
-    """What is behind it at a tick."""
+    """The number behind the filter at a tick."""
     found: Real = sensed.value if p.filter == "none" else states.filtered
     return found

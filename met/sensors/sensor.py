@@ -1,4 +1,4 @@
-"""What a sensor is to the engine: it reads a quantity, of a joint or of a link.
+"""The declaration of a sensor: it reads a quantity, of a joint or of a link.
 
 A sensor of a joint stands in a servo, between a quantity and the control law that sees it, and reads at the servo's
 ticks. A sensor of a link (`measures`) stands in a run under a name of its own, and reads at ticks of its own.
@@ -22,8 +22,8 @@ from met.vectors import ZERO, Vector
 
 
 class Felt(World, Protocol):
-    """What a sensor of a link may ask of the arm: a `World`, and what only shows on board. Links are those of a World,
-    and `base`, whether it moves or not.
+    """The questions that a sensor of a link may ask of the arm: those to a `World`, and what only shows on board. Links
+    are those of a World, and `base`, whether it moves or not.
 
     acceleration(link, point)    of a point given in the link's frame (m), the second derivative of its position: world
                                  axes, m/s^2
@@ -41,7 +41,7 @@ class Felt(World, Protocol):
 
 @frozen
 class Sensed:
-    """What there is to read at a tick.
+    """The inputs of a sensor at a tick.
 
     find    gives the quantity itself
     period  time from this tick to the next, s
@@ -60,7 +60,7 @@ class Sensed:
 
 @frozen
 class Reading:
-    """What a sensor gives at a tick: the number that is seen, and its new memory, by name."""
+    """The answer of a sensor at a tick: the number that is seen, and its new memory, by name."""
 
     value: Real
     held: Mapping[str, Real] = field(default_factory=dict)

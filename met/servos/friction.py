@@ -50,7 +50,7 @@ SHAFT = (
     replace(F_C, default=None, at_least=None, above=0.0, only=LUGRE, source=""),  # bristles unbend with 1/g
     F_V,
 )
-"""What a servo declares whose motor has such friction."""
+"""Parameters of a servo whose motor has such friction."""
 
 LOSS = Parameter(
     name="loss", default=0.0, at_least=0.0, below=1.0,
@@ -106,7 +106,7 @@ def steady(p: Any, w: Real, transmitted: Real | None = None) -> tuple[Real, dict
 
 
 def _level(p: Any, w: Real, transmitted: Real | None) -> Real:
-    """What dry friction is at this rate, N m."""
+    """The level of dry friction at this rate, N m."""
     level = p.f_c
     if transmitted is not None:
         level = level + where(p.loss > 0.0, p.loss * absolute(transmitted), 0.0)

@@ -17,7 +17,7 @@ from met.trace import Real, absolute, both, clip, exp, log, minimum, sign, where
 
 
 def parameters(only: Only | None = None) -> tuple[Parameter, ...]:
-    """What a servo declares for its gear."""
+    """Parameters of a servo with such a gear."""
     return (
         Parameter(
             name="stiffness", unit="effort/joint", above=0.0, only=only, doc="stiffness k1 of the gear, at the joint"
@@ -49,19 +49,19 @@ def torque(p: Any, d: Real, rate: Real) -> Real:
 
 
 def energy(p: Any, d: Real) -> Real:
-    """What the spring has in it, J, wound up by d (rad; m)."""
+    """Energy in the gear's spring, J, wound up by d (rad; m)."""
     square = _beyond(p, d) * _beyond(p, d)
     return 0.5 * p.stiffness * square + 0.25 * p.hardening * (square * square)
 
 
 def _beyond(p: Any, d: Real) -> Real:
-    """How far d is beyond the play."""
+    """The part of d that is beyond the play, rad (m)."""
     half = 0.5 * p.backlash
     return where(p.backlash > 0.0, d - clip(d, -half, half), d)
 
 
 def wound(p: Any, transmitted: Real) -> Real:
-    """What the gear is wound up by, rad (m), where this is the torque that it transmits, N m (N), and keeps to it.
+    """The deflection, rad (m), at which the gear transmits this torque, N m (N), and keeps to it.
 
     The root of the spring's cubic: from no more than twice of it, five of Newton's steps leave rounding.
     """

@@ -27,12 +27,12 @@ ARMATURE = (
     ),
 )  # fmt: skip
 TAU_MAX = Parameter(name="tau_max", unit="N*m", above=0.0, source=TABLE_1, doc="largest motor torque, before friction")
-"""What servos with a motor declare."""
+"""Limit of the motor's torque; with `RATIO`, `SHAFT` and `ARMATURE` the parameters of a servo with a motor."""
 
 
 @frozen
 class Motor:
-    """What is believed of a motor; shaft side.
+    """A motor as its servo's parameters describe it; shaft side.
 
     ratio       turns of the shaft a turn of the joint N (rad/m on a prismatic joint)
     kt          torque constant, and back-EMF constant (N m/A, V s/rad);  resistance: of the armature, ohm
@@ -51,7 +51,7 @@ class Motor:
 
     @property
     def damping(self) -> Real:
-        """What brakes the shaft for each unit of its rate, N m s/rad."""
+        """The torque that brakes the shaft for each unit of its rate, N m s/rad."""
         return damping(self.kt, self.resistance, self.f_v)
 
 

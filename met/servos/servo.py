@@ -1,4 +1,4 @@
-"""What a servo is to the engine: a declaration, its control law, and the physics that the law drives.
+"""The declaration of a servo: its parameters, its control law, and the physics that the law drives.
 
 A servo is split where the real one is: the law of its computer (`control`), and what nature does (`drive`). Both are
 ordinary functions over numbers that may be traced (docs/models.md). The physics is part of the derivative, evaluated at
@@ -60,7 +60,7 @@ class Seen:
 
 @frozen
 class Control:
-    """What the control law gives: its outputs by name, and how fast its integrals change, 1/s of their units."""
+    """The answer of the control law: its outputs by name, and how fast its integrals change, 1/s of their units."""
 
     outputs: Mapping[str, Real] = field(default_factory=dict)
     slopes: Mapping[str, Real] = field(default_factory=dict)
@@ -68,7 +68,7 @@ class Control:
 
 @frozen
 class JointMotion:
-    """What nature does to the servo's physics at a stage.
+    """The motion of the joint that the servo's physics sees at a stage.
 
     q, qd    joint position and rate
     time     of the stage, s
@@ -89,7 +89,7 @@ class JointMotion:
 @old_fields(astray="state_out_of_range")
 @frozen
 class Drive:
-    """What the servo does to its joint at a stage.
+    """The servo's action on its joint at a stage.
 
     torque     smooth torque on the joint, viscous friction included, dry friction not (N m; N)
     dry        level of dry friction that opposes motion and holds at rest, >= 0 (N m; N). The engine decides
@@ -187,7 +187,7 @@ class Servo:
 
 @frozen
 class Parts:
-    """What there is of a servo in one use of it, under that use's words and with its law sampled or continuous.
+    """The parts of a servo in one use of it, under that use's words and with its law sampled or continuous.
 
     natural  states that nature integrates
     memory   held from tick to tick, and recorded at ticks: outputs and integrals of a sampled law
@@ -216,7 +216,7 @@ class Parts:
 
 
 def parts(servo: Servo, words: Mapping[str, str], *, continuous: bool = False) -> Parts:
-    """What there is of a servo under these words, by the names of their parameters; of one left out, its default."""
+    """The parts of a servo that are present under these words, by parameter; a word left out has its default."""
     words = {each.name: each.default for each in servo.parameters if isinstance(each.default, str)} | dict(words)
     return Parts(
         tuple(part for part in servo.parameters if is_present(part, words)),

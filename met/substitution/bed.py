@@ -1,4 +1,4 @@
-"""What a bed is to the engine: a motor and its load on one shaft, a wire to it, and what is read back.
+"""The declaration of a bed: a motor and its load on one shaft, a wire to it, and what is read back.
 
 The wire carries the drive motor's voltage and the load motor's current, held by the amplifiers from one tick to the
 next, and brings back the filtered rate of the shaft, once a tick. An emulated bed is a model, below; a real one takes
@@ -18,7 +18,7 @@ from met.trace import Real, Truth
 
 @frozen
 class Wire:
-    """What the amplifiers hold: voltage of the drive motor, V; current of the load motor, A."""
+    """The values that the amplifiers hold: voltage of the drive motor, V; current of the load motor, A."""
 
     voltage: Real
     current: Real

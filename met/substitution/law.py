@@ -1,4 +1,4 @@
-"""What a law is to the engine: how the load motor is driven, so that the shaft turns as if it carried the arm.
+"""The declaration of a law: how the load motor is driven, so that the shaft turns as if it carried the arm.
 
 At a tick the engine has read the filtered rate of every substituted joint, has run its servo for the voltage, and knows
 what the arm is to these joints: tau_load = Lambda qdd + b_0, all together. A law says what load torque each is given,
@@ -84,7 +84,7 @@ OBSERVER = (
     Parameter(name="drift", unit="N^2*m^2/s", default=1e-5, above=0.0, doc="density of steps of the unknown torque"),
     Parameter(name="reading_noise", unit="rad^2/s", default=1e-5, above=0.0, doc="density of the reading's noise"),
 )
-"""How far the observer trusts what it believes. 1e-5 rad^2/s is 0.1 rad/s, rms, at 1 kHz."""
+"""Parameters of the observer's noise. 1e-5 rad^2/s is 0.1 rad/s, rms, at 1 kHz."""
 
 if not TYPE_CHECKING:  # a type checker knows the new names alone
     __getattr__ = old_names(__name__, {"Told": "LawInput", "Given": "LawOutput"}, globals())

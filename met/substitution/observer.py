@@ -59,7 +59,7 @@ def corrected(x: Four, gain: Four, reading: Real) -> Four:
 
 @frozen
 class Noise:
-    """How far the model is trusted; variances of one tick.
+    """Noise of the observer's model, as variances of one tick.
 
     torque   of a torque held over the tick, (N m)^2
     drift    of a step of d, (N m)^2

@@ -13,7 +13,7 @@ from met.trace import Real, Truth, absolute, both, exp, sign, where
 
 
 def stuck(w: Real, smooth: Real, dry: Real) -> Truth:
-    """Whether a shaft at rest stays there: friction's level `dry` (N m) holds the smooth torque."""
+    """True where a shaft at rest stays there: friction's level `dry` (N m) holds the smooth torque."""
     return both(w == 0.0, absolute(smooth) <= dry)
 
 

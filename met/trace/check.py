@@ -1,4 +1,4 @@
-"""Whether a recording is what back ends may rely on: asked between the passes, in tests and wherever it is wanted.
+"""Checks of a recording that back ends rely on: made between the passes, in tests and wherever it is wanted.
 
 `MET_CHECK_RECORDINGS=1` in the environment turns it on. A pass that leaves a recording that is none is a defect of MET.
 """
@@ -19,7 +19,7 @@ _REST = {"const": float, "input": str, "cell": str, "bit": int, "flip": int, "ga
 
 
 def wanted() -> bool:
-    """Whether recordings are to be checked."""
+    """True where recordings are to be checked."""
     return os.environ.get("MET_CHECK_RECORDINGS") == "1"
 
 

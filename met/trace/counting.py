@@ -1,4 +1,4 @@
-"""How often the loops of a program run: the same program with counters in every `WhileAny`.
+"""Counts of a program's loops: the same program with counters in every `WhileAny`.
 
 A loop runs for a whole block of cases as long as one of them asks, so its counters are a block's: all cases of a
 block count alike, and what a case computes is left as it was.

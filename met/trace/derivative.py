@@ -38,7 +38,7 @@ def derivative(x: Scalar, name: str) -> Scalar:
 
 
 def _rounds(graph: Graph, op: str, operands: list[int]) -> bool:
-    """Whether a node is a sum that rounds to whole numbers, or halves."""
+    """True where a node is a sum that rounds to whole numbers, or halves."""
     added = {"add": operands[:2], "sub": operands[:2], "fma": operands[2:3]}.get(op, [])
     return any(abs(value) >= ROUNDS for ref in added if (value := graph.value(ref)) is not None)
 
@@ -63,4 +63,4 @@ _RULES: dict[str, Rule] = {
     "where": lambda g, _, y, x, dx: Scalar(g, g.where(x[0].ref, dx[1].ref, dx[2].ref)),
     "significand": lambda g, _, y, x, dx: dx[0] * (y / x[0]),
 }
-"""What is not here has no derivative, or none but at jumps."""
+"""Rules of differentiation by operation. Those not here have no derivative, or none but at jumps."""

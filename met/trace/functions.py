@@ -161,7 +161,7 @@ def _extreme(a: Any, b: Any, better: Callable[[Any, Any], Any]) -> Any:
 
 
 def _is_number(x: Any) -> bool:
-    """Whether x is known now, and a number."""
+    """True where x is known now, and a number."""
     if x.__class__ is Scalar:
         x = x.graph.value(x.ref)
     return isinstance(x, (float, int)) and x == x
@@ -179,12 +179,12 @@ def sign(x: Real) -> Real:
 
 
 def is_nan(x: Real) -> Truth:
-    """Whether x is not a number."""
+    """True where x is not a number."""
     return x != x
 
 
 def isfinite(x: Real) -> Truth:
-    """Whether x is a number and not infinite."""
+    """True where x is a number and not infinite."""
     size: Any = abs(x)
     return size < math.inf
 
@@ -197,17 +197,17 @@ def not_(a: Truth) -> Truth:
 
 
 def both(a: Truth, b: Truth) -> Truth:
-    """Whether both conditions hold."""
+    """True where both conditions hold."""
     return a & b
 
 
 def either(a: Truth, b: Truth) -> Truth:
-    """Whether one of two conditions holds, or both."""
+    """True where one of two conditions holds, or both."""
     return a | b
 
 
 def all_of(conditions: Iterable[Truth]) -> Truth:
-    """Whether every condition holds."""
+    """True where every condition holds."""
     result: Truth = True
     for condition in conditions:
         result = result & condition
@@ -215,7 +215,7 @@ def all_of(conditions: Iterable[Truth]) -> Truth:
 
 
 def any_of(conditions: Iterable[Truth]) -> Truth:
-    """Whether any condition holds."""
+    """True where any condition holds."""
     result: Truth = False
     for condition in conditions:
         result = result | condition

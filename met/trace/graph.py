@@ -366,7 +366,7 @@ class Formulas:
     outputs: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
-        """What comes back from JSON as lists is tuples again."""
+        """Turn the lists that come from JSON into tuples again."""
         object.__setattr__(self, "inputs", tuple(self.inputs))
         object.__setattr__(
             self,
@@ -377,7 +377,7 @@ class Formulas:
 
     @staticmethod
     def of(graph: Graph, outputs: Iterable[Real]) -> Formulas:
-        """What the outputs need of a graph; an output may be a plain number."""
+        """The part of a graph that the outputs need; an output may be a plain number."""
         refs = [x.ref if isinstance(x, (Scalar, Mask)) else graph.constant(x) for x in outputs]
         order = graph.live(refs)
         number = {i: 2 * n for n, i in enumerate(order)}

@@ -138,7 +138,7 @@ class _Writer:
                     self._put(kind, places[number], place[ref >> 1] | ref & 1)
 
     def _written(self, op: str, rest: Any) -> str:
-        """What is no operand of a node: a number, a table, a bit's number, or the name of a cell or an input."""
+        """Text of what is no operand of a node: a number, a table, a bit's number, or the name of a cell or input."""
         if op == "cell":
             return self._cell(rest)
         if op == "input":

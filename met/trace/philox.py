@@ -35,7 +35,7 @@ def _rounds(words: Sequence[Any], kind: Callable[[int], Any]) -> tuple[Any, Any,
 
 
 def plain(*operands: Any) -> float:
-    """Of four words of a counter and two of a key, and of 0 to 3 for which: that of the four results."""
+    """One of Philox's four words for a counter of four words and a key of two; the last operand says which."""
     *words, n = operands
     if not all(0.0 <= x <= LOW and x == int(x) for x in words):
         return float("nan")

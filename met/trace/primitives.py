@@ -1,4 +1,4 @@
-"""What each node of a graph means, exactly, over plain floats and over numpy arrays.
+"""The exact meaning of each node of a graph, over plain floats and over numpy arrays.
 
 Every back end agrees with these definitions bit for bit: IEEE double arithmetic, to nearest, nothing raised.
 `fma` is the correctly rounded a*b + c, made here from exact sums and products, so that a replay on any machine gives

@@ -19,7 +19,7 @@ from met.trace.graph import Real, Truth
 
 
 class Tape(Protocol):
-    """What a phase's body reads from and writes to; the recorder and the reference each have one."""
+    """Memory as a phase's body reads and writes it; the recorder and the reference each have one."""
 
     @property
     def tick(self) -> Real:
@@ -36,7 +36,7 @@ class Tape(Protocol):
         """Sets a cell."""
 
     def read_mask(self, name: str) -> Truth:
-        """Whether a cell is not zero."""
+        """True where a cell is not zero."""
 
     def write_mask(self, name: str, value: Truth) -> None:
         """Sets a cell to 1 or 0."""
@@ -51,7 +51,7 @@ class Tape(Protocol):
         """One of the program's outputs; only in `end`."""
 
     def part(self, name: str) -> AbstractContextManager[None]:
-        """What is computed in here belongs to the part of this name, for whoever asks what costs how much."""
+        """A context whose computations belong to the part of this name, for whoever asks what costs how much."""
 
 
 @frozen
@@ -117,7 +117,7 @@ Control = RunPhase | CallPhase | Every | Unless0 | WhileAny | RecordPhase
 
 @frozen
 class Program:
-    """What a kernel runs: control at the start, at each tick and at the end, inputs, columns of a row, outputs.
+    """The program of a kernel: control at the start, at each tick and at the end, inputs, columns of a row, outputs.
 
     state_outputs  the outputs that tell how the run itself went. What they depend on is the program's state, and its
                    bits are the same whatever else is recorded or put out; None: all outputs and rows are one

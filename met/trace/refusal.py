@@ -1,4 +1,4 @@
-"""What a model must not do while it is recorded, said at the model's own line (E200)."""
+"""Refusals of what a model must not do while it is recorded, said at the model's own line (E200)."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ _OURS = {
 
 
 def place_of_caller() -> tuple[Place, str]:
-    """Where the first frame outside met/trace is, and the piece of source that was being evaluated there."""
+    """The place of the first frame outside met/trace, and the piece of source that was being evaluated there."""
     frame: FrameType | None = sys._getframe(1)
     while frame is not None and frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
         frame = frame.f_back

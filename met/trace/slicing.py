@@ -1,4 +1,4 @@
-"""Which part of a recorded program some of its outputs depend on (a backward slice, Weiser 1981)."""
+"""The part of a recorded program that some of its outputs depend on (a backward slice, Weiser 1981)."""
 
 from __future__ import annotations
 

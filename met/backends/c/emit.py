@@ -54,7 +54,7 @@ def literal(value: float) -> str:
 
 
 def _members(prefix: str, names: Iterable[str]) -> dict[str, str]:
-    """What the struct calls its numbers of these names: no two alike."""
+    """Names of members of the C struct, by the program's names of numbers; no two alike."""
     made: dict[str, str] = {}
     for name in names:
         base = member = prefix + "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
@@ -161,7 +161,7 @@ class _CEmitter:
         return _function(f"{self.names[number]}(void)", lines)
 
     def _value(self, nodes: Sequence[Node], node: Node) -> str:
-        """What a node that is no constant computes."""
+        """The C expression of a node that is no constant."""
         op = node[0]
         if op == "input":
             return f"met.{self.inputs[node[1]]}"

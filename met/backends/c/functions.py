@@ -52,7 +52,7 @@ HEAD = """\
 #define MET_LOCAL static
 #endif
 """
-"""What stands before the functions."""
+"""Text before the functions of a program in C."""
 
 FUNCTIONS: dict[str, Function] = {
     "bits": Function("""\

@@ -55,7 +55,7 @@ _KEPT = ("@llvm.", "@malloc", "@free", f"@{ENTRY}")
 
 
 class _Numbers(dict[str, str]):
-    """What stands for each name in a function, in order of appearance.
+    """Names in a function, numbered in order of appearance.
 
     symbols  what stands for the module's own names: one table for all functions. Names of LLVM and of C stay
     """
@@ -90,7 +90,7 @@ def numbered(text: str) -> str:
 
 
 def _remark(name: str) -> str:
-    """What a line is about, for who reads it."""
+    """A comment of a line of IR: the name of what it is about, for readers."""
     return f"  ; {name}" if name.isprintable() and name else ""
 
 

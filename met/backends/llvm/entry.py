@@ -82,7 +82,7 @@ class _Entry:
                 )
 
     def due(self, divisor: int) -> str:
-        """Whether the divisor divides the tick's number."""
+        """IR of a condition: the divisor divides the tick's number."""
         n = self.label("due")
         self.put(f"  %{n}.rest = urem i64 {self.now[0]}, {divisor}", f"  %{n} = icmp eq i64 %{n}.rest, 0")
         return f"%{n}"

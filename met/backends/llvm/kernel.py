@@ -117,7 +117,7 @@ class LlvmKernel:
 
     @property
     def program(self) -> Program:
-        """What it runs."""
+        """The program that the kernel runs."""
         return self.recording.program
 
     @property

@@ -20,7 +20,7 @@ from met.trace import check
 
 @frozen
 class Machine:
-    """What code is made for: LLVM's names of processor and features, doubles in a register, whether it has fma.
+    """The target of machine code: LLVM's names of processor and features, doubles in a register, whether it has fma.
 
     triple   LLVM's name of architecture and system; "" for those of this process
     """
@@ -81,7 +81,7 @@ def _target_machine(target: Machine, level: int | None = None) -> Any:
 
 
 def versions() -> str:
-    """What else decides the code that a text becomes."""
+    """Versions of all that decides the code which a text becomes, besides the text."""
     return f"llvmlite {llvmlite.__version__} llvm {'.'.join(map(str, llvm.llvm_version_info))}"
 
 

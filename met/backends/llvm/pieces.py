@@ -127,7 +127,7 @@ def check(section: CodeSection, pieces: list[Piece]) -> None:
 
 
 def _bounds(section: CodeSection, body: list[int], number: dict[int, int], shortest: int, longest: int) -> list[int]:
-    """Where to cut: each piece ends where the fewest values cross, within its bounds."""
+    """Positions at which a section is cut: each piece ends where the fewest values cross, within its bounds."""
     nodes = section.nodes
     change = [0] * (len(body) + 2)
     last_use = list(range(len(body)))

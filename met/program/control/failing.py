@@ -1,4 +1,4 @@
-"""What environment models do to the servo of a joint: let it go, put other outputs on it, keep it from seeing."""
+"""Failures of a servo by environment models: they let its joint go, replace its outputs or its readings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class StepTimes:
 
 
 def coupled(system: System, actuator: Actuator, read: ReadCell, begin: Real) -> Real | None:
-    """How far the servo has hold of its joint in the step that began then; None where nothing lets it go, ever."""
+    """The servo's hold on its joint, 0 to 1, in the step that began then; None where nothing ever lets it go."""
     held: Real | None = None
     step = StepTimes(begin, system.structure.schedule.step)
     for owner, model, p in _about(system, actuator, read):
@@ -38,7 +38,7 @@ def coupled(system: System, actuator: Actuator, read: ReadCell, begin: Real) -> 
 def law_outputs(
     system: System, actuator: Actuator, read: ReadCell, p: NamedValues, time: Real, found: Control
 ) -> Control:
-    """What comes out of the servo's law."""
+    """Outputs of the servo's law, after environment models have replaced some."""
     for owner, model, own in _about(system, actuator, read):
         if model.replaced_outputs is None:
             continue
@@ -52,7 +52,10 @@ def law_outputs(
 
 
 def seen(system: System, actuator: Actuator, read: ReadCell, seen: Seen, last: str | None) -> Seen:
-    """What the law sees. last: what cells begin with that hold what it saw at its last tick; None: there is none."""
+    """Inputs of the law, after environment models have replaced some.
+
+    last  prefix of the cells that hold what it saw at its last tick; None: there is none
+    """
     for owner, model, p in _about(system, actuator, read):
         if model.replaced_reading is None:
             continue
@@ -68,7 +71,7 @@ def seen(system: System, actuator: Actuator, read: ReadCell, seen: Seen, last: s
 
 
 def quantities(actuator: Actuator) -> tuple[str, ...]:
-    """What a law sees of its joint."""
+    """Names of the quantities of its joint that a law sees."""
     return ("q", "qd", *(state.name for state in actuator.parts.natural))
 
 

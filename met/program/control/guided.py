@@ -1,4 +1,4 @@
-"""What a guide asks of one of its joints, for the servo that follows it."""
+"""The setpoint that a guide gives one of its joints, for the servo that follows it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def own(system: System, use: GuideUse, read: ReadCell) -> tuple[NamedValues, lis
 
 
 def setpoint(system: System, joint: str, kind: str, use: GuideUse, read: ReadCell, time: Real) -> Setpoint:
-    """What the guide asks of a joint at a time: between its ticks, the rate of the last one and where that leads."""
+    """The guide's setpoint of a joint at a time: between its ticks, the rate of the last one and where that leads."""
     guide = models.find("guide", use.model, use.place)
     if guide.course is None:
         rate = read(f"{GUIDE}{joint}.rate")

@@ -43,7 +43,7 @@ def ticking(system: System) -> Iterator[GuideUse]:
 
 
 def start(system: System, tape: Tape) -> None:
-    """Where guides begin: their joints' positions, no rates, and the guided frames, from which paths are counted."""
+    """Write where guides begin: their joints' positions, rates of 0, and the guided frames, where paths begin."""
     for use in ticking(system):
         tape.write(f"{GUIDE}{use.name}.time", 0.0)
         for joint in use.joints:
@@ -126,8 +126,8 @@ class _ArmAt:
 
     @cached_property
     def _answers(self) -> list[tuple[Vector, Vector]]:
-        """What a free base does to the frame for each unit of each joint's rate: angular velocity and velocity; with
-        the payloads that the links carry at this time."""
+        """A free base's answer to joint rates: the frame's angular velocity and velocity for each unit of each rate;
+        with the payloads that the links carry at this time."""
         arm = sub(self._p, self._base.pose.p)
         found = base_answers(self._loaded_tree, self._q, self._base.pose)
         return [(w, add(v, cross(w, arm))) for w, v in found]

@@ -31,7 +31,7 @@ from met.vectors import ZERO, Vector, add, cross, sub, turn_vector_back
 
 @frozen
 class Accelerations:
-    """What a derivative tells.
+    """Accelerations at a stage, as the derivative has them.
 
     qdd      slopes of all rates, those of bodies too, as in `Slope`
     base     angular acceleration of the base frame, and that of its origin, base axes, rad/s^2, m/s^2
@@ -80,7 +80,7 @@ class Aboard(ArmWorld):
         return found
 
     def _acceleration(self, link: str, point: Vector) -> Vector:
-        """Of a point given in the link's frame, in its axes."""
+        """Acceleration of a point given in the link's frame, m, in the link's axes, m/s^2."""
         wd, a = self._of_frame(link)
         w = self.link(link).w
         return add(a, add(cross(wd, point), cross(w, cross(w, point))))
@@ -132,7 +132,7 @@ def free_fall(
 
 
 def start(system: System, tape: Tape, gravity: Callable[[Motion], Vector]) -> None:
-    """Where sensors begin: settled on joints that do not accelerate, and bodies that fall freely.
+    """Write sensors where a run begins: settled on joints that do not accelerate, and bodies that fall freely.
 
     gravity  at a state where a run begins, as in `Accelerations`
     """

@@ -80,12 +80,12 @@ class Plant:
 
     @property
     def shaft_rate(self) -> float:
-        """Of the shaft itself, rad/s."""
+        """Rate of the shaft itself, not of its encoder, rad/s."""
         return float(self._outputs[1, 0])
 
     @property
     def shaft_angle(self) -> float:
-        """Of the shaft itself, rad, from 0 at the start."""
+        """Angle of the shaft itself, rad, from 0 at the start."""
         return float(self._outputs[2, 0])
 
 
@@ -183,7 +183,7 @@ class _Phases:
 
 
 def _settled(experiment: Experiment, joint: str, case: int) -> dict[str, float]:
-    """What the parameters of a joint's bed that vary are in a case, as the kernel's start computes them, by path."""
+    """Values of the varied parameters of a joint's bed in a case, by path, as the kernel's start computes them."""
     coordinates = {c.path: float(c.values[case]) for c in experiment.cases.coordinates}
     varying = {path: quantity.value.output for path, quantity in experiment.parameters.items()
                if isinstance(quantity.value, Formula) and path.startswith(f"{joint}.bed.")}  # fmt: skip

@@ -49,7 +49,7 @@ def slopes(system: System, actuator: Actuator, read: ReadCell, seen: Seen, own: 
 
 
 def seen_at_stage(system: System, actuator: Actuator, read: ReadCell, seen: Seen, own: Mapping[str, Real]) -> Seen:
-    """What a continuous law sees through its sensors at a stage."""
+    """Inputs of a continuous law at a stage, through its sensors."""
 
     def never() -> Real:
         raise Problem(error("E213", "a sensor that a continuous law sees draws noise", help="declare it `clocked`"))
@@ -63,7 +63,7 @@ def seen_at_stage(system: System, actuator: Actuator, read: ReadCell, seen: Seen
 
 
 def seen_at_tick(system: System, tape: Tape, actuator: Actuator, seen: Seen, state: Callable[[str], Real]) -> Seen:
-    """What a sampled law sees through its sensors at a tick. state: gives their states, by channel."""
+    """Inputs of a sampled law at a tick, through its sensors. state: gives their states, by channel."""
     found = seen
     for fitted in actuator.sensors:
         of = quantity(fitted)
@@ -100,7 +100,7 @@ def tick(
     system: System, tape: Tape, fitted: Fitted, find: Callable[[], Real], divisor: int, period: float,
     state: Callable[[str], Real],
 ) -> Real:  # fmt: skip
-    """What a sensor reads at a tick of its computer, and its memory a tick on.
+    """The reading of a sensor at a tick of its computer; its memory goes a tick on.
 
     find   gives the quantity;  state  its states, by channel
     """
@@ -120,7 +120,7 @@ def tick(
 
 
 def quantity(fitted: Fitted) -> str:
-    """What a joint's sensor is of."""
+    """Name of the quantity that a joint's sensor reads."""
     assert isinstance(fitted.use, SensorUse)
     return fitted.use.of
 
@@ -135,7 +135,7 @@ def _states(fitted: Fitted, state: Callable[[str], Real]) -> NamedValues:
 
 
 def with_value(actuator: Actuator, seen: Seen, of: str, value: Real) -> Seen:
-    """What is seen, with this quantity replaced."""
+    """The same inputs of a law, with this quantity replaced."""
     if of in ("q", "qd"):
         return replace(seen, q=value) if of == "q" else replace(seen, qd=value)
     numbers: dict[str, Any] = {part.name: getattr(seen.states, part.name) for part in actuator.parts.natural}

@@ -58,7 +58,7 @@ class Mounted:
 
 
 Loads = Callable[[Tape], tuple[list[list[Real]], list[Real]]]
-"""From the state at an instant: Lambda (a row a substituted joint) and b_0."""
+"""A function of the state at an instant: Lambda (a row a substituted joint) and b_0."""
 
 
 class Substituted:
@@ -85,12 +85,12 @@ class Substituted:
 
     @property
     def wire_inputs(self) -> tuple[str, ...]:
-        """What comes over the wires at each tick."""
+        """Names of the program's inputs that come over the wires at each tick."""
         return tuple(f"wire:{each.joint}.rate" for each in self.mounted) if self.wire else ()
 
     @property
     def wire_outputs(self) -> dict[str, str]:
-        """What goes over the wires, by the cells that hold it."""
+        """Names of the outputs that go over the wires, by the cells that hold them."""
         return {
             f"wire:{each.joint}.{name}": f"{each.joint}:sent.{name}" for each in self.mounted
             for name in ("voltage", "current")
@@ -99,7 +99,7 @@ class Substituted:
     # Control.
 
     def begin_run(self) -> tuple[Control, ...]:
-        """What is done before the first tick."""
+        """Phases before the first tick."""
         if not self.mounted:
             return ()
         parts: tuple[Control, ...] = (RunPhase(Phase("beds", self.start)),)
@@ -197,7 +197,7 @@ class Substituted:
             tape.write(f"{each.joint}.bed.{name}", value)
 
     def reading(self, tape: Tape, each: Mounted) -> Real:
-        """What the computer reads of an emulated bed: the filtered rate, rad/s."""
+        """The filtered rate of an emulated bed's shaft, rad/s, as the computer reads it."""
         return answer(self._owner(each), each.bed.read, self._bed_values(tape, each), self._bed(tape, each))
 
     def read(self, tape: Tape) -> None:
@@ -227,7 +227,7 @@ class Substituted:
             tape.write(f"{each.joint}.qd", tape.read(f"{each.joint}:w") / ratio)
 
     def seen(self, tape: Tape, actuator: Actuator) -> tuple[Real, Real] | None:
-        """What the servo's computer sees of a substituted joint: position, and the filtered rate. None: not one."""
+        """Position and filtered rate of a substituted joint, as its servo's computer sees them; None for others."""
         for each in self.mounted:
             if each.actuator is actuator:
                 ratio = self.motor(tape, each).ratio
@@ -235,7 +235,7 @@ class Substituted:
         return None
 
     def arm(self, tape: Tape) -> None:
-        """What the arm is to the substituted joints, at this instant."""
+        """Write Lambda and b_0 at this instant: the load of the arm on the substituted joints."""
         Lambda, b_0 = self.loads(tape)
         for each, row, b in zip(self.mounted, Lambda, b_0, strict=True):
             tape.write(f"{each.joint}:b_0", b)

@@ -36,7 +36,7 @@ from met.trace.program import Tape
 from met.vectors import Quaternion, composed
 
 PAYLOAD = "payload:"
-"""What the cells of a payload begin with."""
+"""Prefix of the cells of a payload."""
 
 SIX = 6
 
@@ -68,7 +68,7 @@ class FreeBody:
         return y.qd[self.first : self.first + SIX]
 
     def qdd(self, slopes: tuple[Real, ...]) -> tuple[Real, ...]:
-        """Of the slopes of all rates."""
+        """The body's accelerations, among the slopes of all rates."""
         return slopes[self.first : self.first + SIX]
 
 
@@ -101,7 +101,7 @@ def coordinates(system: System) -> tuple[str, ...]:
 
 
 def flight(body: FreeBody, read: ReadCell, y: Motion) -> Flight:
-    """Where a body is and how it moves, at a state that has its coordinates, theta included."""
+    """Pose and velocities of a body, at a state that has its coordinates, theta included."""
     q, qd = body.q(y), body.qd(y)
     theta, v, w = q[3:], qd[:3], qd[3:]
     there = _read(body, read, "")

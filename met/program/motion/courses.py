@@ -22,8 +22,9 @@ TIME = "time"
 
 
 def recorded(experiment: Experiment) -> Formulas:
-    """From the time (`TIME`, s) and the parameters that vary, by path: the rows of R_WB, and in world axes the origin,
-    angular velocity, velocity, angular acceleration and acceleration of the origin; three numbers each."""
+    """The motion of a prescribed base as formulas of the time (`TIME`, s) and of the parameters that vary, by path: the
+    rows of R_WB, and in world axes the origin, angular velocity, velocity, angular acceleration and acceleration of the
+    origin; three numbers each."""
     graph = Graph()
 
     def number(path: str) -> Any:

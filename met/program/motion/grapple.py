@@ -41,7 +41,7 @@ class Grapple:
         self.system, self._state, self._held = system, state, held
 
     def events(self) -> tuple[Control, ...]:
-        """What happens at an instant."""
+        """Phases of grapples and releases at an instant."""
         if not self.system.flying:
             return ()
         parts: list[Control] = [RunPhase(Phase("payloads", self.due))]
@@ -52,7 +52,7 @@ class Grapple:
         return (Every(self.system.structure.schedule.dynamics, tuple(parts)),)
 
     def due(self, tape: Tape) -> None:
-        """Which payloads are grappled and released at this instant."""
+        """Write which payloads are grappled and released at this instant."""
         grappling: list[Truth] = []
         releasing: list[Truth] = []
         for payload in self.system.flying:
@@ -133,11 +133,11 @@ class Grapple:
         return servo_response(self.system, actuator, tape.read, y, held, tape.time, tape.time).drive
 
     def _is_time(self, tape: Tape, name: str, event: str) -> Truth:
-        """Whether this is an instant not before the event's time."""
+        """True at an instant that is not before the event's time."""
         time: Real = self.system.value(f"payloads.{name}.{event}", tape.read)
         return tape.time >= time - INSTANT * self.system.structure.schedule.step
 
 
 def _yields(drive: Drive | None) -> Truth:
-    """Whether a blow moves the joint."""
+    """True where a blow moves the joint."""
     return True if drive is None or drive.given is None else not_(drive.given)

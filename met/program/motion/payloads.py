@@ -40,7 +40,7 @@ from met.trace.program import Tape
 from met.vectors import ZERO, Vector, quaternion_rpy
 
 FLYING, CARRIED, RELEASED = 0.0, 1.0, 2.0
-"""What has become of a payload: it flies and waits to be grappled; a link carries it; it flies for good."""
+"""Stages of a payload: it flies and waits to be grappled; a link carries it; it flies for good."""
 
 NOTHING: Wrench = (ZERO, ZERO)
 
@@ -61,7 +61,7 @@ def cell(payload: Payload, name: str) -> str:
 
 
 def carried(payload: Payload, read: ReadCell) -> Truth:
-    """Whether a link carries it."""
+    """True where a link carries the payload."""
     return read(cell(payload, "stage")) == CARRIED
 
 
@@ -150,7 +150,7 @@ def slopes_of_payloads(
 
 
 def start(system: System, tape: Tape) -> None:
-    """Where payloads are when a run begins."""
+    """Write where payloads are when a run begins."""
     for payload in system.flying:
         head = f"payloads.{payload.name}"
 
@@ -184,7 +184,7 @@ def detach(tape: Tape, active: Truth, payload: Payload) -> None:
 
 
 def gap(system: System, payload: Payload, read: ReadCell, motion: LinkMotion, link: LinkMotion) -> Vector:
-    """From the point of the link that the payload's frame is to come to, to where it is; world axes, m."""
+    """The vector from the link's point that the payload's frame is to come to, to that frame; world axes, m."""
     x, y, z = motion.pose.p
     a, b, c = link.position(system.vector(f"payloads.{payload.name}.at", read))
     return x - a, y - b, z - c

@@ -18,7 +18,7 @@ from met.vectors import ZERO, Matrix, Vector
 
 
 def environment_values(system: System, name: str, model: Environment, read: ReadCell) -> tuple[str, NamedValues]:
-    """What an environment model under the deck's name for it is called in messages, and its parameters."""
+    """The name in messages of an environment model in use, and its parameters."""
     owner = f"environment model `{model.name}` (as `{name}`)"
     head = f"environment.{name}"
     return owner, parameters(owner, head, model.parameters, lambda path: system.value(path, read))
@@ -76,7 +76,7 @@ class ArmWorld:
         return self._system.inertia(self._own(link), self._read)
 
     def is_ground(self, link: str) -> bool:
-        """Whether this names the ground. Where the arm has a link of that name, no model's parameter is that word."""
+        """True for the ground's name. Where the arm has a link of that name, no model's parameter is that word."""
         return link == WORLD and link not in self.links
 
     def link(self, link: str) -> LinkMotion:
