@@ -29,9 +29,27 @@ DEFECT = 70  # EX_SOFTWARE of sysexits.h
 
 # How `met --help` lists the commands: in the order of work. A command that is not named here comes after them.
 ORDER = (
-    "new", "import", "fmt", "check", "explain", "plan", "cases", "run", "submit", "status", "show", "plot", "report",
-    "diff", "export", "profile", "margin", "bed", "doc", "dump",
-)  # fmt: skip
+    "new",
+    "import",
+    "fmt",
+    "check",
+    "explain",
+    "plan",
+    "cases",
+    "run",
+    "submit",
+    "status",
+    "show",
+    "plot",
+    "report",
+    "diff",
+    "export",
+    "profile",
+    "margin",
+    "bed",
+    "doc",
+    "dump",
+)
 
 Face = TypeVar("Face", bound=Callable[..., Any])
 
@@ -107,22 +125,33 @@ def met() -> None:
 def deck_options(face: Face) -> Face:
     """The options of whatever reads a deck: -D, -I and --set, given on as `defines`, `include_dirs` and `settings`."""
     face = click.option(
-        "--set", "settings", multiple=True, metavar="PATH=VALUE",
+        "--set",
+        "settings",
+        multiple=True,
+        metavar="PATH=VALUE",
         help="Set what `vary` names, as if the deck said so: 'gearbox.kp=0.02 V*s/rad'; may be repeated.",
-    )(face)  # fmt: skip
+    )(face)
     face = click.option(
-        "-I", "include_dirs", multiple=True, metavar="DIR", type=click.Path(exists=True, file_okay=False),
+        "-I",
+        "include_dirs",
+        multiple=True,
+        metavar="DIR",
+        type=click.Path(exists=True, file_okay=False),
         help="Look for included files here too; may be repeated.",
-    )(face)  # fmt: skip
+    )(face)
     return click.option(
         "-D", "defines", multiple=True, metavar="NAME[=VALUE]", help="Define a macro as #define does; may be repeated."
     )(face)
 
 
 def check_options(
-    source: str, names: Sequence[str] = (), everything: bool = False, defines: Sequence[str] = (),
-    include_dirs: Sequence[str] = (), settings: Sequence[str] = (),
-) -> None:  # fmt: skip
+    source: str,
+    names: Sequence[str] = (),
+    everything: bool = False,
+    defines: Sequence[str] = (),
+    include_dirs: Sequence[str] = (),
+    settings: Sequence[str] = (),
+) -> None:
     """Refuse options that clash, or that would do nothing, as click refuses what it cannot read."""
     if names and everything:
         raise click.UsageError(f"--all and `{names[0]}` exclude each other: name runs and sweeps, or take all")

@@ -74,8 +74,13 @@ class Measure:
     def __mul__(self, other: Measure) -> Measure:
         over, under = self.over * other.over, self.under * other.under
         common = math.gcd(over, under)
-        return Measure(self.dimension * other.dimension, over // common, under // common,
-                       self.turns + other.turns, self.hertz + other.hertz)  # fmt: skip
+        return Measure(
+            self.dimension * other.dimension,
+            over // common,
+            under // common,
+            self.turns + other.turns,
+            self.hertz + other.hertz,
+        )
 
     def __pow__(self, exponent: int) -> Measure:
         over, under = (self.over, self.under) if exponent >= 0 else (self.under, self.over)
@@ -213,9 +218,28 @@ UNITS: Mapping[str, NamedUnit] = MappingProxyType(
 
 # how a dimension is said, where base units would be hard to read; the first that matches
 _SPOKEN = (
-    "N*m/A", "V*s/rad", "V/rad", "N*m*s/rad", "kg*m^2", "N", "N*m", "W", "V", "ohm", "H", "F", "Pa", "N/m", "N*s/m",
-    "V*s", "V/s", "N*m/s", "N/s", "N/A", "N*m/rad",
-)  # fmt: skip
+    "N*m/A",
+    "V*s/rad",
+    "V/rad",
+    "N*m*s/rad",
+    "kg*m^2",
+    "N",
+    "N*m",
+    "W",
+    "V",
+    "ohm",
+    "H",
+    "F",
+    "Pa",
+    "N/m",
+    "N*s/m",
+    "V*s",
+    "V/s",
+    "N*m/s",
+    "N/s",
+    "N/A",
+    "N*m/rad",
+)
 
 
 def is_unit(name: str) -> bool:

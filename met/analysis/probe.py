@@ -28,11 +28,13 @@ def reads(use: ServoUse, values: Mapping[str, Any]) -> frozenset[str] | None:
         return frozenset()
     of_law = parts.integrals if parts.continuous else (*parts.outputs, *parts.integrals)
     seen = Seen(
-        graph.input("q"), graph.input("qd"),
+        graph.input("q"),
+        graph.input("qd"),
         Setpoint(use.command.kind if use.command is not None else "none", graph.input(":asked"), graph.input(":slope")),
-        0.0 if parts.continuous else 1.0, graph.input(":time"),
+        0.0 if parts.continuous else 1.0,
+        graph.input(":time"),
         SimpleNamespace(**{state.name: graph.input(state.name) for state in parts.natural}),
-    )  # fmt: skip
+    )
     found = _tried(servo.control, _parameters(graph, parts.parameters, values), _named(graph, of_law), seen)
     if found is None:
         return None

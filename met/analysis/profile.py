@@ -39,14 +39,27 @@ FLOPS = {"add": 1, "sub": 1, "mul": 1, "div": 1, "sqrt": 1, "fma": 2}
 """Operations that count as arithmetic, and for how much; comparing, choosing and moving count for none."""
 
 WORK = {
-    "bed": "emulated beds", "read": "observers", "follow": "observers", "guides_": "guides",
+    "bed": "emulated beds",
+    "read": "observers",
+    "follow": "observers",
+    "guides_": "guides",
     "sensors_": "sensors of links",
     "servos_": "servo computers",
-    "modes": "friction modes", "decide": "friction decisions", "arm": "arm on a bed", "law": "laws", "given": "laws",
-    "derive": "first stage", "judge": "failures", "left_open": "friction decisions", "advance": "integrator",
-    "carry": "integrator", "slope": "further stages", "split": "friction splits", "metrics_": "metrics",
+    "modes": "friction modes",
+    "decide": "friction decisions",
+    "arm": "arm on a bed",
+    "law": "laws",
+    "given": "laws",
+    "derive": "first stage",
+    "judge": "failures",
+    "left_open": "friction decisions",
+    "advance": "integrator",
+    "carry": "integrator",
+    "slope": "further stages",
+    "split": "friction splits",
+    "metrics_": "metrics",
     "record": "recorder",
-}  # fmt: skip
+}
 """Names of kinds of work by the beginning of a phase's name, in the order of an instant and the step after it."""
 
 WITHIN = ("servo physics", "environment", "dynamics", "sensors")
@@ -156,9 +169,9 @@ def profile(experiment: Experiment) -> RunProfile:
     halfway.step(0, ticks // 2)
     numbers = sorted({number for number, _ in calls})
     chains, fused = _chains()
-    seconds, fastest, *alone = _best([
-        lambda: made.run(cases, ticks, threads=1), chains, *(_alone(made, number, halfway) for number in numbers)
-    ])  # fmt: skip
+    seconds, fastest, *alone = _best(
+        [lambda: made.run(cases, ticks, threads=1), chains, *(_alone(made, number, halfway) for number in numbers)]
+    )
     ns = {number: each * 1e9 / (_CALLS * _STARTS * made.lanes) for number, each in zip(numbers, alone, strict=True)}
     return RunProfile(
         experiment=experiment.name,
@@ -279,8 +292,9 @@ def _parts(
             key = (_work(phase), part, event)
             old = found.get(key, WorkCost(*key, 0.0, 0.0, 0.0, 0.0))
             ns = alone[number] * rate * (ops / whole if ops else 1.0)
-            found[key] = WorkCost(*key, max(old.calls, rate), old.operations + ops * rate, old.flops + flops * rate,
-                              old.ns + ns)  # fmt: skip
+            found[key] = WorkCost(
+                *key, max(old.calls, rate), old.operations + ops * rate, old.flops + flops * rate, old.ns + ns
+            )
     return tuple(sorted(found.values(), key=_place))
 
 

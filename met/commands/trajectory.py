@@ -35,11 +35,14 @@ PROFILE = Profile(
         Parameter(name="times", unit="s", shape="list", doc="times of the rows, rising"),
         Parameter(name="values", unit="command", shape="list", doc="values at those times, as many"),
         Parameter(
-            name="interpolation", shape="word", words=("linear", "cubic"), default="linear",
+            name="interpolation",
+            shape="word",
+            words=("linear", "cubic"),
+            default="linear",
             doc="the curve between the rows",
         ),
         Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="when the file's time 0 is"),
     ),
     course=course,
     jumps=lambda p: "none" if p.interpolation == "cubic" else "rate",
-)  # fmt: skip
+)

@@ -99,15 +99,26 @@ ENVIRONMENT = Environment(
         Parameter(name="link", shape="word", names="link", doc="link at one side"),
         Parameter(name="at", unit="m", shape="vector", default=ZEROS, doc="origin of its frame, link frame"),
         Parameter(
-            name="rpy", unit="rad", shape="vector", default=ZEROS,
+            name="rpy",
+            unit="rad",
+            shape="vector",
+            default=ZEROS,
             doc="turns of its frame about fixed x, y, z of the link's",
         ),
         Parameter(
-            name="to", shape="word", names="link", words=(WORLD,), default=WORLD, doc="link at the other side",
+            name="to",
+            shape="word",
+            names="link",
+            words=(WORLD,),
+            default=WORLD,
+            doc="link at the other side",
         ),
         Parameter(name="to_at", unit="m", shape="vector", default=ZEROS, doc="origin of its frame, frame of that link"),
         Parameter(
-            name="to_rpy", unit="rad", shape="vector", default=ZEROS,
+            name="to_rpy",
+            unit="rad",
+            shape="vector",
+            default=ZEROS,
             doc="turns of its frame about fixed x, y, z of that link's; its axes are those of what follows",
         ),
         _three("stiffness", "N/m", "force per displacement along each axis"),
@@ -118,4 +129,4 @@ ENVIRONMENT = Environment(
     loads=loads,
     idle=idle,
     pushed_links=lambda p: ("link", "to"),
-)  # fmt: skip
+)

@@ -18,14 +18,21 @@ FIRING = (
     *WINDOW,
     Parameter(name="period", unit="s", default=1.0, above=0.0, doc="time from pulse to pulse, the first at `from`"),
     Parameter(
-        name="duty", default=1.0, above=0.0, at_most=1.0,
+        name="duty",
+        default=1.0,
+        above=0.0,
+        at_most=1.0,
         doc="share of the period that a pulse lasts, from its beginning; 1: no pulses, it fires steadily",
     ),
     Parameter(
-        name="switches", unit="s", shape="list", rises=True, default=(),
+        name="switches",
+        unit="s",
+        shape="list",
+        rises=True,
+        default=(),
         doc="times at which it is switched on, off, on and so forth; left out: on from the beginning",
     ),
-)  # fmt: skip
+)
 
 
 def share(p: Any, world: World) -> Real:

@@ -113,19 +113,28 @@ ENVIRONMENT = Environment(
     parameters=(
         Parameter(name="radius", unit="m", above=0.0, doc="of the orbit, from the centre of attraction"),
         Parameter(
-            name="mu", unit="m^3/s^2", default=3.986004418e14, above=0.0, doc="gravitational parameter",
+            name="mu",
+            unit="m^3/s^2",
+            default=3.986004418e14,
+            above=0.0,
+            doc="gravitational parameter",
             source="Earth: WGS 84",
         ),
         Parameter(
-            name="rpy", unit="rad", shape="vector", default=ZEROS,
+            name="rpy",
+            unit="rad",
+            shape="vector",
+            default=ZEROS,
             doc="turns of the orbit's axes about fixed x, y, z of the world's: x up, y along the flight, z the normal",
         ),
         Parameter(
-            name="frame", shape="word", words=("inertial", "orbital"),
+            name="frame",
+            shape="word",
+            words=("inertial", "orbital"),
             doc="whether the world keeps its directions, or turns with the orbit",
         ),
     ),
     loads=loads,
     free_fall=free_fall,
     world_rate=world_rate,
-)  # fmt: skip
+)

@@ -52,13 +52,19 @@ ENVIRONMENT = Environment(
     parameters=(
         Parameter(name="joint", shape="word", names="joint", doc="joint that is stopped"),
         Parameter(
-            name="lower", unit="joint", default=-math.inf, less_than="upper",
+            name="lower",
+            unit="joint",
+            default=-math.inf,
+            less_than="upper",
             doc="position of the lower end; none unless written",
         ),
         Parameter(name="upper", unit="joint", default=math.inf, doc="position of the upper end; none unless written"),
         Parameter(name="stiffness", unit="effort/joint", at_least=0.0, doc="torque per way into a stop"),
         Parameter(
-            name="dissipation", unit="s/joint", default=0.0, at_least=0.0,
+            name="dissipation",
+            unit="s/joint",
+            default=0.0,
+            at_least=0.0,
             doc="share by which a stop pushes more for each unit of the rate of going in; 0: it gives all energy back",
         ),
     ),
@@ -66,4 +72,4 @@ ENVIRONMENT = Environment(
     springs=("joint", "stiffness"),
     idle=idle,
     initial_range=("lower", "upper"),
-)  # fmt: skip
+)

@@ -62,15 +62,22 @@ ENVIRONMENT = Environment(
         Parameter(name="link", shape="word", names="link", doc="link that it acts on"),
         Parameter(name="point", unit="m", shape="vector", default=ZEROS, doc="where the force acts, link frame"),
         Parameter(
-            name="axes", shape="word", words=("world", "link"), default="world",
+            name="axes",
+            shape="word",
+            words=("world", "link"),
+            default="world",
             doc="axes of force and moment: the world's, or the link's, which turn with it",
         ),
         Parameter(name="begin", unit="s", default=0.0, doc="when the table's time 0 is"),
         Parameter(name="times", unit="s", shape="list", rises=True, doc="times of the rows"),
         *(
             Parameter(
-                name=name, unit="N" if name.startswith("force") else "N*m", shape="list", as_many_as="times",
-                default=(), doc=f"{name[-1]} of the {name[:-2]} at those times",
+                name=name,
+                unit="N" if name.startswith("force") else "N*m",
+                shape="list",
+                as_many_as="times",
+                default=(),
+                doc=f"{name[-1]} of the {name[:-2]} at those times",
             )
             for name in NAMES
         ),
@@ -78,4 +85,4 @@ ENVIRONMENT = Environment(
     loads=loads,
     idle=idle,
     pushed_links=lambda p: ("link",),
-)  # fmt: skip
+)

@@ -34,9 +34,15 @@ from met.trace import Real, absolute, maximum, sqrt, where
 from met.vectors import Vector, add, dot, product, rotation_vector, scale, sub, transposed
 
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
-GUIDED = MappingProxyType({
-    "pose": POSE, "position": POSE[:3], "xy": ("x", "y"), "xz": ("x", "z"), "yz": ("y", "z"),
-})  # fmt: skip
+GUIDED = MappingProxyType(
+    {
+        "pose": POSE,
+        "position": POSE[:3],
+        "xy": ("x", "y"),
+        "xz": ("x", "z"),
+        "yz": ("y", "z"),
+    }
+)
 """Components of the path, by the word that says what is guided."""
 
 

@@ -76,8 +76,11 @@ def _is_ours(path: Path, status: os.stat_result) -> bool:
 @functools.cache
 def _tell(path: Path, why: str) -> None:
     """Say once that something of the cache is not used."""
-    print(f"met: {path} of the cache is not used: {why}; what is in it is compiled anew (MET_CACHE_DIR names another "
-          "cache)", file=sys.stderr)  # fmt: skip
+    print(
+        f"met: {path} of the cache is not used: {why}; what is in it is compiled anew (MET_CACHE_DIR names another "
+        "cache)",
+        file=sys.stderr,
+    )
 
 
 def key(*parts: str) -> str:

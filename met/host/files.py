@@ -25,8 +25,11 @@ WHOLE_BITS = 64
 """Whole numbers of more bits are nothing that MET writes, and overflow where they are computed with."""
 
 KINDS = {
-    stat.S_IFIFO: "a named pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
-}  # fmt: skip
+    stat.S_IFIFO: "a named pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
 
 
 def open_regular(path: str | os.PathLike[str]) -> BufferedReader:

@@ -91,22 +91,38 @@ _OTHERS: Mapping[str, tuple[str, str, str]] = MappingProxyType({
 })  # fmt: skip
 """Word: what it is, how many of which unit of the table."""
 
-_NOT_HERE: Mapping[str, tuple[str, ...]] = MappingProxyType({
-    **dict.fromkeys(("degC", "Celsius", "celsius", "centigrade"), (
-        "temperatures are in K: 0 degrees Celsius are 273.15 K", "a difference of 1 degree Celsius is 1 K")),
-    **dict.fromkeys(("degF", "Fahrenheit", "fahrenheit"), (
-        "temperatures are in K: 32 degrees Fahrenheit are 273.15 K", "a difference of 1 degree Fahrenheit is 5/9 K")),
-    **dict.fromkeys(("dB", "db", "dBm"), ("decibels are no unit here: write the ratio as a number, 20 dB as `10`",)),
-    **dict.fromkeys(("k", "mega", "kilo", "milli", "micro"), (
-        "a prefix stands in the unit's name, as in `kg`; for a pure number write `1e3`, `1e-3`",)),
-    **dict.fromkeys(("degR", "Rankine", "rankine"), ("temperatures are in K: 1 degree Rankine is 5/9 K",)),
-    **dict.fromkeys(("KV", "Kv"), ("a kilovolt is a `kV`; what is called the KV of a motor is in `rpm/V`",)),
-    **dict.fromkeys(("mol", "cd", "lm", "lx"), ("no unit of light or of an amount of substance is known here",)),
-})  # fmt: skip
+_NOT_HERE: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        **dict.fromkeys(
+            ("degC", "Celsius", "celsius", "centigrade"),
+            ("temperatures are in K: 0 degrees Celsius are 273.15 K", "a difference of 1 degree Celsius is 1 K"),
+        ),
+        **dict.fromkeys(
+            ("degF", "Fahrenheit", "fahrenheit"),
+            (
+                "temperatures are in K: 32 degrees Fahrenheit are 273.15 K",
+                "a difference of 1 degree Fahrenheit is 5/9 K",
+            ),
+        ),
+        **dict.fromkeys(
+            ("dB", "db", "dBm"), ("decibels are no unit here: write the ratio as a number, 20 dB as `10`",)
+        ),
+        **dict.fromkeys(
+            ("k", "mega", "kilo", "milli", "micro"),
+            ("a prefix stands in the unit's name, as in `kg`; for a pure number write `1e3`, `1e-3`",),
+        ),
+        **dict.fromkeys(("degR", "Rankine", "rankine"), ("temperatures are in K: 1 degree Rankine is 5/9 K",)),
+        **dict.fromkeys(("KV", "Kv"), ("a kilovolt is a `kV`; what is called the KV of a motor is in `rpm/V`",)),
+        **dict.fromkeys(("mol", "cd", "lm", "lx"), ("no unit of light or of an amount of substance is known here",)),
+    }
+)
 
-_AS_FORCE: Mapping[str, str] = MappingProxyType({
-    **dict.fromkeys(("lb", "lbs"), "4.4482216152605"), "oz": "0.27801385095378125",
-})  # fmt: skip
+_AS_FORCE: Mapping[str, str] = MappingProxyType(
+    {
+        **dict.fromkeys(("lb", "lbs"), "4.4482216152605"),
+        "oz": "0.27801385095378125",
+    }
+)
 """Words for a mass that are said of its weight too, in N."""
 
 _NEVER_RUN_TOGETHER = ("t", "h", "K", "H", "F")  # `th`, `mHg`: such words are no products
@@ -143,8 +159,9 @@ def suggest(name: str) -> str | None:
 
 def _one_slip(word: str, unit: str) -> bool:
     """True where one letter too many, too few or wrong parts the two, or two letters that changed places."""
-    same = next((i for i, pair in enumerate(zip(word, unit, strict=False)) if pair[0] != pair[1]),
-                min(len(word), len(unit)))  # fmt: skip
+    same = next(
+        (i for i, pair in enumerate(zip(word, unit, strict=False)) if pair[0] != pair[1]), min(len(word), len(unit))
+    )
     a, b = word[same:], unit[same:]
     return a[1:] in (b, b[1:]) or a == b[1:] or (a[1::-1] == b[:2] and a[2:] == b[2:])
 
@@ -165,16 +182,22 @@ def remedy(name: str, number: str = "", *, alone: bool = True) -> tuple[str, ...
         what, size, unit = _OTHERS[name]
         written = f"`{_times(number or '1', size)} {unit}`"
         weight = f"`{_times(number or '1', _AS_FORCE[name])} N`" if name in _AS_FORCE else ""
-        return (f"{what} is not in the table: write {written}" if number else
-                f"{what} is {written}: put that into the number",
-                *([f"as a force it is {weight}"] if weight else []),
-                *([_NOT_HERE["degC"][0]] if name == "C" else []))  # fmt: skip
+        return (
+            f"{what} is not in the table: write {written}"
+            if number
+            else f"{what} is {written}: put that into the number",
+            *([f"as a force it is {weight}"] if weight else []),
+            *([_NOT_HERE["degC"][0]] if name == "C" else []),
+        )
     prefixed = _with_prefix(name) if len(name) <= LONGEST else None
     if prefixed is not None:
         unit, power = prefixed
         written = f"`{_shifted(number or '1', power)} {unit}`"
-        return (f"the table has no such prefix: write {written}" if number else
-                f"1 {name} is {written}: put that into the number",)  # fmt: skip
+        return (
+            f"the table has no such prefix: write {written}"
+            if number
+            else f"1 {name} is {written}: put that into the number",
+        )
     splits = _splits(name) if len(name) <= LONGEST else []
     return (f"did you mean {' or '.join('`' + '*'.join(each) + '`' for each in splits[:3])}?",) if splits else ()
 

@@ -105,9 +105,11 @@ OF_ARM = (
 )
 
 FAMILIES = {
-    "reaction": ("moment", "force"), "jacobian": ("angular", "linear"),
-    "energy": ("kinetic", "potential"), "momentum": ("linear", "angular"),
-}  # fmt: skip
+    "reaction": ("moment", "force"),
+    "jacobian": ("angular", "linear"),
+    "energy": ("kinetic", "potential"),
+    "momentum": ("linear", "angular"),
+}
 """Names that stand for several variables: `reaction` is `reaction.moment` and `reaction.force`."""
 
 COMMAND_UNIT = {"rate": "joint/s", "position": "joint", "torque": "effort", "acceleration": "joint/s^2"}
@@ -324,9 +326,12 @@ def _of_all(name: str, channel: Channel) -> str:
 
 
 def _enter(
-    found: dict[str, tuple[Recorded, ...]], known: dict[str, Channel], name: str, joints: tuple[str, ...],
+    found: dict[str, tuple[Recorded, ...]],
+    known: dict[str, Channel],
+    name: str,
+    joints: tuple[str, ...],
     components: tuple[str, ...],
-) -> None:  # fmt: skip
+) -> None:
     """Take a variable in, and into its family, which is told before its members."""
     scalars = channel_paths(name, joints, components)
     units = tuple(known[path].unit for path in scalars) if joints else (known[scalars[0]].unit,)

@@ -106,8 +106,10 @@ def _check_requirements(experiment: Experiment, where: str) -> None:
             raise Damaged(f"{where}[{index}].limit", "it is not a number")
         first = said.setdefault(requirement.text, requirement)
         if (first.metric, first.comparison, first.limit) != (
-            requirement.metric, requirement.comparison, requirement.limit
-        ):  # fmt: skip
+            requirement.metric,
+            requirement.comparison,
+            requirement.limit,
+        ):
             raise Damaged(f"{where}[{index}].text", "another requirement has the same text")
 
 
@@ -434,7 +436,12 @@ def _is_inertia(values: np.ndarray) -> np.ndarray:
     size = np.abs(np.where(finite[:, None], values, 0.0)).max(axis=1)
     xx, yy, zz, xy, xz, yz = np.where(finite[:, None], values, 0.0).T / np.where(size > 0.0, size, 1.0)
     minors = (
-        xx, yy, zz, xx * yy - xy * xy, xx * zz - xz * xz, yy * zz - yz * yz,
+        xx,
+        yy,
+        zz,
+        xx * yy - xy * xy,
+        xx * zz - xz * xz,
+        yy * zz - yz * yz,
         xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz),
-    )  # fmt: skip
+    )
     return finite & np.logical_and.reduce([minor >= -ROUNDING for minor in minors])

@@ -114,8 +114,9 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
     for on_bed in structure.substitutions:
         joint = kinds[on_bed.joint]
         for head, model in (
-            ("bed", models.find("bed", on_bed.bed, on_bed.place)), ("law", models.find("law", on_bed.law, on_bed.place))
-        ):  # fmt: skip
+            ("bed", models.find("bed", on_bed.bed, on_bed.place)),
+            ("law", models.find("law", on_bed.law, on_bed.place)),
+        ):
             for parameter in model.parameters:
                 if parameter.shape != "text":  # for the compiler alone
                     yield from _numbers(f"{on_bed.joint}.{head}", parameter, joint_unit(parameter.unit, joint))

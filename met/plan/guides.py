@@ -17,9 +17,11 @@ def check(structure: Structure, where: str) -> None:
         path = f"{where}.guides[{index}]"
         guide = models.find("guide", use.model, use.place)
         follow = tuple(
-            servo.joint for joint in structure.moving for servo in structure.servos
+            servo.joint
+            for joint in structure.moving
+            for servo in structure.servos
             if servo.joint == joint.name and servo.command is not None and servo.command.guide == use.name
-        )  # fmt: skip
+        )
         if use.joints != follow or not follow:
             listed = ", ".join(follow) or "none"
             raise Damaged(f"{path}.joints", f"it should be those whose servos follow it, in the arm's order: {listed}")

@@ -17,15 +17,21 @@ say it where they do not."""
 
 def tests(experiment: Experiment) -> list[Test]:
     """One test a joint that its servo may want at rest."""
-    return [_test(experiment, use) for use in experiment.structure.servos
-            if models.find("servo", use.model, use.place).at_rest is not None]  # fmt: skip
+    return [
+        _test(experiment, use)
+        for use in experiment.structure.servos
+        if models.find("servo", use.model, use.place).at_rest is not None
+    ]
 
 
 def _test(experiment: Experiment, use: ServoUse) -> Test:
     servo, rate = models.find("servo", use.model, use.place), f"initial.{use.joint}.qd"
     head = f"{use.joint}.servo."
-    numbers = {path.removeprefix(head): path for path, quantity in experiment.parameters.items()
-               if path.startswith(head) and not isinstance(quantity.value, str | tuple)}  # fmt: skip
+    numbers = {
+        path.removeprefix(head): path
+        for path, quantity in experiment.parameters.items()
+        if path.startswith(head) and not isinstance(quantity.value, str | tuple)
+    }
 
     def holds(values: np.ndarray) -> np.ndarray:
         p = SimpleNamespace(**{name: values[:, i] for i, name in enumerate(numbers, 1)})

@@ -86,10 +86,16 @@ MOST = 100
 def changed_count(integrator: Integrator) -> Problem:
     """It asked for another number of slopes than before."""
     message = f"integrator `{integrator.name}`: `advance` asks for more slopes at one time than at another"
-    return Problem(error("E214", message, help=(
-        f"ask for the same number, at most {MOST}, whatever the step's length is, and whether it is known",
-        "keep nothing from call to call: `advance` is called once for each slope that it asks for, and more",
-    )))  # fmt: skip
+    return Problem(
+        error(
+            "E214",
+            message,
+            help=(
+                f"ask for the same number, at most {MOST}, whatever the step's length is, and whether it is known",
+                "keep nothing from call to call: `advance` is called once for each slope that it asks for, and more",
+            ),
+        )
+    )
 
 
 def _wrong(y: object, like: Motion) -> str:

@@ -30,9 +30,16 @@ def balance(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[s
 
     def moved(modes: Mapping[str, Real]) -> Derivative:
         return derivative(
-            system, tape.read, y=y, held=held, friction=modes, time=0.0, begin=0.0, part=tape.part,
+            system,
+            tape.read,
+            y=y,
+            held=held,
+            friction=modes,
+            time=0.0,
+            begin=0.0,
+            part=tape.part,
             prescribed_qdd={actuator.index: 0.0 for actuator in balanced},
-        )  # fmt: skip
+        )
 
     others = [each for each in sticking(system) if not each.state and each.actuator not in balanced]
     levels = {each.name: _level(system, tape, y, each, held) for each in others}
@@ -41,10 +48,14 @@ def balance(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[s
     if others:
         modes = {
             each.name: friction.decide(
-                modes[each.name], both(levels[each.name] > 0.0, each.rate(y) == 0.0), found.need[each.name],
-                levels[each.name], found.slope.qdd[each.number],
-            ) for each in others
-        }  # fmt: skip
+                modes[each.name],
+                both(levels[each.name] > 0.0, each.rate(y) == 0.0),
+                found.need[each.name],
+                levels[each.name],
+                found.slope.qdd[each.number],
+            )
+            for each in others
+        }
         found = moved(modes)
     for actuator in balanced:
         assert actuator.servo.balance is not None

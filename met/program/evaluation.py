@@ -293,9 +293,15 @@ def brake_levels(system: System, read: ReadCell, y: Motion, time: Real, begin: R
 
 
 def _environment(
-    system: System, tree: Tree, read: ReadCell, y: Motion, base: BaseMotion, time: Real, begin: Real,
+    system: System,
+    tree: Tree,
+    read: ReadCell,
+    y: Motion,
+    base: BaseMotion,
+    time: Real,
+    begin: Real,
     models: Sequence[tuple[str, Environment]] | None = None,
-) -> _Loads:  # fmt: skip
+) -> _Loads:
     """Sum of the loads of these models; of all, where None. Wrenches are on links and payloads."""
     world = ArmWorld(system, read, tree, y, base, time, begin)
     gravity: list[Real] = [0.0, 0.0, 0.0]

@@ -139,9 +139,10 @@ class Observed:
         """Every payload in the world, by name."""
         return {
             each.name: payloads.payload_motion(self.system, each, self.read, self.y, self.motions)
-            if each.flies else self.motions[each.name]
+            if each.flies
+            else self.motions[each.name]
             for each in self.system.structure.payloads
-        }  # fmt: skip
+        }
 
     @cached_property
     def energy(self) -> Energy:

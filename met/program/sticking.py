@@ -44,6 +44,8 @@ def sticking(system: System) -> tuple[Sticking, ...]:
     names = system.states
     states = [
         Sticking(f"{a.path}.{name}", f"{a.path}.{name}", a, name, names.index(f"{a.path}.{name}"), level)
-        for a in free for name, level in a.levels.items() if level != 0.0
-    ]  # fmt: skip
+        for a in free
+        for name, level in a.levels.items()
+        if level != 0.0
+    ]
     return (*joints, *states)

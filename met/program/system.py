@@ -142,8 +142,9 @@ class System:
         """Joints on which environment models put dry friction."""
         return frozenset(
             str(self.experiment.parameters[f"environment.{name}.{model.friction_joint}"].value)
-            for name, model in self.environment if model.friction_joint
-        )  # fmt: skip
+            for name, model in self.environment
+            if model.friction_joint
+        )
 
     @cached_property
     def failing(self) -> dict[str, list[tuple[str, Environment]]]:
@@ -198,8 +199,9 @@ class System:
         uses = {use.joint: use for use in self.structure.substitutions}
         return tuple(
             (a, models.find("bed", uses[a.use.joint].bed), models.find("law", uses[a.use.joint].law))
-            for a in self.working if a.use.joint in uses
-        )  # fmt: skip
+            for a in self.working
+            if a.use.joint in uses
+        )
 
     @cached_property
     def flying(self) -> tuple[Payload, ...]:
@@ -258,9 +260,11 @@ class System:
         if actuator.profile is None:
             return Setpoint("none", 0.0, 0.0)
         p = parameters(
-            f"command `{actuator.profile.name}` of {actuator.owner}", f"{actuator.path}.command",
-            actuator.profile.parameters, lambda path: self.value(path, read),
-        )  # fmt: skip
+            f"command `{actuator.profile.name}` of {actuator.owner}",
+            f"{actuator.path}.command",
+            actuator.profile.parameters,
+            lambda path: self.value(path, read),
+        )
         value, slope = answer(actuator.owner, actuator.profile.course, p, time)
         return Setpoint(actuator.command_kind, value, slope)
 

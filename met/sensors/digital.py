@@ -17,9 +17,13 @@ RESOLUTION = Parameter(
     name="resolution", unit="of", default=0.0, at_least=0.0, doc="step of the converter, to the nearest; 0: it has none"
 )
 DELAY = Parameter(
-    name="delay", default=0.0, at_least=0.0, at_most=float(MOST), whole=True,
+    name="delay",
+    default=0.0,
+    at_least=0.0,
+    at_most=float(MOST),
+    whole=True,
     doc="ticks from reading to what is seen",
-)  # fmt: skip
+)
 PAST = tuple(Memory(name=f"past_{n}", unit="of", doc=f"reading {n} ticks before the last") for n in range(MOST))
 
 

@@ -119,7 +119,15 @@ SERVO = Servo(
     doc=__doc__,
     commands=rate_loop.COMMANDS,
     parameters=(
-        RATIO, *rate_loop.PARAMETERS, *ARMATURE, TAU_MAX, *SHAFT, *FRICTION, LOSS, *gear.parameters(), *JOINT_FRICTION
+        RATIO,
+        *rate_loop.PARAMETERS,
+        *ARMATURE,
+        TAU_MAX,
+        *SHAFT,
+        *FRICTION,
+        LOSS,
+        *gear.parameters(),
+        *JOINT_FRICTION,
     ),
     outputs=rate_loop.OUTPUTS,
     integrals=rate_loop.INTEGRALS,
@@ -134,4 +142,4 @@ SERVO = Servo(
     fastest_law=fastest_law,
     swings=swings,
     full=rate_loop.full,
-)  # fmt: skip
+)

@@ -34,16 +34,17 @@ LUGRE = ("friction", ("lugre",))
 
 PARAMETERS = (
     Parameter(
-        name="friction", shape="word", words=("coulomb", "stribeck", "lugre"), default="coulomb",
+        name="friction",
+        shape="word",
+        words=("coulomb", "stribeck", "lugre"),
+        default="coulomb",
         doc="law of the friction at the motor",
     ),
     Parameter(name="f_s", unit="N*m", at_least=0.0, only=CURVED, doc="friction that breaks away, F_s"),
     Parameter(name="rate_s", unit="rad/s", above=0.0, only=CURVED, doc="motor rate at which it has mostly fallen, w_s"),
     Parameter(name="sigma_0", unit="N*m/rad", above=0.0, only=LUGRE, doc="stiffness of the bristles"),
-    Parameter(
-        name="sigma_1", unit="N*m*s/rad", default=0.0, at_least=0.0, only=LUGRE, doc="damping of the bristles"
-    ),
-)  # fmt: skip
+    Parameter(name="sigma_1", unit="N*m*s/rad", default=0.0, at_least=0.0, only=LUGRE, doc="damping of the bristles"),
+)
 SHAFT = (
     J_M,
     replace(F_C, only=("friction", ("coulomb", "stribeck"))),
@@ -53,9 +54,12 @@ SHAFT = (
 """Parameters of a servo whose motor has such friction."""
 
 LOSS = Parameter(
-    name="loss", default=0.0, at_least=0.0, below=1.0,
+    name="loss",
+    default=0.0,
+    at_least=0.0,
+    below=1.0,
     doc="share of the gear's torque by which dry friction at the motor is higher",
-)  # fmt: skip
+)
 
 BLOW = 10.0
 """As many times what its motor gives at most a gear is thought to transmit."""

@@ -23,15 +23,23 @@ def parameters(only: Only | None = None) -> tuple[Parameter, ...]:
             name="stiffness", unit="effort/joint", above=0.0, only=only, doc="stiffness k1 of the gear, at the joint"
         ),
         Parameter(
-            name="hardening", unit="effort/joint^3", default=0.0, at_least=0.0, only=only,
+            name="hardening",
+            unit="effort/joint^3",
+            default=0.0,
+            at_least=0.0,
+            only=only,
             doc="k3: torque of the gear with the third power of its winding",
         ),
         Parameter(name="backlash", unit="joint", default=0.0, at_least=0.0, only=only, doc="play, from end to end"),
         Parameter(
-            name="damping", unit="effort*s/joint", default=0.0, at_least=0.0, only=only,
+            name="damping",
+            unit="effort*s/joint",
+            default=0.0,
+            at_least=0.0,
+            only=only,
             doc="damping c of the gear, at the joint",
         ),
-    )  # fmt: skip
+    )
 
 
 def deflection(only: Only | None = None) -> State:

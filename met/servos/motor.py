@@ -13,19 +13,17 @@ RATIO = Parameter(
 )
 SHAFT = (
     Parameter(name="j_m", unit="kg*m^2", above=0.0, source=TABLE_1, doc="inertia of the motor's shaft J_m"),
-    Parameter(
-        name="f_c", unit="N*m", default=0.0, at_least=0.0, source=TABLE_1, doc="Coulomb friction at the motor"
-    ),
+    Parameter(name="f_c", unit="N*m", default=0.0, at_least=0.0, source=TABLE_1, doc="Coulomb friction at the motor"),
     Parameter(
         name="f_v", unit="N*m*s/rad", default=0.0, at_least=0.0, source=TABLE_1, doc="viscous friction at the motor"
     ),
-)  # fmt: skip
+)
 ARMATURE = (
     Parameter(name="resistance", unit="ohm", above=0.0, source=TABLE_1, doc="armature resistance R"),
     Parameter(
         name="kt", unit="N*m/A", above=0.0, source=TABLE_1, doc="torque constant, and back-EMF constant in V s/rad"
     ),
-)  # fmt: skip
+)
 TAU_MAX = Parameter(name="tau_max", unit="N*m", above=0.0, source=TABLE_1, doc="largest motor torque, before friction")
 """Limit of the motor's torque; with `RATIO`, `SHAFT` and `ARMATURE` the parameters of a servo with a motor."""
 

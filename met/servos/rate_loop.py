@@ -24,10 +24,14 @@ PARAMETERS = (
     Parameter(name="ki", unit="V/rad", at_least=0.0, source=TABLE_1, doc="gain on the rate error's integral"),
     Parameter(name="v_max", unit="V", above=0.0, source=TABLE_1, doc="largest voltage of the drive's amplifier"),
     Parameter(
-        name="k_position", unit="1/s", default=0.0, at_least=0.0, needed_for=("position",),
+        name="k_position",
+        unit="1/s",
+        default=0.0,
+        at_least=0.0,
+        needed_for=("position",),
         doc="gain from position error to rate asked, used under a position command alone",
     ),
-)  # fmt: skip
+)
 
 OUTPUTS = (Memory(name="voltage", unit="V", doc="voltage on the drive motor"),)
 INTEGRALS = (State(name="integral", unit="rad", doc="integral of the motor's rate error"),)

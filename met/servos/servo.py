@@ -179,8 +179,12 @@ class Servo:
     def deciding(self) -> tuple[str, ...]:
         """Names of the parameters, words, on which parts of it depend (`only`), in order."""
         parts: tuple[Parameter | Memory | State | Signal, ...] = (
-            *self.parameters, *self.outputs, *self.integrals, *self.states, *self.signals
-        )  # fmt: skip
+            *self.parameters,
+            *self.outputs,
+            *self.integrals,
+            *self.states,
+            *self.signals,
+        )
         names = {part.only[0] for part in parts if part.only is not None}
         return tuple(parameter.name for parameter in self.parameters if parameter.name in names)
 

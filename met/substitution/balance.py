@@ -64,10 +64,11 @@ def balanced(sides: Sequence[JointSide], Lambda: Matrix, b_0: Sequence[Real]) ->
         qdd = solved(sides, Lambda, b_0, s)
     held = loads(Lambda, b_0, qdd)
     return [
-        Balanced(a, where(way == 0.0, clip(side.net - load / side.ratio, -side.dry, side.dry), way * side.dry), way,
-                 side.net)
+        Balanced(
+            a, where(way == 0.0, clip(side.net - load / side.ratio, -side.dry, side.dry), way * side.dry), way, side.net
+        )
         for side, a, way, load in zip(sides, qdd, s, held, strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def bare(sides: Sequence[JointSide], Lambda: Matrix, b_0: Sequence[Real]) -> list[Balanced]:
@@ -95,10 +96,14 @@ def solved(
     m = len(sides)
     slides: list[Truth] = [way != 0.0 for way in s]
     rows = [
-        [where(both(slides[i], slides[j]), Lambda[i][j] + (sides[i].inertia if i == j else 0.0), 1.0 if i == j else 0.0)
-         for j in range(m)]
+        [
+            where(
+                both(slides[i], slides[j]), Lambda[i][j] + (sides[i].inertia if i == j else 0.0), 1.0 if i == j else 0.0
+            )
+            for j in range(m)
+        ]
         for i in range(m)
-    ]  # fmt: skip
+    ]
     right = [
         where(slides[i], side.ratio * (side.net - (s[i] * side.dry if dry else 0.0)) - b_0[i], 0.0)
         for i, side in enumerate(sides)

@@ -80,7 +80,11 @@ BED = Bed(
         Parameter(name="f_v", unit="N*m*s/rad", at_least=0.0, of_servo="f_v", doc="viscous friction of the shaft"),
         Parameter(name="inertia", unit="kg*m^2", above=0.0, of_servo="j_m", doc="inertia of the shaft, both rotors"),
         Parameter(
-            name="kt_load", unit="N*m/A", default=0.072, above=0.0, source=TABLE_1,
+            name="kt_load",
+            unit="N*m/A",
+            default=0.072,
+            above=0.0,
+            source=TABLE_1,
             doc="torque constant of the load motor",
         ),
         Parameter(name="i_max", unit="A", default=3.0, above=0.0, source=ASSUMED, doc="limit of the load's amplifier"),
@@ -88,11 +92,17 @@ BED = Bed(
             name="f_cut", unit="Hz", default=50.0, above=0.0, source=TABLE_1, doc="cut-off of the tachometer's filter"
         ),
         Parameter(
-            name="delay", default=0.0, at_least=0.0, at_most=3.0, whole=True,
+            name="delay",
+            default=0.0,
+            at_least=0.0,
+            at_most=3.0,
+            whole=True,
             doc="whole ticks from reading the rate to acting on it; 1 for most hardware",
         ),
         Parameter(
-            name="faults", shape="text", default="none",
+            name="faults",
+            shape="text",
+            default="none",
             doc="`none` or `typical`: what the faults are that are not written one by one",
         ),
         Parameter(name="unevenness", at_least=0.0, default=0.0, doc="share of the load torque that comes and goes"),
@@ -118,8 +128,13 @@ BED = Bed(
         "none": {},
         # 12-bit converters over +-400 rad/s, +-20 V and +-3 A
         "typical": {
-            "unevenness": 0.02, "once": 0.002, "twice": 0.001, "tachometer": 0.1,
-            "converter_in": 800.0 / 4096.0, "converter_voltage": 40.0 / 4096.0, "converter_current": 6.0 / 4096.0,
+            "unevenness": 0.02,
+            "once": 0.002,
+            "twice": 0.001,
+            "tachometer": 0.1,
+            "converter_in": 800.0 / 4096.0,
+            "converter_voltage": 40.0 / 4096.0,
+            "converter_current": 6.0 / 4096.0,
         },
     },
-)  # fmt: skip
+)

@@ -75,9 +75,12 @@ class Law:
 
 
 BAND = Parameter(
-    name="band", unit="rad/s", default=0.5, at_least=0.0,
+    name="band",
+    unit="rad/s",
+    default=0.5,
+    at_least=0.0,
     doc="rate of the shaft below which it counts as at rest: friction is then what holds it",
-)  # fmt: skip
+)
 
 OBSERVER = (
     Parameter(name="torque_noise", unit="N^2*m^2*s", default=1e-9, above=0.0, doc="density of torques that are noise"),

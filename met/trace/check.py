@@ -59,9 +59,10 @@ def check_nodes(where: str, nodes: Sequence[Node]) -> None:
 
 def _check_results(section: CodeSection, cells: set[str], columns: int, outputs: int) -> None:
     for kind, there, results in (
-        ("cell", cells, section.stores), ("column", range(columns), section.records),
+        ("cell", cells, section.stores),
+        ("column", range(columns), section.records),
         ("output", range(outputs), section.outputs),
-    ):  # fmt: skip
+    ):
         for name, ref in results:
             if name not in there:
                 raise ValueError(f"{section.name}: it sets the {kind} {name!r}, which there is not")

@@ -83,12 +83,18 @@ class _CEmitter:
     def source(self) -> CSource:
         sections = [self._section(n, one) for n, one in enumerate(self.recording.sections)]
         entries = [self._start(), self._tick(), self._end()]
-        tables = [f"static const uint64_t {name}[] = {{{', '.join(_pattern(x) for x in table)}}};\n"
-                  for table, name in self.tables.items()]  # fmt: skip
+        tables = [
+            f"static const uint64_t {name}[] = {{{', '.join(_pattern(x) for x in table)}}};\n"
+            for table, name in self.tables.items()
+        ]
         parts = [HEAD, functions(self.called), self._memory(), *tables, *sections, *entries]
-        return CSource("\n".join(part for part in parts if part),
-                      *({name: f"met.{member}" for name, member in names.items()}
-                        for names in (self.inputs, self.outputs, self.cells)))  # fmt: skip
+        return CSource(
+            "\n".join(part for part in parts if part),
+            *(
+                {name: f"met.{member}" for name, member in names.items()}
+                for names in (self.inputs, self.outputs, self.cells)
+            ),
+        )
 
     def _memory(self) -> str:
         members = [*self.inputs.values(), *self.cells.values(), *self.outputs.values()]

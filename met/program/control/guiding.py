@@ -149,9 +149,13 @@ def _wanted(system: System, tape: Tape, use: GuideUse) -> Stance:
     begun = [tape.read(name) for name in _begun(use)]
     R: Matrix = tuple(tuple(begun[i : i + 3]) for i in (0, 3, 6))  # type: ignore[assignment]
     values, rates = values_and_rates(
-        f"path of guide `{use.name}`", f"guides.{use.name}", use.courses, use.place,
-        lambda path: system.value(path, tape.read), tape.time,
-    )  # fmt: skip
+        f"path of guide `{use.name}`",
+        f"guides.{use.name}",
+        use.courses,
+        use.place,
+        lambda path: system.value(path, tape.read),
+        tape.time,
+    )
     place, moving = ([part[name] for name in COMPONENTS[:3]] for part in (values, rates))
     angles, turning = ([part[name] for name in COMPONENTS[3:]] for part in (values, rates))
     p = add((begun[9], begun[10], begun[11]), (place[0], place[1], place[2]))

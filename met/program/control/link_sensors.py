@@ -51,9 +51,17 @@ class Aboard(ArmWorld):
     """
 
     def __init__(
-        self, system: System, read: ReadCell, tree: Tree, y: Motion, base: BaseMotion, time: Real, begin: Real,
-        moved: Accelerations | None, place: Place | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        system: System,
+        read: ReadCell,
+        tree: Tree,
+        y: Motion,
+        base: BaseMotion,
+        time: Real,
+        begin: Real,
+        moved: Accelerations | None,
+        place: Place | None = None,
+    ) -> None:
         super().__init__(system, read, tree, y, base, time, begin)
         self._moved, self._place = moved, place
 

@@ -98,33 +98,38 @@ def plant_c(experiment: Experiment, joint: str, *, case: int = 0, period: float 
     source = emit(record(plant_program(experiment, joint, case=case, period=period)))
     into, out = source.inputs, source.outputs
     named = joint.replace("*/", "* /")
-    return "\n".join([
-        f"/* The motor bed of joint {named} as simulated, a tick every {period} s. Written by MET. */",
-        '#include "plant.h"',
-        "",
-        source.text,
-        f"const double plant_period = {literal(period)};",
-        "",
-        "void plant_start(double rate, double seed, double repeat)",
-        "{",
-        f"    {into['voltage']} = 0.0;",
-        f"    {into['current']} = 0.0;",
-        *(f"    {into[name]} = {name};" for name in ("rate", "seed", "repeat")),
-        "    met_start();",
-        "    met_tick(0);",
-        "    met_end();",
-        "}",
-        "",
-        "void plant_tick(double voltage, double current)",
-        "{",
-        *(f"    {into[name]} = {name};" for name in ("voltage", "current")),
-        "    met_tick((int64_t)met.tick + 1);",
-        "    met_end();",
-        "}",
-        *(line for name in _OUTPUTS for line in
-          ("", f"double plant_{name}(void)", "{", f"    return {out[name]};", "}")),
-        "",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            f"/* The motor bed of joint {named} as simulated, a tick every {period} s. Written by MET. */",
+            '#include "plant.h"',
+            "",
+            source.text,
+            f"const double plant_period = {literal(period)};",
+            "",
+            "void plant_start(double rate, double seed, double repeat)",
+            "{",
+            f"    {into['voltage']} = 0.0;",
+            f"    {into['current']} = 0.0;",
+            *(f"    {into[name]} = {name};" for name in ("rate", "seed", "repeat")),
+            "    met_start();",
+            "    met_tick(0);",
+            "    met_end();",
+            "}",
+            "",
+            "void plant_tick(double voltage, double current)",
+            "{",
+            *(f"    {into[name]} = {name};" for name in ("voltage", "current")),
+            "    met_tick((int64_t)met.tick + 1);",
+            "    met_end();",
+            "}",
+            *(
+                line
+                for name in _OUTPUTS
+                for line in ("", f"double plant_{name}(void)", "{", f"    return {out[name]};", "}")
+            ),
+            "",
+        ]
+    )
 
 
 def bed_values(experiment: Experiment, joint: str, case: int = 0) -> dict[str, float]:
@@ -157,9 +162,13 @@ class _Phases:
         names = ("settle", "begin", "hold", "bed", "read")
         settle, begin, hold, bed, read = (CallPhase(Phase(name, getattr(self, name))) for name in names)
         return Program(
-            base_hz=1.0 / self.period, start=(settle, begin) if self.settled else (begin,),
-            tick=(Unless0((hold, bed)),), end=(read,), inputs=_INPUTS, outputs=_OUTPUTS,
-        )  # fmt: skip
+            base_hz=1.0 / self.period,
+            start=(settle, begin) if self.settled else (begin,),
+            tick=(Unless0((hold, bed)),),
+            end=(read,),
+            inputs=_INPUTS,
+            outputs=_OUTPUTS,
+        )
 
     def settle(self, tape: Tape) -> None:
         for path, value in self.settled.items():
@@ -185,8 +194,11 @@ class _Phases:
 def _settled(experiment: Experiment, joint: str, case: int) -> dict[str, float]:
     """Values of the varied parameters of a joint's bed in a case, by path, as the kernel's start computes them."""
     coordinates = {c.path: float(c.values[case]) for c in experiment.cases.coordinates}
-    varying = {path: quantity.value.output for path, quantity in experiment.parameters.items()
-               if isinstance(quantity.value, Formula) and path.startswith(f"{joint}.bed.")}  # fmt: skip
+    varying = {
+        path: quantity.value.output
+        for path, quantity in experiment.parameters.items()
+        if isinstance(quantity.value, Formula) and path.startswith(f"{joint}.bed.")
+    }
     if not varying:
         return {}
     # what no phase of the kernel reads is not computed there

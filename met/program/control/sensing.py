@@ -97,9 +97,14 @@ def sensor_slopes(
 
 
 def tick(
-    system: System, tape: Tape, fitted: Fitted, find: Callable[[], Real], divisor: int, period: float,
+    system: System,
+    tape: Tape,
+    fitted: Fitted,
+    find: Callable[[], Real],
+    divisor: int,
+    period: float,
     state: Callable[[str], Real],
-) -> Real:  # fmt: skip
+) -> Real:
     """The reading of a sensor at a tick of its computer; its memory goes a tick on.
 
     find   gives the quantity;  state  its states, by channel

@@ -91,10 +91,15 @@ class Substituted:
     @property
     def wire_outputs(self) -> dict[str, str]:
         """Names of the outputs that go over the wires, by the cells that hold them."""
-        return {
-            f"wire:{each.joint}.{name}": f"{each.joint}:sent.{name}" for each in self.mounted
-            for name in ("voltage", "current")
-        } if self.wire else {}  # fmt: skip
+        return (
+            {
+                f"wire:{each.joint}.{name}": f"{each.joint}:sent.{name}"
+                for each in self.mounted
+                for name in ("voltage", "current")
+            }
+            if self.wire
+            else {}
+        )
 
     # Control.
 
@@ -127,9 +132,11 @@ class Substituted:
         arm, law, first = (
             Every(due, (RunPhase(Phase(name, body)),))
             for due, name, body in (
-                (self.dynamics, "arm", self.arm), (self.divisor, "law", self.act), (self.dynamics, "given", self.first)
+                (self.dynamics, "arm", self.arm),
+                (self.divisor, "law", self.act),
+                (self.dynamics, "given", self.first),
             )
-        )  # fmt: skip
+        )
         return arm, law, first
 
     # The run's start.
@@ -250,14 +257,20 @@ class Substituted:
         ahead = [self._ahead(tape, each) for each in self.mounted]
         found: Sequence[balance.Balanced | None] = [None] * len(self.mounted)
         if self.law.balance != "none":
-            sides = [self._side(tape, each, w, self._voltage(tape, each), self._band(tape, each))
-                     for each, w in zip(self.mounted, ahead, strict=True)]  # fmt: skip
+            sides = [
+                self._side(tape, each, w, self._voltage(tape, each), self._band(tape, each))
+                for each, w in zip(self.mounted, ahead, strict=True)
+            ]
             solve = balance.bare if self.law.balance == "bare" else balance.balanced
             found = solve(sides, Lambda, b_0)
         inputs = [self._law_input(tape, each, one) for each, one in zip(self.mounted, found, strict=True)]
         p = [self._law_values(tape, each) for each in self.mounted]
-        held = [NamedValues(f"law `{each.law.name}`", {m.name: tape.read(f"{each.joint}.law.{m.name}")
-                for m in each.law.memory}) for each in self.mounted]  # fmt: skip
+        held = [
+            NamedValues(
+                f"law `{each.law.name}`", {m.name: tape.read(f"{each.joint}.law.{m.name}") for m in each.law.memory}
+            )
+            for each in self.mounted
+        ]
         owner = f"law `{self.law.name}`"
         given = answer(owner, self.law.give, p, held, inputs, lambda qdd: balance.loads(Lambda, b_0, qdd))
         applied = []
@@ -364,11 +377,17 @@ class Substituted:
         mean = each.law.balance == "full"
         extra = p.inertia * (self.period / lasting(motor.damping / p.inertia, self.period) - 1.0) if mean else 0.0
         return LawInput(
-            motor=motor, inertia=p.inertia, rate=tape.read(f"{name}:read"), before=tape.read(f"{name}:before"),
-            w=tape.read(f"{name}:w"), d=self._observed(tape, each)[3] if each.law.observer else 0.0,
+            motor=motor,
+            inertia=p.inertia,
+            rate=tape.read(f"{name}:read"),
+            before=tape.read(f"{name}:before"),
+            w=tape.read(f"{name}:w"),
+            d=self._observed(tape, each)[3] if each.law.observer else 0.0,
             w_ref=tape.read(f"{name}:w_ref") if each.law.observer else 0.0,
-            period=self.period, balance=found, extra=extra,
-        )  # fmt: skip
+            period=self.period,
+            balance=found,
+            extra=extra,
+        )
 
     def _predicted(self, tape: Tape, each: Mounted, x: observer.Four, wire: Wire) -> observer.Four:
         """The observer's state a tick on, under what the amplifiers hold."""

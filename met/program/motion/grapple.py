@@ -112,10 +112,13 @@ class Grapple:
         drives = [self._drive(tape, actuator, y) for actuator in system.actuators]
         on_beds = {actuator.index for actuator, _, _ in system.mounted}
         solved = solve(
-            payloads.tree_with_payloads(system, tape.read), y.q[:n], (0.0,) * n,
+            payloads.tree_with_payloads(system, tape.read),
+            y.q[:n],
+            (0.0,) * n,
             mode=tuple(False if i in on_beds else _yields(drive) for i, drive in enumerate(drives)),
-            rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives), wrenches=blows,
-        )  # fmt: skip
+            rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
+            wrenches=blows,
+        )
         jumping = tape.read_mask("grappling")
         jumps = [(joint.name, jump) for joint, jump in zip(system.joints, solved.qdd, strict=True)]
         body = free_base(system)

@@ -140,8 +140,9 @@ def slopes_of_payloads(
         wrench = wrenches.get(payload.name, NOTHING)
         solved = free_acceleration(body_of(system, payload, read), found.w, wrench, falling)
         on = carried(payload, read)
-        for kept, free in zip((qd, qdd), slopes(body, y, pose=found.pose, turned=found.turned, solved=solved),
-                              strict=True):  # fmt: skip
+        for kept, free in zip(
+            (qd, qdd), slopes(body, y, pose=found.pose, turned=found.turned, solved=solved), strict=True
+        ):
             kept += [choose(on, 0.0, slope) for slope in free]
     return tuple(qd), tuple(qdd)
 
