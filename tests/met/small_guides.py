@@ -49,7 +49,9 @@ def inboard(kinds: Mapping[str, JointKind]) -> dict[str, str]:
 
 def body(guide: Any, guided: Sequence[str], entries: Sequence[str]) -> str:
     """The guide's entries with its path, which moves, and with its rate."""
-    path = [f"{name} = ramp(to = 0.05 {'m' if component(name).kind == 'prismatic' else 'rad'}, over = 0.1 s);"
-            for name in guided]  # fmt: skip
+    path = [
+        f"{name} = ramp(to = 0.05 {'m' if component(name).kind == 'prismatic' else 'rad'}, over = 0.1 s);"
+        for name in guided
+    ]
     rate = ["rate = 125 Hz;"] if guide.steer is not None else []
     return " ".join([*entries, *path, *rate])

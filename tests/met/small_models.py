@@ -60,9 +60,18 @@ run it {{
 sweep cases of it {{ {cases} }}
 """
 PLAIN = {
-    "base": "", "root": "base", **JOINTS, "more": "", "servos": "", "gravity": "gravity = [0, 0, -9.81] m/s^2;",
-    "environment": "", "integrator": "modified_euler", "metric": "final { of = slide.q; }", "run": "", "cases": CASES,
-}  # fmt: skip
+    "base": "",
+    "root": "base",
+    **JOINTS,
+    "more": "",
+    "servos": "",
+    "gravity": "gravity = [0, 0, -9.81] m/s^2;",
+    "environment": "",
+    "integrator": "modified_euler",
+    "metric": "final { of = slide.q; }",
+    "run": "",
+    "cases": CASES,
+}
 """The parts of the deck, where no model writes them."""
 
 WORDS_OF_DECK = ("root", *JOINTS, "integrator", "metric")
@@ -223,10 +232,16 @@ class Use:
         """What the paths of its parameters begin with."""
         of_joint = f"{self.joint}.servo.sensor.{self.small.of}"
         return {
-            "servo": f"{self.joint}.servo", "sensor": "sensors.used" if self.on_link else of_joint,
-            "command": f"{self.joint}.servo.command", "environment": "environment.used", "guide": "guides.used",
-            "metric": "metrics.m", "bed": f"{self.joint}.bed", "law": f"{self.joint}.law", "integrator": "integrator",
-        }[self.kind]  # fmt: skip
+            "servo": f"{self.joint}.servo",
+            "sensor": "sensors.used" if self.on_link else of_joint,
+            "command": f"{self.joint}.servo.command",
+            "environment": "environment.used",
+            "guide": "guides.used",
+            "metric": "metrics.m",
+            "bed": f"{self.joint}.bed",
+            "law": f"{self.joint}.law",
+            "integrator": "integrator",
+        }[self.kind]
 
     @property
     def label(self) -> str:
@@ -234,10 +249,14 @@ class Use:
         return {
             "servo": "servo `used`",
             "sensor": "sensor `used`" if self.on_link else f"sensor `{self.small.of}` of servo `used`",
-            "command": f"`{self.name}`", "environment": "environment `used`", "guide": "guide `used`",
-            "metric": "metric `m`", "bed": f"bed `{self.name}` of joint `{self.joint}`",
-            "law": f"law `{self.name}` of joint `{self.joint}`", "integrator": "",
-        }[self.kind]  # fmt: skip
+            "command": f"`{self.name}`",
+            "environment": "environment `used`",
+            "guide": "guide `used`",
+            "metric": "metric `m`",
+            "bed": f"bed `{self.name}` of joint `{self.joint}`",
+            "law": f"law `{self.name}` of joint `{self.joint}`",
+            "integrator": "",
+        }[self.kind]
 
     @property
     def of_joint(self) -> tuple[Parameter, ...]:
@@ -301,9 +320,10 @@ class Use:
 
     def _here(self, declared: Iterable[Parameter], *, lists: bool = True) -> tuple[Parameter, ...]:
         return tuple(
-            under(parameter, self.command) for parameter in declared
+            under(parameter, self.command)
+            for parameter in declared
             if is_present(parameter, self.chosen) and (lists or parameter.shape != "list")
-        )  # fmt: skip
+        )
 
     @property
     def parts(self) -> Parts:
@@ -341,8 +361,14 @@ class Use:
         number = f"[{', '.join(map(repr, value))}]" if isinstance(value, tuple) else repr(float(value))
         return f"{number} {unit}".rstrip()
 
-    def deck(self, written: Mapping[str, str] | None = None, *, without: Collection[str] = (), before: str = "",
-             cases: str = CASES) -> str:  # fmt: skip
+    def deck(
+        self,
+        written: Mapping[str, str] | None = None,
+        *,
+        without: Collection[str] = (),
+        before: str = "",
+        cases: str = CASES,
+    ) -> str:
         """The deck.
 
         written  texts of parameters, in the stead of the smallest deck's or besides
@@ -353,8 +379,9 @@ class Use:
         entries |= written or {}
         parts = {**PLAIN, **self.small.beside, "cases": cases}
         own = self._parts({name: text for name, text in entries.items() if name not in without})
-        return before + DECK.format(**parts | {name: text if name in WORDS_OF_DECK else f"{parts[name]} {text}"
-                                               for name, text in own.items()})  # fmt: skip
+        return before + DECK.format(
+            **parts | {name: text if name in WORDS_OF_DECK else f"{parts[name]} {text}" for name, text in own.items()}
+        )
 
     def _parts(self, entries: Mapping[str, str]) -> dict[str, str]:
         """The parts of the deck in which it stands, with its entries."""
@@ -369,15 +396,17 @@ class Use:
             return {"run": f"sensor used = {self.name} {{ rate = 125 Hz; {block[2:]}"}
         if self.kind == "sensor":
             servo = replace(self, kind="servo", name=self.carrier or carrier(self.kind, self.command), words={})
-            taken = servo._parts({name: servo.text(servo.parameter(name), value)
-                                  for name, value in servo.values.items()})  # fmt: skip
+            taken = servo._parts(
+                {name: servo.text(servo.parameter(name), value) for name, value in servo.values.items()}
+            )
             sensor = f"sensor {self.small.of} = {self.name} {block};"
             return {**taken, "more": f"{taken['more'].removesuffix('}')} {sensor} }}"}
         if self.kind in ("command", "bed", "law"):
             asked = f"{self.name}{call}" if self.kind == "command" else value_of(self.command, self.joint)
             servo = replace(self, kind="servo", name=self.carrier or carrier(self.kind, self.command), words={})
-            taken = servo._parts({name: servo.text(servo.parameter(name), value)
-                                  for name, value in servo.values.items()})  # fmt: skip
+            taken = servo._parts(
+                {name: servo.text(servo.parameter(name), value) for name, value in servo.values.items()}
+            )
             taken["servos"] = f"{self.joint} = used {{ command = {self.command}({asked}); }};"
             put = f"substitute {self.joint} {{ {self.kind} = {self.name}{call}; }}"
             return taken if self.kind == "command" else {**taken, "run": put}
@@ -392,8 +421,12 @@ class Use:
     def _guide(self, entries: Mapping[str, str]) -> dict[str, str]:
         """The parts of the deck with a guide, whose joints have servos of their kinds."""
         kinds, alike = self.kinds, {kind: joint for joint, kind in JOINTS.items()}
-        servos = {kind: replace(self, kind="servo", name=carrier("servo", self.command), joint=alike[kind], words={},
-                                for_all=False) for kind in kinds.values()}  # fmt: skip
+        servos = {
+            kind: replace(
+                self, kind="servo", name=carrier("servo", self.command), joint=alike[kind], words={}, for_all=False
+            )
+            for kind in kinds.values()
+        }
         definitions = [
             f"servo of_{kind} {{ model = {servo.name}; "
             + " ".join(f"{name} = {servo.text(servo.parameter(name), x)};" for name, x in servo.values.items())
@@ -411,10 +444,12 @@ class Use:
         body = small_guides.body(self.model, small_guides.components(self.model, self.chosen), written)
         own = dict.fromkeys(JOINTS, JOINTS[self.joint]) if self.for_all else {}
         return {
-            **small_guides.inboard(kinds), **own, "more": "\n".join(definitions),
+            **small_guides.inboard(kinds),
+            **own,
+            "more": "\n".join(definitions),
             "servos": " ".join(f"{joint} = of_{kind};" for joint, kind in kinds.items()),
             "run": f"guide used = {self.name} {{ {body} }}",
-        }  # fmt: skip
+        }
 
     def put(self, folder: Path) -> Use:
         """Writes the file that a course from a file reads, beside the deck; gives itself."""
@@ -462,8 +497,11 @@ def value_of(command: str, joint: str) -> str:
 def carrier(kind: str, command: str) -> str:
     """The first servo that takes this command; for a bed or law, that has a motor besides."""
     on_bed = kind in ("bed", "law")
-    return next(name for name, servo in models.find_own("servo").items()
-                if command in servo.commands and (models.has_motor(servo) or not on_bed))  # fmt: skip
+    return next(
+        name
+        for name, servo in models.find_own("servo").items()
+        if command in servo.commands and (models.has_motor(servo) or not on_bed)
+    )
 
 
 def commands(kind: str, model: Any) -> tuple[str, ...]:
@@ -491,8 +529,11 @@ def uses(kind: models.Kind, name: str, joint: str = "hinge") -> Iterator[Use]:
         return small.values.get(parameter.name, parameter.default)  # type: ignore[return-value]
 
     written = models.written(model)
-    chosen = [[(p.name, word) for word in sorted(p.words, key=lambda word, p=p: word != first(p))]
-              for p in written if p.words and not p.names]  # fmt: skip
+    chosen = [
+        [(p.name, word) for word in sorted(p.words, key=lambda word, p=p: word != first(p))]
+        for p in written
+        if p.words and not p.names
+    ]
     links = [(p.name, link) for p in written if p.names == "link" for link in (*LINKS, *p.words) if link != first(p)]
     for command in kinds:
         plain = Use(kind, name, joint, command)

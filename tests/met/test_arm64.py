@@ -52,8 +52,16 @@ def run_on_arm64(
     made = subprocess.run(words, capture_output=True, text=True)
     assert made.returncode == 0, made.stderr
     rows = ticks // program.record_divisor + 1
-    shape = (len(cases), lanes, len(program.inputs), len(recording.cells), len(program.outputs), ticks, rows,
-             program.columns)  # fmt: skip
+    shape = (
+        len(cases),
+        lanes,
+        len(program.inputs),
+        len(recording.cells),
+        len(program.outputs),
+        ticks,
+        rows,
+        program.columns,
+    )
     (folder / "question").write_bytes(np.array(shape, "<i8").tobytes() + cases.astype("<f8").tobytes())
     done = subprocess.run([EMULATOR, folder / "run", folder / "question", folder / "answer"], capture_output=True)
     assert done.returncode == 0, done.stderr

@@ -25,8 +25,10 @@ LOCKED = "servo drive { model = locked;  release = WHEN; }\n"
 
 
 def ran(folder: Path, servo: str, environment: str, when: str) -> Run:
-    deck = [part.replace("ENVIRONMENT", environment).replace("COMMAND", "rate(0.1 rad/s)").replace("WHEN", when)
-            for part in (ARM, servo, RUN)]  # fmt: skip
+    deck = [
+        part.replace("ENVIRONMENT", environment).replace("COMMAND", "rate(0.1 rad/s)").replace("WHEN", when)
+        for part in (ARM, servo, RUN)
+    ]
     return engine.run(experiment(folder, *deck))
 
 

@@ -15,8 +15,17 @@ from tests.oracles.package import Package
 pint = Package("pint")
 
 # what pint calls those that it names otherwise
-PINT_NAMES = {"%": "percent", "cycle": "turn", "t": "metric_ton", "um": "micrometer", "us": "microsecond",
-              "arcmin": "arcminute", "arcsec": "arcsecond", "mohm": "milliohm", "kohm": "kiloohm"}  # fmt: skip
+PINT_NAMES = {
+    "%": "percent",
+    "cycle": "turn",
+    "t": "metric_ton",
+    "um": "micrometer",
+    "us": "microsecond",
+    "arcmin": "arcminute",
+    "arcsec": "arcsecond",
+    "mohm": "milliohm",
+    "kohm": "kiloohm",
+}
 
 
 @pytest.fixture(scope="module")
@@ -75,11 +84,20 @@ def test_an_angle_counts_only_where_the_rest_is_time_or_nothing(a, b, alike):
 @pytest.mark.parametrize(
     ("written", "scale"),
     [
-        ("1", 1.0), ("1/s", 1.0), ("mm^2", 1e-6), ("kg*m^2", 1.0), ("g*cm^2", 1e-7), ("N*m/(A*s)", 1.0),
-        ("N*m/(mA*ms)", 1e6), ("1/(kg*mm^2)", 1e6), ("V / (rad / s)", 1.0), ("m^-2", 1.0),
-        ("mm^-1", 1e3), ("(mm)^2", 1e-6),
+        ("1", 1.0),
+        ("1/s", 1.0),
+        ("mm^2", 1e-6),
+        ("kg*m^2", 1.0),
+        ("g*cm^2", 1e-7),
+        ("N*m/(A*s)", 1.0),
+        ("N*m/(mA*ms)", 1e6),
+        ("1/(kg*mm^2)", 1e6),
+        ("V / (rad / s)", 1.0),
+        ("m^-2", 1.0),
+        ("mm^-1", 1e3),
+        ("(mm)^2", 1e-6),
     ],
-)  # fmt: skip
+)
 def test_a_declared_unit_is_read_with_products_powers_and_parentheses(written, scale):
     # powers and products of the scales: a few roundings
     assert parse_unit(written).scale == pytest.approx(scale, rel=1e-15 * 8)
@@ -122,8 +140,12 @@ _IN_SI = {
 }  # fmt: skip
 EXACT = {
     **{name: Fraction(each) for name, each in _IN_SI.items()},
-    "deg": PI / 180, "arcmin": PI / 10800, "arcsec": PI / 648000, "cycle": 2 * PI, "rpm": PI / 30,
-}  # fmt: skip
+    "deg": PI / 180,
+    "arcmin": PI / 10800,
+    "arcsec": PI / 648000,
+    "cycle": 2 * PI,
+    "rpm": PI / 30,
+}
 
 
 @pytest.mark.slow

@@ -51,10 +51,18 @@ def _in_software(folder: Path) -> list[Path]:
         axes = figure.add_subplot(facecolor=SURFACE)
         rate = met.signals["qd"][0, :, joint]
         axes.axhline(SLOW, color=MUTED, linewidth=1.0, linestyle=(0, (4, 3)))
-        axes.annotate(f"commanded, {SLOW} rad/s", (20.0, SLOW), xytext=(0, 5), textcoords="offset points",
-                      ha="right", color=MUTED, fontsize=9)  # fmt: skip
-        axes.plot(exact.time, exact.qd[:, joint], color=BEHIND, linewidth=4.0, alpha=0.45,
-                  label="exact (Lagrange, DOP853)")  # fmt: skip
+        axes.annotate(
+            f"commanded, {SLOW} rad/s",
+            (20.0, SLOW),
+            xytext=(0, 5),
+            textcoords="offset points",
+            ha="right",
+            color=MUTED,
+            fontsize=9,
+        )
+        axes.plot(
+            exact.time, exact.qd[:, joint], color=BEHIND, linewidth=4.0, alpha=0.45, label="exact (Lagrange, DOP853)"
+        )
         axes.plot(met.time, rate, color=LINE, linewidth=1.6, label="MET, dynamics 25 Hz, servo 100 Hz")
         title = f"Joint {joint + 1} ({name}): the paper's figure {joint + 5}"
         axes.set_title(title, loc="left", color=INK, fontsize=11)

@@ -82,8 +82,14 @@ def test_velocity_products_are_those_of_lagrange():
     exact = reference(times, velocity_products=True, **options)
     without = reference(times, velocity_products=False, **options)
     body = "environment { velocity_products = on; } initial { elbow.q = 1 rad; }"
-    result = run(dynamics_hz=1000, record_hz=100, duration=5, friction=False, run=body,
-                 command="rate(sine(amplitude = 0.2 rad/s, frequency = 0.3 Hz))")  # fmt: skip
+    result = run(
+        dynamics_hz=1000,
+        record_hz=100,
+        duration=5,
+        friction=False,
+        run=body,
+        command="rate(sine(amplitude = 0.2 rad/s, frequency = 0.3 Hz))",
+    )
     assert off(result, exact, "qd") < 2e-5
     assert off(result, without, "qd") > 50 * off(result, exact, "qd")
 

@@ -111,8 +111,9 @@ def inertias(heavier: float) -> np.ndarray:
     length, upper, lower = 2.0, 40.0 * heavier, 20.0 * heavier
     elbow = lower * length**2 / 3.0
     both = lower * length**2 / 2.0
-    return np.array([[upper * length**2 / 3.0 + lower * length**2 + 2.0 * both + elbow, both + elbow],
-                     [both + elbow, elbow]])  # fmt: skip
+    return np.array(
+        [[upper * length**2 / 3.0 + lower * length**2 + 2.0 * both + elbow, both + elbow], [both + elbow, elbow]]
+    )
 
 
 def factor(r: float) -> float:

@@ -35,8 +35,9 @@ SIGNALS = "record += [shoulder.bed.filtered, shoulder.law.unknown_torque];  seed
 
 
 def made(bed: str = "emulated(faults = typical)", duration: float = 0.5) -> Experiment:
-    return compiled(deck(("shoulder", "elbow"), command=TURNING, duration=duration, bed=bed, swept=VARIED,
-                         hybrid=SIGNALS), "bench")  # fmt: skip
+    return compiled(
+        deck(("shoulder", "elbow"), command=TURNING, duration=duration, bed=bed, swept=VARIED, hybrid=SIGNALS), "bench"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -116,9 +117,14 @@ def test_the_kernel_computes_what_the_plain_run_does(cases: list[int], duration:
 
 def still(seed: int, gain: str) -> engine.Run:
     """Both joints told to stay where they are: the shafts stand still, and what the filter shows is noise alone."""
-    text = deck(("shoulder", "elbow"), command="0 rad/s", duration=0.2, bed="emulated(faults = typical)",
-                swept=f"vary told.kp = {gain} V*s/rad;  vary shoulder.law.gain = [0.1, 0.3];",
-                hybrid=f"record += [bed.filtered];  seed = {seed};")  # fmt: skip
+    text = deck(
+        ("shoulder", "elbow"),
+        command="0 rad/s",
+        duration=0.2,
+        bed="emulated(faults = typical)",
+        swept=f"vary told.kp = {gain} V*s/rad;  vary shoulder.law.gain = [0.1, 0.3];",
+        hybrid=f"record += [bed.filtered];  seed = {seed};",
+    )
     return engine.run(compiled(text, "bench"))
 
 

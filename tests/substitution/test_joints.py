@@ -21,14 +21,22 @@ LIMITS = {"velocity_tracking": (0.3, 0.5, 0.6), "torque_balance": (1.0, 2.0, 2.5
 BENT = "initial { q = [0, 0.3, -0.4] rad; }"
 
 
-def tree(name: str, masses: Sequence[float], *, parents: Sequence[int] = (-1, 0, 1), at: Sequence[float] = (0, 2, 2),
-         axes: str = "zzz") -> tuple[str, Sequence[str], str]:  # fmt: skip
+def tree(
+    name: str,
+    masses: Sequence[float],
+    *,
+    parents: Sequence[int] = (-1, 0, 1),
+    at: Sequence[float] = (0, 2, 2),
+    axes: str = "zzz",
+) -> tuple[str, Sequence[str], str]:
     """An arm of three rods of 2 m; masses kg, at m along the parent."""
     lines = []
     for i, (mass, parent, x, axis) in enumerate(zip(masses, parents, at, axes, strict=True)):
         lines.append(f"link l{i} {{ mass = {mass} kg; shape = rod(length = reach, along = x); }}")
-        lines.append(f"joint j{i} revolute {{ parent = {'base' if parent < 0 else f'l{parent}'}; child = l{i};"
-                     f" axis = {axis}; at = [{x}, 0, 0] m; }}")  # fmt: skip
+        lines.append(
+            f"joint j{i} revolute {{ parent = {'base' if parent < 0 else f'l{parent}'}; child = l{i};"
+            f" axis = {axis}; at = [{x}, 0, 0] m; }}"
+        )
     return name, ("j0", "j1", "j2"), f"arm {name} {{ {' '.join(lines)} }}"
 
 
@@ -42,9 +50,16 @@ BRANCH = tree("branched", (40, 20, 10), parents=(-1, 0, 0), at=(0, 2, 1))
 @pytest.mark.parametrize("joints", [
     ("j1",), ("j0", "j1", "j2"), pytest.param(("j2",), marks=slow), pytest.param(("j0", "j2"), marks=slow),
 ])  # fmt: skip
-@pytest.mark.parametrize("arm", [
-    HEAVY, BRANCH, pytest.param(PLANAR, marks=slow), pytest.param(SPATIAL, marks=slow),
-], ids=lambda arm: arm[0])  # fmt: skip
+@pytest.mark.parametrize(
+    "arm",
+    [
+        HEAVY,
+        BRANCH,
+        pytest.param(PLANAR, marks=slow),
+        pytest.param(SPATIAL, marks=slow),
+    ],
+    ids=lambda arm: arm[0],
+)
 def test_joints_of_a_tree_follow_their_own_motors(
     arm: tuple[str, Sequence[str], str], joints: tuple[str, ...], law: str
 ) -> None:

@@ -75,8 +75,9 @@ def test_under_a_position_command_the_limit_is_that_of_the_position_loop(gain: f
 
 @pytest.mark.slow
 def test_under_a_torque_command_the_gains_that_it_does_not_use_do_not_matter() -> None:
-    limits = {_margin(f"kp = {kp} V*s/rad;  command = torque(1 N*m);", "measured_acceleration")[0].limit
-              for kp in (0.02, 1.0)}  # fmt: skip
+    limits = {
+        _margin(f"kp = {kp} V*s/rad;  command = torque(1 N*m);", "measured_acceleration")[0].limit for kp in (0.02, 1.0)
+    }
     assert len(limits) == 1 and None not in limits
     assert _margin("kp = 1 V*s/rad;", "measured_acceleration")[0].lower > 0.0
 
@@ -144,22 +145,45 @@ def test_where_the_arm_is_too_light_the_table_says_from_where_it_would_not_be() 
     assert rows[1]["lower"] == found[1][0].lower and rows[1]["margin"] == found[1][0].lighter
 
 
-@pytest.mark.parametrize(("one", "said", "sentence", "what_helps"), [
-    (_one(), "50 times heavier, 10 times lighter", "r = 1, stable from 0.1 to 50", None),
-    (_one(limit=None), "10 times lighter", "r = 1, stable from 0.1 to more than 2e+03", None),
-    (_one(lower=0.0), "50 times", "r = 1, stable to 50", None),
-    (_one(lower=0.0, limit=None), "no limit found", "r = 1, stable to more than 2e+03", None),
-    (_one(lower=2.0), "NONE: unstable, too light", "r = 1, stable from 2 to 50",
-     "a lower gain of the servo's rate loop, a faster servo or a heavier arm"),
-    (_one(least=0.05), "NONE: unstable, too light", "r = 0.05, stable from 0.1 to 50",
-     "a lower gain of the servo's rate loop, a faster servo or a heavier arm"),
-    (_one(together=60.0), "NONE: unstable", "r = 60, stable from 0.1 to 50",
-     "a lighter arm, a faster servo or another law"),
-    (_one(lower=0.0, limit=0.5), "NONE: unstable", "r = 1, stable to 0.5",
-     "a lighter arm, a faster servo or another law"),
-    (_one(lower=0.0, limit=0.0), "NONE: unstable", "r = 1, stable at no r",
-     "lower gains, a faster servo or another law"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("one", "said", "sentence", "what_helps"),
+    [
+        (_one(), "50 times heavier, 10 times lighter", "r = 1, stable from 0.1 to 50", None),
+        (_one(limit=None), "10 times lighter", "r = 1, stable from 0.1 to more than 2e+03", None),
+        (_one(lower=0.0), "50 times", "r = 1, stable to 50", None),
+        (_one(lower=0.0, limit=None), "no limit found", "r = 1, stable to more than 2e+03", None),
+        (
+            _one(lower=2.0),
+            "NONE: unstable, too light",
+            "r = 1, stable from 2 to 50",
+            "a lower gain of the servo's rate loop, a faster servo or a heavier arm",
+        ),
+        (
+            _one(least=0.05),
+            "NONE: unstable, too light",
+            "r = 0.05, stable from 0.1 to 50",
+            "a lower gain of the servo's rate loop, a faster servo or a heavier arm",
+        ),
+        (
+            _one(together=60.0),
+            "NONE: unstable",
+            "r = 60, stable from 0.1 to 50",
+            "a lighter arm, a faster servo or another law",
+        ),
+        (
+            _one(lower=0.0, limit=0.5),
+            "NONE: unstable",
+            "r = 1, stable to 0.5",
+            "a lighter arm, a faster servo or another law",
+        ),
+        (
+            _one(lower=0.0, limit=0.0),
+            "NONE: unstable",
+            "r = 1, stable at no r",
+            "lower gains, a faster servo or another law",
+        ),
+    ],
+)
 def test_a_margin_in_words(one: Margin, said: str, sentence: str, what_helps: str | None) -> None:
     assert verdict(one) == said
     assert in_words(one) == f"hip: {sentence} with velocity_tracking at 500 Hz"

@@ -38,8 +38,11 @@ def test_a_run_follows_the_motor_on_the_bed_and_not_its_data_sheet(share: float,
 
 def test_what_the_motor_does_besides_its_data_sheet_is_found_by_the_observer() -> None:
     """kt 7 % low: at a steady rate the unknown torque is what the servo believes of the torque, less what there is."""
-    text = deck(bed=f"emulated(kt = {KT * 0.93:.6g} N*m/A)", sweep=loads([1.5]),
-                hybrid="record += [shoulder.bed.drive_voltage, shoulder.law.unknown_torque];")  # fmt: skip
+    text = deck(
+        bed=f"emulated(kt = {KT * 0.93:.6g} N*m/A)",
+        sweep=loads([1.5]),
+        hybrid="record += [shoulder.bed.drive_voltage, shoulder.law.unknown_torque];",
+    )
     run = ran(text, "bench")
     w = run.signals["shoulder.bed.shaft_rate"][0, -500:]
     V, d = (run.signals[f"shoulder.{name}"][0, -500:] for name in ("bed.drive_voltage", "law.unknown_torque"))

@@ -68,10 +68,16 @@ def test_a_rod_that_is_pulled_down_holds_or_gives_way_as_on_its_own_motor(comman
     """Friction holds 32 N m. With 20 N m a rod at rest stays there exactly, with 40 N m it turns its motor back."""
     heaviness, weights = (0.5, 5.0, 50.0), (-40.0, -20.0, 20.0, 40.0)
     cases = [(3.0 * r * ROTOR / 4.0, weight) for r in heaviness for weight in weights]  # kg, N m
-    masses, pulls = (", ".join(f"{x:.9g}" for x in row)
-                     for row in zip(*((mass, weight / mass) for mass, weight in cases), strict=True))  # fmt: skip
-    text = deck(arm=HANGING, command=command, sweep=f"zip {{ load = [{masses}] kg;  pull = [{pulls}] m/s^2; }}",
-                pure="environment { gravity = [0 m/s^2, 0 m/s^2, -pull]; }")  # fmt: skip
+    masses, pulls = (
+        ", ".join(f"{x:.9g}" for x in row)
+        for row in zip(*((mass, weight / mass) for mass, weight in cases), strict=True)
+    )
+    text = deck(
+        arm=HANGING,
+        command=command,
+        sweep=f"zip {{ load = [{masses}] kg;  pull = [{pulls}] m/s^2; }}",
+        pure="environment { gravity = [0 m/s^2, 0 m/s^2, -pull]; }",
+    )
     own, bench = ran(text, "own").signals["qd"][:, :, 0], shaft(ran(text, "bench"), "shoulder")
     worst = Worst(f"rods pulled down, {command[:7]}, %")
     for (mass, weight), each in zip(cases, apart(own, bench), strict=True):

@@ -49,26 +49,43 @@ def grows(own: np.ndarray, bench: np.ndarray, rows: int) -> np.ndarray:
 def swept(law: str, rate: int, swept: str, heaviness: Sequence[float], duration: float) -> tuple[str, np.ndarray]:
     """A deck, and whether each of its cases grows: (other axes of the sweep, r)."""
     masses = ", ".join(f"{r * ROTOR * 3.0 / REACH**2:.12g}" for r in heaviness)
-    text = deck(law=law, servos=rate, dynamics=rate, duration=duration, arm=ONE, sweep=f"vary load = [{masses}] kg;",
-                swept=swept)  # fmt: skip
+    text = deck(
+        law=law,
+        servos=rate,
+        dynamics=rate,
+        duration=duration,
+        arm=ONE,
+        sweep=f"vary load = [{masses}] kg;",
+        swept=swept,
+    )
     own = ran(text, "own").signals["qd"][:, :, 0]
     bench = shaft(ran(text, "bench"), "shoulder").reshape(-1, *own.shape)
     return text, grows(own, bench, round(duration * rate / 8.0))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("rate", "duration", "delays", "cuts"), [
-    (100, 8.0, (0, 1), (50,)),
-    (1000, 4.0, (0, 1), (50,)),
-    *(pytest.param(rate, duration, (0, 1, 2), (20, 50, 100), marks=slow)
-      for rate, duration in ((100, 8.0), (200, 8.0), (1000, 4.0))),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("rate", "duration", "delays", "cuts"),
+    [
+        (100, 8.0, (0, 1), (50,)),
+        (1000, 4.0, (0, 1), (50,)),
+        *(
+            pytest.param(rate, duration, (0, 1, 2), (20, 50, 100), marks=slow)
+            for rate, duration in ((100, 8.0), (200, 8.0), (1000, 4.0))
+        ),
+    ],
+)
 def test_measured_acceleration_grows_from_where_the_margin_and_an_independent_model_say(
     rate: int, duration: float, delays: tuple[int, ...], cuts: tuple[int, ...]
 ) -> None:
     heaviness = np.geomspace(0.8, 16.0, 121)  # 2.5 % apart
-    text, found = swept("measured_acceleration", rate, f"vary shoulder.bed.delay = {list(delays)};"
-                        f" vary shoulder.bed.f_cut = {list(cuts)} Hz;", heaviness, duration)  # fmt: skip
+    text, found = swept(
+        "measured_acceleration",
+        rate,
+        f"vary shoulder.bed.delay = {list(delays)}; vary shoulder.bed.f_cut = {list(cuts)} Hz;",
+        heaviness,
+        duration,
+    )
     bench = compiled(text, "bench")
     ahead = Worst(f"limit at {rate} Hz, found against predicted, as a share")
     known = Worst(f"limit at {rate} Hz, found against an independent model, as a share")
@@ -92,16 +109,24 @@ def test_measured_acceleration_grows_from_where_the_margin_and_an_independent_mo
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", ["velocity_tracking", "torque_balance", "torque_balance_observer"])
-@pytest.mark.parametrize(("rate", "delays", "cuts"), [
-    (1000, (1,), (50,)),
-    *(pytest.param(rate, (0, 1, 2), (20, 50, 100), marks=slow) for rate in (100, 200, 1000)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("rate", "delays", "cuts"),
+    [
+        (1000, (1,), (50,)),
+        *(pytest.param(rate, (0, 1, 2), (20, 50, 100), marks=slow) for rate in (100, 200, 1000)),
+    ],
+)
 def test_no_other_law_grows_however_heavy_the_arm(
     law: str, rate: int, delays: tuple[int, ...], cuts: tuple[int, ...]
 ) -> None:
     heaviness = np.geomspace(0.1, 1000.0, 21)
-    text, found = swept(law, rate, f"vary shoulder.bed.delay = {list(delays)};"
-                        f" vary shoulder.bed.f_cut = {list(cuts)} Hz;", heaviness, 4.0)  # fmt: skip
+    text, found = swept(
+        law,
+        rate,
+        f"vary shoulder.bed.delay = {list(delays)}; vary shoulder.bed.f_cut = {list(cuts)} Hz;",
+        heaviness,
+        4.0,
+    )
     assert found.shape == (len(delays) * len(cuts), 21) and not found.any()
     first_of_each = range(0, found.size, found.shape[1])
     assert [each[0].limit for each in margins(compiled(text, "bench"), first_of_each)] == [None] * len(found)
@@ -113,16 +138,23 @@ def test_the_gain_of_velocity_tracking_has_the_limit_that_the_margin_says(rate: 
     """With a delay: without one there is none up to 1.6. r = 5; it hardly matters."""
     delays, gains = (0, 1, 2), np.linspace(0.4, 1.6, 49)
     listed = ", ".join(f"{gain:.6g}" for gain in gains)
-    text, found = swept("velocity_tracking", rate, f"vary shoulder.bed.delay = {list(delays)};"
-                        f" vary shoulder.law.gain = [{listed}];", [5.0], 6.0)  # fmt: skip
+    text, found = swept(
+        "velocity_tracking",
+        rate,
+        f"vary shoulder.bed.delay = {list(delays)}; vary shoulder.law.gain = [{listed}];",
+        [5.0],
+        6.0,
+    )
     grown = found.reshape(len(delays), len(gains))
     bench = compiled(text, "bench")
     assert not grown[0].any()
     for i in (1, 2):
         first = int(grown[i].argmax())
         assert first > 0 and grown[i, first:].all()
-        low, high = (margins(bench, [i * len(gains) + int(np.abs(gains - share * gains[first]).argmin())])[0][0].stable
-                     for share in (0.9, 1.1))  # fmt: skip
+        low, high = (
+            margins(bench, [i * len(gains) + int(np.abs(gains - share * gains[first]).argmin())])[0][0].stable
+            for share in (0.9, 1.1)
+        )
         print(f"{rate} Hz, delay {delays[i]}: grows from gain {gains[first]:.3g}")
         assert low and not high
 
@@ -157,8 +189,13 @@ def test_joints_by_measured_acceleration_together_grow_by_the_largest_r_of_all_t
 def test_a_servo_with_much_gain_grows_below_one_r_and_above_another_as_the_margin_says() -> None:
     heaviness = (0.05, 0.1, 0.17, 0.2, 0.5, 1.5, 3.0, 3.8, 4.3, 6.0)
     masses = ", ".join(f"{r * ROTOR * 3.0 / REACH**2:.12g}" for r in heaviness)
-    text = deck(law="measured_acceleration", duration=4.0, arm=ONE, sweep=f"vary load = [{masses}] kg;",
-                servo={"shoulder": "told { kp = 1 V*s/rad; }"})  # fmt: skip
+    text = deck(
+        law="measured_acceleration",
+        duration=4.0,
+        arm=ONE,
+        sweep=f"vary load = [{masses}] kg;",
+        servo={"shoulder": "told { kp = 1 V*s/rad; }"},
+    )
     found = grows(ran(text, "own").signals["qd"][:, :, 0], shaft(ran(text, "bench"), "shoulder"), 500)
     told = [one for (one,) in margins(compiled(text, "bench"))]
     assert found.tolist() == [not one.stable for one in told] == [True] * 3 + [False] * 5 + [True] * 2

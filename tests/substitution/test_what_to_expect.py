@@ -19,8 +19,9 @@ RANGE = sorted({*R, *np.geomspace(0.1, 20.0, 24).tolist()})
 
 def errors(law: str, rates: str, command: str, heaviness: list[float]) -> np.ndarray:
     servos, dynamics = RATES[rates]
-    return measured("shoulder", 0, deck(law=law, servos=servos, dynamics=dynamics, command=command,
-                                        sweep=loads(heaviness)))  # fmt: skip
+    return measured(
+        "shoulder", 0, deck(law=law, servos=servos, dynamics=dynamics, command=command, sweep=loads(heaviness))
+    )
 
 
 def told(found: np.ndarray) -> str:

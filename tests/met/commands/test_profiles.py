@@ -66,8 +66,9 @@ def test_the_trapezoid_integrates_an_acceleration_that_is_either_the_limit_or_no
     whole = rise + way / peak  # a trapezoid's area is its height times the mean of its two parallel sides
     corners = begin + np.array([0.0, rise, whole - rise, whole])
     t = np.concatenate([np.linspace(0.0, begin + whole + 1.0, 257), corners])
-    value, slope = values("trapezoid", t, start=start, to=to, max_rate=max_rate, max_acceleration=max_acceleration,
-                          begin=begin)  # fmt: skip
+    value, slope = values(
+        "trapezoid", t, start=start, to=to, max_rate=max_rate, max_acceleration=max_acceleration, begin=begin
+    )
     sign = math.copysign(1.0, to - start)
     rate = sign * np.interp(t, corners, [0.0, peak, peak, 0.0])
     # the slope is a product and a sum away; corners are rounded, and the rate is steep there
@@ -110,8 +111,9 @@ def test_a_trapezoid_from_a_value_to_itself_stays_there(at: float) -> None:
 def test_the_chirp_is_that_of_scipy(growth: str, method: str, f0: float, f1: float) -> None:
     over, begin, phase = 3.0, 0.25, 0.4
     t = np.linspace(begin, begin + over, 301)
-    value, _ = values("chirp", t, amplitude=2.0, f0=f0, f1=f1, over=over, growth=growth, offset=0.5, phase=phase,
-                      begin=begin)  # fmt: skip
+    value, _ = values(
+        "chirp", t, amplitude=2.0, f0=f0, f1=f1, over=over, growth=growth, offset=0.5, phase=phase, begin=begin
+    )
     # scipy has a cosine and degrees; its exponential form loses digits where f0 is near f1, so there 2e-6
     known = 0.5 + 2.0 * scipy_chirp(t - begin, f0, over, f1, method, phi=math.degrees(phase) - 90.0)
     near = growth == "exponential" and abs(f1 / f0 - 1.0) < 1e-3 and f1 != f0
@@ -124,8 +126,16 @@ def test_the_phase_of_an_exponential_chirp_is_the_integral_of_its_frequency(rati
     for t in (0.1, 0.9, 1.999):
         # with a small amplitude about zero, the sine is its angle up to the last digits: read it off in quadrature
         x, _ = values("chirp", np.array([t]), amplitude=1.0, f0=f0, f1=f0 * ratio, over=over, growth="exponential")
-        y, _ = values("chirp", np.array([t]), amplitude=1.0, f0=f0, f1=f0 * ratio, over=over, growth="exponential",
-                      phase=math.pi / 2)  # fmt: skip
+        y, _ = values(
+            "chirp",
+            np.array([t]),
+            amplitude=1.0,
+            f0=f0,
+            f1=f0 * ratio,
+            over=over,
+            growth="exponential",
+            phase=math.pi / 2,
+        )
         turns, _ = quad(lambda s: f0 * ratio ** (s / over), 0.0, t, epsabs=1e-13, epsrel=1e-13)
         angle = 2.0 * math.pi * turns
         # rounding of an angle of up to 4e3 rad, and the quadrature's own error
@@ -185,8 +195,9 @@ def test_the_cubic_trajectory_is_scipys_clamped_spline_held_at_both_ends(n: int)
     np.testing.assert_allclose(value, spline(u), atol=1e-12 * size[0])
     np.testing.assert_allclose(slope, np.where(u == t, spline(u, 1), 0.0), atol=1e-12 * size[1])
     assert clamped_slopes(times, heights)[0] == clamped_slopes(times, heights)[-1] == 0.0
-    assert values("trajectory", np.array([times[0] - 1.0, times[-1], 1e6]), times=times, values=heights,
-                  interpolation="cubic")[0].tolist() == [heights[0], heights[-1], heights[-1]]  # fmt: skip
+    assert values(
+        "trajectory", np.array([times[0] - 1.0, times[-1], 1e6]), times=times, values=heights, interpolation="cubic"
+    )[0].tolist() == [heights[0], heights[-1], heights[-1]]
 
 
 def test_a_trajectory_begins_when_it_is_told() -> None:
@@ -227,8 +238,9 @@ def test_what_is_recorded_gives_what_plain_floats_give_lane_by_lane(
     if name == "chirp":
         drawn["f1"][:20] = drawn["f0"][:20]
     value, slope = recorded(name, t, drawn, **given)
-    plain = [values(name, t[i : i + 1], **given, **{key: float(x[i]) for key, x in drawn.items()})
-             for i in range(t.size)]  # fmt: skip
+    plain = [
+        values(name, t[i : i + 1], **given, **{key: float(x[i]) for key, x in drawn.items()}) for i in range(t.size)
+    ]
     wanted = np.array(plain)[:, :, 0].T
     if name == "chirp":  # sines differ by units in the last place, of angles up to 50 rad
         np.testing.assert_allclose([value, slope], wanted, atol=1e-12)

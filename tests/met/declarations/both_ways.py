@@ -40,8 +40,18 @@ from tests.met.small_models import Use
 
 Draw = Callable[[], float]
 
-SINES = (trace.sin, trace.cos, trace.tan, trace.asin, trace.acos, trace.atan, trace.atan2,
-         trace.exp, trace.log, trace.tanh)  # fmt: skip
+SINES = (
+    trace.sin,
+    trace.cos,
+    trace.tan,
+    trace.asin,
+    trace.acos,
+    trace.atan,
+    trace.atan2,
+    trace.exp,
+    trace.log,
+    trace.tanh,
+)
 """What models may call whose plain form is the platform's, and whose recorded form is MET's own."""
 
 
@@ -127,8 +137,9 @@ def differences(call: Callable[[Numbers], Any], seed: int) -> list[str]:
     formulas = Formulas.of(graph, [each for each in recorded.values() if _is_number(each)])
     found = iter(formulas.replay(numbers.drawn))
     replayed = {name: next(found) if _is_number(each) else each for name, each in recorded.items()}
-    return [f"{name}: plain {x}, recorded {replayed[name]}" for name, x in plain.items()
-            if not _alike(x, replayed[name])]  # fmt: skip
+    return [
+        f"{name}: plain {x}, recorded {replayed[name]}" for name, x in plain.items() if not _alike(x, replayed[name])
+    ]
 
 
 def flat(answer: Any, name: str = "") -> Iterator[tuple[str, Any]]:
@@ -161,9 +172,16 @@ def calls(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any
     """Every function that the model declares, by name, as a call on numbers alone."""
     model = use.model
     kinds = {
-        "servo": _servo, "sensor": _sensor, "environment": _environment, "command": _command, "guide": _guide,
-        "metric": _metric, "integrator": _integrator, "bed": _bed, "law": _law,
-    }  # fmt: skip
+        "servo": _servo,
+        "sensor": _sensor,
+        "environment": _environment,
+        "command": _command,
+        "guide": _guide,
+        "metric": _metric,
+        "integrator": _integrator,
+        "bed": _bed,
+        "law": _law,
+    }
     known = kinds[use.kind](use, experiment)
     return {name: call for name, call in known.items() if getattr(model, name) is not None}
 
@@ -185,8 +203,9 @@ def parameters(numbers: Numbers, use: Use, experiment: Experiment, of: str = "")
     return _drawn(numbers, declared, use, experiment, of)
 
 
-def _drawn(numbers: Numbers, declared: Iterable[Parameter], use: Use, experiment: Experiment, of: str,
-           joint: str = "") -> SimpleNamespace:  # fmt: skip
+def _drawn(
+    numbers: Numbers, declared: Iterable[Parameter], use: Use, experiment: Experiment, of: str, joint: str = ""
+) -> SimpleNamespace:
     """These parameters; joint: whose they are, of what each joint has."""
     values: dict[str, Any] = {}
     use = replace(use, joint=joint or use.joint)
@@ -194,8 +213,10 @@ def _drawn(numbers: Numbers, declared: Iterable[Parameter], use: Use, experiment
         places = paths(use, parameter)
         found = [experiment.parameters[each].value for each in places]
         if parameter.shape in ("number", "vector") and not parameter.decides:
-            found = [numbers.number(f"{of}{each}", lambda near=near, p=parameter: numbers.within(p, near))
-                     for each, near in zip(places, found, strict=True)]  # fmt: skip
+            found = [
+                numbers.number(f"{of}{each}", lambda near=near, p=parameter: numbers.within(p, near))
+                for each, near in zip(places, found, strict=True)
+            ]
         values[parameter.name] = tuple(found) if parameter.shape == "vector" else found[0]
     return SimpleNamespace(**values)
 
@@ -274,13 +295,16 @@ def servo_calls(servo: Servo, use: Use, experiment: Experiment) -> dict[str, Cal
     return {
         "control": control,
         "drive": lambda n: servo.drive(
-            p(n), held(n, (*parts.outputs, *parts.integrals)), states(n),
+            p(n),
+            held(n, (*parts.outputs, *parts.integrals)),
+            states(n),
             filled(n, JointMotion, "joint", command=command),
         ),
         "begin": lambda n: servo.begin(p(n), n.number("q", n.any), n.number("qd", n.any)),
         "measured": lambda n: servo.measured(p(n), n.number("q", n.any), n.number("qd", n.any), states(n)),
         "balance": lambda n: servo.balance(
-            p(n), n.number("torque", n.any),
+            p(n),
+            n.number("torque", n.any),
             filled(n, Seen, "seen", setpoint=filled(n, Setpoint, "asked", kind=command), states=states(n), **known),
         ),
         "fastest": lambda n: servo.fastest(p(n)),
@@ -289,7 +313,7 @@ def servo_calls(servo: Servo, use: Use, experiment: Experiment) -> dict[str, Cal
         "full": lambda n: servo.full(p(n)),
         "motor": lambda n: servo.motor(p(n)),
         "at_rest": lambda n: servo.at_rest(p(n)),
-    }  # fmt: skip
+    }
 
 
 def _sensor(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]]:
@@ -507,12 +531,15 @@ def _bed(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]
     return {
         "begin": lambda n: bed.begin(p(n), n.number("w", n.any)),
         "advance": lambda n: bed.advance(
-            p(n), held(n, bed.memory), filled(n, Wire), n.known("time", lambda: n.rng.uniform(1e-4, 2e-3)),
+            p(n),
+            held(n, bed.memory),
+            filled(n, Wire),
+            n.known("time", lambda: n.rng.uniform(1e-4, 2e-3)),
             lambda name: n.number(f"draw.{name}", n.rng.normal),
         ),
         "read": lambda n: bed.read(p(n), held(n, bed.memory)),
         "taken": lambda n: bed.taken(p(n), filled(n, Wire)),
-    }  # fmt: skip
+    }
 
 
 def _law(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]]:
@@ -520,8 +547,10 @@ def _law(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any]
 
     def give(n: Numbers) -> Any:
         known = {"balance": None} if law.balance == "none" else {}
-        told = [filled(n, LawInput, joint, **known or {"balance": filled(n, Balanced, f"{joint}.balance")})
-                for joint in joints]  # fmt: skip
+        told = [
+            filled(n, LawInput, joint, **known or {"balance": filled(n, Balanced, f"{joint}.balance")})
+            for joint in joints
+        ]
         rows = [[n.number(f"Lambda[{i}][{j}]", n.any) for j in range(3)] for i in range(2)]
         return law.give(
             [parameters(n, use, experiment, joint) for joint in joints],

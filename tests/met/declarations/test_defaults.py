@@ -60,13 +60,18 @@ def test_what_a_deck_leaves_out_has_its_default(kind: models.Kind, name: str, tm
 def test_writing_the_defaults_changes_neither_plan_nor_bits(kind: models.Kind, name: str, tmp_path: Path) -> None:
     for n, (use, new) in enumerate(first_uses(kind, name)):
         # what stands for never cannot be written, nor what is called after a joint
-        said = {p.name: use.text(p, p.default) for p in defaulted(use, new) if finite(p.default) and p.shape != "text"
-                and p.name not in use.words}  # fmt: skip
+        said = {
+            p.name: use.text(p, p.default)
+            for p in defaulted(use, new)
+            if finite(p.default) and p.shape != "text" and p.name not in use.words
+        }
         if not said:
             continue
         use.put(tmp_path)
-        silent, spoken = (experiment(tmp_path, use.deck(written, without=said.keys() - written.keys()), select=["it"])
-                          for written in ({}, said))  # fmt: skip
+        silent, spoken = (
+            experiment(tmp_path, use.deck(written, without=said.keys() - written.keys()), select=["it"])
+            for written in ({}, said)
+        )
         assert {path: q.value for path, q in silent.parameters.items()} == {
             path: q.value for path, q in spoken.parameters.items()
         }

@@ -47,8 +47,11 @@ def cells(parameter: Parameter) -> list[str]:
     text += f"; needed under {', '.join(parameter.needed_for)}" if parameter.needed_for else ""
     bounds = ["whole"] if parameter.whole else []
     signs = {"above": ">", "at_least": ">=", "below": "<", "at_most": "<="}
-    bounds += [f"{sign} {in_full(getattr(parameter, name))}" for name, sign in signs.items()
-               if getattr(parameter, name) is not None]  # fmt: skip
+    bounds += [
+        f"{sign} {in_full(getattr(parameter, name))}"
+        for name, sign in signs.items()
+        if getattr(parameter, name) is not None
+    ]
     words = ((f"a {parameter.names}",) if parameter.names else ()) + parameter.words
     range_ = " | ".join(words) if words else ", ".join(bounds)
     if parameter.above_where_needed is not None:

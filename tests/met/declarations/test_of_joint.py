@@ -50,7 +50,8 @@ def test_a_sweep_varies_it_for_all_or_for_one(name: str, tmp_path: Path) -> None
         value, unit = use.values[parameter.name], use.unit(parameter)
         assert isinstance(value, float)
         for path, varied in ((f"{use.head}.{parameter.name}", list(use.kinds)), (use.path(parameter), [use.joint])):
-            deck = experiment(tmp_path, use.deck(cases=f"vary {path} = [{value}, {2.0 * value}] {unit};"),
-                              select=["cases"])  # fmt: skip
+            deck = experiment(
+                tmp_path, use.deck(cases=f"vary {path} = [{value}, {2.0 * value}] {unit};"), select=["cases"]
+            )
             of_guide = {each for each in keys.inputs(deck) if each.startswith(use.head)}
             assert of_guide == {path, *(replace(use, joint=joint).path(parameter) for joint in varied)}

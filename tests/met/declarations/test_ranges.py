@@ -42,8 +42,18 @@ def ranged(kind: models.Kind, name: str) -> Iterator[tuple[Use, Parameter]]:
                 yield use, parameter
 
 
-def refused(folder: Path, use: Use, parameter: Parameter, deck: str, written: str, words: str, *, ends: str = "",
-            settings: tuple[str, ...] = (), select: str = "it") -> None:  # fmt: skip
+def refused(
+    folder: Path,
+    use: Use,
+    parameter: Parameter,
+    deck: str,
+    written: str,
+    words: str,
+    *,
+    ends: str = "",
+    settings: tuple[str, ...] = (),
+    select: str = "it",
+) -> None:
     """The deck is refused for one number alone: by code, parameter and bound, and at the place where it is written."""
     found = check(folder, deck, select=[select], set=settings)
     refusals = [each for each in errors(found) if each.code not in UNSTABLE]
@@ -161,7 +171,7 @@ PROBE = Environment(
         Parameter(name="arrow", unit="N*m", shape="vector", default=(1.0, 1.0, 1.0), at_most=1.0, doc="a moment"),
     ),
     loads=lambda p, world: Loads(gravity=(p.over * p.least, p.under * p.most * p.count, p.free + p.arrow[2])),
-)  # fmt: skip
+)
 
 
 @pytest.fixture

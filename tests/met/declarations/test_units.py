@@ -28,9 +28,10 @@ ODD = "K"
 """A unit of a dimension that no parameter has."""
 
 WITH_NUMBERS = [
-    (kind, name) for kind, name in EVERY
+    (kind, name)
+    for kind, name in EVERY
     if any(parameter.shape in NUMBERS for parameter in models.written(models.find(kind, name)))
-]  # fmt: skip
+]
 
 
 def every_use(kind: models.Kind, name: str, joint: str) -> Iterator[tuple[Use, list[Parameter]]]:
@@ -141,7 +142,10 @@ def test_the_unit_of_the_other_kind_of_joint_is_refused(
     kind: models.Kind, name: str, joint: str, other: str, tmp_path: Path
 ) -> None:
     for (use, new), (elsewhere, _) in zip(every_use(kind, name, joint), every_use(kind, name, other), strict=True):
-        numbers = {each: (p, v) for each, (p, v) in numbers_of(use, new).items()
-                   if not same(use.dimension(p), elsewhere.dimension(p))}  # fmt: skip
+        numbers = {
+            each: (p, v)
+            for each, (p, v) in numbers_of(use, new).items()
+            if not same(use.dimension(p), elsewhere.dimension(p))
+        }
         texts = {each: written(v, elsewhere.unit(p)).strip() for each, (p, v) in numbers.items()}
         refused(tmp_path, use, texts, "D061")

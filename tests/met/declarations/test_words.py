@@ -14,9 +14,10 @@ from tests.met.declarations.values import errors, inner
 from tests.met.small_models import EVERY, LINKS, Use, smallest, uses
 
 WITH_WORDS = [
-    (kind, name) for kind, name in EVERY
+    (kind, name)
+    for kind, name in EVERY
     if any(parameter.shape == "word" for parameter in models.written(models.find(kind, name)))
-]  # fmt: skip
+]
 
 
 def words_of(use: Use) -> Iterator[Parameter]:

@@ -29,8 +29,11 @@ def bounds(parameter: Parameter) -> Iterator[tuple[float, float, str]]:
     """(inside, outside, words that a message has of it): each bound with the numbers on its two sides."""
     up, down = math.inf, -math.inf
     # a whole number's neighbours are whole, so that one bound alone is broken
-    next_up, next_down = ((lambda x: x + 1.0), (lambda x: x - 1.0)) if parameter.whole else (
-        (lambda x: math.nextafter(x, up)), (lambda x: math.nextafter(x, down)))  # fmt: skip
+    next_up, next_down = (
+        ((lambda x: x + 1.0), (lambda x: x - 1.0))
+        if parameter.whole
+        else ((lambda x: math.nextafter(x, up)), (lambda x: math.nextafter(x, down)))
+    )
     if parameter.above is not None:
         yield next_up(parameter.above), parameter.above, f"above {parameter.above:g}"
     if parameter.at_least is not None and (parameter.above is None or parameter.above < parameter.at_least):

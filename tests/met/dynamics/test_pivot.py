@@ -42,8 +42,17 @@ def without(bodies: tuple[Body, ...]) -> tuple[Body, ...]:
             R, pivot = np.array(rotation_rpy(*body.rpy), float), np.array(body.pivot)
             at = tuple(map(float, np.array(body.at, float) + R @ pivot))
             made.append(Body(f"{body.name}_axis", body.joint, body.kind, parent, at, body.rpy, body.axis))
-            made.append(replace(body, joint=f"{body.joint}_fixed", kind="fixed", parent=len(made) - 1,
-                                at=tuple(map(float, -pivot)), rpy=(0.0, 0.0, 0.0), pivot=(0.0, 0.0, 0.0)))  # fmt: skip
+            made.append(
+                replace(
+                    body,
+                    joint=f"{body.joint}_fixed",
+                    kind="fixed",
+                    parent=len(made) - 1,
+                    at=tuple(map(float, -pivot)),
+                    rpy=(0.0, 0.0, 0.0),
+                    pivot=(0.0, 0.0, 0.0),
+                )
+            )
         number[b] = len(made) - 1
     return tuple(made)
 

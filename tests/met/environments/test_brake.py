@@ -58,8 +58,13 @@ def test_it_holds_no_more_than_its_torque(tmp_path: Path) -> None:
 
 def test_it_adds_to_the_friction_of_the_joints_servo(tmp_path: Path) -> None:
     rub = "servo rub { model = passive;  friction = 2 N*m; }\n"
-    run = ran(tmp_path, ("servos { }", "servos { hinge = rub; }"), ("[0, 0, 3]", "[0, 0, 7]"),
-              ("from = 0.2 s;", ""), before=rub)  # fmt: skip
+    run = ran(
+        tmp_path,
+        ("servos { }", "servos { hinge = rub; }"),
+        ("[0, 0, 3]", "[0, 0, 7]"),
+        ("from = 0.2 s;", ""),
+        before=rub,
+    )
     t = run.time
     np.testing.assert_allclose(of(run, "qdd")[t < 1.0], 1.0 / INERTIA, rtol=1e-12)
     np.testing.assert_allclose(of(run, "qdd")[t > 1.0], 5.0 / INERTIA, rtol=1e-12)
@@ -69,16 +74,24 @@ def test_what_a_brake_bears_is_no_torque_of_the_servo(tmp_path: Path) -> None:
     """Held or sliding, the servo has its share of the level alone; a joint without one has none."""
     assert (of(ran(tmp_path), "tau") == 0.0).all()
     rub = "servo rub { model = passive;  friction = 2 N*m; }\n"
-    run = ran(tmp_path, ("servos { }", "servos { hinge = rub; }"), ("from = 0.2 s;  until = 1 s;", "until = 0.5 s;"),
-              before=rub)  # fmt: skip
+    run = ran(
+        tmp_path,
+        ("servos { }", "servos { hinge = rub; }"),
+        ("from = 0.2 s;  until = 1 s;", "until = 0.5 s;"),
+        before=rub,
+    )
     t = run.time
     np.testing.assert_allclose(of(run, "tau")[t < 0.5], -3.0 * 2.0 / 6.0, rtol=1e-12)
     np.testing.assert_allclose(of(run, "tau")[t > 0.5], -2.0, rtol=1e-12)
 
 
 def test_two_brakes_on_a_joint_add_up(tmp_path: Path) -> None:
-    run = ran(tmp_path, ("from = 0.2 s;", ""), ("[0, 0, 3]", "[0, 0, 7]"),
-              ("push =", "more = brake { joint = hinge;  torque = 2 N*m; }\n        push ="))  # fmt: skip
+    run = ran(
+        tmp_path,
+        ("from = 0.2 s;", ""),
+        ("[0, 0, 3]", "[0, 0, 7]"),
+        ("push =", "more = brake { joint = hinge;  torque = 2 N*m; }\n        push ="),
+    )
     np.testing.assert_allclose(of(run, "qdd")[run.time < 1.0], 1.0 / INERTIA, rtol=1e-12)
 
 

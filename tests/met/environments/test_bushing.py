@@ -81,8 +81,9 @@ def test_it_is_the_springs_of_its_axes_and_takes_energy_by_its_damping_alone() -
     moment = other @ np.array(restoring(p.turning, tuple(map(tuple, other.T @ own))))
     moment -= other @ (np.array(p.turning_damping) * (other.T @ spin))
     np.testing.assert_allclose(one.moment, moment, rtol=1e-12)
-    power = sum(np.dot(f.force, world.velocity(f.link, f.point)) + np.dot(f.moment, world.rate(f.link))
-                for f in (one, two))  # fmt: skip
+    power = sum(
+        np.dot(f.force, world.velocity(f.link, f.point)) + np.dot(f.moment, world.rate(f.link)) for f in (one, two)
+    )
     felt = seen @ np.array(one.force) + spin @ np.array(one.moment)
     assert power == pytest.approx(felt, rel=1e-12), "nothing is gained but by the motion of one against the other"
 

@@ -65,10 +65,21 @@ def test_one_that_follows_whatever_the_arm_swings_too(tmp_path: Path) -> None:
 
 def test_behind_an_elastic_gear_the_motor_is_let_go_as_well(tmp_path: Path) -> None:
     """Nothing pushes from outside; joint and motor move apart, and what both have of momentum is kept."""
-    geared = changed(SERVO, ("rigid_gearbox", "compliant_gearbox"), ("kp = 0.1", "kp = 0"), ("ki = 1", "ki = 0"),
-                     ("kt = 0.05", "kt = 1e-9"), ("command", "stiffness = 400 N*m/rad;  command"))  # fmt: skip
-    run = ran(tmp_path, f"free_swinging {{ {WINDOW} }}", geared, ("moment = [0, 0, 2] N*m;", "moment = [0, 0, 2] N*m;"
-              "  until = 0.2 s;"), ("servo.voltage", "servo.motor_rate"))  # fmt: skip
+    geared = changed(
+        SERVO,
+        ("rigid_gearbox", "compliant_gearbox"),
+        ("kp = 0.1", "kp = 0"),
+        ("ki = 1", "ki = 0"),
+        ("kt = 0.05", "kt = 1e-9"),
+        ("command", "stiffness = 400 N*m/rad;  command"),
+    )
+    run = ran(
+        tmp_path,
+        f"free_swinging {{ {WINDOW} }}",
+        geared,
+        ("moment = [0, 0, 2] N*m;", "moment = [0, 0, 2] N*m;  until = 0.2 s;"),
+        ("servo.voltage", "servo.motor_rate"),
+    )
     inside = (run.time > 0.3) & (run.time < 0.6)
     assert np.ptp(of(run, "qd")[inside]) < 1e-15 and np.ptp(of(run, "servo.motor_rate")[inside]) < 1e-12
     both = INERTIA * of(run, "qd") + ROTOR / 100.0 * of(run, "servo.motor_rate")
@@ -77,10 +88,17 @@ def test_behind_an_elastic_gear_the_motor_is_let_go_as_well(tmp_path: Path) -> N
 
 def test_a_gear_that_was_let_go_takes_hold_with_nothing_wound_up(tmp_path: Path) -> None:
     """While it is let go motor and joint move apart by radians; the gear has let that slip."""
-    geared = changed(SERVO, ("rigid_gearbox", "compliant_gearbox"),
-                     ("command", "stiffness = 400 N*m/rad;  damping = 5 N*m*s/rad;  command"))  # fmt: skip
-    run = ran(tmp_path, f"free_swinging {{ {WINDOW} }}", geared,
-              ("servo.voltage", "servo.deflection, servo.gear_torque, servo.motor_rate"))  # fmt: skip
+    geared = changed(
+        SERVO,
+        ("rigid_gearbox", "compliant_gearbox"),
+        ("command", "stiffness = 400 N*m/rad;  damping = 5 N*m*s/rad;  command"),
+    )
+    run = ran(
+        tmp_path,
+        f"free_swinging {{ {WINDOW} }}",
+        geared,
+        ("servo.voltage", "servo.deflection, servo.gear_torque, servo.motor_rate"),
+    )
     t, wound = run.time, of(run, "servo.deflection")
     assert abs(wound[t < 0.3][-1]) > 1e-4
     inside, slips = (t >= 0.32) & (t < 0.6), of(run, "servo.motor_rate") / 100.0 - of(run, "qd")
@@ -107,8 +125,12 @@ def test_a_law_that_does_not_see_goes_by_nothing_or_by_what_it_saw_last(
     inside = (run.time >= 0.3) & (run.time < 0.6)
     last = of(run, "qd")[run.time < 0.3][-1] if seen is None else seen
     through = changed(SERVO, ("ki = 1", "ki = 0"), ("command", "sensor qd = tachometer { }  command"))
-    noted = ran(tmp_path, f"dead_sensor {{ {WINDOW}  of = qd;  reads = {reads}; }}", through,
-                ("servo.voltage", "servo.sensor.qd"))  # fmt: skip
+    noted = ran(
+        tmp_path,
+        f"dead_sensor {{ {WINDOW}  of = qd;  reads = {reads}; }}",
+        through,
+        ("servo.voltage", "servo.sensor.qd"),
+    )
     assert (of(noted, "servo.sensor.qd")[inside] == last).all(), "what the law saw"
     np.testing.assert_allclose(of(run, "servo.voltage")[inside], 0.1 * 100.0 * (0.1 - last), rtol=1e-12)
     assert np.ptp(of(run, "servo.voltage")[~inside]) > 0.0

@@ -36,8 +36,15 @@ def body(seed: int) -> Link:
     y = x - com
     I = sum(mass * (r @ r * np.eye(3) - np.outer(r, r)) for mass, r in zip(m, y, strict=True))  # noqa: E741
     rng = np.random.default_rng(seed + 100)
-    return Link(turned(seed), rng.standard_normal(3), N * rng.standard_normal(3), N * rng.standard_normal(3),
-                float(m.sum()), tuple(com), (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))  # fmt: skip
+    return Link(
+        turned(seed),
+        rng.standard_normal(3),
+        N * rng.standard_normal(3),
+        N * rng.standard_normal(3),
+        float(m.sum()),
+        tuple(com),
+        (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]),
+    )
 
 
 def axes(time: float, frame: str) -> tuple[np.ndarray, np.ndarray]:
@@ -131,8 +138,10 @@ run it {
 
 def flown(tmp_path: Path, frame: str, initial: dict[str, float]) -> tuple[np.ndarray, ...]:
     """Times, positions and orientations of the body of a flyer whose orbit has n = 1/s, and the joints."""
-    text = "".join(f"{name} = {value!r} {'m' if 'way' in name else 'rad'}{'/s' if 'qd' in name else ''};  "
-                   for name, value in initial.items())  # fmt: skip
+    text = "".join(
+        f"{name} = {value!r} {'m' if 'way' in name else 'rad'}{'/s' if 'qd' in name else ''};  "
+        for name, value in initial.items()
+    )
     found = engine.run(experiment(tmp_path, FLYER.replace("INITIAL", text).replace("FRAME", frame)))
     assert found.cause == [""]
     turns = [np.array(rotation_quaternion(*each)) for each in found.signals["links.body.orientation"][0]]
@@ -148,11 +157,14 @@ def test_a_free_point_follows_clohessy_and_wiltshire(tmp_path: Path) -> None:
     t = found.time
     x, y, z, u, v, w = start.values()
     c, s = np.cos(t), np.sin(t)
-    exact = np.stack([
-        (4 - 3 * c) * x + s * u + 2 * (1 - c) * v,
-        6 * (s - t) * x + y + 2 * (c - 1) * u + (4 * s - 3 * t) * v,
-        c * z + s * w,
-    ], axis=1)  # fmt: skip
+    exact = np.stack(
+        [
+            (4 - 3 * c) * x + s * u + 2 * (1 - c) * v,
+            6 * (s - t) * x + y + 2 * (c - 1) * u + (4 * s - 3 * t) * v,
+            c * z + s * w,
+        ],
+        axis=1,
+    )
     # rk4 with h = 2 ms: h^4/120 a second
     np.testing.assert_allclose(found.signals["links.body.position"][0], exact, rtol=0, atol=1e-11)
 
@@ -160,8 +172,18 @@ def test_a_free_point_follows_clohessy_and_wiltshire(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_tumbling_body_does_the_same_seen_from_either_frame(tmp_path: Path) -> None:
     """Positions and orientations turned back by n t; the rates at t = 0 are less by the orbit's."""
-    inertial = {"x_way.q": 0.3, "y_way.q": -0.2, "x_way.qd": 0.1, "y_way.qd": 0.5, "z_way.qd": 0.2, "a_turn.q": 0.4,
-                "b_turn.q": 0.3, "a_turn.qd": 0.9, "b_turn.qd": 0.4, "c_turn.qd": -0.5}  # fmt: skip
+    inertial = {
+        "x_way.q": 0.3,
+        "y_way.q": -0.2,
+        "x_way.qd": 0.1,
+        "y_way.qd": 0.5,
+        "z_way.qd": 0.2,
+        "a_turn.q": 0.4,
+        "b_turn.q": 0.3,
+        "a_turn.qd": 0.9,
+        "b_turn.qd": 0.4,
+        "c_turn.qd": -0.5,
+    }
     # v - n x p; the first turn is about the orbit's normal, so its rate is less by n
     orbital = inertial | {"x_way.qd": 0.1 - 0.2, "y_way.qd": 0.5 - 0.3, "a_turn.qd": 0.9 - 1.0}
     t, p, R, q = flown(tmp_path, "inertial", inertial)

@@ -30,9 +30,15 @@ run it {
 }
 """
 HINGE = changed(
-    SLIDER, ("prismatic", "revolute"), ("axis = x", "axis = z"), ("0.6 m/s", "0.6 rad/s"), ("-0.1 m", "-0.1 rad"),
-    ("0.1 m;", "0.1 rad;"), ("800 N/m", "6.4 N*m/rad"), ("0.5 s/m", "0.5 s/rad"),
-)  # fmt: skip
+    SLIDER,
+    ("prismatic", "revolute"),
+    ("axis = x", "axis = z"),
+    ("0.6 m/s", "0.6 rad/s"),
+    ("-0.1 m", "-0.1 rad"),
+    ("0.1 m;", "0.1 rad;"),
+    ("800 N/m", "6.4 N*m/rad"),
+    ("0.5 s/m", "0.5 s/rad"),
+)
 
 
 def given_back(v: float, a: float) -> float:

@@ -187,9 +187,16 @@ def left_out(plates: int) -> np.ndarray:
         }
         nozzle = (0.7 * a * rng.normal(), 0.7 * b * rng.normal(), far)
         *few, many = (
-            np.array(on_plate(given(ENVIRONMENT, **{**values, "cells": cells}), nozzle,
-                              tuple(axis / np.linalg.norm(axis)))[0], float) * (exponent + 2.0) / (4.0 * math.pi)
-            for cells in (4.0, 6.0, 8.0, 24.0))  # fmt: skip
+            np.array(
+                on_plate(given(ENVIRONMENT, **{**values, "cells": cells}), nozzle, tuple(axis / np.linalg.norm(axis)))[
+                    0
+                ],
+                float,
+            )
+            * (exponent + 2.0)
+            / (4.0 * math.pi)
+            for cells in (4.0, 6.0, 8.0, 24.0)
+        )
         found.append([np.linalg.norm(each - many) for each in few])
     return np.array(found)
 
@@ -258,8 +265,10 @@ def test_what_is_no_number_stays_none() -> None:
 
 
 def test_the_thruster_pushes_its_own_link_where_it_is_told_to() -> None:
-    p = given(ENVIRONMENT, **{**STEADY, "nozzle": (0.1, 0.0, 0.0), "axis": (0.0, 0.0, 2.0), "nozzle_link": "hull",
-                              "reaction": "on"})  # fmt: skip
+    p = given(
+        ENVIRONMENT,
+        **{**STEADY, "nozzle": (0.1, 0.0, 0.0), "axis": (0.0, 0.0, 2.0), "nozzle_link": "hull", "reaction": "on"},
+    )
     R = turned(2)
     _, back = loads(p, Given({"panel": Link(), "hull": Link(R, (0.0, 0.0, -3.0))})).forces
     assert (back.link, back.point) == ("hull", (0.1, 0.0, 0.0))
@@ -296,8 +305,18 @@ def test_recorded_it_computes_the_same() -> None:
     kept = {"cells": 2.0, "width": 0.5, "height": 0.4, "sides": "both", "reemission": 0.1}
 
     def outcome(one: dict) -> list:  # type: ignore[type-arg]
-        p = given(ENVIRONMENT, **{**STEADY, **kept, "nozzle": (one["x"], one["y"], one["z"]), "axis": (0.0, 0.2, -1.0),
-                                  "exponent": one["n"], "period": one["period"], "duty": one["duty"]})  # fmt: skip
+        p = given(
+            ENVIRONMENT,
+            **{
+                **STEADY,
+                **kept,
+                "nozzle": (one["x"], one["y"], one["z"]),
+                "axis": (0.0, 0.2, -1.0),
+                "exponent": one["n"],
+                "period": one["period"],
+                "duty": one["duty"],
+            },
+        )
         force = loads(p, Given({"panel": Link()}, begin=one["begin"], step=0.002)).forces[0]
         return [*force.force, *force.moment]
 

@@ -21,11 +21,13 @@ VALUES = {"link": "one", "to": "two", "point": A, "to_point": B, "stiffness": 70
 
 
 def pair(**moved: object) -> Given:
-    return Given({
-        "one": Link(turned(1), (0.2, 0.5, -0.3), (0.3, -1.0, 0.4), (0.1, 0.0, -0.6)),
-        "two": Link(turned(2), (1.4, -0.2, 0.9), (-0.7, 0.2, 0.5), (0.3, 0.9, 0.2)),
-        **moved,  # type: ignore[dict-item]
-    })  # fmt: skip
+    return Given(
+        {
+            "one": Link(turned(1), (0.2, 0.5, -0.3), (0.3, -1.0, 0.4), (0.1, 0.0, -0.6)),
+            "two": Link(turned(2), (1.4, -0.2, 0.9), (-0.7, 0.2, 0.5), (0.3, 0.9, 0.2)),
+            **moved,  # type: ignore[dict-item]
+        }
+    )
 
 
 def test_it_pulls_both_links_together_along_the_line_between_its_points() -> None:

@@ -15,11 +15,13 @@ pin = Package("pinocchio")
 Array = np.ndarray
 
 PATH = {
-    "x": "ramp(to = 9 cm, over = 1 s)", "y": "sine(amplitude = 5 cm, frequency = 0.5 Hz)",
+    "x": "ramp(to = 9 cm, over = 1 s)",
+    "y": "sine(amplitude = 5 cm, frequency = 0.5 Hz)",
     "z": "ramp(to = -6 cm, over = 1 s)",
-    "roll": "ramp(to = 20 deg, over = 1 s)", "pitch": "sine(amplitude = 10 deg, frequency = 0.4 Hz)",
+    "roll": "ramp(to = 20 deg, over = 1 s)",
+    "pitch": "sine(amplitude = 10 deg, frequency = 0.4 Hz)",
     "yaw": "ramp(to = -15 deg, over = 1 s)",
-}  # fmt: skip
+}
 POINT = (0.1, -0.2, 0.05)
 HZ = 100.0
 
@@ -57,18 +59,24 @@ def chain(
         )
         servos.append(f"j{i} = follow;")
         begins.append(f"j{i}.q = {pick.uniform(-1, 1):.4f} {'m' if i == sliding else 'rad'};")
-    return "\n".join([
-        f"servo follow {{ model = ideal; bandwidth = {bandwidth} 1/s; command = {command}(tip); }}",
-        "arm chain {", *arm, "}",
-        "run it {",
-        f"    arm = chain;  {base}  servos {{ {' '.join(servos)} }}",
-        f"    initial {{ {' '.join(begins)} {initial} }}  environment {{}}",
-        f"    guide tip = resolved_rate {{ link = link{count - 1}; point = [{', '.join(map(str, POINT))}] m; {more} }}",
-        f"    rates {{ {rates} }}  duration = {duration};  integrator = rk4;",
-        "    record = [q, qd, servo.command, guides.tip.error, guides.tip.turn_error, guides.tip.manipulability,"
-        " guides.tip.damping, guides.tip.share];",
-        "}", "",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            f"servo follow {{ model = ideal; bandwidth = {bandwidth} 1/s; command = {command}(tip); }}",
+            "arm chain {",
+            *arm,
+            "}",
+            "run it {",
+            f"    arm = chain;  {base}  servos {{ {' '.join(servos)} }}",
+            f"    initial {{ {' '.join(begins)} {initial} }}  environment {{}}",
+            f"    guide tip = resolved_rate {{ link = link{count - 1}; point = [{', '.join(map(str, POINT))}] m;",
+            f"        {more} }}",
+            f"    rates {{ {rates} }}  duration = {duration};  integrator = rk4;",
+            "    record = [q, qd, servo.command, guides.tip.error, guides.tip.turn_error, guides.tip.manipulability,"
+            " guides.tip.damping, guides.tip.share];",
+            "}",
+            "",
+        ]
+    )
 
 
 def path(names: tuple[str, ...] = tuple(PATH)) -> str:

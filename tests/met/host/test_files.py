@@ -65,9 +65,21 @@ def test_a_file_of_holes_that_is_larger_than_the_memory_is_not_read(tmp_path: Pa
         files.read_regular(tmp_path / "a")
 
 
-@pytest.mark.parametrize("text", [
-    "[" * 100_000, '{"a":' * 100_000, "1" * 30, "-" + "9" * 5000, "NaN", "-Infinity", "1e999", "{", b"\xff", "",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 100_000,
+        '{"a":' * 100_000,
+        "1" * 30,
+        "-" + "9" * 5000,
+        "NaN",
+        "-Infinity",
+        "1e999",
+        "{",
+        b"\xff",
+        "",
+    ],
+)
 def test_json_that_no_program_of_ours_wrote_is_a_value_error(text: str | bytes) -> None:
     with pytest.raises(ValueError):
         files.parse_json(text)

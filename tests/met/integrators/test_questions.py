@@ -32,9 +32,9 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..
         own = Integrator(name="own", doc="Of this test.", order=2, real_limit=2.0, advance=advance)
         monkeypatch.setattr(met.integrators, "INTEGRATORS", (*met.integrators.INTEGRATORS, own))
         models.available.cache_clear()
-        return engine.run(experiment(
-            tmp_path, ARM, STICKING, changed(RUN, ("record = [q]", "record = [q]; integrator = own"))
-        )).signals["q"]  # fmt: skip
+        return engine.run(
+            experiment(tmp_path, ARM, STICKING, changed(RUN, ("record = [q]", "record = [q]; integrator = own")))
+        ).signals["q"]
 
     yield running
     monkeypatch.undo()

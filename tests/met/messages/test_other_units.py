@@ -21,9 +21,11 @@ OTHERWISE = {"M", "MM", "G", "PA", "KV", "a", "ma", "k", "kn", "mrads", "mh", "u
 # what pint takes for a constant, a year, a molar, thousandths of an hour
 WORDS = [
     *(prefix + unit for prefix in PREFIXES for unit in (*UNITS, "Ohm", "Nm") if unit != "%"),
-    *(unit.upper() for unit in UNITS), *(unit.lower() for unit in UNITS), *(unit + "s" for unit in UNITS),
+    *(unit.upper() for unit in UNITS),
+    *(unit.lower() for unit in UNITS),
+    *(unit + "s" for unit in UNITS),
     *FOREIGN.split(),
-]  # fmt: skip
+]
 PINT = {
     "in": "inch", "mil": "thou", "lbs": "lb", "PS": "metric_horsepower", "l": "liter", "L": "liter", "rps": "turn/s",
     "ml": "milliliter", "P": "poise", "cP": "centipoise", "G": "gauss", "gon": "grade", "grad": "grade", "d": "day",
@@ -110,10 +112,34 @@ def test_the_digits_stay_as_they_are_written(number: str, told: str) -> None:
 
 @pytest.mark.parametrize(
     ("wrong", "right"),
-    [("sec", "s"), ("Nm", "N*m"), ("Ohm", "ohm"), ("degrees", "deg"), ("RPM", "rpm"), ("kgs", "kg"), ("Metre", "m"),
-     ("hz", "Hz"), ("radd", "rad"), ("elephant", None), ("x" * 500, None), ("foo", None), ("am", None), ("th", None),
-     ("At", None), ("mfarad", None), ("minHg", None), ("minch", None), ("mho", None), ("uS", None), ("degR", None),
-     ("KV", None), ("KN", "kN"), ("mNm", "mN*m"), ("MNm", None), ("asec", "arcsec")],
-)  # fmt: skip
+    [
+        ("sec", "s"),
+        ("Nm", "N*m"),
+        ("Ohm", "ohm"),
+        ("degrees", "deg"),
+        ("RPM", "rpm"),
+        ("kgs", "kg"),
+        ("Metre", "m"),
+        ("hz", "Hz"),
+        ("radd", "rad"),
+        ("elephant", None),
+        ("x" * 500, None),
+        ("foo", None),
+        ("am", None),
+        ("th", None),
+        ("At", None),
+        ("mfarad", None),
+        ("minHg", None),
+        ("minch", None),
+        ("mho", None),
+        ("uS", None),
+        ("degR", None),
+        ("KV", None),
+        ("KN", "kN"),
+        ("mNm", "mN*m"),
+        ("MNm", None),
+        ("asec", "arcsec"),
+    ],
+)
 def test_a_word_that_is_no_unit_gets_the_unit_that_was_meant(wrong: str, right: str | None) -> None:
     assert suggest(wrong) == right

@@ -50,9 +50,15 @@ def hook(*_: Any) -> Any:
 
 
 OLD_HOOKS = {
-    "pushes": "pushed_links", "between": "initial_range", "rubs": "friction_joint", "loose": "decoupling",
-    "gives": "replaced_outputs", "sees": "replaced_reading", "falls": "free_fall", "turns": "world_rate",
-}  # fmt: skip
+    "pushes": "pushed_links",
+    "between": "initial_range",
+    "rubs": "friction_joint",
+    "loose": "decoupling",
+    "gives": "replaced_outputs",
+    "sees": "replaced_reading",
+    "falls": "free_fall",
+    "turns": "world_rate",
+}
 
 
 @pytest.mark.parametrize(("old", "new"), OLD_HOOKS.items())

@@ -63,28 +63,58 @@ def base(**new: Any) -> Change:
     return lambda e: e["structure"]["base"].update(new)
 
 
-@pytest.mark.parametrize(("text", "change", "said"), [
-    (RUN, base(kind="loose"), "structure.base.kind: it should be one of prescribed, free"),
-    (RUN, base(courses=[{"component": "x", "model": "sine"}]), "structure.base.courses: a free base has none"),
-    (RUN, lambda e: e["structure"].update(velocity_products=False),
-     "structure.velocity_products: a base that turns needs them"),
-    (RUN, lambda e: e["structure"].update(links=[link for link in e["structure"]["links"] if link["name"] != "base"]),
-     "structure.base: there is no link `base`, and it moves"),
-    (RUN, lambda e: e["parameters"]["links.base.mass"].update(value=0.0),
-     "parameters.links.base.mass: the base moves freely and has no mass"),
-    (RUN, lambda e: e["parameters"]["initial.base.rpy.x"].update(unit="m"),
-     "parameters.initial.base.rpy.x.unit: it should be rad"),
-    (RUN, lambda e: e["structure"]["joints"][1].update(child="base"),
-     "structure.joints[1].child: there is no link `base`"),
-    (SHAKEN, lambda e: e["structure"]["base"]["courses"].reverse(),
-     "structure.base.courses[1].component: it should be one of x, y, z, roll, pitch, yaw, in this order"),
-    (SHAKEN, lambda e: e["structure"]["base"]["courses"][0].update(component="up"),
-     "structure.base.courses[0].component: it should be one of x, y, z, roll, pitch, yaw, in this order"),
-    (SHAKEN, lambda e: e["parameters"]["base.yaw.times"].update(value=[1.0, 0.0]),
-     "parameters.base.yaw.times: they do not rise"),
-    (SHAKEN, lambda e: e["parameters"]["base.x.frequency"].update(value=0.0),
-     "parameters.base.x.frequency.value: it should be above 0"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "change", "said"),
+    [
+        (RUN, base(kind="loose"), "structure.base.kind: it should be one of prescribed, free"),
+        (RUN, base(courses=[{"component": "x", "model": "sine"}]), "structure.base.courses: a free base has none"),
+        (
+            RUN,
+            lambda e: e["structure"].update(velocity_products=False),
+            "structure.velocity_products: a base that turns needs them",
+        ),
+        (
+            RUN,
+            lambda e: e["structure"].update(links=[link for link in e["structure"]["links"] if link["name"] != "base"]),
+            "structure.base: there is no link `base`, and it moves",
+        ),
+        (
+            RUN,
+            lambda e: e["parameters"]["links.base.mass"].update(value=0.0),
+            "parameters.links.base.mass: the base moves freely and has no mass",
+        ),
+        (
+            RUN,
+            lambda e: e["parameters"]["initial.base.rpy.x"].update(unit="m"),
+            "parameters.initial.base.rpy.x.unit: it should be rad",
+        ),
+        (
+            RUN,
+            lambda e: e["structure"]["joints"][1].update(child="base"),
+            "structure.joints[1].child: there is no link `base`",
+        ),
+        (
+            SHAKEN,
+            lambda e: e["structure"]["base"]["courses"].reverse(),
+            "structure.base.courses[1].component: it should be one of x, y, z, roll, pitch, yaw, in this order",
+        ),
+        (
+            SHAKEN,
+            lambda e: e["structure"]["base"]["courses"][0].update(component="up"),
+            "structure.base.courses[0].component: it should be one of x, y, z, roll, pitch, yaw, in this order",
+        ),
+        (
+            SHAKEN,
+            lambda e: e["parameters"]["base.yaw.times"].update(value=[1.0, 0.0]),
+            "parameters.base.yaw.times: they do not rise",
+        ),
+        (
+            SHAKEN,
+            lambda e: e["parameters"]["base.x.frequency"].update(value=0.0),
+            "parameters.base.x.frequency.value: it should be above 0",
+        ),
+    ],
+)
 def test_what_is_wrong_is_said_with_its_path(tmp_path: Path, text: str, change: Change, said: str) -> None:
     document = json.loads(plan_file.dumps(plan(tmp_path, text)))
     change(document["experiments"][0])

@@ -57,54 +57,91 @@ def coordinate(**new: Any) -> Change:
         (value("links.upper.mass", [40.0]), "parameters.links.upper.mass.value: it should be a number"),
         (value("links.upper.mass", -40.0), "parameters.links.upper.mass: it should be at least 0"),
         (value("links.upper.mass", "inf"), "parameters.links.upper.mass.value: it is not finite"),
-        (value("links.upper.inertia.xx", -1.0),
-         "parameters.links.upper.inertia: a principal moment is below 0: no body has that"),
-        (value("links.upper.inertia.xy", 99.0),
-         "parameters.links.upper.inertia: a principal moment is below 0: no body has that"),
+        (
+            value("links.upper.inertia.xx", -1.0),
+            "parameters.links.upper.inertia: a principal moment is below 0: no body has that",
+        ),
+        (
+            value("links.upper.inertia.xy", 99.0),
+            "parameters.links.upper.inertia: a principal moment is below 0: no body has that",
+        ),
         (value("elbow.axis.z", 0.0), "parameters.elbow.axis: its length should be 1"),
         (value("elbow.axis.x", 1.0), "parameters.elbow.axis: its length should be 1"),
-        (value("elbow.servo.ratio", {"formula": 3}), "parameters.elbow.servo.ratio.value: there is no formula 3, but "
-         "3 of them"),
-        (value("elbow.servo.ratio", {"formula": -1}), "parameters.elbow.servo.ratio.value: there is no formula -1, but "
-         "3 of them"),
+        (
+            value("elbow.servo.ratio", {"formula": 3}),
+            "parameters.elbow.servo.ratio.value: there is no formula 3, but 3 of them",
+        ),
+        (
+            value("elbow.servo.ratio", {"formula": -1}),
+            "parameters.elbow.servo.ratio.value: there is no formula -1, but 3 of them",
+        ),
         (value("elbow.servo.resistance", -2.0), "parameters.elbow.servo.resistance.value: it should be above 0"),
-        (lambda e: e["parameters"]["elbow.servo.kt"].update(unit="V"),
-         "parameters.elbow.servo.kt.unit: it should be N*m/A"),
-        (lambda e: e["parameters"]["links.upper.mass"].update(unit="g"),
-         "parameters.links.upper.mass.unit: it should be kg"),
-        (lambda e: e["parameters"].update({"links.ghost.mass": e["parameters"]["links.upper.mass"]}),
-         "parameters.links.ghost.mass: nothing in this run has this parameter"),
-        (lambda e: e["parameters"].update({"wrist.at.x": e["parameters"]["elbow.at.x"]}),
-         "parameters.wrist.at.x: nothing in this run has this parameter"),
+        (
+            lambda e: e["parameters"]["elbow.servo.kt"].update(unit="V"),
+            "parameters.elbow.servo.kt.unit: it should be N*m/A",
+        ),
+        (
+            lambda e: e["parameters"]["links.upper.mass"].update(unit="g"),
+            "parameters.links.upper.mass.unit: it should be kg",
+        ),
+        (
+            lambda e: e["parameters"].update({"links.ghost.mass": e["parameters"]["links.upper.mass"]}),
+            "parameters.links.ghost.mass: nothing in this run has this parameter",
+        ),
+        (
+            lambda e: e["parameters"].update({"wrist.at.x": e["parameters"]["elbow.at.x"]}),
+            "parameters.wrist.at.x: nothing in this run has this parameter",
+        ),
         (structure("metrics", of="shoulder.speed"), "structure.metrics[0].of: there is no channel `shoulder.speed`"),
-        (structure("record", channels=["shoulder.q", "elbow.speed"]),
-         "structure.record[0].channels: there is no channel `elbow.speed`"),
-        (structure("record", joints=["elbow", "shoulder"]),
-         "structure.record[0].channels: `q` of these joints is elbow.q, shoulder.q"),
+        (
+            structure("record", channels=["shoulder.q", "elbow.speed"]),
+            "structure.record[0].channels: there is no channel `elbow.speed`",
+        ),
+        (
+            structure("record", joints=["elbow", "shoulder"]),
+            "structure.record[0].channels: `q` of these joints is elbow.q, shoulder.q",
+        ),
         (structure("record", joints=["shoulder"]), "structure.record[0].channels: `q` of these joints is shoulder.q"),
         (structure("record", joints=[]), "structure.record[0].channels: `q` of these joints is q"),
-        (structure("record", name="time"),
-         "structure.record[0].channels: `time` of these joints is shoulder.time, elbow.time"),
-        (structure("record", components=["x", "y"]),
-         "structure.record[0].components: it should be x, y, z or w, x, y, z"),
-        (structure("record", components=["x", "y", "z"]), "structure.record[0].channels: `q` of these joints is "
-         "shoulder.q.x, shoulder.q.y, shoulder.q.z, elbow.q.x, elbow.q.y, elbow.q.z"),
+        (
+            structure("record", name="time"),
+            "structure.record[0].channels: `time` of these joints is shoulder.time, elbow.time",
+        ),
+        (
+            structure("record", components=["x", "y"]),
+            "structure.record[0].components: it should be x, y, z or w, x, y, z",
+        ),
+        (
+            structure("record", components=["x", "y", "z"]),
+            "structure.record[0].channels: `q` of these joints is "
+            "shoulder.q.x, shoulder.q.y, shoulder.q.z, elbow.q.x, elbow.q.y, elbow.q.z",
+        ),
         (structure("record", unit=[]), "structure.record[0].unit: it should be one unit, or one a channel"),
-        (lambda e: e["structure"]["record"].append(e["structure"]["record"][0]),
-         "structure.record[4].name: `q` is there twice"),
-        (structure("servos", command={"kind": "voltage", "model": "constant"}),
-         "structure.servos[1].command.kind: rigid_gearbox takes no command `voltage`, but rate, position, torque"),
+        (
+            lambda e: e["structure"]["record"].append(e["structure"]["record"][0]),
+            "structure.record[4].name: `q` is there twice",
+        ),
+        (
+            structure("servos", command={"kind": "voltage", "model": "constant"}),
+            "structure.servos[1].command.kind: rigid_gearbox takes no command `voltage`, but rate, position, torque",
+        ),
         (structure("servos", command=None), "structure.servos[1].command: a rigid_gearbox needs one"),
         (structure("servos", joint="wrist"), "structure.servos[1].joint: there is no joint `wrist`"),
         (structure("servos", joint="shoulder"), "structure.servos[1].joint: joint `shoulder` has a servo already"),
-        (structure("servos", divisor=0),
-         "structure.servos[1].divisor: it should be a whole number from 1 to 1000000000000"),
+        (
+            structure("servos", divisor=0),
+            "structure.servos[1].divisor: it should be a whole number from 1 to 1000000000000",
+        ),
         (structure("joints", kind="fixed"), "structure.servos[1].joint: joint `elbow` is fixed"),
         (structure("joints", parent="lower"), "structure.joints[1].parent: link `lower` hangs on itself"),
-        (structure("joints", child="upper", parent="lower"),
-         "structure.joints[1].child: link `upper` is another joint's child already"),
-        (lambda e: e["structure"]["joints"][0].update(parent="lower"),
-         "structure.joints[0].parent: link `upper` hangs on itself"),
+        (
+            structure("joints", child="upper", parent="lower"),
+            "structure.joints[1].child: link `upper` is another joint's child already",
+        ),
+        (
+            lambda e: e["structure"]["joints"][0].update(parent="lower"),
+            "structure.joints[0].parent: link `upper` hangs on itself",
+        ),
         (structure("joints", child="base"), "structure.joints[1].child: there is no link `base`"),
         (structure("joints", name="shoulder"), "structure.joints[1].name: `shoulder` is there twice"),
         (structure("links", name="upper"), "structure.links[1].name: `upper` is there twice"),
@@ -124,23 +161,27 @@ def coordinate(**new: Any) -> Change:
         (coordinate(path="links.lower.mass", sets=[]), "cases.coordinates[1].path: `links.lower.mass` is there twice"),
         (coordinate(path="a/b"), "cases.coordinates[0].path: 'a/b' is no path"),
         (coordinate(scale=0.0), "cases.coordinates[0].scale: it should be above 0, and finite"),
-        (coordinate(sets=["elbow.servo.kpp"]),
-         "cases.coordinates[0].sets: there is no parameter `elbow.servo.kpp`"),
-        (lambda e: e["formulas"]["inputs"].append("gearbox.ki"),
-         "formulas.inputs[2]: no coordinate is `gearbox.ki`"),
-        (lambda e: e["formulas"]["nodes"].__setitem__(0, ["const", "many"]),
-         "formulas.nodes[0]: it is not a formula's node"),
+        (coordinate(sets=["elbow.servo.kpp"]), "cases.coordinates[0].sets: there is no parameter `elbow.servo.kpp`"),
+        (lambda e: e["formulas"]["inputs"].append("gearbox.ki"), "formulas.inputs[2]: no coordinate is `gearbox.ki`"),
+        (
+            lambda e: e["formulas"]["nodes"].__setitem__(0, ["const", "many"]),
+            "formulas.nodes[0]: it is not a formula's node",
+        ),
         (lambda e: e["formulas"]["nodes"].append(["and", 0, 2]), "formulas.nodes[6]: it is not a formula's node"),
         (lambda e: e["requirements"][0].update(limit="nan"), "requirements[0].limit: it is not a number"),
-        (lambda e: e["requirements"][1].update(text="settle < 10 s"),
-         "requirements[1].text: another requirement has the same text"),
-        (lambda e: e["cases"]["coordinates"][1].update(values=[20.0, -0.1, 20.0]),
-         "parameters.links.lower.mass: it should be at least 0; in case #1"),
+        (
+            lambda e: e["requirements"][1].update(text="settle < 10 s"),
+            "requirements[1].text: another requirement has the same text",
+        ),
+        (
+            lambda e: e["cases"]["coordinates"][1].update(values=[20.0, -0.1, 20.0]),
+            "parameters.links.lower.mass: it should be at least 0; in case #1",
+        ),
         (lambda e: e.update(name="a/b"), "name: 'a/b' is no name: letters, digits and _"),
         (lambda e: e["structure"].update(arm="a\0b"), "structure.arm: a null character is in it"),
         (lambda e: e["requirements"][0].update(text="\ud800"), "requirements[0].text: half of a character is in it"),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_is_said_with_its_path(change: Change, said: str) -> None:
     assert said_of(change) == said
 
@@ -191,10 +232,12 @@ def test_a_trajectory_has_two_points_or_more(times: list[float | str], said: str
 
 @pytest.mark.parametrize(
     ("pivot", "said"),
-    [({"x": 1.0}, "pivot: it is made of three numbers, .x .y .z"),
-     ({"x": 1.0, "y": 0.0, "z": "inf"}, "pivot.z.value: it is not finite"),
-     ({"x": 1.0, "y": 0.0, "z": 0.0, "w": 0.0}, "pivot.w: nothing in this run has this parameter")],
-)  # fmt: skip
+    [
+        ({"x": 1.0}, "pivot: it is made of three numbers, .x .y .z"),
+        ({"x": 1.0, "y": 0.0, "z": "inf"}, "pivot.z.value: it is not finite"),
+        ({"x": 1.0, "y": 0.0, "z": 0.0, "w": 0.0}, "pivot.w: nothing in this run has this parameter"),
+    ],
+)
 def test_a_pivot_is_three_numbers(pivot: dict[str, Any], said: str) -> None:
     def change(e: dict[str, Any]) -> None:
         given = e["parameters"]["elbow.at.x"]

@@ -133,22 +133,34 @@ def test_a_newer_plan_is_refused() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda d: d["experiments"][0]["structure"]["joints"][1].update(kind="bendy"),
-         "experiments[0].structure.joints[1].kind: it should be one of revolute, prismatic, fixed"),
-        (lambda d: d["experiments"][0]["structure"]["schedule"].update(ticks="many"),
-         "experiments[0].structure.schedule.ticks: it should be a whole number"),
+        (
+            lambda d: d["experiments"][0]["structure"]["joints"][1].update(kind="bendy"),
+            "experiments[0].structure.joints[1].kind: it should be one of revolute, prismatic, fixed",
+        ),
+        (
+            lambda d: d["experiments"][0]["structure"]["schedule"].update(ticks="many"),
+            "experiments[0].structure.schedule.ticks: it should be a whole number",
+        ),
         (lambda d: d["experiments"][0]["structure"].pop("arm"), "experiments[0].structure: `arm` is missing"),
         (lambda d: d["experiments"][0].update(colour="red"), "experiments[0]: `colour` is not known"),
-        (lambda d: d["experiments"][0]["structure"]["joints"][1].update(parent="nowhere"),
-         "experiments[0].structure.joints[1].parent: there is no link `nowhere`"),
-        (lambda d: d["experiments"][0]["structure"]["schedule"].update(record=0),
-         "experiments[0].structure.schedule.record: it should be a whole number from 1 to 1000000000000"),
-        (lambda d: d["experiments"][0]["requirements"][0].update(metric="speed"),
-         "experiments[0].requirements[0].metric: there is no metric `speed`"),
-        (lambda d: d["experiments"][0]["formulas"].update(nodes=[["add", 4, 6]], outputs=[0]),
-         "experiments[0].formulas.nodes[0]: it is not a formula's node"),
+        (
+            lambda d: d["experiments"][0]["structure"]["joints"][1].update(parent="nowhere"),
+            "experiments[0].structure.joints[1].parent: there is no link `nowhere`",
+        ),
+        (
+            lambda d: d["experiments"][0]["structure"]["schedule"].update(record=0),
+            "experiments[0].structure.schedule.record: it should be a whole number from 1 to 1000000000000",
+        ),
+        (
+            lambda d: d["experiments"][0]["requirements"][0].update(metric="speed"),
+            "experiments[0].requirements[0].metric: there is no metric `speed`",
+        ),
+        (
+            lambda d: d["experiments"][0]["formulas"].update(nodes=[["add", 4, 6]], outputs=[0]),
+            "experiments[0].formulas.nodes[0]: it is not a formula's node",
+        ),
     ],
-)  # fmt: skip
+)
 def test_damage_is_placed(change, said: str) -> None:  # type: ignore[no-untyped-def]
     document = json.loads(plan_file.dumps(plans.plan()))
     change(document)

@@ -54,28 +54,44 @@ def test_a_plan_with_sensors_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert plan_file.dumps(plan_file.loads(written, "p.json")) == written
 
 
-@pytest.mark.parametrize(("change", "said"), [
-    (sensor(0, name="an up"), "structure.sensors[0].name: 'an up' is no name: letters, digits and _"),
-    (sensor(1, name="up"), "structure.sensors[1].name: `up` is there twice"),
-    (sensor(0, divisor=0), "structure.sensors[0].divisor: it should be a whole number from 1 to 1000000000000"),
-    (sensor(0, divisor=3), "structure.sensors[0].divisor: it should be a multiple of that of the dynamics, 2"),
-    (sensor(0, model="encoder"),
-     "structure.sensors[0].model: `encoder` is a sensor of a joint: it stands in a servo"),
-    (sensor(1, words=[["filtr", "none"]]), "structure.sensors[1].words: `gyroscope` has no word `filtr`"),
-    (sensor(0, words=[["link", "bar"]]), "structure.sensors[0].words: `accelerometer` has no word `link`"),
-    (lambda e: e["structure"]["servos"][0]["sensors"][0].update(model="gyroscope"),
-     "structure.servos[0].sensors[0].model: `gyroscope` is a sensor of a link: it stands in a run"),
-    (value("up.link", {"word": "bra"}), "parameters.sensors.up.link.value: it should name one of the arm's links"),
-    (value("up.link", {"word": "world"}), "parameters.sensors.up.link.value: it should name one of the arm's links"),
-    (value("spin.filter", {"word": "none"}),
-     "parameters.sensors.spin.filter: it should be butterworth, as the structure says"),
-    (value("up.cutoff", 0.0), "parameters.sensors.up.cutoff.value: it should be above 0"),
-    (value("up.along.z", 0.0), "parameters.sensors.up.along: it has no direction"),
-    (lambda e: e["parameters"]["sensors.up.noise"].update(unit="m/s"),
-     "parameters.sensors.up.noise.unit: it should be m/s^2"),
-    (lambda e: e["structure"]["record"][1].update(channels=["sensors.pu"]),
-     "structure.record[1].channels: there is no channel `sensors.pu`"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (sensor(0, name="an up"), "structure.sensors[0].name: 'an up' is no name: letters, digits and _"),
+        (sensor(1, name="up"), "structure.sensors[1].name: `up` is there twice"),
+        (sensor(0, divisor=0), "structure.sensors[0].divisor: it should be a whole number from 1 to 1000000000000"),
+        (sensor(0, divisor=3), "structure.sensors[0].divisor: it should be a multiple of that of the dynamics, 2"),
+        (
+            sensor(0, model="encoder"),
+            "structure.sensors[0].model: `encoder` is a sensor of a joint: it stands in a servo",
+        ),
+        (sensor(1, words=[["filtr", "none"]]), "structure.sensors[1].words: `gyroscope` has no word `filtr`"),
+        (sensor(0, words=[["link", "bar"]]), "structure.sensors[0].words: `accelerometer` has no word `link`"),
+        (
+            lambda e: e["structure"]["servos"][0]["sensors"][0].update(model="gyroscope"),
+            "structure.servos[0].sensors[0].model: `gyroscope` is a sensor of a link: it stands in a run",
+        ),
+        (value("up.link", {"word": "bra"}), "parameters.sensors.up.link.value: it should name one of the arm's links"),
+        (
+            value("up.link", {"word": "world"}),
+            "parameters.sensors.up.link.value: it should name one of the arm's links",
+        ),
+        (
+            value("spin.filter", {"word": "none"}),
+            "parameters.sensors.spin.filter: it should be butterworth, as the structure says",
+        ),
+        (value("up.cutoff", 0.0), "parameters.sensors.up.cutoff.value: it should be above 0"),
+        (value("up.along.z", 0.0), "parameters.sensors.up.along: it has no direction"),
+        (
+            lambda e: e["parameters"]["sensors.up.noise"].update(unit="m/s"),
+            "parameters.sensors.up.noise.unit: it should be m/s^2",
+        ),
+        (
+            lambda e: e["structure"]["record"][1].update(channels=["sensors.pu"]),
+            "structure.record[1].channels: there is no channel `sensors.pu`",
+        ),
+    ],
+)
 def test_what_a_plan_says_wrong_of_sensors_is_placed(change: Change, said: str, tmp_path: Path) -> None:
     document = json.loads(text(tmp_path))
     change(document["experiments"][0])
@@ -99,9 +115,13 @@ def test_a_parameter_that_no_sensor_has_is_told_and_one_that_is_missing_takes_it
     )
 
 
-@pytest.mark.parametrize(("unit", "said"), [
-    ("", "unit `` ends too early"), ("m/ss", "unit `m/ss`: `ss` is not a unit"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("unit", "said"),
+    [
+        ("", "unit `` ends too early"),
+        ("m/ss", "unit `m/ss`: `ss` is not a unit"),
+    ],
+)
 def test_a_sensor_of_a_link_says_in_which_unit_it_measures(
     unit: str, said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -101,22 +101,37 @@ def test_a_servos_parameter_that_is_missing_too_is_its_default() -> None:
     [
         (substitution(joint="wrist"), "structure.substitutions[1].joint: there is no joint `wrist`"),
         (substitution(joint="shoulder"), "structure.substitutions[1].joint: joint `shoulder` is on a bed already"),
-        (substitution(law="bare"),
-         "structure.substitutions[1].law: it should be torque_balance, that of the first substituted joint"),
+        (
+            substitution(law="bare"),
+            "structure.substitutions[1].law: it should be torque_balance, that of the first substituted joint",
+        ),
         (lambda e: e["structure"]["servos"].pop(), "structure.substitutions[1].joint: joint `elbow` has no servo"),
-        (lambda e: (e["structure"]["joints"][1].update(kind="fixed"), e["structure"]["servos"].pop()),
-         "structure.substitutions[1].joint: joint `elbow` is fixed"),
-        (lambda e: e["structure"]["servos"][1].update(model="ideal"),
-         "structure.substitutions[1].joint: the servo of joint `elbow`, ideal, has no motor for a bed"),
-        (lambda e: e["structure"]["servos"][1].update(divisor=2),
-         "structure.substitutions[1].joint: the servo of joint `elbow` should tick with that of `shoulder`, the first on a bed"),
-        (lambda e: e["parameters"]["elbow.bed.kt"].update(value=-1.0),
-         "parameters.elbow.bed.kt.value: it should be above 0"),
-        (lambda e: e["parameters"]["elbow.law.band"].update(unit="rad"), "parameters.elbow.law.band.unit: it should be rad/s"),
-        (lambda e: e["structure"].update(substitutions=[]),
-         "parameters.elbow.bed.converter_current: nothing in this run has this parameter"),
+        (
+            lambda e: (e["structure"]["joints"][1].update(kind="fixed"), e["structure"]["servos"].pop()),
+            "structure.substitutions[1].joint: joint `elbow` is fixed",
+        ),
+        (
+            lambda e: e["structure"]["servos"][1].update(model="ideal"),
+            "structure.substitutions[1].joint: the servo of joint `elbow`, ideal, has no motor for a bed",
+        ),
+        (
+            lambda e: e["structure"]["servos"][1].update(divisor=2),
+            "structure.substitutions[1].joint: the servo of joint `elbow` should tick with that of `shoulder`, the first on a bed",
+        ),
+        (
+            lambda e: e["parameters"]["elbow.bed.kt"].update(value=-1.0),
+            "parameters.elbow.bed.kt.value: it should be above 0",
+        ),
+        (
+            lambda e: e["parameters"]["elbow.law.band"].update(unit="rad"),
+            "parameters.elbow.law.band.unit: it should be rad/s",
+        ),
+        (
+            lambda e: e["structure"].update(substitutions=[]),
+            "parameters.elbow.bed.converter_current: nothing in this run has this parameter",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_is_said_with_its_path(change: Change, said: str) -> None:
     assert said_of(change) == f"E302: {said}"
 
@@ -146,10 +161,13 @@ def test_motors_on_beds_make_another_program() -> None:
     assert len({keys.structure_key(each.structure) for each in made}) == len(made)
 
 
-@pytest.mark.parametrize(("kind", "model"), [
-    ("law", replace(LAWS[0], name="mine", memory=(Memory(name="rate", unit="rad/s", doc="a rate"),))),
-    ("bed", replace(BEDS[0], name="mine", memory=(Memory(name="load_current", unit="A", doc="a current"),))),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("kind", "model"),
+    [
+        ("law", replace(LAWS[0], name="mine", memory=(Memory(name="rate", unit="rad/s", doc="a rate"),))),
+        ("bed", replace(BEDS[0], name="mine", memory=(Memory(name="load_current", unit="A", doc="a current"),))),
+    ],
+)
 def test_a_model_may_not_take_a_name_of_the_engines(
     kind: models.Kind, model: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -159,5 +177,6 @@ def test_a_model_may_not_take_a_name_of_the_engines(
         models.available.__wrapped__(kind)
     [diagnostic] = caught.value.diagnostics
     assert (diagnostic.code, diagnostic.message) == (
-        "E215", f"entry point `mine = my_arm:MODEL` of my-arm in group `met.{kind}s` declares `{model.memory[0].name}` twice"
-    )  # fmt: skip
+        "E215",
+        f"entry point `mine = my_arm:MODEL` of my-arm in group `met.{kind}s` declares `{model.memory[0].name}` twice",
+    )

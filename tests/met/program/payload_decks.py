@@ -21,7 +21,13 @@ BOX = """\
     }
 """
 
-RUN = changed(TUMBLING, ("    environment {}\n", BOX + "    environment {}\n"),
-              ("energy, momentum, J_eff, b]", "energy, momentum, J_eff, b, payloads.box.position, "
-               "payloads.box.orientation, payloads.box.velocity, payloads.box.rate, payloads.box.distance, "
-               "payloads.box.carried, reaction]"))  # fmt: skip
+RUN = changed(
+    TUMBLING,
+    ("    environment {}\n", BOX + "    environment {}\n"),
+    (
+        "energy, momentum, J_eff, b]",
+        "energy, momentum, J_eff, b, payloads.box.position, "
+        "payloads.box.orientation, payloads.box.velocity, payloads.box.rate, payloads.box.distance, "
+        "payloads.box.carried, reaction]",
+    ),
+)

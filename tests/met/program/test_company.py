@@ -65,7 +65,7 @@ BRAKE = Servo(
         dry=p.level * {"computer": held.braking, "time": maximum(0.0, sin(97.0 * joint.time)), "nobody": 1.0}[p.by],
         rotor=0.1,
     ),
-)  # fmt: skip
+)
 ARM = """\
 arm swing {
     link bar { mass = 1 kg; shape = rod(length = 1 m, along = x); }
@@ -110,10 +110,14 @@ def test_friction_that_begins_within_a_step_opposes_motion_either_way(tmp_path: 
 @pytest.mark.parametrize("integrator", ["modified_euler", "semi_implicit_euler", "rk4"])
 def test_company_changes_nothing_where_joints_stick_and_levels_come_and_go(tmp_path: Path, integrator: str) -> None:
     run = changed(
-        RUN, ("by = computer", "by = time"), ("push = 0", "push = 20"), ("duration = 0.2", "duration = 1"),
+        RUN,
+        ("by = computer", "by = time"),
+        ("push = 0", "push = 20"),
+        ("duration = 0.2", "duration = 1"),
         ("hinge = hold;", "hinge = hold; tip = hold { by = nobody; level = 1 N*m; push = -3 N*m; };"),
-        ("modified_euler", integrator), ("servos = 1 kHz", "servos = 500 Hz"),
-    )  # fmt: skip
+        ("modified_euler", integrator),
+        ("servos = 1 kHz", "servos = 500 Hz"),
+    )
     made = experiment(tmp_path, ARM.removesuffix("}\n") + TIP, run, select=["both_ways"])
     count, outputs = differing(made, 0)
     assert count == 0 and outputs["friction.splits"] > 5.0, outputs

@@ -75,15 +75,20 @@ class Chain:
     def deck(self) -> str:
         n = range(len(self.q))
         length, mass, dry = self.length.tolist(), self.mass.tolist(), self.dry.tolist()
-        parts = [f"link rod{k} {{ mass = {mass[k]!r} kg; com = [{length[k] / 2!r}, 0, 0] m; "
-                 f"inertia = [1, 1, {0.01 * mass[k]!r}] kg*m^2; }} "
-                 f"joint j{k} revolute {{ parent = {f'rod{k - 1}' if k else 'base'}; child = rod{k}; axis = z; "
-                 f"at = [{length[k - 1] if k else 0.0!r}, 0, 0] m; }}" for k in n]  # fmt: skip
+        parts = [
+            f"link rod{k} {{ mass = {mass[k]!r} kg; com = [{length[k] / 2!r}, 0, 0] m; "
+            f"inertia = [1, 1, {0.01 * mass[k]!r}] kg*m^2; }} "
+            f"joint j{k} revolute {{ parent = {f'rod{k - 1}' if k else 'base'}; child = rod{k}; axis = z; "
+            f"at = [{length[k - 1] if k else 0.0!r}, 0, 0] m; }}"
+            for k in n
+        ]
         servos = "".join(f"j{k} = rubs {{ friction = {dry[k]!r} N*m; }};" for k in n)
-        return (f"arm chain {{ {' '.join(parts)} }} servo rubs {{ model = passive; friction = 1 N*m; }} "
-                f"run let_go {{ arm = chain; servos {{ {servos} }} environment {{ gravity = [0, -{g}, 0] m/s^2; }} "
-                f"initial {{ q = [{', '.join(map(repr, self.q.tolist()))}] rad; }} "
-                "rates { dynamics = 1 kHz; record = 1 kHz; } duration = 0.2 s; record = [q, qd, qdd]; }")  # fmt: skip
+        return (
+            f"arm chain {{ {' '.join(parts)} }} servo rubs {{ model = passive; friction = 1 N*m; }} "
+            f"run let_go {{ arm = chain; servos {{ {servos} }} environment {{ gravity = [0, -{g}, 0] m/s^2; }} "
+            f"initial {{ q = [{', '.join(map(repr, self.q.tolist()))}] rad; }} "
+            "rates { dynamics = 1 kHz; record = 1 kHz; } duration = 0.2 s; record = [q, qd, qdd]; }"
+        )
 
 
 def chain(rng: np.random.Generator, joints: int) -> Chain:

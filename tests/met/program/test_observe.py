@@ -93,9 +93,10 @@ class Arm:
         values = experiment.formulas.replay({c.path: float(c.values[case]) for c in experiment.cases.coordinates})
         parameters = {
             path: replace(quantity, value=float(values[quantity.value.output]))
-            if isinstance(quantity.value, Formula) else quantity
+            if isinstance(quantity.value, Formula)
+            else quantity
             for path, quantity in experiment.parameters.items()
-        }  # fmt: skip
+        }
 
         def number(path: str) -> float:
             return float(parameters[path].value) if path in parameters else 0.0
@@ -103,9 +104,9 @@ class Arm:
         alone = replace(experiment, parameters=parameters)
         names = [joint.name for joint in experiment.structure.moving]
         self.names = names
-        self.rotor = np.array([
-            number(f"{j}.servo.ratio") ** 2 * number(f"{j}.servo.j_m") + number(f"{j}.servo.rotor") for j in names
-        ])  # fmt: skip
+        self.rotor = np.array(
+            [number(f"{j}.servo.ratio") ** 2 * number(f"{j}.servo.j_m") + number(f"{j}.servo.rotor") for j in names]
+        )
         self.rubs = [number(f"{j}.servo.f_c") > 0.0 for j in names]
         self.gravity = [number(f"environment.gravity.g.{axis}") for axis in "xyz"]
         self.products = experiment.structure.velocity_products
@@ -139,10 +140,13 @@ class Arm:
             head = f"links.{body.name}"
             carrying = np.flatnonzero(np.any(link.Jw != 0.0, axis=0) | np.any(link.Jv != 0.0, axis=0))
             found |= {
-                f"{head}.position": link.p, f"{head}.velocity": link.v, f"{head}.rate": link.w,
-                f"{head}.orientation": link.R, f"{head}.jacobian.angular": link.Jw[:, carrying].T,
+                f"{head}.position": link.p,
+                f"{head}.velocity": link.v,
+                f"{head}.rate": link.w,
+                f"{head}.orientation": link.R,
+                f"{head}.jacobian.angular": link.Jw[:, carrying].T,
                 f"{head}.jacobian.linear": link.Jv[:, carrying].T,
-            }  # fmt: skip
+            }
             if not len(carrying):
                 continue  # fixed to the base
             c, J, _ = self.dense._matter(body, link)

@@ -103,8 +103,11 @@ def test_rows_between_instants_hold_the_last_one(tmp_path: Path) -> None:
 
 
 def test_what_turns_more_than_half_a_turn_from_row_to_row_is_as_near_the_row_before_as_can_be(tmp_path: Path) -> None:
-    slow = changed(DECK, ("record = 50 Hz", "record = 2 Hz"), ("    duration", "    metric end = final { of = "
-                   "links.rod.orientation.w; }\n    duration"))  # fmt: skip
+    slow = changed(
+        DECK,
+        ("record = 50 Hz", "record = 2 Hz"),
+        ("    duration", "    metric end = final { of = links.rod.orientation.w; }\n    duration"),
+    )
     run = engine.run(experiment(tmp_path, slow))
     assert np.ptp(run.signals["q"][0, :2, 0]) > np.pi
     for name in TURNED:

@@ -168,14 +168,27 @@ HELD = (
     ("        rate     = [-30, 20, 45] deg/s;\n", ""),
 )
 MERGED = changed(
-    ARM, ("    joint shoulder", "    link box { mass = 12 kg; com = [0.1, -0.05, 0.02] m; "
-          "inertia = [0.8, 0.9, 1.1, 0.02, -0.03, 0.05] kg*m^2; }\n    joint shoulder"),
-    ("at = [1, 0, 0] m; }\n}", "at = [1, 0, 0] m; }\n    joint grip fixed { parent = lower; child = box; "
-     "at = [1, 0, 0] m; rpy = [10, -20, 30] deg; }\n}"),
-)  # fmt: skip
-BARE = changed(RUN, (BOX, ""), (", payloads.box.position, payloads.box.orientation, payloads.box.velocity, "
-                                "payloads.box.rate, payloads.box.distance, payloads.box.carried, reaction]",
-                                ", links.box.position, reaction]"))  # fmt: skip
+    ARM,
+    (
+        "    joint shoulder",
+        "    link box { mass = 12 kg; com = [0.1, -0.05, 0.02] m; "
+        "inertia = [0.8, 0.9, 1.1, 0.02, -0.03, 0.05] kg*m^2; }\n    joint shoulder",
+    ),
+    (
+        "at = [1, 0, 0] m; }\n}",
+        "at = [1, 0, 0] m; }\n    joint grip fixed { parent = lower; child = box; "
+        "at = [1, 0, 0] m; rpy = [10, -20, 30] deg; }\n}",
+    ),
+)
+BARE = changed(
+    RUN,
+    (BOX, ""),
+    (
+        ", payloads.box.position, payloads.box.orientation, payloads.box.velocity, "
+        "payloads.box.rate, payloads.box.distance, payloads.box.carried, reaction]",
+        ", links.box.position, reaction]",
+    ),
+)
 SAME = ("q", "qd", "qdd", "tau", "J_eff", "b", "reaction.moment", "reaction.force", "energy.kinetic", *KEPT)
 
 

@@ -29,11 +29,13 @@ GRAVITY = np.array([1.0, -2.0, -9.0])
 
 def matrix(quaternion: np.ndarray) -> np.ndarray:
     w, x, y, z = quaternion
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 # What is felt
@@ -45,11 +47,16 @@ def test_on_a_free_arm_it_is_what_pinocchio_says(tmp_path: Path, monkeypatch: py
     known(monkeypatch)
     more = triad("lower", "lower", f"{list(POINT)} m") + triad("base", "base", f"{list(POINT)} m")
     text = changed(
-        TUMBLING, ("environment {}", "environment { gravity = [1, -2, -9] m/s^2;  push = wrench { link = lower; "
-                   f"force = [3, 2, 1] N; axes = link; }} }}\n{more}"),
+        TUMBLING,
+        (
+            "environment {}",
+            "environment { gravity = [1, -2, -9] m/s^2;  push = wrench { link = lower; "
+            f"force = [3, 2, 1] N; axes = link; }} }}\n{more}",
+        ),
         ("dynamics = 100 Hz; record = 10 Hz;", "dynamics = 100 Hz; servos = 100 Hz; record = 100 Hz;"),
-        ("modified_euler", "semi_implicit_euler"), ("energy, momentum, J_eff, b", recorded("lower", "base")),
-    )  # fmt: skip
+        ("modified_euler", "semi_implicit_euler"),
+        ("energy, momentum, J_eff, b", recorded("lower", "base")),
+    )
     found = experiment(tmp_path, FLYER, text)
     run, theirs = engine.run(found), FloatingPinocchio([*bodies(found), base_body(found)], GRAVITY, (0.0, 0.0))
     ours = {name: felt(run, name) for name in ("lower", "base")}
@@ -76,10 +83,14 @@ def test_on_a_prescribed_base_its_acceleration_is_felt(tmp_path: Path, monkeypat
     known(monkeypatch)
     more = triad("base", "base", "[0, 0, 0] m") + triad("lower", "lower", f"{list(POINT)} m")
     text = changed(
-        SHAKEN, ("    rates    { dynamics = 500 Hz; record = 10 Hz; }",
-                 f"{more}    rates {{ dynamics = 100 Hz; servos = 100 Hz; record = 100 Hz; }}"),
-        ("integrator = rk4", "integrator = semi_implicit_euler"), ("tau_load,", f"{recorded('base', 'lower')},"),
-    )  # fmt: skip
+        SHAKEN,
+        (
+            "    rates    { dynamics = 500 Hz; record = 10 Hz; }",
+            f"{more}    rates {{ dynamics = 100 Hz; servos = 100 Hz; record = 100 Hz; }}",
+        ),
+        ("integrator = rk4", "integrator = semi_implicit_euler"),
+        ("tau_load,", f"{recorded('base', 'lower')},"),
+    )
     found = experiment(tmp_path, FLYER, text)
     run, theirs = engine.run(found), FloatingPinocchio(bodies(found), GRAVITY, (0.0, 0.0))
     at_base, at_lower = felt(run, "base"), felt(run, "lower")
@@ -118,8 +129,14 @@ run it {
 """
 
 
-def stood(folder: Path, sensors: str, *changes: tuple[str, str], servo: str = "held", rate: str = "0 rad/s",
-          acceleration: str = "0 rad/s^2") -> Run:  # fmt: skip
+def stood(
+    folder: Path,
+    sensors: str,
+    *changes: tuple[str, str],
+    servo: str = "held",
+    rate: str = "0 rad/s",
+    acceleration: str = "0 rad/s^2",
+) -> Run:
     text = changed(STILL, ("SENSORS", sensors), ("SERVO", servo), ("RATE", rate), ("ACCELERATION", acceleration))
     return engine.run(experiment(folder, changed(text, *changes)))
 
@@ -129,11 +146,16 @@ def of(run: Run, name: str, case: int = 0) -> np.ndarray:
 
 
 def test_at_rest_it_reads_gravity_along_its_axis_from_the_first_tick_on(tmp_path: Path) -> None:
-    run = stood(tmp_path, "\n".join((
-        "sensor up = accelerometer { link = bar; along = [0, 0, 3]; cutoff = 50 Hz; }",
-        "sensor out = accelerometer { link = bar; along = [-1, 0, 0]; cutoff = 50 Hz; }",
-        "sensor foot = accelerometer { link = base; along = [0, 0, 1]; cutoff = 50 Hz; }",
-    )))  # fmt: skip
+    run = stood(
+        tmp_path,
+        "\n".join(
+            (
+                "sensor up = accelerometer { link = bar; along = [0, 0, 3]; cutoff = 50 Hz; }",
+                "sensor out = accelerometer { link = bar; along = [-1, 0, 0]; cutoff = 50 Hz; }",
+                "sensor foot = accelerometer { link = base; along = [0, 0, 1]; cutoff = 50 Hz; }",
+            )
+        ),
+    )
     # the hinge turns about y: z of the bar leans by 30 deg, and its x points down by as much
     for name, g in (("up", 9.81 * math.cos(math.pi / 6)), ("out", 9.81 * 0.5), ("foot", 9.81)):
         np.testing.assert_allclose(of(run, name), g, rtol=1e-13)
@@ -142,13 +164,25 @@ def test_at_rest_it_reads_gravity_along_its_axis_from_the_first_tick_on(tmp_path
 @pytest.mark.slow
 def test_in_free_fall_it_reads_nothing_on_any_body(tmp_path: Path) -> None:
     """A free base, its arm at rest on it, and a payload that flies beside."""
-    still = [("= 0.5 rad/s", "= 0 rad/s"), ("= -1 rad/s", "= 0 rad/s"), ("[40, 20, -60]", "[0, 0, 0]"),
-             ("rate     = [-30, 20, 45]", "rate     = [0, 0, 0]"), ("grapple  = 0.8 s;\n", "grapple = 5 s;\n"),
-             ("        release  = 1.5 s;\n", ""),
-             ("environment {}", "environment { gravity = [1, -2, -9] m/s^2; }\n" + "".join(
-                 f"sensor {link} = accelerometer {{ link = {link}; at = [0.3, 0.2, 0.1] m; along = [1, 2, 3]; "
-                 "cutoff = 5 Hz; }\n" for link in ("base", "lower", "box"))),
-             ("record = 10 Hz", "servos = 50 Hz; record = 10 Hz"), ("energy,", "sensors, energy,")]  # fmt: skip
+    still = [
+        ("= 0.5 rad/s", "= 0 rad/s"),
+        ("= -1 rad/s", "= 0 rad/s"),
+        ("[40, 20, -60]", "[0, 0, 0]"),
+        ("rate     = [-30, 20, 45]", "rate     = [0, 0, 0]"),
+        ("grapple  = 0.8 s;\n", "grapple = 5 s;\n"),
+        ("        release  = 1.5 s;\n", ""),
+        (
+            "environment {}",
+            "environment { gravity = [1, -2, -9] m/s^2; }\n"
+            + "".join(
+                f"sensor {link} = accelerometer {{ link = {link}; at = [0.3, 0.2, 0.1] m; along = [1, 2, 3]; "
+                "cutoff = 5 Hz; }\n"
+                for link in ("base", "lower", "box")
+            ),
+        ),
+        ("record = 10 Hz", "servos = 50 Hz; record = 10 Hz"),
+        ("energy,", "sensors, energy,"),
+    ]
     run = engine.run(experiment(tmp_path, FLYER, changed(GRAPPLING, *still)))
     for link in ("base", "lower", "box"):
         assert np.max(np.abs(of(run, link))) < 1e-12, link
@@ -160,8 +194,11 @@ def test_turning_it_feels_what_holds_it_in_its_circle(tmp_path: Path) -> None:
         tmp_path,
         "sensor way = accelerometer { link = bar; at = [0.8, 0, 0] m; along = [0, 0, 1]; cutoff = 40 Hz; }\n"
         "sensor out = accelerometer { link = bar; at = [80, 0, 0] cm; along = [1, 0, 0]; cutoff = 40 Hz; }",
-        ("[0, 0, -9.81]", "[0, 0, 0]"), servo="turn", rate="3 rad/s", acceleration="2 rad/s^2",
-    )  # fmt: skip
+        ("[0, 0, -9.81]", "[0, 0, 0]"),
+        servo="turn",
+        rate="3 rad/s",
+        acceleration="2 rad/s^2",
+    )
     late = run.time > 0.5
     # H = 1 - sqrt(2) s/w_c + s^2/w_c^2 + ..., as of a delay of sqrt(2)/w_c: a parabola is late by that
     lag = math.sqrt(2.0) / (2.0 * math.pi * 40.0)
@@ -178,11 +215,14 @@ def test_turning_it_feels_what_holds_it_in_its_circle(tmp_path: Path) -> None:
 def test_the_filter_answers_as_its_transfer_function_does(cutoff: float, hz: float, tmp_path: Path) -> None:
     w = 2.0 * math.pi * hz
     run = stood(
-        tmp_path, f"sensor way = accelerometer {{ link = bar; at = [0, 0, 1] m; along = [1, 0, 0]; "
-        f"cutoff = {cutoff} Hz; }}", ("[0, 0, -9.81]", "[0, 0, 0]"), ("dynamics = 1 kHz;  servos = 1 kHz",
-                                                                     "dynamics = 4 kHz;  servos = 4 kHz"),
-        servo="turn", rate=f"{-5.0 / w} rad/s", acceleration=f"sine(amplitude = 5 rad/s^2, frequency = {hz} Hz)",
-    )  # fmt: skip
+        tmp_path,
+        f"sensor way = accelerometer {{ link = bar; at = [0, 0, 1] m; along = [1, 0, 0]; cutoff = {cutoff} Hz; }}",
+        ("[0, 0, -9.81]", "[0, 0, 0]"),
+        ("dynamics = 1 kHz;  servos = 1 kHz", "dynamics = 4 kHz;  servos = 4 kHz"),
+        servo="turn",
+        rate=f"{-5.0 / w} rad/s",
+        acceleration=f"sine(amplitude = 5 rad/s^2, frequency = {hz} Hz)",
+    )
     s = 2j * math.pi * hz / (2.0 * math.pi * cutoff)
     H = 1.0 / (1.0 + math.sqrt(2.0) * s + s * s)
     late = run.time > 0.6  # the filter's own motion has died away by exp(-0.6 * 89)
@@ -196,13 +236,20 @@ def test_the_filter_answers_as_its_transfer_function_does(cutoff: float, hz: flo
 @pytest.mark.parametrize("integrator", models.find_own("integrator"))
 def test_a_reading_is_of_the_integrators_order(integrator: str, tmp_path: Path) -> None:
     order = models.find("integrator", integrator).order
-    sensors = ("sensor tip = accelerometer { link = lower; at = [1, 0.1, 0.2] m; along = [1, 2, 3]; cutoff = 2 Hz; "
-               "rate = 10 Hz; }\nsensor spin = gyroscope { link = lower; along = [1, 1, 0]; filter = butterworth; "
-               "cutoff = 3 Hz; rate = 10 Hz; }\n")  # fmt: skip
+    sensors = (
+        "sensor tip = accelerometer { link = lower; at = [1, 0.1, 0.2] m; along = [1, 2, 3]; cutoff = 2 Hz; "
+        "rate = 10 Hz; }\nsensor spin = gyroscope { link = lower; along = [1, 1, 0]; filter = butterworth; "
+        "cutoff = 3 Hz; rate = 10 Hz; }\n"
+    )
 
     def last(hz: int, integrator: str) -> np.ndarray:
-        text = changed(TUMBLING, ("environment {}", f"environment {{}}\n{sensors}"), ("momentum,", "sensors,"),
-                       ("dynamics = 100 Hz", f"dynamics = {hz} Hz"), ("modified_euler", integrator))  # fmt: skip
+        text = changed(
+            TUMBLING,
+            ("environment {}", f"environment {{}}\n{sensors}"),
+            ("momentum,", "sensors,"),
+            ("dynamics = 100 Hz", f"dynamics = {hz} Hz"),
+            ("modified_euler", integrator),
+        )
         run = engine.run(experiment(tmp_path, FLYER, text))
         return np.array([of(run, name)[-1] for name in ("tip", "spin")])
 
@@ -217,11 +264,14 @@ def test_a_reading_is_of_the_integrators_order(integrator: str, tmp_path: Path) 
 def test_a_gyroscope_reads_the_rate_that_is(tmp_path: Path) -> None:
     """cos of the angle to the axis, times the rate; exactly where there is no filter."""
     run = stood(
-        tmp_path, "sensor about = gyroscope { link = bar; along = [3, 4, 0]; }\n"
+        tmp_path,
+        "sensor about = gyroscope { link = bar; along = [3, 4, 0]; }\n"
         "sensor off = gyroscope { link = bar; along = [0, 2, 0]; scale = 1.5; bias = 1 deg/s; }\n"
         "sensor none = gyroscope { link = base; along = [0, 1, 0]; }",
-        servo="turn", rate="3 rad/s", acceleration="2 rad/s^2",
-    )  # fmt: skip
+        servo="turn",
+        rate="3 rad/s",
+        acceleration="2 rad/s^2",
+    )
     qd = run.signals["qd"][0].ravel()
     np.testing.assert_allclose(of(run, "about"), 0.8 * qd, rtol=1e-14)
     np.testing.assert_allclose(of(run, "off"), 1.5 * qd + math.radians(1.0), rtol=1e-14)
@@ -229,9 +279,11 @@ def test_a_gyroscope_reads_the_rate_that_is(tmp_path: Path) -> None:
 
 
 def test_a_reading_has_bias_scale_steps_and_delay_at_its_own_rate(tmp_path: Path) -> None:
-    sensors = ("sensor true = gyroscope { link = bar; along = [0, 1, 0]; rate = 200 Hz; }\n"
-               "sensor read = gyroscope { link = bar; along = [0, 1, 0]; rate = 200 Hz; scale = 1.1; "
-               "bias = 0.05 rad/s; resolution = 0.01 rad/s; delay = 2; }")  # fmt: skip
+    sensors = (
+        "sensor true = gyroscope { link = bar; along = [0, 1, 0]; rate = 200 Hz; }\n"
+        "sensor read = gyroscope { link = bar; along = [0, 1, 0]; rate = 200 Hz; scale = 1.1; "
+        "bias = 0.05 rad/s; resolution = 0.01 rad/s; delay = 2; }"
+    )
     run = stood(tmp_path, sensors, servo="turn", rate="3 rad/s", acceleration="2 rad/s^2")
     true, read = of(run, "true"), of(run, "read")
     assert (true.reshape(-1)[:1000].reshape(200, 5) == true[:1000:5, None]).all(), "held between ticks"
@@ -241,9 +293,11 @@ def test_a_reading_has_bias_scale_steps_and_delay_at_its_own_rate(tmp_path: Path
 
 
 def test_noise_is_its_size_white_and_the_same_wherever_else_cases_differ(tmp_path: Path) -> None:
-    sensors = ("sensor a = gyroscope { link = bar; along = [0, 1, 0]; noise = 0.05 rad/s; }\n"
-               "sensor b = gyroscope { link = bar; along = [0, 1, 0]; noise = 0.05 rad/s; }\n"
-               "sensor true = gyroscope { link = bar; along = [0, 1, 0]; }")  # fmt: skip
+    sensors = (
+        "sensor a = gyroscope { link = bar; along = [0, 1, 0]; noise = 0.05 rad/s; }\n"
+        "sensor b = gyroscope { link = bar; along = [0, 1, 0]; noise = 0.05 rad/s; }\n"
+        "sensor true = gyroscope { link = bar; along = [0, 1, 0]; }"
+    )
     text = changed(STILL, ("SENSORS", sensors), ("SERVO", "held"), ("RATE", "0 rad/s"), ("ACCELERATION", "0 rad/s^2"))
     sweep = "sweep cases of it { vary links.bar.mass = [1, 2] kg; repeat 2; }\n"
     found = experiment(tmp_path, text, sweep, select=["cases"])
@@ -279,8 +333,9 @@ def test_a_grapple_is_no_acceleration_and_a_payload_has_sensors_wherever_it_is(t
     sensors = "".join(
         f"sensor {kind}_{name} = {kind} {{ link = {name}; along = [0, 0, 1]; "
         f"{'cutoff = 10 Hz; ' * (kind == 'accelerometer')} }}\n"
-        for kind in ("accelerometer", "gyroscope") for name in ("box", "lower")
-    )  # fmt: skip
+        for kind in ("accelerometer", "gyroscope")
+        for name in ("box", "lower")
+    )
     text = changed(
         GRAPPLING,
         ("environment {}", "environment {}\n" + sensors),
@@ -350,8 +405,12 @@ def test_in_orbit_it_feels_the_tide_away_from_the_centre_and_nothing_at_it(frame
 def test_both_frames_of_the_gradient_feel_the_same(tmp_path: Path) -> None:
     """One motion in a world that keeps its directions, and in one that turns: specific force knows no frame."""
     w, v, p = np.array([0.0, 0.0, N]), np.array([0.01, -0.02, 0.03]), np.array([3.0, 4.0, 5.0])
-    fixed = changed(ORBIT, ("FRAME", "inertial"), ("RATE", f"[0.2, -0.1, {0.3 + N!r}] rad/s"),
-                    ("[0.01, -0.02, 0.03]", str((v + np.cross(w, p)).tolist())))  # fmt: skip
+    fixed = changed(
+        ORBIT,
+        ("FRAME", "inertial"),
+        ("RATE", f"[0.2, -0.1, {0.3 + N!r}] rad/s"),
+        ("[0.01, -0.02, 0.03]", str((v + np.cross(w, p)).tolist())),
+    )
     turning = changed(ORBIT, ("FRAME", "orbital"), ("RATE", "[0.2, -0.1, 0.3] rad/s"))
     a, b = (engine.run(experiment(tmp_path, text)) for text in (fixed, turning))
     for name, size in (("mid", 1e-9), ("tidal", 2e-9), ("turn", 1e-8)):
@@ -361,12 +420,18 @@ def test_both_frames_of_the_gradient_feel_the_same(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_plain_numbers_lanes_and_threads_give_the_same(tmp_path: Path) -> None:
-    sensors = ("sensor tip = accelerometer { link = lower; at = [1, 0, 0] m; along = [1, 2, 3]; cutoff = 5 Hz; "
-               "noise = 0.1 m/s^2; resolution = 1e-3 m/s^2; delay = 1; }\n"
-               "sensor box = accelerometer { link = box; along = [1, 0, 0]; cutoff = 5 Hz; }\n"
-               "sensor spin = gyroscope { link = base; along = [1, 0, 1]; noise = 1 deg/s; }\n")  # fmt: skip
-    text = changed(GRAPPLING, ("environment {}", "environment { gravity = [1, -2, -9] m/s^2; }\n" + sensors),
-                   ("energy,", "sensors, energy,"), ("record = 10 Hz", "servos = 50 Hz; record = 10 Hz"))  # fmt: skip
+    sensors = (
+        "sensor tip = accelerometer { link = lower; at = [1, 0, 0] m; along = [1, 2, 3]; cutoff = 5 Hz; "
+        "noise = 0.1 m/s^2; resolution = 1e-3 m/s^2; delay = 1; }\n"
+        "sensor box = accelerometer { link = box; along = [1, 0, 0]; cutoff = 5 Hz; }\n"
+        "sensor spin = gyroscope { link = base; along = [1, 0, 1]; noise = 1 deg/s; }\n"
+    )
+    text = changed(
+        GRAPPLING,
+        ("environment {}", "environment { gravity = [1, -2, -9] m/s^2; }\n" + sensors),
+        ("energy,", "sensors, energy,"),
+        ("record = 10 Hz", "servos = 50 Hz; record = 10 Hz"),
+    )
     sweep = """\
 sweep some of tumbling {
     zip {
@@ -385,8 +450,9 @@ sweep some of tumbling {
     inputs = {coordinate.path: float(coordinate.values[4]) for coordinate in found.cases.coordinates}
     own = {"noise:repeat": float(np.asarray(found.cases.repeats)[4])}
     rows, _ = execute(build(found), {**inputs, **own}, found.structure.schedule.ticks)
-    kernel = np.concatenate([runs[0].signals[each.name][4].reshape(len(rows), -1)
-                             for each in found.structure.record], axis=1)  # fmt: skip
+    kernel = np.concatenate(
+        [runs[0].signals[each.name][4].reshape(len(rows), -1) for each in found.structure.record], axis=1
+    )
     # a rounding may turn one reading's step of 1e-3
     np.testing.assert_allclose(rows, kernel, rtol=1e-9, atol=2e-3)
 
@@ -397,10 +463,13 @@ def test_a_filter_that_comes_to_no_number_ends_its_case_and_says_so(tmp_path: Pa
     sweep = "sweep cases of it { vary sensors.way.at.x = [1, 1e308] m; }\n"
     run = engine.run(experiment(tmp_path, text, sweep, select=["cases"]))
     place = f"{tmp_path}/deck.ic:11"
-    assert run.cause == ["", (
-        f"t = 0 s: sensor way: its filter is no longer a finite number ({place}). Usual reasons: a step too long for "
-        "its `cutoff` (try a faster rate for the dynamics), or numbers that no double holds."
-    )]  # fmt: skip
+    assert run.cause == [
+        "",
+        (
+            f"t = 0 s: sensor way: its filter is no longer a finite number ({place}). Usual reasons: a step too long "
+            "for its `cutoff` (try a faster rate for the dynamics), or numbers that no double holds."
+        ),
+    ]
 
 
 STICKING = """\
@@ -443,8 +512,14 @@ def test_what_sticks_stops_being_felt_where_it_does(hz: int, tmp_path: Path) -> 
 def test_it_feels_the_motion_that_is_whatever_the_dynamics_leave_out(tmp_path: Path) -> None:
     """Without velocity products the joint needs no force for its circle; the point goes it all the same."""
     sensors = "sensor out = accelerometer { link = bar; at = [2, 0, 0] m; along = [1, 0, 0]; cutoff = 40 Hz; }"
-    run = stood(tmp_path, sensors, ("[0, 0, -9.81]", "[0, 0, 0]"), ("products = on", "products = off"), servo="turn",
-                rate="3 rad/s")  # fmt: skip
+    run = stood(
+        tmp_path,
+        sensors,
+        ("[0, 0, -9.81]", "[0, 0, 0]"),
+        ("products = on", "products = off"),
+        servo="turn",
+        rate="3 rad/s",
+    )
     np.testing.assert_allclose(of(run, "out"), -18.0, rtol=1e-12)
 
 
@@ -453,10 +528,19 @@ def test_with_a_motor_on_a_bed_it_feels_the_acceleration_that_the_bed_gives(tmp_
 servo motor { model = rigid_gearbox; ratio = 100; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm;
     kt = 0.05 N*m/A; tau_max = 1 N*m; j_m = 1e-4 kg*m^2; command = rate(0.5 rad/s); }
 """
-    sensors = ("sensor way = accelerometer { link = bar; at = [1, 0, 0] m; along = [0, 0, 1]; cutoff = 50 Hz; }\n"
-               "substitute hinge { bed = emulated; }")  # fmt: skip
-    text = changed(STILL, ("SENSORS", sensors), ("SERVO", "motor"), ("RATE", "0 rad/s"), ("ACCELERATION", "0 rad/s^2"),
-                   ("[0, 0, -9.81]", "[0, 0, 0]"), ("sensors]", "sensors, sensors.way.filtered]"))  # fmt: skip
+    sensors = (
+        "sensor way = accelerometer { link = bar; at = [1, 0, 0] m; along = [0, 0, 1]; cutoff = 50 Hz; }\n"
+        "substitute hinge { bed = emulated; }"
+    )
+    text = changed(
+        STILL,
+        ("SENSORS", sensors),
+        ("SERVO", "motor"),
+        ("RATE", "0 rad/s"),
+        ("ACCELERATION", "0 rad/s^2"),
+        ("[0, 0, -9.81]", "[0, 0, 0]"),
+        ("sensors]", "sensors, sensors.way.filtered]"),
+    )
     run = engine.run(experiment(tmp_path, servo + text))
     assert run.cause == [""]
     qdd, x = run.signals["qdd"][0].ravel(), of(run, "way")

@@ -36,9 +36,13 @@ def of(run: Run, name: str, case: int = 0) -> np.ndarray:
     return run.signals[name][case, :, 0]
 
 
-@pytest.mark.parametrize(("sensor", "order"), [
-    ("tachometer { filter = butterworth;  cutoff = 20 Hz; }", 2), ("low_pass { cutoff = 20 Hz; }", 1),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("sensor", "order"),
+    [
+        ("tachometer { filter = butterworth;  cutoff = 20 Hz; }", 2),
+        ("low_pass { cutoff = 20 Hz; }", 1),
+    ],
+)
 def test_a_filter_answers_as_its_transfer_function_does(sensor: str, order: int, tmp_path: Path) -> None:
     run = moved(tmp_path, f"sensor qd = {sensor}", "servo.sensor.qd")
     s = 2j * np.pi * 8.0 / (2.0 * np.pi * 20.0)
@@ -53,8 +57,12 @@ def test_a_filter_answers_as_its_transfer_function_does(sensor: str, order: int,
 
 
 def test_a_converter_gives_the_nearest_step_and_an_encoder_the_last_line(tmp_path: Path) -> None:
-    run = moved(tmp_path, "sensor qd = tachometer { resolution = 0.25 rad/s; }  sensor q = encoder { step = 0.5 deg; }",
-                "servo.sensor.qd", "servo.sensor.q")  # fmt: skip
+    run = moved(
+        tmp_path,
+        "sensor qd = tachometer { resolution = 0.25 rad/s; }  sensor q = encoder { step = 0.5 deg; }",
+        "servo.sensor.qd",
+        "servo.sensor.q",
+    )
     qd, q, step = of(run, "qd"), of(run, "q"), np.deg2rad(0.5)
     assert (of(run, "servo.sensor.qd") == 0.25 * np.rint(qd / 0.25)).all()
     assert (of(run, "servo.sensor.q") == step * np.floor(q / step)).all()
@@ -70,8 +78,13 @@ def test_a_delay_is_whole_ticks_and_begins_with_the_first_reading(ticks: int, tm
 
 def test_noise_has_its_size_is_white_and_the_same_for_cases_that_differ_in_a_gain(tmp_path: Path) -> None:
     sweep = "sweep cases of it { vary links.bar.mass = [1, 2] kg; }\n"
-    run = moved(tmp_path, "sensor qd = tachometer { noise = 0.05 rad/s; }  sensor q = tachometer { noise = 0.05 rad; }",
-                "servo.sensor.qd", "servo.sensor.q", more=sweep)  # fmt: skip
+    run = moved(
+        tmp_path,
+        "sensor qd = tachometer { noise = 0.05 rad/s; }  sensor q = tachometer { noise = 0.05 rad; }",
+        "servo.sensor.qd",
+        "servo.sensor.q",
+        more=sweep,
+    )
     noise = [of(run, "servo.sensor.qd", case) - of(run, "qd", case) for case in (0, 1)]
     np.testing.assert_allclose(noise[0], noise[1], rtol=0, atol=1e-15)
     other = of(run, "servo.sensor.q") - of(run, "q")
@@ -93,8 +106,15 @@ def test_a_law_sees_what_its_sensor_reads(tmp_path: Path) -> None:
 
 
 def test_a_sensor_on_the_motors_side_is_of_a_state(tmp_path: Path) -> None:
-    geared = changed(SERVO, ("rigid_gearbox", "compliant_gearbox"), ("command", "stiffness = 5000 N*m/rad;  "
-                     "sensor motor_rate = tachometer { resolution = 0.5 rad/s;  delay = 1; }  command"))  # fmt: skip
+    geared = changed(
+        SERVO,
+        ("rigid_gearbox", "compliant_gearbox"),
+        (
+            "command",
+            "stiffness = 5000 N*m/rad;  "
+            "sensor motor_rate = tachometer { resolution = 0.5 rad/s;  delay = 1; }  command",
+        ),
+    )
     run = changed(RUN, ("[q]", "[servo.motor_rate, servo.sensor.motor_rate]"), ("record = 100 Hz", "record = 1 kHz"))
     found = engine.run(experiment(tmp_path, ARM, geared, run))
     rate = of(found, "servo.motor_rate")
@@ -112,8 +132,12 @@ def test_a_continuous_law_sees_through_analog_sensors_alone(tmp_path: Path) -> N
 
 
 def test_between_instants_a_sensor_sees_the_state_carried_forward(tmp_path: Path) -> None:
-    run = moved(tmp_path, "rate = 16 kHz;  sensor qd = tachometer { filter = butterworth;  cutoff = 50 Hz; }",
-                "servo.sensor.qd", "servo.sensor.qd.filtered")  # fmt: skip
+    run = moved(
+        tmp_path,
+        "rate = 16 kHz;  sensor qd = tachometer { filter = butterworth;  cutoff = 50 Hz; }",
+        "servo.sensor.qd",
+        "servo.sensor.qd.filtered",
+    )
     away = np.abs(of(run, "servo.sensor.qd") - of(run, "servo.sensor.qd.filtered")).max()
     assert away == 0.0, "at an instant nothing is carried"
     assert np.isfinite(of(run, "servo.sensor.qd")).all()
@@ -122,8 +146,12 @@ def test_between_instants_a_sensor_sees_the_state_carried_forward(tmp_path: Path
 SENSOR = "sensor qd = tachometer { noise = 0.1 rad/s; }"
 
 
-@pytest.mark.parametrize(("sensor", "said"), [
-    ("sensor qdd = tachometer { }", """\
+@pytest.mark.parametrize(
+    ("sensor", "said"),
+    [
+        (
+            "sensor qdd = tachometer { }",
+            """\
 error[D245]: servo `drive` has no `qdd` to be sensed
  --> deck.ic:9:5
   |
@@ -133,8 +161,11 @@ error[D245]: servo `drive` has no `qdd` to be sensed
   = help: a sensor may be of: q, qd
 
 1 error
-"""),
-    ("sensor qd = tacho { }", """\
+""",
+        ),
+        (
+            "sensor qd = tacho { }",
+            """\
 error[D140]: no sensor model `tacho`
  --> deck.ic:9:17
   |
@@ -144,11 +175,16 @@ error[D140]: no sensor model `tacho`
   = help: sensor models: accelerometer, encoder, gyroscope, low_pass, tachometer
 
 1 error
-"""),
-    ("sensor qd = tachometer { noise = 0.1 rad; }", """\
+""",
+        ),
+        (
+            "sensor qd = tachometer { noise = 0.1 rad; }",
+            """\
 error[D061]: `noise` of sensor `qd` of servo `drive` is in rad/s, and this is in rad
-"""),
-])  # fmt: skip
+""",
+        ),
+    ],
+)
 def test_what_is_wrong_with_a_sensor_is_told(sensor: str, said: str, tmp_path: Path) -> None:
     text = messages(check(tmp_path, ARM, changed(SERVO, ("command", f"{sensor} command")), RUN))
     assert text.startswith(said) if said.count("\n") == 1 else text == said

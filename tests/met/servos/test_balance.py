@@ -209,8 +209,13 @@ def test_it_is_a_word_that_sweeps_and_the_command_line_may_change(tmp_path: Path
     assert by_hand is not None and by_hand.experiments[0].structure.balanced
 
 
-@pytest.mark.parametrize(("body", "servo", "said"), [
-    ("servos = level;", "stiff", """\
+@pytest.mark.parametrize(
+    ("body", "servo", "said"),
+    [
+        (
+            "servos = level;",
+            "stiff",
+            """\
 error[D076]: `servos` of the initial state cannot be `level`
   --> deck.ic:10:24
    |
@@ -219,8 +224,12 @@ error[D076]: `servos` of the initial state cannot be `level`
    = help: one of: unloaded, balanced
 
 1 error
-"""),
-    ("servos = balanced;", "limp", """\
+""",
+        ),
+        (
+            "servos = balanced;",
+            "limp",
+            """\
 warning[D248]: no servo of this run can begin balanced: this changes nothing
   --> deck.ic:10:15
    |
@@ -229,8 +238,10 @@ warning[D248]: no servo of this run can begin balanced: this changes nothing
    = help: models that can: rigid_gearbox, compliant_gearbox, cascade
 
 1 warning
-"""),
-])  # fmt: skip
+""",
+        ),
+    ],
+)
 def test_a_mistake_is_told(body: str, servo: str, said: str, tmp_path: Path) -> None:
     servos = """servo limp { model = passive; }
 servo stiff { model = rigid_gearbox; ratio = 100; kp = 0.1 V*s/rad; ki = 1 V/rad; v_max = 24 V; resistance = 1 ohm;

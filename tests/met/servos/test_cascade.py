@@ -88,8 +88,10 @@ def test_a_gear_that_is_stiff_moves_as_a_rigid_one(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_sampled_loops_come_to_the_continuous_ones(tmp_path: Path) -> None:
-    smooth = ("trapezoid(to = 1 rad, max_rate = 1 rad/s, max_acceleration = 4 rad/s^2)",
-              "sine(amplitude = 0.1 rad, frequency = 1 Hz)")  # fmt: skip
+    smooth = (
+        "trapezoid(to = 1 rad, max_rate = 1 rad/s, max_acceleration = 4 rad/s^2)",
+        "sine(amplitude = 0.1 rad, frequency = 1 Hz)",
+    )
     analog = ran(tmp_path, smooth)
     away = []
     for rate in ("500 Hz", "1 kHz", "2 kHz"):

@@ -59,8 +59,12 @@ def test_a_hardening_gear_keeps_its_energy(tmp_path: Path) -> None:
     """k1 d^2/2 + k3 d^4/4 and both kinetic energies: what the push has put in, and what is recorded as energy."""
     errors = []
     for rate in ("1 kHz", "2 kHz"):
-        run = ran(tmp_path, ("stiffness = 500 N*m/rad;", "stiffness = 500 N*m/rad;  hardening = 2e7 N*m/rad^3;"),
-                  ("dynamics = 5 kHz", f"dynamics = {rate}"), ("[q, qd, qdd,", "[q, qd, energy,"))  # fmt: skip
+        run = ran(
+            tmp_path,
+            ("stiffness = 500 N*m/rad;", "stiffness = 500 N*m/rad;  hardening = 2e7 N*m/rad^3;"),
+            ("dynamics = 5 kHz", f"dynamics = {rate}"),
+            ("[q, qd, qdd,", "[q, qd, energy,"),
+        )
         d, q, qd, w = (of(run, name) for name in ("servo.deflection", "q", "qd", "servo.motor_rate"))
         energy = 500.0 * d**2 / 2.0 + 2e7 * d**4 / 4.0 + ARM_INERTIA * qd**2 / 2.0 + 1e-4 * w**2 / 2.0
         assert (2e7 * d**2).max() > 500.0, "the cubic part is the larger one"
@@ -74,11 +78,15 @@ def test_a_hardening_gear_keeps_its_energy(tmp_path: Path) -> None:
 def test_teeth_push_and_never_pull(tmp_path: Path) -> None:
     """Shaken to and fro across the play, with a damping that would pull as they part."""
     run = ran(
-        tmp_path, ("stiffness = 500", "backlash = 0.02 rad;  damping = 5 N*m*s/rad;  stiffness = 500"),
-        ("moment = [0, 0, 6] N*m; }", "moment = [0, 0, 6] N*m;  until = 60 ms; }\n"
-         "    pull = wrench { link = bar;  moment = [0, 0, -6] N*m;  from = 60 ms;  until = 0.16 s; }"),
+        tmp_path,
+        ("stiffness = 500", "backlash = 0.02 rad;  damping = 5 N*m*s/rad;  stiffness = 500"),
+        (
+            "moment = [0, 0, 6] N*m; }",
+            "moment = [0, 0, 6] N*m;  until = 60 ms; }\n"
+            "    pull = wrench { link = bar;  moment = [0, 0, -6] N*m;  from = 60 ms;  until = 0.16 s; }",
+        ),
         ("record = 500 Hz", "record = 5 kHz"),
-    )  # fmt: skip
+    )
     d, torque = of(run, "servo.deflection"), of(run, "servo.gear_torque")
     beyond = d - np.clip(d, -0.01, 0.01)
     assert (torque[beyond == 0.0] == 0.0).all() and (torque * np.sign(beyond) >= 0.0).all()
@@ -94,8 +102,14 @@ STUCK = (("j_m = 1e-4", "f_c = 0.02 N*m;  j_m = 1e-4"), ("stiffness = 500", "dam
 @pytest.mark.slow
 def test_a_motor_that_sticks_does_not_creep_in_an_hour(tmp_path: Path) -> None:
     """Held by 0.98 of what breaks it away, N F_c, through the wound gear, once the jolt at the start is over."""
-    run = ran(tmp_path, *STUCK, ("[0, 0, 6] N*m", "[0, 0, 1.96] N*m"), ("dynamics = 5 kHz", "dynamics = 200 Hz"),
-              ("record = 500 Hz", "record = 0.1 Hz"), ("duration = 0.5 s", "duration = 3600 s"))  # fmt: skip
+    run = ran(
+        tmp_path,
+        *STUCK,
+        ("[0, 0, 6] N*m", "[0, 0, 1.96] N*m"),
+        ("dynamics = 5 kHz", "dynamics = 200 Hz"),
+        ("record = 500 Hz", "record = 0.1 Hz"),
+        ("duration = 0.5 s", "duration = 3600 s"),
+    )
     assert (of(run, "servo.motor_rate") == 0.0).all()
     held = (of(run, "q") + of(run, "servo.deflection"))[1:]  # the motor's angle over the ratio
     assert np.ptp(held) < 1e-15, "roundings of the two, which move against each other"
@@ -106,8 +120,14 @@ def test_a_motor_that_sticks_does_not_creep_in_an_hour(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("moment", "moves"), [("2.05", True), ("1.99", False)])
 def test_it_breaks_away_where_the_gear_pulls_harder_than_friction(tmp_path: Path, moment: str, moves: bool) -> None:
     """The push grows slowly enough for the gear not to overshoot: it is ten times damped."""
-    run = ran(tmp_path, *STUCK, ("damping = 4", "damping = 100"), ("[0, 0, 6] N*m", f"[0, 0, {moment}] N*m"),
-              ("duration = 0.5 s", "duration = 20 s"), ("record = 500 Hz", "record = 5 Hz"))  # fmt: skip
+    run = ran(
+        tmp_path,
+        *STUCK,
+        ("damping = 4", "damping = 100"),
+        ("[0, 0, 6] N*m", f"[0, 0, {moment}] N*m"),
+        ("duration = 0.5 s", "duration = 20 s"),
+        ("record = 500 Hz", "record = 5 Hz"),
+    )
     assert bool(of(run, "servo.motor_rate")[-1]) is moves
 
 
@@ -116,10 +136,14 @@ def test_friction_at_the_joint_sticks_behind_a_motor_that_turns(tmp_path: Path) 
     run = ran(tmp_path, ("stiffness = 500", "f_c_joint = 8 N*m;  stiffness = 500"))
     assert (of(run, "q") == 0.0).all() and (of(run, "servo.motor_rate") == 0.0).all(), "6 N m do not move 8"
     run = ran(
-        tmp_path, ("stiffness = 500", "f_c_joint = 8 N*m;  stiffness = 500"), ("kp = 0", "kp = 1"),
-        ("kt = 1e-9", "kt = 0.05"), ("rate(0 rad/s)", "rate(0.3 rad/s)"), ("duration = 0.5", "duration = 2"),
+        tmp_path,
+        ("stiffness = 500", "f_c_joint = 8 N*m;  stiffness = 500"),
+        ("kp = 0", "kp = 1"),
+        ("kt = 1e-9", "kt = 0.05"),
+        ("rate(0 rad/s)", "rate(0.3 rad/s)"),
+        ("duration = 0.5", "duration = 2"),
         ("    environment { push = wrench { link = bar;  moment = [0, 0, 6] N*m; } }\n", ""),
-    )  # fmt: skip
+    )
     d, qd = of(run, "servo.deflection"), of(run, "qd")
     waits = qd == 0.0
     assert waits[:3].all() and (d[waits] * STIFFNESS <= 8.0 + 1e-9).all(), "the gear is wound up first"
@@ -161,8 +185,13 @@ def test_modified_euler_keeps_its_order_through_events_of_both_sides(tmp_path: P
 
 
 def test_a_run_begins_with_the_motor_turning_with_the_joint(tmp_path: Path) -> None:
-    run = ran(tmp_path, ("    environment { push = wrench { link = bar;  moment = [0, 0, 6] N*m; } }\n",
-                         "    initial { hinge.q = 1 rad;  hinge.qd = 0.5 rad/s; }\n"))  # fmt: skip
+    run = ran(
+        tmp_path,
+        (
+            "    environment { push = wrench { link = bar;  moment = [0, 0, 6] N*m; } }\n",
+            "    initial { hinge.q = 1 rad;  hinge.qd = 0.5 rad/s; }\n",
+        ),
+    )
     np.testing.assert_allclose(of(run, "servo.motor_rate"), 50.0, rtol=1e-13)
     np.testing.assert_allclose(of(run, "servo.deflection"), 0.0, atol=1e-15)
     np.testing.assert_allclose(of(run, "q"), 1.0 + 0.5 * run.time, rtol=1e-13)

@@ -50,12 +50,22 @@ def test_once_released_the_joint_is_free(tmp_path: Path) -> None:
     q, qd, tau = (found[name][0] for name in ("q", "qd", "tau"))
     assert (q[:101, RAISE] == 0.4).all() and (qd[:101, PUSH] == 0.0).all()
     assert (tau[100:, [RAISE, PUSH]] == 0.0).all() and (tau[:100, [RAISE, PUSH]] != 0.0).all()
-    again = "initial {" + "".join(
-        f"{joint}.q = {q[100, n]!r} {unit}; {joint}.qd = {qd[100, n]!r} {unit}/s; "
-        for n, (joint, unit) in enumerate((("turn", "rad"), ("raise", "rad"), ("push", "m"), ("wag", "rad")))
-    ).replace("np.float64(", "").replace(")", "") + "}"  # fmt: skip
-    free = changed(RUN, ("servos { raise = lock; push = lock; }", ""), ("duration = 0.5 s", "duration = 0.3 s"),
-                   ("initial { raise.q = 0.4 rad; turn.qd = 1 rad/s; }", again))  # fmt: skip
+    again = (
+        "initial {"
+        + "".join(
+            f"{joint}.q = {q[100, n]!r} {unit}; {joint}.qd = {qd[100, n]!r} {unit}/s; "
+            for n, (joint, unit) in enumerate((("turn", "rad"), ("raise", "rad"), ("push", "m"), ("wag", "rad")))
+        )
+        .replace("np.float64(", "")
+        .replace(")", "")
+        + "}"
+    )
+    free = changed(
+        RUN,
+        ("servos { raise = lock; push = lock; }", ""),
+        ("duration = 0.5 s", "duration = 0.3 s"),
+        ("initial { raise.q = 0.4 rad; turn.qd = 1 rad/s; }", again),
+    )
     expected = engine.run(experiment(tmp_path, TREE, free)).signals["q"][0]
     assert np.abs(q[100:] - expected).max() < 1e-12 * np.abs(expected).max()  # rounding over 150 steps
 
@@ -124,12 +134,16 @@ def test_a_joint_that_is_free_from_the_start_may_move(tmp_path: Path) -> None:
     ("sweep", "said"),
     [
         ("", "experiments[0].parameters.initial.raise.qd: a locked joint begins at rest"),
-        ("sweep some of it { vary initial.turn.qd = [1, 2] rad/s; }\n",
-         "experiments[0].parameters.initial.raise.qd: a locked joint begins at rest"),
-        ("sweep some of it { vary raise.servo.release = [0, 1, 2] s; }\n",
-         "experiments[0].parameters.initial.raise.qd: a locked joint begins at rest; in case #1"),
+        (
+            "sweep some of it { vary initial.turn.qd = [1, 2] rad/s; }\n",
+            "experiments[0].parameters.initial.raise.qd: a locked joint begins at rest",
+        ),
+        (
+            "sweep some of it { vary raise.servo.release = [0, 1, 2] s; }\n",
+            "experiments[0].parameters.initial.raise.qd: a locked joint begins at rest; in case #1",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_plan_by_hand_is_held_to_it_too(tmp_path: Path, sweep: str, said: str) -> None:
     deck = experiment(tmp_path, TREE, RUN, sweep, select=["some"] if sweep else None)
     plan_check.check([deck])

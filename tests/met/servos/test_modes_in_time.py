@@ -32,9 +32,11 @@ def drive(p: SimpleNamespace, held: object, states: object, joint: JointMotion) 
         rotor=ROTOR,
         given=both(joint.time >= p.first, joint.time < p.last),
         qdd=p.size * sin(5.0 * joint.time) - joint.qd,
-        signals={"asked": p.size * sin(5.0 * joint.time) - joint.qd,
-                 "given_torque": p.size * sin(3.0 * joint.time) - 0.5 * joint.qd},
-    )  # fmt: skip
+        signals={
+            "asked": p.size * sin(5.0 * joint.time) - joint.qd,
+            "given_torque": p.size * sin(3.0 * joint.time) - 0.5 * joint.qd,
+        },
+    )
 
 
 SWITCHING = Servo(

@@ -40,9 +40,16 @@ ARM = ("arm-none-eabi-gcc", "-O2")
 
 
 def experiment(
-    folder: Path, name: str = "paper", *, dynamics: int = 25, servos: int = 100, faults: str = "typical",
-    delay: int = 0, law: str = "velocity_tracking", more: str = "",
-) -> Experiment:  # fmt: skip
+    folder: Path,
+    name: str = "paper",
+    *,
+    dynamics: int = 25,
+    servos: int = 100,
+    faults: str = "typical",
+    delay: int = 0,
+    law: str = "velocity_tracking",
+    more: str = "",
+) -> Experiment:
     path = folder / "deck.ic"
     text = DECK.format(dynamics=dynamics, servos=servos, faults=faults, delay=delay, law=law, more=more)
     path.write_text(text, encoding="utf-8")
@@ -72,8 +79,10 @@ def assert_same_run(found: Experiment, case: int = 0, ticks: int | None = None) 
     for k in range(ticks + 1):
         for joint, plant in plants.items():
             if k and k % divisor == 0:
-                voltage, current = (block.outputs.item(split.outputs.index(f"wire:{joint}.{name}"), 0)
-                                    for name in ("voltage", "current"))  # fmt: skip
+                voltage, current = (
+                    block.outputs.item(split.outputs.index(f"wire:{joint}.{name}"), 0)
+                    for name in ("voltage", "current")
+                )
                 block.inputs[split.inputs.index(f"wire:{joint}.rate"), :] = plant.tick(voltage, current)
         row = block.recorded(k, k)[0]
         if k % schedule.record == 0:
@@ -191,24 +200,42 @@ def test_the_text_is_the_same_each_time_and_another_cases_is_another(tmp_path: P
 
 @pytest.mark.compiler
 @pytest.mark.parametrize("level", ["-O0", "-Os", "-O3"])
-@pytest.mark.parametrize("words", [
-    ("gcc",), ("clang",),
-    pytest.param(("arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb"), marks=pytest.mark.firmware),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("gcc",),
+        ("clang",),
+        pytest.param(("arm-none-eabi-gcc", "-mcpu=cortex-m3", "-mthumb"), marks=pytest.mark.firmware),
+    ],
+)
 def test_it_asks_for_no_library_but_the_compilers_own_arithmetic(
     tmp_path: Path, words: tuple[str, ...], level: str
 ) -> None:
     need(words[0])
     text = plant_c(experiment(tmp_path, "several"), "shoulder", case=3, period=0.002)
     (tmp_path / "plant.c").write_text(text, encoding="utf-8")
-    command = [*words, *STRICT, level, "-ffreestanding", f"-I{FIRMWARE}", "-c", "-o", tmp_path / "plant.o",
-               tmp_path / "plant.c"]  # fmt: skip
+    command = [
+        *words,
+        *STRICT,
+        level,
+        "-ffreestanding",
+        f"-I{FIRMWARE}",
+        "-c",
+        "-o",
+        tmp_path / "plant.o",
+        tmp_path / "plant.c",
+    ]
     subprocess.run(command, check=True)
     named = subprocess.run(["nm", tmp_path / "plant.o"], capture_output=True, text=True, check=True).stdout
     outside = {line.split()[-1] for line in named.splitlines() if line.split()[-2].isupper()}
     assert {name for name in outside if not name.startswith("__aeabi_")} == {
-        "plant_period", "plant_start", "plant_tick", "plant_rate", "plant_shaft_rate", "plant_shaft_angle",
-    }  # fmt: skip
+        "plant_period",
+        "plant_start",
+        "plant_tick",
+        "plant_rate",
+        "plant_shaft_rate",
+        "plant_shaft_angle",
+    }
 
 
 def test_a_joint_whose_motor_is_its_own_has_no_plant(tmp_path: Path) -> None:

@@ -42,8 +42,11 @@ def test_a_bed_outside_the_kernel_makes_the_same_run_as_the_emulated_one_inside(
     assert split.inputs == ("wire:shoulder.rate",)
     block = kernel.compile(split).block(np.zeros((1, 1)))
     told = {name: split.outputs.index(f"wire:shoulder.{name}") for name in ("voltage", "current")}
-    values = {name.removeprefix("shoulder.bed."): quantity.value
-              for name, quantity in experiment.parameters.items() if name.startswith("shoulder.bed.")}  # fmt: skip
+    values = {
+        name.removeprefix("shoulder.bed."): quantity.value
+        for name, quantity in experiment.parameters.items()
+        if name.startswith("shoulder.bed.")
+    }
     p = SimpleNamespace(**values)
     held = SimpleNamespace(shaft_rate=0.0, shaft_angle=0.0, filtered=0.0, filtered_slope=0.0)
     rows, shaft, waiting = [], [], [Wire(0.0, 0.0)] * late

@@ -39,8 +39,17 @@ def made(folder: Path, text: str, words: tuple[str, ...], *, include: Path = HER
     arm = words[0].startswith("arm")
     need(words[0], *(["qemu-arm"] if arm else []))
     (folder / "program.c").write_text(text, encoding="utf-8")
-    command = [*words, *STRICT, *(CONTROLLER if arm else ()), f"-I{HERE}", f"-I{include}", "-o", folder / "program",
-               folder / "program.c", *(["-lgcc"] if arm else [])]  # fmt: skip
+    command = [
+        *words,
+        *STRICT,
+        *(CONTROLLER if arm else ()),
+        f"-I{HERE}",
+        f"-I{include}",
+        "-o",
+        folder / "program",
+        folder / "program.c",
+        *(["-lgcc"] if arm else []),
+    ]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return (*(EMULATOR if arm else ()), str(folder / "program"))
@@ -56,14 +65,30 @@ def answered(command: tuple[str, ...], question: np.ndarray) -> np.ndarray:
 def driver(program: Program) -> str:
     """The program in C, with a `main` that runs it for any number of cases."""
     source = emit(record(program))
-    lines = [source.text, *(f"#define {name} {value}" for name, value in (
-        ("INPUTS", len(program.inputs)), ("OUTPUTS", len(program.outputs)), ("COLUMNS", program.columns),
-        ("DIVISOR", program.record_divisor)))]  # fmt: skip
-    lines += ["static void put_inputs(const double *given)", "{",
-              *(f"    {source.inputs[name]} = given[{i}];" for i, name in enumerate(program.inputs)), "}",
-              "static void get_outputs(double *outputs)", "{",
-              *(f"    outputs[{i}] = {source.outputs[name]};" for i, name in enumerate(program.outputs)), "}",
-              '#include "run_program.c"', ""]  # fmt: skip
+    lines = [
+        source.text,
+        *(
+            f"#define {name} {value}"
+            for name, value in (
+                ("INPUTS", len(program.inputs)),
+                ("OUTPUTS", len(program.outputs)),
+                ("COLUMNS", program.columns),
+                ("DIVISOR", program.record_divisor),
+            )
+        ),
+    ]
+    lines += [
+        "static void put_inputs(const double *given)",
+        "{",
+        *(f"    {source.inputs[name]} = given[{i}];" for i, name in enumerate(program.inputs)),
+        "}",
+        "static void get_outputs(double *outputs)",
+        "{",
+        *(f"    outputs[{i}] = {source.outputs[name]};" for i, name in enumerate(program.outputs)),
+        "}",
+        '#include "run_program.c"',
+        "",
+    ]
     return "\n".join(lines)
 
 

@@ -56,6 +56,10 @@ def renamed(program: Program, cell: Name, given: Name = lambda name: name) -> Pr
         return tuple(out)
 
     return replace(
-        program, start=body_of(program.start), tick=body_of(program.tick), end=body_of(program.end),
-        inputs=tuple(map(given, program.inputs)), counters=tuple(map(cell, program.counters)),
-    )  # fmt: skip
+        program,
+        start=body_of(program.start),
+        tick=body_of(program.tick),
+        end=body_of(program.end),
+        inputs=tuple(map(given, program.inputs)),
+        counters=tuple(map(cell, program.counters)),
+    )

@@ -51,8 +51,12 @@ from met.trace.recorder import record
 from tests.met.trace.compiled import STRICT, different, driver, need, run
 
 HERE = [("gcc", "-O0"), ("gcc", "-O3"), ("gcc", "-O2", "-mfma"), ("clang", "-O2"), ("clang", "-O1", "-mfma")]
-ALL = [(name, level, *more) for name in ("gcc", "clang") for level in ("-O0", "-O1", "-O2", "-O3")
-       for more in ((), ("-mfma",))]  # fmt: skip
+ALL = [
+    (name, level, *more)
+    for name in ("gcc", "clang")
+    for level in ("-O0", "-O1", "-O2", "-O3")
+    for more in ((), ("-mfma",))
+]
 ARM = [("arm-none-eabi-gcc", level) for level in ("-O0", "-Os", "-O1", "-O2", "-O3")]
 
 SPECIAL = np.array([
@@ -91,24 +95,61 @@ def operations(a: Scalar, b: Scalar, c: Scalar) -> list[Scalar]:
     """Each operation of a graph at least once, also on turned signs and on what is known while it is recorded."""
     graph = a.graph
     return [
-        a + b, a - b, a * b, a / b, abs(a), -a, sqrt(a), sqrt(abs(b)), floor(a), rint(a), fma(a, b, c), fma(a, -b, c),
-        fma(a, b, -c), a * b + c, c - a * b, 1.0 / a, a / 3.0, math.inf - a, a * math.nan,
+        a + b,
+        a - b,
+        a * b,
+        a / b,
+        abs(a),
+        -a,
+        sqrt(a),
+        sqrt(abs(b)),
+        floor(a),
+        rint(a),
+        fma(a, b, c),
+        fma(a, -b, c),
+        fma(a, b, -c),
+        a * b + c,
+        c - a * b,
+        1.0 / a,
+        a / 3.0,
+        math.inf - a,
+        a * math.nan,
         *(Scalar(graph, graph.unary(op, a.ref)) for op in ("pow2", "exponent", "significand")),
         *(where(Mask(graph, graph.bit(a.ref, n)), b, c) for n in (0, 1, 51, 52, 62, 63)),
         *(Scalar(graph, graph.flip(a.ref, b.ref, n)) for n in (0, 17, 52, 63)),
-        where(a < b, a, c), where(a <= b, a, c), where(a == b, a, c), where(a != b, -a, c),
-        where(both(a < b, not_(b < c)), a, b), where(either(a < b, is_nan(c)), 1.0, -0.0),
-        minimum(a, b), maximum(a, b), clip(a, -1.0, 2.0), gather((0.5, -1.0, math.inf, 1e300, math.nan), a),
+        where(a < b, a, c),
+        where(a <= b, a, c),
+        where(a == b, a, c),
+        where(a != b, -a, c),
+        where(both(a < b, not_(b < c)), a, b),
+        where(either(a < b, is_nan(c)), 1.0, -0.0),
+        minimum(a, b),
+        maximum(a, b),
+        clip(a, -1.0, 2.0),
+        gather((0.5, -1.0, math.inf, 1e300, math.nan), a),
         *(philox(floor(abs(a)), floor(abs(b)), 3.0, c, 0.0, 4294967295.0, word) for word in range(4)),
-    ]  # fmt: skip
+    ]
 
 
 def elementary(a: Scalar, b: Scalar, c: Scalar) -> list[Scalar]:
     """What models call, and noise."""
     unit = a / (1.0 + abs(a))
     noise = normal_pair(Stream(floor(abs(b)), 3.0, "shoulder.bed.tachometer"), floor(abs(c)))
-    return [sin(a), cos(b), tan(c), exp(a), exp(b * 0.01), log(abs(a)), log(b), tanh(a), asin(unit), acos(unit),
-            atan(c), atan2(a, b), *noise]  # fmt: skip
+    return [
+        sin(a),
+        cos(b),
+        tan(c),
+        exp(a),
+        exp(b * 0.01),
+        log(abs(a)),
+        log(b),
+        tanh(a),
+        asin(unit),
+        acos(unit),
+        atan(c),
+        atan2(a, b),
+        *noise,
+    ]
 
 
 def table(make: Callable[[Scalar, Scalar, Scalar], list[Scalar]]) -> Program:
