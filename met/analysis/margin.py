@@ -18,6 +18,7 @@ import numpy as np
 from met.backends.reference.plain import PlainTape, follow
 from met.frozen import frozen
 from met.plan import Experiment
+from met.program import cell_names
 from met.program.build import Builder
 from met.program.control.substituted import Mounted
 from met.program.system import System
@@ -131,7 +132,7 @@ def _margins(experiment: Experiment, case: int, known: dict[tuple[Any, ...], _Kn
     beds = builder.step.beds
     # All of them first: a loop is taken round over the same cells, with loads of its own.
     names = [each.joint for each in beds.mounted]
-    Lambda = np.array([[float(tape.read(f"{a}:Lambda.{b}")) for b in names] for a in names])
+    Lambda = np.array([[float(tape.read(cell_names.ARM_INERTIA(a, b))) for b in names] for a in names])
     loops = [_Loop(builder, tape, each) for each in beds.mounted]
     ratios = Lambda / np.array([loop.rotor for loop in loops])[:, None]
     # of a matrix that is similar to a symmetric one: real but for rounding
@@ -243,7 +244,7 @@ class _Loop:
         tape.cells = _Noting(tape.cells)
         self._around(cells, self.rotor)
         # Under a position command the angle acts back; else it only adds up.
-        back = f"{each.joint}:angle" if each.actuator.command_kind == "position" else ""
+        back = cell_names.SHAFT_ANGLE(each.joint) if each.actuator.command_kind == "position" else ""
         written = tape.cells.written
         self.names = [name for name in cells if name in written and (name == back or not name.endswith(_ANGLES))]
         # The shaft turns on at one rate, and nothing else is under way.
@@ -257,7 +258,9 @@ class _Loop:
         """The cells a tick later, with an arm of this inertia on the joint (kg m^2; kg)."""
         tape, joint, actuator = self.tape, self.each.joint, self.each.actuator
         tape.cells.update({name: np.float64(value) for name, value in cells.items()})
-        tape.cells.update({f"{joint}:Lambda.{joint}": np.float64(load), f"{joint}:b_0": np.float64(0.0)})
+        tape.cells.update(
+            {cell_names.ARM_INERTIA(joint, joint): np.float64(load), cell_names.ARM_TORQUE(joint): np.float64(0.0)}
+        )
         self.beds.advance(tape)
         self.beds.read(tape)
         q, qd = self.beds.seen(tape, actuator) or (0.0, 0.0)

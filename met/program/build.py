@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 
 from met.plan import Experiment
 from met.plan.channel import Channel
-from met.program import balancing, orientations
+from met.program import balancing, cell_names, orientations
 from met.program.control import failing, guiding, link_sensors, sensing
 from met.program.control.substituted import LIMITED
 from met.program.evaluation import gravity, law
@@ -138,7 +138,7 @@ class Builder:
         seen = Seen(*sensing.measured(actuator, p, *state, states), Setpoint("none", 0.0, 0.0), 0.0, 0.0, states)
         sensing.start(self.system, tape, actuator, seen)
         for of in failing.quantities(actuator) if actuator.use.joint in self.system.failing else ():
-            tape.write(f"saw:{actuator.use.joint}.{of}", sensing.true_value(seen, of))
+            tape.write(cell_names.SEEN(actuator.use.joint, of), sensing.true_value(seen, of))
 
     def end(self, tape: Tape) -> None:
         for name in OUTPUTS:
@@ -194,9 +194,9 @@ class Builder:
         seen = self.seen(actuator, q, qd, setpoint, tape.time, states)
         seen = sensing.seen_at_tick(self.system, tape, actuator, seen, state)
         if joint in self.system.failing:
-            seen = failing.seen(self.system, actuator, tape.read, seen, f"saw:{joint}.")
+            seen = failing.seen(self.system, actuator, tape.read, seen, cell_names.SEEN(joint, ""))
             for of in failing.quantities(actuator):
-                tape.write(f"saw:{joint}.{of}", sensing.true_value(seen, of))
+                tape.write(cell_names.SEEN(joint, of), sensing.true_value(seen, of))
         for fitted in actuator.sensors:
             tape.write(fitted.path, sensing.true_value(seen, sensing.quantity(fitted)))
         self.compute(tape, actuator, seen)
@@ -232,7 +232,7 @@ class Builder:
         """Joint position and rate between instants: carried forward with the acceleration of the step just done."""
         joint = self.joints[actuator.index]
         q, qd = self._state_of(tape, joint)
-        a, s = tape.read(f"carry:{joint}"), self._since(tape)
+        a, s = tape.read(cell_names.CARRY(joint)), self._since(tape)
         rate = qd + s * a
         rate = where(both(self.step.has_dry_friction(tape, joint), qd * rate < 0.0), 0.0, rate)
         return q + s * qd + 0.5 * s * s * a, rate
@@ -240,7 +240,7 @@ class Builder:
     def _carried_state(self, tape: Tape, state: str) -> Real:
         """A servo's state between instants, carried forward as it changed over the step just done."""
         x = tape.read(state)
-        carried = x + self._since(tape) * tape.read(f"carry:{state}")
+        carried = x + self._since(tape) * tape.read(cell_names.CARRY(state))
         return where(both(self.step.has_dry_friction(tape, state), x * carried < 0.0), 0.0, carried)
 
     def _since(self, tape: Tape) -> Real:

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from met.integrators.integrator import Motion, Slope
-from met.program import cells, friction
+from met.program import cell_names, cells, friction
 from met.program.asking import Question, advance_with, changed_count, question_count
 from met.program.control.substituted import Substituted
 from met.program.evaluation import Derivative, brake_levels, derivative, servo_response
@@ -97,9 +97,9 @@ class StepPhases:
         for actuator in self.system.ticking_between:
             for memory in actuator.parts.memory:
                 channel = f"{actuator.path}.{memory.name}"
-                tape.write(f"first:{channel}", tape.read(channel))
+                tape.write(cell_names.FIRST(channel), tape.read(channel))
             for name, cell in self._carried(actuator):
-                tape.write(f"before:{name}", tape.read(cell))
+                tape.write(cell_names.BEFORE(name), tape.read(cell))
         tape.write("instant", tape.time)
         tape.write("fraction", 0.0)
         tape.write("splits", 0.0)
@@ -115,9 +115,14 @@ class StepPhases:
             rate = tape.read(each.cell)
             has_friction = level > 0.0
             if not isinstance(has_friction, bool):
-                cells.keep(tape, active, f"rubs:{each.name}", where(has_friction, 1.0, 0.0))
+                cells.keep(tape, active, cell_names.HAS_FRICTION(each.name), where(has_friction, 1.0, 0.0))
             # without friction at rest it moves freely; a level that rises later in the step opposes the motion at once
-            cells.keep(tape, active, f"friction:{each.name}", where(either(has_friction, rate != 0.0), sign(rate), 1.0))
+            cells.keep(
+                tape,
+                active,
+                cell_names.FRICTION_MODE(each.name),
+                where(either(has_friction, rate != 0.0), sign(rate), 1.0),
+            )
             any_at_rest = either(any_at_rest, both(has_friction, rate == 0.0))
         tape.write_mask("undecided", both(active, any_at_rest))
 
@@ -143,7 +148,7 @@ class StepPhases:
         found = next((each for each in self.sticking if each.name == name), None)
         if found is None:
             return False
-        return True if found.level is not None else tape.read_mask(f"rubs:{name}")
+        return True if found.level is not None else tape.read_mask(cell_names.HAS_FRICTION(name))
 
     def decide(self, tape: Tape) -> None:
         """One decision at rest, on the derivative just taken: who breaks away, who turns back."""
@@ -157,13 +162,13 @@ class StepPhases:
         active, y = tape.read_mask("undecided"), self.state(tape)
         changed: Truth = False
         for each, level in zip(self.sticking, self._levels(tape), strict=True):
-            s = tape.read(f"friction:{each.name}")
-            slope = tape.read(f"slope:{each.name}" if each.state else f"{each.name}.qdd")
+            s = tape.read(cell_names.FRICTION_MODE(each.name))
+            slope = tape.read(cell_names.SLOPE(each.name) if each.state else f"{each.name}.qdd")
             at_rest = both(self.has_dry_friction(tape, each.name), each.rate(y) == 0.0)
-            s_new = friction.decide(s, at_rest, tape.read(f"need:{each.name}"), level, slope)
+            s_new = friction.decide(s, at_rest, tape.read(cell_names.HOLDING(each.name)), level, slope)
             s_new = where(changed, s, s_new) if one else s_new
             changed = either(changed, s_new != s)
-            cells.keep(tape, active, f"friction:{each.name}", s_new)
+            cells.keep(tape, active, cell_names.FRICTION_MODE(each.name), s_new)
         tape.write_mask("undecided", both(active, changed))
 
     def left_open(self, tape: Tape) -> None:
@@ -181,9 +186,9 @@ class StepPhases:
             if name in self.joints:
                 tape.write(f"{name}.tau", found.tau[i])
         for name in self._needs:
-            tape.write(f"need:{name}", found.need[name])
+            tape.write(cell_names.HOLDING(name), found.need[name])
         for name, slope in zip(self.states, found.slope.xd, strict=True):
-            tape.write(f"slope:{name}", slope)
+            tape.write(cell_names.SLOPE(name), slope)
         for channel, value in found.shown.items():
             tape.write(channel, value)
         singular: Real = where(found.solved.base_singular, float(len(self.joints) + 1), 0.0)
@@ -210,7 +215,7 @@ class StepPhases:
         for joint, qd in zip(self.coordinates[len(self.joints) :], found.slope.qd[len(self.joints) :], strict=True):
             tape.write(f"{STAGE}{joint}.qd", qd)  # of a turn no rate of the state
         for name, slope in zip(self.states, found.slope.xd, strict=True):
-            tape.write(f"{STAGE}slope:{name}", slope)
+            tape.write(STAGE + cell_names.SLOPE(name), slope)
 
     def judge(self, tape: Tape) -> None:
         self._judge(tape, True)
@@ -228,7 +233,7 @@ class StepPhases:
         number: Real = where(out_of_range != 0.0, out_of_range - 1.0, 0.0)
         of_bodies = list(enumerate(bodies.bodies(self.system), len(self.joints)))
         for i, fitted in reversed(list(enumerate(self.system.sensors, len(self.joints) + len(of_bodies)))):
-            watched = [part for name in fitted.channels for part in (name, f"slope:{name}")]
+            watched = [part for name in fitted.channels for part in (name, cell_names.SLOPE(name))]
             bad = not_(isfinite(sum((tape.read(name) for name in watched), 0.0)))
             cause, number = where(bad, NOT_FINITE, cause), where(bad, float(i), number)
         for i, body in reversed(of_bodies):
@@ -241,8 +246,10 @@ class StepPhases:
         for i, joint in reversed(list(enumerate(self.joints))):
             watched = [f"{joint}.qdd", f"{joint}.q", f"{joint}.qd"]
             moves = isfinite(sum((tape.read(name) for name in watched), 0.0))
-            watched += [f"need:{name}" for name in self._needs if name == joint or name.startswith(f"{joint}.servo.")]
-            watched += [f"slope:{name}" for name in self.states if name.startswith(f"{joint}.servo.")]
+            watched += [
+                cell_names.HOLDING(name) for name in self._needs if name == joint or name.startswith(f"{joint}.servo.")
+            ]
+            watched += [cell_names.SLOPE(name) for name in self.states if name.startswith(f"{joint}.servo.")]
             bad = not_(isfinite(sum((tape.read(name) for name in watched), 0.0)))
             if bodies.bodies(self.system):  # a joint that moves well, and only bears what a body does, is not named
                 bad = both(bad, either(not_(moves), not_(elsewhere)))
@@ -303,7 +310,7 @@ class StepPhases:
             channel = f"{actuator.path}.{memory.name}"
             now = tape.read(channel)
             if actuator in self.system.ticking_between:
-                first = tape.read(f"first:{channel}")
+                first = tape.read(cell_names.FIRST(channel))
                 now = first + fraction * (now - first)
             numbers[memory.name] = now
         return NamedValues(actuator.owner, numbers)
@@ -357,14 +364,14 @@ class StepPhases:
         if settled:
             for joint in self.coordinates:
                 for part in ("qd", "qdd"):
-                    tape.write(f"k{settled}:{joint}.{part}", tape.read(f"{STAGE}{joint}.{part}"))
+                    tape.write(cell_names.STAGE_SLOPE(settled, f"{joint}.{part}"), tape.read(f"{STAGE}{joint}.{part}"))
             for name in self.states:
-                tape.write(f"k{settled}:{name}", tape.read(f"{STAGE}slope:{name}"))
+                tape.write(cell_names.STAGE_SLOPE(settled, name), tape.read(STAGE + cell_names.SLOPE(name)))
         answers = [
             Slope(
-                tuple(tape.read(f"k{n}:{joint}.qd") for joint in self.coordinates),
-                tuple(tape.read(f"k{n}:{joint}.qdd") for joint in self.coordinates),
-                tuple(tape.read(f"k{n}:{name}") for name in self.states),
+                tuple(tape.read(cell_names.STAGE_SLOPE(n, f"{joint}.qd")) for joint in self.coordinates),
+                tuple(tape.read(cell_names.STAGE_SLOPE(n, f"{joint}.qdd")) for joint in self.coordinates),
+                tuple(tape.read(cell_names.STAGE_SLOPE(n, name)) for name in self.states),
             )
             for n in range(1, settled + 1)
         ]
@@ -376,7 +383,7 @@ class StepPhases:
         return Slope(
             qd,
             tuple(tape.read(f"{joint}.qdd") for joint in self.coordinates),
-            tuple(tape.read(f"slope:{name}") for name in self.states),
+            tuple(tape.read(cell_names.SLOPE(name)) for name in self.states),
         )
 
     def split(self, tape: Tape) -> None:
@@ -408,8 +415,10 @@ class StepPhases:
         for actuator in self.system.ticking_between:
             for name, cell in self._carried(actuator):
                 now = tape.read(cell)
-                slope = (now - tape.read(f"before:{name}")) / self.schedule.step
-                tape.write(f"carry:{name}", where(both(self.has_dry_friction(tape, name), now == 0.0), 0.0, slope))
+                slope = (now - tape.read(cell_names.BEFORE(name))) / self.schedule.step
+                tape.write(
+                    cell_names.CARRY(name), where(both(self.has_dry_friction(tape, name), now == 0.0), 0.0, slope)
+                )
 
     def _carried(self, actuator: Actuator) -> list[tuple[str, str]]:
         """Rates that are carried forward between instants, and their cells: the joint's rate, the servo's states."""
@@ -424,13 +433,13 @@ class StepPhases:
         return y if copy == STAGE else bodies.with_zero_turn(self.system, y)
 
     def _friction(self, tape: Tape) -> dict[str, Real]:
-        return {each.name: tape.read(f"friction:{each.name}") for each in self.sticking}
+        return {each.name: tape.read(cell_names.FRICTION_MODE(each.name)) for each in self.sticking}
 
     def _sliding(self, tape: Tape) -> list[Real | None]:
         """Friction modes as crossings count them: zero, so that it never crosses, where a case has no friction."""
         modes: list[Real | None] = [None] * (len(self.coordinates) + len(self.states))
         for each in self.sticking:
-            mode = tape.read(f"friction:{each.name}")
+            mode = tape.read(cell_names.FRICTION_MODE(each.name))
             number = each.number + (len(self.coordinates) if each.state else 0)
             modes[number] = where(self.has_dry_friction(tape, each.name), mode, 0.0)
         return modes

@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING
 from met import models
 from met.parameter import Parameter
 from met.plan import GuideUse
+from met.program import cell_names
 from met.program.values import NamedValues, answer, parameters
 from met.servos.servo import Setpoint
 from met.trace import Real
 
 if TYPE_CHECKING:
     from met.program.system import ReadCell, System
-
-GUIDE = "guide:"
-"""Prefix of cells of guides: the rate and position that a joint is asked, by joint; the time of the tick, by guide."""
 
 
 def owner(use: GuideUse) -> str:
@@ -39,10 +37,12 @@ def setpoint(system: System, joint: str, kind: str, use: GuideUse, read: ReadCel
     """The guide's setpoint of a joint at a time: between its ticks, the rate of the last one and where that leads."""
     guide = models.find("guide", use.model, use.place)
     if guide.course is None:
-        rate = read(f"{GUIDE}{joint}.rate")
+        rate = read(cell_names.GUIDE_RATE(joint))
         if kind == "rate":
             return Setpoint(kind, rate, 0.0)
-        return Setpoint(kind, read(f"{GUIDE}{joint}.position") + rate * (time - read(f"{GUIDE}{use.name}.time")), rate)
+        return Setpoint(
+            kind, read(cell_names.GUIDE_POSITION(joint)) + rate * (time - read(cell_names.GUIDE_TIME(use.name))), rate
+        )
     p, joints = own(system, use, read)
     begins = [system.value(f"initial.{each}.q", read) for each in use.joints]
     value, slope = answer(owner(use), guide.course, p, joints, begins, time)[use.joints.index(joint)]

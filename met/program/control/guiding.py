@@ -26,8 +26,8 @@ from met.dynamics.spatial import (
 from met.guides.guide import Sight, Stance
 from met.integrators.integrator import Motion
 from met.plan import COMPONENTS, GuideUse
-from met.program import cells
-from met.program.control.guided import GUIDE, own, owner
+from met.program import cell_names, cells
+from met.program.control.guided import own, owner
 from met.program.motion import base, bodies, payloads
 from met.program.motion.base import BaseMotion
 from met.program.motion.courses import rate_of_rpy, values_and_rates
@@ -45,10 +45,10 @@ def ticking(system: System) -> Iterator[GuideUse]:
 def start(system: System, tape: Tape) -> None:
     """Write where guides begin: their joints' positions, rates of 0, and the guided frames, where paths begin."""
     for use in ticking(system):
-        tape.write(f"{GUIDE}{use.name}.time", 0.0)
+        tape.write(cell_names.GUIDE_TIME(use.name), 0.0)
         for joint in use.joints:
-            tape.write(f"{GUIDE}{joint}.position", tape.read(f"{joint}.q"))
-            tape.write(f"{GUIDE}{joint}.rate", 0.0)
+            tape.write(cell_names.GUIDE_POSITION(joint), tape.read(f"{joint}.q"))
+            tape.write(cell_names.GUIDE_RATE(joint), 0.0)
         guide = models.find("guide", use.model, use.place)
         for memory in guide.memory:
             tape.write(f"guides.{use.name}.{memory.name}", memory.start)
@@ -63,8 +63,8 @@ def tick(system: System, tape: Tape, use: GuideUse) -> None:
     guide = models.find("guide", use.model, use.place)
     assert guide.steer is not None
     period = use.divisor / system.structure.schedule.base_hz
-    begun = {joint: tape.read(f"{GUIDE}{joint}.position") for joint in use.joints}
-    positions = {joint: at + period * tape.read(f"{GUIDE}{joint}.rate") for joint, at in begun.items()}
+    begun = {joint: tape.read(cell_names.GUIDE_POSITION(joint)) for joint in use.joints}
+    positions = {joint: at + period * tape.read(cell_names.GUIDE_RATE(joint)) for joint, at in begun.items()}
     y, stands = _state(system, tape, tape.time)
     number = {joint.name: i for i, joint in enumerate(system.joints)}
     q = [positions.get(joint.name, y.q[i]) for i, joint in enumerate(system.joints)]
@@ -80,9 +80,9 @@ def tick(system: System, tape: Tape, use: GuideUse) -> None:
     for name, value in shown.items():
         tape.write(f"guides.{use.name}.{name}", value)
     for joint, rate in zip(use.joints, found.rates, strict=True):
-        tape.write(f"{GUIDE}{joint}.position", positions[joint])
-        tape.write(f"{GUIDE}{joint}.rate", rate)
-    tape.write(f"{GUIDE}{use.name}.time", tape.time)
+        tape.write(cell_names.GUIDE_POSITION(joint), positions[joint])
+        tape.write(cell_names.GUIDE_RATE(joint), rate)
+    tape.write(cell_names.GUIDE_TIME(use.name), tape.time)
 
 
 class _ArmAt:
@@ -141,7 +141,9 @@ def _state(system: System, tape: Tape, time: Real) -> tuple[Motion, BaseMotion]:
 
 def _begun(use: GuideUse) -> list[str]:
     """The cells that hold where a guided frame began: the rows of its axes, and its origin."""
-    return [f"{GUIDE}{use.name}.{name}" for name in (*(f"R{i}{j}" for i in range(3) for j in range(3)), *"xyz")]
+    return [
+        cell_names.GUIDE_FRAME(use.name, name) for name in (*(f"R{i}{j}" for i in range(3) for j in range(3)), *"xyz")
+    ]
 
 
 def _wanted(system: System, tape: Tape, use: GuideUse) -> Stance:

@@ -17,7 +17,7 @@ from typing import Any
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import REPEAT, SEED
-from met.program import cells
+from met.program import cell_names, cells
 from met.program.system import Actuator, System
 from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.motor import Motor, torque
@@ -93,7 +93,7 @@ class Substituted:
         """Names of the outputs that go over the wires, by the cells that hold them."""
         return (
             {
-                f"wire:{each.joint}.{name}": f"{each.joint}:sent.{name}"
+                f"wire:{each.joint}.{name}": cell_names.SENT(each.joint, name)
                 for each in self.mounted
                 for name in ("voltage", "current")
             }
@@ -151,12 +151,14 @@ class Substituted:
             if self.wire:  # what is inside a real one nobody knows
                 for memory in each.bed.memory:
                     tape.write(f"{each.joint}.bed.{memory.name}", math.nan)
-            for name in ("read", "before", "w", "w_ref", "observer.w", "observer.y"):
-                tape.write(f"{each.joint}:{name}", w)
-            tape.write(f"{each.joint}:angle", motor.ratio * tape.read(f"{each.joint}.q"))
+            for cell in (cell_names.READ, cell_names.READ_BEFORE, cell_names.SHAFT_RATE, cell_names.REFERENCE_RATE):
+                tape.write(cell(each.joint), w)
+            for part in "wy":
+                tape.write(cell_names.OBSERVED(each.joint, part), w)
+            tape.write(cell_names.SHAFT_ANGLE(each.joint), motor.ratio * tape.read(f"{each.joint}.q"))
             for i in range(4):
                 for j in range(i + 1):
-                    tape.write(f"{each.joint}:P.{i}.{j}", _UNKNOWN[i] if i == j else 0.0)
+                    tape.write(cell_names.COVARIANCE(each.joint, i, j), _UNKNOWN[i] if i == j else 0.0)
 
     def begin_bed(self, tape: Tape, each: Mounted, w: Real) -> None:
         """The emulated bed of a shaft that has turned at w rad/s for long."""
@@ -171,13 +173,13 @@ class Substituted:
             P = observer.next_covariance(self._model(tape, each), self._covariance(tape, each), self._noise(tape, each))
             for i in range(4):
                 for j in range(i + 1):
-                    tape.write(f"{each.joint}:P.{i}.{j}", P[i][j])
+                    tape.write(cell_names.COVARIANCE(each.joint, i, j), P[i][j])
 
     def gain(self, tape: Tape) -> None:
         for each in self.mounted:
             found = observer.gain_of(self._covariance(tape, each), self._noise(tape, each))
             for i, value in enumerate(found):
-                tape.write(f"{each.joint}:gain.{i}", value)
+                tape.write(cell_names.OBSERVER_GAIN(each.joint, i), value)
 
     # A tick.
 
@@ -214,46 +216,50 @@ class Substituted:
             rate = tape.input(f"wire:{name}.rate") if self.wire else self.reading(tape, each)
             w: Real = rate
             if each.law.observer:
-                gain = tuple(tape.read(f"{name}:gain.{i}") for i in range(4))
+                gain = tuple(tape.read(cell_names.OBSERVER_GAIN(name, i)) for i in range(4))
                 x = observer.corrected(self._observed(tape, each), gain, rate)  # type: ignore[arg-type]
                 self._observe(tape, each, x)
                 w = x[0]
                 tape.write(f"{name}.law.unknown_torque", x[3])
-            turned = 0.5 * self.period * (w + tape.read(f"{name}:w"))
-            tape.write(f"{name}:angle", tape.read(f"{name}:angle") + where(tape.tick == 0.0, 0.0, turned))
-            tape.write(f"{name}:before", tape.read(f"{name}:read"))
-            tape.write(f"{name}:read", rate)
-            tape.write(f"{name}:w", w)
+            turned = 0.5 * self.period * (w + tape.read(cell_names.SHAFT_RATE(name)))
+            tape.write(
+                cell_names.SHAFT_ANGLE(name),
+                tape.read(cell_names.SHAFT_ANGLE(name)) + where(tape.tick == 0.0, 0.0, turned),
+            )
+            tape.write(cell_names.READ_BEFORE(name), tape.read(cell_names.READ(name)))
+            tape.write(cell_names.READ(name), rate)
+            tape.write(cell_names.SHAFT_RATE(name), w)
             tape.write(f"{name}.law.rate", w)
 
     def follow(self, tape: Tape) -> None:
         """The arm's joints are where the shafts are."""
         for each in self.mounted:
             ratio = self.motor(tape, each).ratio
-            tape.write(f"{each.joint}.q", tape.read(f"{each.joint}:angle") / ratio)
-            tape.write(f"{each.joint}.qd", tape.read(f"{each.joint}:w") / ratio)
+            tape.write(f"{each.joint}.q", tape.read(cell_names.SHAFT_ANGLE(each.joint)) / ratio)
+            tape.write(f"{each.joint}.qd", tape.read(cell_names.SHAFT_RATE(each.joint)) / ratio)
 
     def seen(self, tape: Tape, actuator: Actuator) -> tuple[Real, Real] | None:
         """Position and filtered rate of a substituted joint, as its servo's computer sees them; None for others."""
         for each in self.mounted:
             if each.actuator is actuator:
                 ratio = self.motor(tape, each).ratio
-                return tape.read(f"{each.joint}:angle") / ratio, tape.read(f"{each.joint}:read") / ratio
+                q = tape.read(cell_names.SHAFT_ANGLE(each.joint)) / ratio
+                return q, tape.read(cell_names.READ(each.joint)) / ratio
         return None
 
     def arm(self, tape: Tape) -> None:
         """Write Lambda and b_0 at this instant: the load of the arm on the substituted joints."""
         Lambda, b_0 = self.loads(tape)
         for each, row, b in zip(self.mounted, Lambda, b_0, strict=True):
-            tape.write(f"{each.joint}:b_0", b)
+            tape.write(cell_names.ARM_TORQUE(each.joint), b)
             for other, entry in zip(self.mounted, row, strict=True):
-                tape.write(f"{each.joint}:Lambda.{other.joint}", entry)
+                tape.write(cell_names.ARM_INERTIA(each.joint, other.joint), entry)
 
     def act(self, tape: Tape) -> None:
         """The law: load torque, what goes over the wire, the joint's acceleration; the observer looks ahead."""
         assert self.law is not None
-        Lambda = [[tape.read(f"{a.joint}:Lambda.{b.joint}") for b in self.mounted] for a in self.mounted]
-        b_0 = [tape.read(f"{each.joint}:b_0") for each in self.mounted]
+        Lambda = [[tape.read(cell_names.ARM_INERTIA(a.joint, b.joint)) for b in self.mounted] for a in self.mounted]
+        b_0 = [tape.read(cell_names.ARM_TORQUE(each.joint)) for each in self.mounted]
         ahead = [self._ahead(tape, each) for each in self.mounted]
         found: Sequence[balance.Balanced | None] = [None] * len(self.mounted)
         if self.law.balance != "none":
@@ -279,7 +285,7 @@ class Substituted:
             for name, value in memory.items():
                 tape.write(f"{each.joint}.law.{name}", value)
             applied.append(self._send(tape, each, one))
-            tape.write(f"{each.joint}:given", one.qdd)
+            tape.write(cell_names.GIVEN(each.joint), one.qdd)
             tape.write(f"{each.joint}.law.torque", one.torque)
         if self.law.observer:
             self._look_ahead(tape, Lambda, b_0, applied)
@@ -287,15 +293,15 @@ class Substituted:
     def first(self, tape: Tape) -> None:
         """The acceleration with which the step begins; a servo faster than the dynamics changes it on the way."""
         for each in self.mounted:
-            tape.write(f"{each.joint}:given.first", tape.read(f"{each.joint}:given"))
+            tape.write(cell_names.GIVEN_FIRST(each.joint), tape.read(cell_names.GIVEN(each.joint)))
 
     def given(self, tape: Tape, fraction: Real) -> dict[int, Real]:
         """Accelerations of the substituted joints at a share of the step, by number."""
         found = {}
         for each in self.mounted:
-            now = tape.read(f"{each.joint}:given")
+            now = tape.read(cell_names.GIVEN(each.joint))
             if self.divisor % self.dynamics:
-                first = tape.read(f"{each.joint}:given.first")
+                first = tape.read(cell_names.GIVEN_FIRST(each.joint))
                 now = first + fraction * (now - first)
             found[each.index] = now
         return found
@@ -305,7 +311,7 @@ class Substituted:
     def _ahead(self, tape: Tape, each: Mounted) -> Real:
         """The rate that the output computed now will meet: the observer's, over the delay; else the one just read."""
         if not each.law.observer:
-            return tape.read(f"{each.joint}:read")
+            return tape.read(cell_names.READ(each.joint))
         delay, x = self._delay(tape, each), self._observed(tape, each)
         for turn in range(QUEUE):
             new = self._predicted(tape, each, x, self._queued(tape, each, delay - float(turn)))
@@ -319,8 +325,8 @@ class Substituted:
         current: Real = 0.0
         for i in range(QUEUE):
             due = ago == float(i + 1)
-            voltage = where(due, tape.read(f"{each.joint}:queue.{i}.voltage"), voltage)
-            current = where(due, tape.read(f"{each.joint}:queue.{i}.current"), current)
+            voltage = where(due, tape.read(cell_names.QUEUED(each.joint, i, "voltage")), voltage)
+            current = where(due, tape.read(cell_names.QUEUED(each.joint, i, "current")), current)
         return Wire(voltage, current)
 
     def _send(self, tape: Tape, each: Mounted, given: LawOutput) -> Wire:
@@ -337,13 +343,13 @@ class Substituted:
         if self.wire:
             early = self._queued(tape, each, delay - float(self.late))
             now = delay <= float(self.late)
-            tape.write(f"{name}:sent.voltage", where(now, asked.voltage, early.voltage))
-            tape.write(f"{name}:sent.current", where(now, asked.current, early.current))
+            tape.write(cell_names.SENT(name, "voltage"), where(now, asked.voltage, early.voltage))
+            tape.write(cell_names.SENT(name, "current"), where(now, asked.current, early.current))
         for i in reversed(range(1, QUEUE)):
-            tape.write(f"{name}:queue.{i}.voltage", tape.read(f"{name}:queue.{i - 1}.voltage"))
-            tape.write(f"{name}:queue.{i}.current", tape.read(f"{name}:queue.{i - 1}.current"))
-        tape.write(f"{name}:queue.0.voltage", asked.voltage)
-        tape.write(f"{name}:queue.0.current", asked.current)
+            tape.write(cell_names.QUEUED(name, i, "voltage"), tape.read(cell_names.QUEUED(name, i - 1, "voltage")))
+            tape.write(cell_names.QUEUED(name, i, "current"), tape.read(cell_names.QUEUED(name, i - 1, "current")))
+        tape.write(cell_names.QUEUED(name, 0, "voltage"), asked.voltage)
+        tape.write(cell_names.QUEUED(name, 0, "current"), asked.current)
         tape.write(f"{name}.bed.drive_voltage", applied.voltage)
         tape.write(f"{name}.bed.load_current", applied.current)
         return applied
@@ -352,13 +358,13 @@ class Substituted:
         """The observer's state at the next tick, and the rate that the joint's own motor would have then."""
         sides = []
         for each, wire in zip(self.mounted, applied, strict=True):
-            w_ref = tape.read(f"{each.joint}:w_ref")
+            w_ref = tape.read(cell_names.REFERENCE_RATE(each.joint))
             sides.append(self._side(tape, each, w_ref, wire.voltage, 0.0))
             self._observe(tape, each, self._predicted(tape, each, self._observed(tape, each), wire))
         for each, side, one in zip(self.mounted, sides, balance.balanced(sides, Lambda, b_0), strict=True):
             after = side.w + self.period * side.ratio * one.qdd
             after = where(one.s * after < 0.0, 0.0, after)
-            tape.write(f"{each.joint}:w_ref", after)
+            tape.write(cell_names.REFERENCE_RATE(each.joint), after)
             tape.write(f"{each.joint}.law.reference_rate", side.w)
 
     def _side(self, tape: Tape, each: Mounted, w: Real, voltage: Real, band: Real) -> balance.JointSide:
@@ -379,11 +385,11 @@ class Substituted:
         return LawInput(
             motor=motor,
             inertia=p.inertia,
-            rate=tape.read(f"{name}:read"),
-            before=tape.read(f"{name}:before"),
-            w=tape.read(f"{name}:w"),
+            rate=tape.read(cell_names.READ(name)),
+            before=tape.read(cell_names.READ_BEFORE(name)),
+            w=tape.read(cell_names.SHAFT_RATE(name)),
             d=self._observed(tape, each)[3] if each.law.observer else 0.0,
-            w_ref=tape.read(f"{name}:w_ref") if each.law.observer else 0.0,
+            w_ref=tape.read(cell_names.REFERENCE_RATE(name)) if each.law.observer else 0.0,
             period=self.period,
             balance=found,
             extra=extra,
@@ -419,16 +425,18 @@ class Substituted:
         return observer.Noise(torque=p.torque_noise / T, drift=p.drift * T, reading=p.reading_noise / T)
 
     def _covariance(self, tape: Tape, each: Mounted) -> observer.Square:
-        entries = [[tape.read(f"{each.joint}:P.{max(i, j)}.{min(i, j)}") for j in range(4)] for i in range(4)]
+        entries = [
+            [tape.read(cell_names.COVARIANCE(each.joint, max(i, j), min(i, j))) for j in range(4)] for i in range(4)
+        ]
         return tuple(tuple(row) for row in entries)  # type: ignore[return-value]
 
     def _observed(self, tape: Tape, each: Mounted) -> observer.Four:
-        w, y, z, d = (tape.read(f"{each.joint}:observer.{name}") for name in "wyzd")
+        w, y, z, d = (tape.read(cell_names.OBSERVED(each.joint, name)) for name in "wyzd")
         return w, y, z, d
 
     def _observe(self, tape: Tape, each: Mounted, x: observer.Four) -> None:
         for name, value in zip("wyzd", x, strict=True):
-            tape.write(f"{each.joint}:observer.{name}", value)
+            tape.write(cell_names.OBSERVED(each.joint, name), value)
 
     def _voltage(self, tape: Tape, each: Mounted) -> Real:
         return tape.read(f"{each.actuator.path}.voltage")

@@ -29,7 +29,7 @@ from met.dynamics.spatial import (
 from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import BASE
-from met.program import cells
+from met.program import cell_names, cells
 from met.program.system import ReadCell, System
 from met.trace import Truth, cos, sin, sqrt, where
 from met.trace.program import Tape
@@ -59,7 +59,7 @@ class FreeBody:
     @property
     def orientation(self) -> tuple[str, ...]:
         """The cells of its quaternion."""
-        return tuple(f"{self.name}:orientation.{part}" for part in "wxyz")
+        return tuple(cell_names.BODY_ORIENTATION(self.name, part) for part in "wxyz")
 
     def q(self, y: Motion) -> tuple[Real, ...]:
         return y.q[self.first : self.first + SIX]

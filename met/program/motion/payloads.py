@@ -32,7 +32,7 @@ from met.dynamics.spatial import (
 from met.dynamics.tree import Tree
 from met.integrators.integrator import Motion
 from met.plan import Payload
-from met.program import cells
+from met.program import cell_names, cells
 from met.program.motion.bodies import PAYLOAD, FreeBody, bodies, flight, place, slopes
 from met.program.system import ReadCell, System
 from met.trace import Truth
@@ -56,18 +56,14 @@ def free_body(system: System, payload: Payload) -> FreeBody:
     return next(each for each in bodies(system) if each.name == PAYLOAD + payload.name)
 
 
-def cell(payload: Payload, name: str) -> str:
-    return f"{PAYLOAD}{payload.name}:{name}"
-
-
 def carried(payload: Payload, read: ReadCell) -> Truth:
     """True where a link carries the payload."""
-    return read(cell(payload, "stage")) == CARRIED
+    return read(cell_names.PAYLOAD_STAGE(payload.name)) == CARRIED
 
 
 def pose_in_link(payload: Payload, read: ReadCell) -> Pose:
     """Its pose in the link's frame, while the link carries it."""
-    x = [read(cell(payload, f"held.{i}")) for i in range(12)]
+    x = [read(cell_names.PAYLOAD_POSE(payload.name, i)) for i in range(12)]
     return Pose(((x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8])), (x[9], x[10], x[11]))
 
 
@@ -75,7 +71,7 @@ def tree_with_payloads(system: System, read: ReadCell) -> Tree:
     """The arm with the payloads that its links carry."""
     tree = system.tree(read)
     for payload in system.flying:
-        x = [read(cell(payload, f"body.{i}")) for i in range(10)]
+        x = [read(cell_names.PAYLOAD_BODY(payload.name, i)) for i in range(10)]
         body = Rigid(x[0], (x[1], x[2], x[3]), (x[4], x[5], x[6], x[7], x[8], x[9]))
         tree = loaded(tree, payload.link, body)
     return tree
@@ -163,7 +159,7 @@ def start(system: System, tape: Tape) -> None:
             turn = quaternion_rpy(*given("attitude"))
             w = turn_vector_back(rotation_quaternion(*turn), given("rate"))
             place(body, tape, True, turn, given("position"), given("velocity"), w)
-            tape.write(cell(payload, "stage"), FLYING)
+            tape.write(cell_names.PAYLOAD_STAGE(payload.name), FLYING)
         else:
             place(body, tape, True, (1.0, 0.0, 0.0, 0.0), ZERO, ZERO, ZERO)
             attach(system, tape, True, payload, Pose(rotation_rpy(*given("rpy")), given("at")))
@@ -172,16 +168,16 @@ def start(system: System, tape: Tape) -> None:
 def attach(system: System, tape: Tape, active: Truth, payload: Payload, pose: Pose) -> None:
     """Makes a payload a part of its link, at this pose in its frame, where active."""
     for i, x in enumerate((*pose.R[0], *pose.R[1], *pose.R[2], *pose.p)):
-        cells.keep(tape, active, cell(payload, f"held.{i}"), x)
+        cells.keep(tape, active, cell_names.PAYLOAD_POSE(payload.name, i), x)
     body = in_tree(system.tree(tape.read), payload.link, body_of(system, payload, tape.read), pose)
     _keep_body(tape, active, payload, body)
-    cells.keep(tape, active, cell(payload, "stage"), CARRIED)
+    cells.keep(tape, active, cell_names.PAYLOAD_STAGE(payload.name), CARRIED)
 
 
 def detach(tape: Tape, active: Truth, payload: Payload) -> None:
     """Takes a payload off its link, where active."""
     _keep_body(tape, active, payload, NO_INERTIA)
-    cells.keep(tape, active, cell(payload, "stage"), RELEASED)
+    cells.keep(tape, active, cell_names.PAYLOAD_STAGE(payload.name), RELEASED)
 
 
 def gap(system: System, payload: Payload, read: ReadCell, motion: LinkMotion, link: LinkMotion) -> Vector:
@@ -193,4 +189,4 @@ def gap(system: System, payload: Payload, read: ReadCell, motion: LinkMotion, li
 
 def _keep_body(tape: Tape, active: Truth, payload: Payload, body: Rigid) -> None:
     for i, x in enumerate((body.mass, *body.h, *body.I)):
-        cells.keep(tape, active, cell(payload, f"body.{i}"), x)
+        cells.keep(tape, active, cell_names.PAYLOAD_BODY(payload.name, i), x)

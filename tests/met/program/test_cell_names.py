@@ -1,0 +1,71 @@
+"""Every cell of the engine's own is of one declared family, so that no name is made up where it is used."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import ic
+from met.plan import Experiment
+from met.program import System, build
+from met.program.build import METRIC
+from met.program.cell_names import FAMILIES, GUIDE_FRAME, GUIDE_TIME, SHAFT_RATE, family_of
+from met.program.motion.bodies import bodies
+from met.program.orientations import INSTANT, ROW
+from met.program.step import FROM, STAGE
+from met.program.system import PARAMETER, TREE
+from met.trace.recorder import record
+from tests.ic.small_decks import experiment
+from tests.met.program.free_flyers import ARM
+from tests.met.program.payload_decks import RUN
+from tests.substitution.hybrid import compiled, deck, loads
+
+
+def test_a_family_names_its_cells_and_knows_them() -> None:
+    assert SHAFT_RATE("elbow") == "elbow:w"
+    assert SHAFT_RATE.matches("elbow:w")
+    assert not SHAFT_RATE.matches("elbow:w_ref")
+    assert family_of(GUIDE_TIME("tip")) is GUIDE_TIME
+    assert family_of(GUIDE_FRAME("tip", "R01")) is GUIDE_FRAME
+    assert family_of("elbow:speed") is None
+
+
+def assert_declared(made: Experiment) -> set[str]:
+    """The patterns of the families that this experiment's program has cells of; each cell is of one."""
+    coordinates = tuple(f"{name}." for body in bodies(System(made)) for name in body.coordinates)
+    others = (PARAMETER, TREE, METRIC, INSTANT, ROW, *coordinates)
+    used = set()
+    for cell in record(build(made)).cells:
+        name = cell.removeprefix(FROM).removeprefix(STAGE)
+        if ":" not in name or name.startswith(others):
+            continue
+        family = family_of(name)
+        assert family is not None, cell
+        used.add(family.pattern)
+    return used
+
+
+@pytest.mark.parametrize(
+    ("name", "some"),
+    [
+        ("free_flyer.ic", {"need:{}", "{}:orientation.{}"}),
+        ("station_arm.ic", {"guide:{}.rate", "guide:{}.{}"}),
+        ("manutec_r3_one_axis.ic", {"friction:{}", "need:{}", "slope:{}"}),
+    ],
+)
+def test_cells_of_a_deck_are_declared(name: str, some: set[str]) -> None:
+    used = set().union(*(assert_declared(made) for made in ic.compile(name, select="all").experiments))
+    assert some <= used
+
+
+def test_cells_of_payloads_are_declared(tmp_path: Path) -> None:
+    used = assert_declared(experiment(tmp_path, ARM, RUN))
+    assert {family.pattern for family in FAMILIES if family.pattern.startswith("payload:")} <= used
+
+
+def test_cells_of_motors_on_beds_are_declared() -> None:
+    used = assert_declared(
+        compiled(deck(("shoulder", "elbow"), law="torque_balance_observer", sweep=loads([1.5, 2.0])), "bench")
+    )
+    assert {"{}:w", "{}:observer.{}", "{}:P.{}.{}", "{}:gain.{}"} <= used, used
