@@ -1,4 +1,4 @@
-"""What a bed is to whoever drives it: connect, arm, exchange, stop. Beds are in hw/beds, one a file.
+"""The interface of a motor bed's driver: connect, arm, exchange, stop. Drivers are in hw/beds, one a file.
 
 A bed has a drive motor, which is the motor under test, and a load motor on the same shaft. It is told the voltage of
 the one and the current of the other, which its amplifiers hold, and answers with what its sensors say. Everything is in
@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from types import TracebackType
 from typing import Self
 
-from met.diagnostic import Problem, error
+from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 
 
@@ -125,14 +125,18 @@ LIMITS = ("voltage", "current", "rate", "voltage_slew", "current_slew")
 """Those that a session may make tighter: V, A, rad/s, V/s, A/s."""
 
 
-class Bed(ABC):
-    """One bed. Every method raises met.diagnostic.Problem (E400-E419) where the bed cannot be reached or says no, but
-    `stop` and `close`, which never raise.
+class BedDriver(ABC):
+    """The computer's side of one motor bed. Every method raises met.diagnostic.Problem (E400-E419) where the bed cannot
+    be reached or says no, but `stop` and `close`, which never raise.
 
     patience  s to wait for the answer to an exchange; whoever drives the bed sets it
+    has_line  False where answers come at once, from this process, so that there is no line to measure
+    warnings  what may make exchanges late, known once it is connected
     """
 
     patience: float = 0.01
+    has_line: bool = True
+    warnings: tuple[Diagnostic, ...] = ()
 
     @abstractmethod
     def connect(self) -> About:
@@ -168,6 +172,10 @@ class Bed(ABC):
     @abstractmethod
     def rest(self, time: float) -> Sample:
         """Stop, and let so much time pass, s. A bed in lock-step advances as far as that."""
+
+    def line_time(self, about: About) -> float:
+        """Time that the bytes of an exchange take on the line, s; 0 where the line's speed is not what counts."""
+        return 0.0
 
     def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> Sample:
         """Start a simulated plant anew, disarmed: its shaft turning at rate (rad/s), its noise from the beginning."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from hw import loop, process, refusals
-from hw.bed import About, Bed, Capability
+from hw.bed import About, BedDriver, Capability
 from hw.beds import latch
 from hw.driven import LANES, Driven, divisor, substituted
 from hw.pace import Pace, pace
@@ -61,7 +61,7 @@ def run(asked: Asked) -> loop.Ended:
     asked_to_stop = process.listening()
     joints = substituted(prepare(experiment, wire=True))
     _check_start(experiment, joints, asked.row)
-    beds: list[Bed] = []
+    beds: list[BedDriver] = []
     abouts: list[About] = []
     try:
         for joint in joints:
@@ -98,7 +98,7 @@ def run(asked: Asked) -> loop.Ended:
             bed.close()
 
 
-def _rest(beds: Sequence[Bed], time: float, asked_to_stop: Callable[[], bool]) -> None:
+def _rest(beds: Sequence[BedDriver], time: float, asked_to_stop: Callable[[], bool]) -> None:
     """All of them, at once, for so long, s, or until the host is asked to stop."""
     for _ in range(math.ceil(time / process.PAUSE - 1e-6)):
         if asked_to_stop():
@@ -106,7 +106,7 @@ def _rest(beds: Sequence[Bed], time: float, asked_to_stop: Callable[[], bool]) -
         beds[0].rest(process.PAUSE)
 
 
-def _greeted(bed: Bed, joint: str, experiment: Experiment, asked: Asked) -> About:
+def _greeted(bed: BedDriver, joint: str, experiment: Experiment, asked: Asked) -> About:
     """Who the bed is; a simulated one begins anew, with the case's noise."""
     about, row = bed.connect(), asked.row
     process.say(bed=joint, about=process.told(about))

@@ -24,7 +24,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from hw.bed import About, Bed, Capability, Fault, Sample, State
+from hw.bed import About, BedDriver, Capability, Fault, Sample, State
 from met.diagnostic import Problem
 
 
@@ -43,21 +43,21 @@ class Conformance:
     share = 0.1
 
     @pytest.fixture
-    def bed(self) -> Iterator[Bed]:
+    def bed(self) -> Iterator[BedDriver]:
         """The bed, not connected, without a fault that is latched, its shaft at rest."""
         raise NotImplementedError
 
-    def outputs(self, bed: Bed) -> tuple[float, float] | None:
+    def outputs(self, bed: BedDriver) -> tuple[float, float] | None:
         """What the amplifiers hold, V and A; None where only a meter can see it."""
         return None
 
-    def wait(self, bed: Bed, seconds: float) -> None:
+    def wait(self, bed: BedDriver, seconds: float) -> None:
         """Say nothing to the bed for so long."""
         time.sleep(seconds)
 
     # What tests do
 
-    def drive(self, bed: Bed, seconds: float, voltage: float = 0.0, current: float = 0.0) -> Sample:
+    def drive(self, bed: BedDriver, seconds: float, voltage: float = 0.0, current: float = 0.0) -> Sample:
         """So many exchanges, until the bed is armed no more; its last answer."""
         sample = None
         for _ in range(math.ceil(seconds / self.period)):
@@ -70,24 +70,24 @@ class Conformance:
         assert sample is not None, "no answer at all"
         return sample
 
-    def connected(self, bed: Bed) -> About:
+    def connected(self, bed: BedDriver) -> About:
         about = bed.connect()
         self._lock_step = Capability.LOCK_STEP in about.capabilities
         return about
 
-    def driven(self, bed: Bed, **limits: float) -> About:
+    def driven(self, bed: BedDriver, **limits: float) -> About:
         """Connected and armed, under these limits."""
         about = self.connected(bed)
         bed.limit(limits)
         bed.arm()
         return about
 
-    def is_safe(self, bed: Bed) -> None:
+    def is_safe(self, bed: BedDriver) -> None:
         held = self.outputs(bed)
         assert held is None or held == (0.0, 0.0)
         assert bed.read().state != State.ARMED
 
-    def faulted(self, bed: Bed, sample: Sample, fault: Fault) -> None:
+    def faulted(self, bed: BedDriver, sample: Sample, fault: Fault) -> None:
         """It has stopped, for this and nothing else; it stays so, until it is cleared."""
         assert sample.state == State.STOPPED
         assert sample.faults & ~Fault.WATCHDOG == fault
@@ -104,7 +104,7 @@ class Conformance:
 
     # Who is there
 
-    def test_it_says_who_it_is_and_what_it_can(self, bed: Bed) -> None:
+    def test_it_says_who_it_is_and_what_it_can(self, bed: BedDriver) -> None:
         about = self.connected(bed)
         assert about.name and about.name.isprintable() and about.version == 1
         assert bytes.fromhex(about.firmware) is not None and len(about.firmware) == 16
@@ -113,20 +113,20 @@ class Conformance:
         said = [scales.voltage, scales.current, scales.rate, *about.limits.__dict__.values()]
         assert all(math.isfinite(x) and x > 0.0 for x in said)
 
-    def test_it_is_disarmed_and_safe_once_it_is_greeted(self, bed: Bed) -> None:
+    def test_it_is_disarmed_and_safe_once_it_is_greeted(self, bed: BedDriver) -> None:
         self.connected(bed)
         sample = bed.read()
         assert sample.state == State.DISARMED and sample.greeted and not sample.refused
         assert not sample.faults & ~Fault.WATCHDOG
         self.is_safe(bed)
 
-    def test_it_has_the_sensors_that_it_says(self, bed: Bed) -> None:
+    def test_it_has_the_sensors_that_it_says(self, bed: BedDriver) -> None:
         about, sample = self.connected(bed), bed.read()
         assert (sample.angle is not None) == (Capability.ENCODER in about.capabilities)
         assert (sample.drive_current is not None) == (Capability.DRIVE_CURRENT in about.capabilities)
         assert (sample.acceleration is not None) == (Capability.ACCELEROMETER in about.capabilities)
 
-    def test_nothing_can_be_asked_before_it_is_greeted(self, bed: Bed) -> None:
+    def test_nothing_can_be_asked_before_it_is_greeted(self, bed: BedDriver) -> None:
         for ask in (bed.arm, bed.read, bed.clear, lambda: bed.exchange(0.0, 0.0), lambda: bed.limit({"voltage": 1.0})):
             with refused("E401"):
                 ask()
@@ -134,7 +134,7 @@ class Conformance:
         bed.close()
         bed.close()
 
-    def test_greeting_it_again_disarms_it(self, bed: Bed) -> None:
+    def test_greeting_it_again_disarms_it(self, bed: BedDriver) -> None:
         about = self.driven(bed)
         self.drive(bed, 0.02, voltage=self.share * about.limits.voltage)
         again = bed.connect()
@@ -143,13 +143,13 @@ class Conformance:
 
     # Arming and commands
 
-    def test_it_arms_with_nothing_commanded(self, bed: Bed) -> None:
+    def test_it_arms_with_nothing_commanded(self, bed: BedDriver) -> None:
         self.connected(bed)
         sample = bed.arm()
         assert sample.state == State.ARMED and not sample.refused
         assert self.outputs(bed) in (None, (0.0, 0.0))
 
-    def test_a_command_takes_hold_as_whole_counts(self, bed: Bed) -> None:
+    def test_a_command_takes_hold_as_whole_counts(self, bed: BedDriver) -> None:
         about = self.driven(bed)
         voltage, current = self.share * about.limits.voltage, self.share * about.limits.current
         sample = self.drive(bed, self.period, voltage, current)
@@ -161,7 +161,7 @@ class Conformance:
 
     @pytest.mark.parametrize("way", [1.0, -1.0])
     @pytest.mark.parametrize("motor", ["drive", "load"])
-    def test_the_shaft_turns_the_way_of_a_command(self, bed: Bed, motor: str, way: float) -> None:
+    def test_the_shaft_turns_the_way_of_a_command(self, bed: BedDriver, motor: str, way: float) -> None:
         about = self.driven(bed)
         voltage = way * self.share * about.limits.voltage if motor == "drive" else 0.0
         current = way * self.share * about.limits.current if motor == "load" else 0.0
@@ -169,7 +169,7 @@ class Conformance:
         assert way * sample.rate > 0.0
         assert sample.angle is None or way * sample.angle > 0.0
 
-    def test_what_is_read_is_whole_counts_and_its_ticks_go_on(self, bed: Bed) -> None:
+    def test_what_is_read_is_whole_counts_and_its_ticks_go_on(self, bed: BedDriver) -> None:
         about = self.driven(bed)
         before = -1
         for _ in range(20):
@@ -178,18 +178,18 @@ class Conformance:
             assert sample.tick > before or (not self._lock_step and sample.tick == before)
             before = sample.tick
 
-    def test_a_command_is_refused_while_it_is_not_armed(self, bed: Bed) -> None:
+    def test_a_command_is_refused_while_it_is_not_armed(self, bed: BedDriver) -> None:
         about = self.connected(bed)
         sample = bed.exchange(self.share * about.limits.voltage, 0.0)
         assert sample is not None and sample.refused and sample.state == State.DISARMED
         self.is_safe(bed)
 
-    def test_it_does_not_arm_twice(self, bed: Bed) -> None:
+    def test_it_does_not_arm_twice(self, bed: BedDriver) -> None:
         self.driven(bed)
         with refused("E406"):
             bed.arm()
 
-    def test_reading_changes_nothing(self, bed: Bed) -> None:
+    def test_reading_changes_nothing(self, bed: BedDriver) -> None:
         about = self.driven(bed)
         self.drive(bed, self.period, voltage=self.share * about.limits.voltage)
         held = self.outputs(bed)
@@ -198,7 +198,7 @@ class Conformance:
 
     # Stopping
 
-    def test_stop_is_safe_and_confirmed(self, bed: Bed) -> None:
+    def test_stop_is_safe_and_confirmed(self, bed: BedDriver) -> None:
         about = self.driven(bed)
         self.drive(bed, 0.02, self.share * about.limits.voltage, self.share * about.limits.current)
         assert bed.stop() and bed.stop()
@@ -206,12 +206,12 @@ class Conformance:
         sample = bed.exchange(0.0, 0.0)
         assert sample is not None and sample.refused and sample.state == State.DISARMED
 
-    def test_the_shaft_is_braked_when_it_is_stopped(self, bed: Bed) -> None:
+    def test_the_shaft_is_braked_when_it_is_stopped(self, bed: BedDriver) -> None:
         about = self.driven(bed)
         fast = self.drive(bed, 0.2, voltage=self.share * about.limits.voltage)
         assert bed.rest(0.5).rate < 0.2 * fast.rate
 
-    def test_leaving_a_with_block_stops_it(self, bed: Bed) -> None:
+    def test_leaving_a_with_block_stops_it(self, bed: BedDriver) -> None:
         with pytest.raises(KeyError), bed:
             about = self.driven(bed)
             self.drive(bed, 0.02, voltage=self.share * about.limits.voltage)
@@ -220,7 +220,7 @@ class Conformance:
         self.connected(bed)
         self.is_safe(bed)
 
-    def test_a_shaft_that_turns_is_not_armed(self, bed: Bed) -> None:
+    def test_a_shaft_that_turns_is_not_armed(self, bed: BedDriver) -> None:
         about = self.driven(bed)
         for _ in range(200):
             if abs(self.drive(bed, 0.01, voltage=3.0 * self.share * about.limits.voltage).rate) > about.limits.rate / 8:
@@ -234,14 +234,16 @@ class Conformance:
 
     @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf, 1e300])
     @pytest.mark.parametrize("which", [0, 1])
-    def test_no_number_and_no_command_beyond_every_limit_is_sent(self, bed: Bed, which: int, wrong: float) -> None:
+    def test_no_number_and_no_command_beyond_every_limit_is_sent(
+        self, bed: BedDriver, which: int, wrong: float
+    ) -> None:
         self.driven(bed)
         with refused("E408"):
             bed.exchange(*((wrong, 0.0) if which == 0 else (0.0, wrong)))
         self.is_safe(bed)
 
     @pytest.mark.parametrize("which", ["voltage", "current"])
-    def test_a_count_beyond_a_limit_is_not_sent_and_the_limit_itself_is(self, bed: Bed, which: str) -> None:
+    def test_a_count_beyond_a_limit_is_not_sent_and_the_limit_itself_is(self, bed: BedDriver, which: str) -> None:
         about = self.connected(bed)
         scale = getattr(about.scales, which)
         most = round(self.share * getattr(about.limits, which) / scale)
@@ -258,14 +260,14 @@ class Conformance:
 
     # Limits
 
-    def test_limits_become_tighter_and_are_its_own_again_when_it_is_greeted(self, bed: Bed) -> None:
+    def test_limits_become_tighter_and_are_its_own_again_when_it_is_greeted(self, bed: BedDriver) -> None:
         about = self.driven(bed, voltage=self.share * self.connected(bed).limits.voltage)
         with refused("E408"):
             bed.exchange(2.0 * self.share * about.limits.voltage, 0.0)
         self.driven(bed)
         assert self.drive(bed, self.period, voltage=2.0 * self.share * about.limits.voltage).state == State.ARMED
 
-    def test_limits_never_become_wider(self, bed: Bed) -> None:
+    def test_limits_never_become_wider(self, bed: BedDriver) -> None:
         own = self.connected(bed).limits
         self.driven(bed, voltage=3.0 * own.voltage, current=3.0 * own.current)
         with refused("E408"):
@@ -274,18 +276,18 @@ class Conformance:
         with refused("E408"):
             bed.exchange(0.0, 1.5 * own.current)
 
-    def test_limits_are_not_taken_while_it_is_armed(self, bed: Bed) -> None:
+    def test_limits_are_not_taken_while_it_is_armed(self, bed: BedDriver) -> None:
         about = self.driven(bed)
         with refused("E406"):
             bed.limit({"voltage": self.share * about.limits.voltage})
 
     @pytest.mark.parametrize("wrong", [-1.0, math.nan, math.inf])
-    def test_a_limit_is_a_number_from_zero_on(self, bed: Bed, wrong: float) -> None:
+    def test_a_limit_is_a_number_from_zero_on(self, bed: BedDriver, wrong: float) -> None:
         self.connected(bed)
         with refused("E408"):
             bed.limit({"rate": wrong})
 
-    def test_a_shaft_faster_than_its_limit_stops_it(self, bed: Bed) -> None:
+    def test_a_shaft_faster_than_its_limit_stops_it(self, bed: BedDriver) -> None:
         about = self.connected(bed)
         most = 4.0 * about.limits.arming_rate
         bed.limit({"rate": most})
@@ -297,7 +299,7 @@ class Conformance:
         self.faulted(bed, sample, Fault.RATE)
 
     @pytest.mark.parametrize("which", ["voltage", "current"])
-    def test_a_command_that_changes_too_fast_stops_it(self, bed: Bed, which: str) -> None:
+    def test_a_command_that_changes_too_fast_stops_it(self, bed: BedDriver, which: str) -> None:
         about = self.connected(bed)
         most = self.share * getattr(about.limits, which)
         # half the change of this test in all the ticks from one command to the next, a late one too
@@ -310,18 +312,18 @@ class Conformance:
 
     # Clearing
 
-    def test_clearing_a_bed_that_is_disarmed_changes_nothing(self, bed: Bed) -> None:
+    def test_clearing_a_bed_that_is_disarmed_changes_nothing(self, bed: BedDriver) -> None:
         self.connected(bed)
         assert bed.clear().state == State.DISARMED
 
-    def test_a_bed_that_is_armed_is_not_cleared(self, bed: Bed) -> None:
+    def test_a_bed_that_is_armed_is_not_cleared(self, bed: BedDriver) -> None:
         self.driven(bed)
         with refused("E406"):
             bed.clear()
 
     # A plant that is simulated, or is not
 
-    def test_only_a_simulated_plant_is_started_anew(self, bed: Bed) -> None:
+    def test_only_a_simulated_plant_is_started_anew(self, bed: BedDriver) -> None:
         about = self.connected(bed)
         if Capability.SIMULATED in about.capabilities:
             assert bed.preset(rate=0.0, seed=1, repeat=2).state == State.DISARMED
@@ -333,7 +335,7 @@ class Conformance:
 class LockStep(Conformance):
     """Without a time of their own."""
 
-    def test_it_advances_by_the_same_ticks_with_each_exchange_and_with_nothing_else(self, bed: Bed) -> None:
+    def test_it_advances_by_the_same_ticks_with_each_exchange_and_with_nothing_else(self, bed: BedDriver) -> None:
         about = self.driven(bed)
         start = bed.read().tick
         ticks = round(self.period * about.tick_hz)
@@ -343,7 +345,7 @@ class LockStep(Conformance):
             assert sample is not None and sample.tick == start + n * ticks
             assert bed.read().tick == sample.tick
 
-    def test_it_advances_while_it_is_not_armed(self, bed: Bed) -> None:
+    def test_it_advances_while_it_is_not_armed(self, bed: BedDriver) -> None:
         about = self.connected(bed)
         start = bed.read().tick
         sample = bed.exchange(0.0, 0.0)
@@ -351,7 +353,7 @@ class LockStep(Conformance):
         assert sample.tick == start + round(self.period * about.tick_hz)
         assert bed.rest(0.3).tick == sample.tick + round(0.3 * about.tick_hz)
 
-    def test_the_same_commands_make_the_same_samples(self, bed: Bed) -> None:
+    def test_the_same_commands_make_the_same_samples(self, bed: BedDriver) -> None:
         about = self.connected(bed)
         runs = []
         for _ in range(2):
@@ -367,25 +369,25 @@ class LockStep(Conformance):
 class FreeRunning(Conformance):
     """With a time of their own."""
 
-    def test_it_stays_armed_as_long_as_it_is_spoken_to(self, bed: Bed) -> None:
+    def test_it_stays_armed_as_long_as_it_is_spoken_to(self, bed: BedDriver) -> None:
         self.driven(bed)
         assert self.drive(bed, 0.3).state == State.ARMED
 
-    def test_silence_stops_it(self, bed: Bed) -> None:
+    def test_silence_stops_it(self, bed: BedDriver) -> None:
         about = self.driven(bed)
         self.drive(bed, 0.01, voltage=self.share * about.limits.voltage)
         self.wait(bed, 2.0 * about.deadman)
         assert self.outputs(bed) in (None, (0.0, 0.0))
         self.faulted(bed, bed.read(), Fault.DEADMAN)
 
-    def test_reading_it_does_not_keep_it_armed(self, bed: Bed) -> None:
+    def test_reading_it_does_not_keep_it_armed(self, bed: BedDriver) -> None:
         self.driven(bed)
         for _ in range(60):
             self.wait(bed, 1e-3)
             sample = bed.read()
         assert sample.state == State.STOPPED and sample.faults & Fault.DEADMAN
 
-    def test_its_ticks_are_those_of_its_rate(self, bed: Bed) -> None:
+    def test_its_ticks_are_those_of_its_rate(self, bed: BedDriver) -> None:
         about = self.connected(bed)
         began = bed.read().tick
         self.wait(bed, 0.5)
@@ -395,17 +397,17 @@ class FreeRunning(Conformance):
 class Simulated(Conformance):
     """Without a motor."""
 
-    def test_a_plant_is_started_at_a_rate(self, bed: Bed) -> None:
+    def test_a_plant_is_started_at_a_rate(self, bed: BedDriver) -> None:
         about = self.connected(bed)
         rate = 0.5 * about.limits.arming_rate
         assert bed.preset(rate=rate).rate == pytest.approx(rate, abs=about.scales.rate)
 
-    def test_a_plant_is_not_started_while_it_is_armed(self, bed: Bed) -> None:
+    def test_a_plant_is_not_started_while_it_is_armed(self, bed: BedDriver) -> None:
         self.driven(bed)
         with refused("E406"):
             bed.preset(rate=1.0)
 
-    def test_a_plant_started_fast_is_not_armed_until_it_is_slow(self, bed: Bed) -> None:
+    def test_a_plant_started_fast_is_not_armed_until_it_is_slow(self, bed: BedDriver) -> None:
         about = self.connected(bed)
         bed.preset(rate=2.0 * about.limits.arming_rate)
         with refused("E406"):

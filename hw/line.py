@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
+BAUD = 921600
+"""Bits a second of a serial line, unless a user says otherwise."""
+
 
 class Line(Protocol):
     """Raises met.diagnostic.Problem E401 where it is lost."""

@@ -20,7 +20,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from hw import records
-from hw.bed import Bed, Fault, Sample, State
+from hw.bed import BedDriver, Fault, Sample, State
 from hw.pace import MISSED, Pace
 from met.frozen import frozen
 
@@ -57,7 +57,7 @@ Put = Callable[[bytes], None]
 
 
 def drive(
-    beds: Sequence[Bed], compute: Compute, pace: Pace, exchanges: int, put: Put, *, lock_step: bool,
+    beds: Sequence[BedDriver], compute: Compute, pace: Pace, exchanges: int, put: Put, *, lock_step: bool,
     asked_to_stop: Callable[[], bool] = lambda: False, armed: bool = True,
 ) -> Ended:  # fmt: skip
     """Arm the beds, drive them through so many exchanges after the first sample, and stop them.
@@ -78,7 +78,7 @@ def drive(
 
 
 def _driven(
-    beds: Sequence[Bed], compute: Compute, pace: Pace, exchanges: int, put: Put, lock_step: bool,
+    beds: Sequence[BedDriver], compute: Compute, pace: Pace, exchanges: int, put: Put, lock_step: bool,
     asked_to_stop: Callable[[], bool], armed: bool,
 ) -> Ended:  # fmt: skip
     clock, packed = time.perf_counter_ns, records.packed

@@ -22,7 +22,7 @@ from dataclasses import asdict
 from typing import Any, TypeVar
 
 from hw import realtime
-from hw.bed import About, Bed
+from hw.bed import About, BedDriver
 from met.diagnostic import Problem, error
 from met.host import interpreter
 from met.messages.render import to_json
@@ -63,9 +63,9 @@ def told(about: About) -> dict[str, Any]:
     return {**asdict(about), "capabilities": int(about.capabilities)}
 
 
-def warnings(bed: Bed) -> None:
+def warnings(bed: BedDriver) -> None:
     """Say what may make exchanges with a bed late."""
-    for warning in getattr(bed, "warnings", ()):
+    for warning in bed.warnings:
         say(said=warning.message, help=list(warning.help))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hw.bed import About, Bed, Fault, Sample, State
+from hw.bed import About, BedDriver, Fault, Sample, State
 from hw.build import Uncountable
 from hw.protocol.frames import Decoder
 from hw.protocol.messages import VERSION
@@ -84,7 +84,7 @@ def latched(about: About, faults: Fault, port: str) -> Problem:
     return Problem(error("E406", message, help=[*remedies(faults & ~Fault.WATCHDOG), own]))
 
 
-def check_stopped(beds: Sequence[Bed], abouts: Sequence[About], why: str) -> None:
+def check_stopped(beds: Sequence[BedDriver], abouts: Sequence[About], why: str) -> None:
     """Raises Problem where a bed that was driven has not confirmed that it is not armed. why: it was to stop early."""
     unsure = [about.name for bed, about in zip(beds, abouts, strict=True) if not bed.stop()]
     if unsure:

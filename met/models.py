@@ -101,9 +101,9 @@ def _integrators() -> tuple[Iterable[Any], type]:
 
 
 def _beds() -> tuple[Iterable[Any], type]:
-    from met.substitution import BEDS, Bed
+    from met.substitution import BEDS, BedModel
 
-    return BEDS, Bed
+    return BEDS, BedModel
 
 
 def _laws() -> tuple[Iterable[Any], type]:
@@ -149,6 +149,8 @@ def available(kind: Kind) -> dict[str, Any]:
         model: Any = loaded
         _check_names(kind, model, found_at)
         _check_units(model, found_at)
+        if kind == "bed":
+            _check_bed(model, found_at)
         if model.name in found and found[model.name] is not model:
             message = f"{found_at} offers {kind} `{model.name}`, which exists already"
             raise Problem(error("E215", message, help="give the model another name"))
@@ -200,6 +202,18 @@ def _check_units(model: Any, found_at: str) -> None:
             message = f"{found_at} declares `{part.name}` with {reason}"
             help = "units are those of decks, and joint, effort, command, of"
             raise Problem(error("E215", message, help=help)) from None
+
+
+def _check_bed(model: Any, found_at: str) -> None:
+    """A bed model declares what laws and wire read of it by name (met/substitution/bed.py)."""
+    from met.substitution.bed import check
+
+    wrong = check(model)
+    if wrong is None and model.presets and not any(p.name == FAULTS and p.shape == "text" for p in model.parameters):
+        wrong = f"has presets, and no parameter `{FAULTS}` that names one", 'declare `faults` with `shape="text"`'
+    if wrong is not None:
+        message, help = wrong
+        raise Problem(error("E215", f"{found_at} {message}", help=help))
 
 
 def find(kind: Kind, name: str, place: Place | None = None) -> Any:

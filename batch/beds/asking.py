@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from batch.campaigns.choosing import experiments_named
 from batch.terminal.running import read_plan
-from hw.ports import SIMULATED, is_transcript
+from hw.ports import check_model, kind_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Experiment, Plan
@@ -24,7 +24,7 @@ class Meant:
     @property
     def simulated(self) -> Experiment | None:
         """The experiment whose bed the port simulates; None where it does not."""
-        return self.experiment if self.port in SIMULATED else None
+        return self.experiment if kind_of(self.port).simulated else None
 
 
 def on_beds(plan: Plan, names: Sequence[str] | None) -> list[Experiment]:
@@ -44,9 +44,11 @@ def meant(
     found = _meant(word, None if source is None else read_plan(
         source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=quiet
     ), names)  # fmt: skip
-    if is_transcript(found.port):
+    if kind_of(found.port).replays:
         helps = "give the line that it was made on; `met bed run --port FILE` replays it"
         raise Problem(error("E428", f"{found.port} is a transcript, and no bed that could be asked", help=helps))
+    if found.experiment is not None:
+        check_model(found.port, found.experiment, found.joint)
     return found
 
 

@@ -9,7 +9,7 @@ from batch.beds.asking import meant
 from hw import refusals
 from hw.bed import About, Fault
 from hw.beds import latch
-from hw.ports import SIMULATED, Port, opened
+from hw.ports import Port, kind_of, opened
 from met.diagnostic import Problem, error
 from met.messages.visible import say
 
@@ -28,7 +28,7 @@ def clear_and_tell(word: str, *, baud: int, form: str, quiet: bool = False, verb
 
 def clear(word: str, baud: int) -> tuple[About, Fault]:
     """Who the bed at a port is, and what it had latched. It is not armed. Raises Problem."""
-    if word in SIMULATED:
+    if kind_of(word).simulated:
         helps = "each run begins with one in which nothing is latched"
         raise Problem(error("E425", f"port `{word}` simulates a bed, anew for each command", help=helps))
     with opened(Port(meant(word, None, ()).port, baud), None, "", 0, math.inf) as bed:

@@ -24,7 +24,7 @@ from batch.campaigns.tasks import Done, Section, Task
 from batch.executors import Outcome
 from hw import records
 from hw.case import Asked, pace_of
-from hw.ports import kind
+from hw.ports import same_bed
 from hw.process import talk
 from met.diagnostic import Problem, error
 from met.frozen import frozen
@@ -134,7 +134,7 @@ class OnBeds:
     def check(self, before: Mapping[str, str], what: str) -> None:
         """Raises Problem E353 where cases were driven at other ports, by joint; what: and where those cases are."""
         for joint, port in before.items():
-            if kind(port) != kind(self.ports.get(joint, "")):
+            if not same_bed(port, self.ports.get(joint, "")):
                 message = f"{what}, driven at `{port}`, and is left as it is"
                 helps = "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it"
                 raise Problem(error("E353", message, help=helps))

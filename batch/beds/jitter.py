@@ -10,7 +10,7 @@ from typing import Any
 from batch.beds.asking import Meant, meant
 from hw.case import pace_of
 from hw.jitter import Asked
-from hw.ports import EMULATED
+from hw.ports import kind_of
 from hw.process import talk
 from hw.timing import EDGES
 from ic.printing.columns import columns
@@ -33,7 +33,8 @@ def measured(
     asked: Meant, baud: int, hz: float | None, seconds: float, joints: int
 ) -> tuple[dict[str, Any], list[str]]:
     """The figures, for programs, and what is told of the measurement. Raises Problem."""
-    if asked.port == EMULATED:
+    kind = kind_of(asked.port)
+    if kind.simulated and kind.lock_step(asked.port, False):
         message = "an emulated bed has no time of its own, so that nothing can be late"
         raise Problem(error("E426", message, help="`--port firmware` has one, over a pseudo-terminal"))
     rate = hz or (HZ if asked.experiment is None else pace_of(asked.experiment).hz)

@@ -12,9 +12,8 @@ from typing import Any
 
 from batch.beds.asking import Meant, meant
 from hw import refusals
-from hw.bed import About, Bed, Capability, Fault, Sample
-from hw.beds.serial_line import LONGEST_SHARE, exchanged, needed
-from hw.beds.wire import WireBed
+from hw.bed import About, BedDriver, Capability, Fault, Sample
+from hw.beds.serial_line import LONGEST_SHARE, exchanged
 from hw.case import pace_of
 from hw.ports import Port, opened
 from ic.printing.columns import columns, number, quantity
@@ -59,10 +58,8 @@ def probe(asked: Meant, baud: int) -> Found:
     with opened(Port(asked.port, baud), simulated, asked.joint, 0, period) as bed:
         about = bed.connect()
         sample = bed.read()
-        trips = _trips(bed) if isinstance(bed, WireBed) else ()
-        bytes_take = needed(about.capabilities, baud) if simulated is None and "://" not in asked.port else 0.0
-        warnings = tuple(getattr(bed, "warnings", ()))
-        return Found(asked.port, about, sample, warnings, baud, bytes_take, trips)
+        trips = _trips(bed) if bed.has_line else ()
+        return Found(asked.port, about, sample, bed.warnings, baud, bed.line_time(about), trips)
 
 
 def probe_and_tell(
@@ -138,7 +135,7 @@ def capabilities(about: About) -> list[str]:
             for each in Capability if each in about.capabilities]  # fmt: skip
 
 
-def _trips(bed: Bed) -> tuple[float, ...]:
+def _trips(bed: BedDriver) -> tuple[float, ...]:
     bed.patience = 0.1
     trips = []
     for _ in range(ASKED):

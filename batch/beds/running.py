@@ -18,7 +18,7 @@ from batch.terminal.margin import in_words, remedy
 from batch.terminal.running import first_picture, read_plan
 from batch.terminal.verdict import announcement, told, worst_cases, writing
 from hw.case import pace_of
-from hw.ports import SIMULATED, in_lock_step
+from hw.ports import check_model, in_lock_step, kind_of, ports_in_words
 from met.analysis.margin import margins
 from met.diagnostic import Problem, error
 from met.host.files import read_json
@@ -42,14 +42,14 @@ def ports_of(given: Sequence[str], experiments: Sequence[Experiment]) -> dict[st
         if joint in found:
             raise Problem(error("E418", f"joint `{joint}` has two ports", help="leave one of the two out"))
         found[joint] = port
-    lines = [os.path.realpath(port) for port in found.values() if port not in SIMULATED]
+    lines = [os.path.realpath(port) for port in found.values() if not kind_of(port).simulated]
     if len(set(lines)) < len(lines):
         one, other = [joint for joint, port in found.items() if lines.count(os.path.realpath(port)) > 1][:2]
         message = f"joints `{one}` and `{other}` have one port: {found[one]}"
         raise Problem(error("E418", message, help="each has a bed of its own, and its own line"))
     missing = [joint for joint in joints if joint not in found]
     if missing:
-        kinds = "`--port JOINT=PORT`: a serial line, `emulated`, `firmware`, `qemu`, or a transcript"
+        kinds = f"`--port JOINT=PORT`: {ports_in_words()}"
         raise Problem(error("E418", f"no port for the bed of joint `{missing[0]}`", help=kinds))
     return found
 
@@ -61,6 +61,9 @@ def campaign_of(
     """What will be run; by joint its ports; whether the beds have no time of their own. Raises Problem."""
     asked = on_beds(plan, names)
     by_joint = ports_of(ports, asked)
+    for each in asked:
+        for use in each.structure.substitutions:
+            check_model(by_joint[use.joint], each, use.joint)
     steps = {in_lock_step(port, lock_step) for port in by_joint.values()}
     if len(steps) > 1:
         one = "give all beds ports of one kind"

@@ -52,12 +52,20 @@ BAUD = click.option("--baud", type=click.IntRange(1, 2**31 - 1), default=921600,
                     help="Of a serial line.")  # fmt: skip
 
 
-@click.group(short_help="Drive a motor bed: probe it, measure its line, run a deck's joint on it.")
+class BedCommands(click.Group):
+    """The group `met bed`, whose help lists the ports that there are drivers for, those of other packages too."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        from hw.ports import kinds
+
+        with formatter.section("Ports"):
+            formatter.write_dl([(kind.written, kind.doc) for kind in kinds()])
+        super().format_epilog(ctx, formatter)
+
+
+@click.group(cls=BedCommands, short_help="Drive a motor bed: probe it, measure its line, run a deck's joint on it.")
 def bed() -> None:
-    """Work with a motor bed, at PORT: a serial line (/dev/ttyUSB0, socket://HOST:PORT), `emulated` (the deck's bed in
-    this process), `firmware` or `qemu` (the bed's firmware over a simulated plant, here or on an emulated Cortex-M3),
-    or the transcript of an earlier run.
-    """
+    """Work with a motor bed at one of the ports below: a real one, a simulated one, or a transcript."""
 
 
 @bed.command(short_help="Say who is at a port, and what its sensors read.")
@@ -70,7 +78,7 @@ def bed() -> None:
 @loudness_options
 def probe(word: str, source: str | None, names: tuple[str, ...], **options: Any) -> int:
     """Greet a bed and read its sensors: its name, firmware, limits and scales, faults that are latched, and for which
-    rates the line is fast enough. It is not armed. A simulated bed (`emulated`, `firmware`, `qemu`) is the one of DECK.
+    rates the line is fast enough. It is not armed. A simulated bed, such as `emulated`, is the one of DECK.
 
     Exit status: 0 it answers; 2 it does not, or the input is wrong.
     """

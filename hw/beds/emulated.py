@@ -12,9 +12,13 @@ from dataclasses import replace
 from typing import Protocol
 
 from hw import refusals
-from hw.bed import About, Bed, Capability, Fault, Limits, Sample, Scales, State
+from hw.bed import About, BedDriver, Capability, Fault, Limits, Sample, Scales, State
 from hw.beds import greeting
+from hw.ports import Opening, PortKind
 from hw.protocol import messages
+from met.diagnostic import Problem, error
+from met.program.control.plant import Plant
+from met.substitution.bed import SIMULATION_PARAMETERS
 
 FINE = 2.0**-20
 """V, A and rad/s of a count where the bed's converter has no resolution: up to 2047 of each, and nothing to round in
@@ -30,8 +34,8 @@ DEADMAN = 0.020
 """s; told, though nothing waits for it."""
 
 
-class Plant(Protocol):
-    """A motor bed as simulated. period: s, of a tick; shaft_angle: rad."""
+class SteppedPlant(Protocol):
+    """A simulated motor bed that is stepped by hand. period: s of a tick; shaft_angle: rad."""
 
     period: float
 
@@ -61,14 +65,16 @@ def limits(values: Mapping[str, float], period: float, *, voltage: float = 60.0,
     return Limits(voltage, current, rate, ARMING_RATE, 2.0 * voltage / period, 2.0 * current / period, heat)
 
 
-class EmulatedBed(Bed):
+class EmulatedBed(BedDriver):
     """plant: at rest when the bed is made;  bears: A that its load motor bears for ever, its limit unless given.
 
     voltage, current  what the amplifiers hold: V, A
     """
 
+    has_line = False
+
     def __init__(
-        self, plant: Plant, scales: Scales, limits: Limits, *, name: str = "emulated", bears: float | None = None
+        self, plant: SteppedPlant, scales: Scales, limits: Limits, *, name: str = "emulated", bears: float | None = None
     ) -> None:
         self._plant, self._name, self._scales, self._limits = plant, name, scales, limits
         self._bears = limits.current if bears is None else bears
@@ -204,3 +210,22 @@ class EmulatedBed(Bed):
         angle = round(self._plant.shaft_angle / self._scales.angle) * self._scales.angle
         rate = self._rate * self._scales.rate
         return Sample(self._state, True, self._faults, refused, self._tick, rate, angle)
+
+
+def _opened_port(opening: Opening) -> EmulatedBed:
+    if opening.port.transcript is not None:
+        helps = "`--port firmware` has one; with `--lock-step` it gives the same bits"
+        raise Problem(error("E409", "an emulated bed has no line whose transcript could be kept", help=helps))
+    values = opening.bed_values()
+    plant = Plant(opening.simulated(), opening.joint, case=opening.row, period=opening.period)
+    return EmulatedBed(plant, scales(values), limits(values, opening.period))
+
+
+PORT = PortKind(
+    scheme="emulated",
+    doc="The deck's bed in this process, in lock-step.",
+    open=_opened_port,
+    simulated=True,
+    needs=tuple(each for each in SIMULATION_PARAMETERS if each.name == "i_max"),
+    lock_step=lambda name, asked: True,
+)

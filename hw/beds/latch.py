@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hw import refusals
-from hw.bed import About, Bed, Fault, State
+from hw.bed import About, BedDriver, Fault, State
 
 COMING_TO_REST = 10.0
 """s that a shaft is given for it."""
@@ -12,7 +12,7 @@ LOOKS = 0.1
 """s between two looks at it."""
 
 
-def cleared(bed: Bed, about: About) -> Fault:
+def cleared(bed: BedDriver, about: About) -> Fault:
     """What a bed, which is greeted, had latched; now it is disarmed. Raises Problem E406 where its shaft turns on."""
     sample = bed.read()
     if sample.state != State.STOPPED:
@@ -24,7 +24,7 @@ def cleared(bed: Bed, about: About) -> Fault:
     return sample.faults & ~Fault.WATCHDOG
 
 
-def check(bed: Bed, about: About, port: str) -> None:
+def check(bed: BedDriver, about: About, port: str) -> None:
     """Raises Problem E406 where a bed, which is greeted, has latched faults."""
     sample = bed.read()
     if sample.state == State.STOPPED:

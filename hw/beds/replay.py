@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from hw.bed import Scales
 from hw.beds.wire import WireBed
 from hw.line import Line
+from hw.ports import Opening, PortKind
 from hw.protocol import messages
 from hw.protocol.frames import Decoder, unframed
-from hw.transcript import LOST, OPENED, RECEIVED, SENT, Record, Transcript, read
+from hw.transcript import LOST, MAGIC, OPENED, RECEIVED, SENT, Record, Transcript, read
 from met.diagnostic import Problem, error
+from met.host.files import open_regular
 
 LONGEST = 1000.0
 """Seconds between two exchanges that no bed waits."""
@@ -122,3 +125,35 @@ class _LineThen:
 
 
 _KINDS = {OPENED: "a line that was opened", RECEIVED: "an answer", LOST: "a line that was lost"}
+
+
+def is_transcript(name: str) -> bool:
+    """True where a port is a file that begins as a transcript does."""
+    if not os.path.isfile(name):
+        return False
+    with open_regular(name) as file:
+        return file.read(len(MAGIC)) == MAGIC
+
+
+def _was_in_lock_step(name: str, asked: bool) -> bool:
+    """True where a transcript has a STEP: its bed had no time of its own, whatever is asked now."""
+    sent = (unframed(each.data[:-1]) for each in read(name).records if each.kind == SENT)
+    return any(payload is not None and payload[0] == messages.Step.kind for payload in sent)
+
+
+def _opened_port(opening: Opening) -> ReplayBed:
+    name = opening.port.name
+    if opening.port.transcript is not None:
+        helps = f"leave out `--transcripts`: {name} is what it would be"
+        raise Problem(error("E409", "a transcript has no line whose transcript could be kept", help=helps))
+    return ReplayBed(name)
+
+
+PORT = PortKind(
+    address="FILE",
+    doc="A transcript of an earlier run: what its bed answered then.",
+    open=_opened_port,
+    lock_step=_was_in_lock_step,
+    replays=True,
+    recognizes=is_transcript,
+)

@@ -22,13 +22,11 @@ from urllib.parse import urlsplit
 
 from hw.bed import About, Capability
 from hw.beds.wire import WireBed
-from hw.line import Line
+from hw.line import BAUD, Line
+from hw.ports import Opening, PortKind
 from hw.protocol import messages
 from hw.transcript import Recorded, Writer
 from met.diagnostic import Diagnostic, Problem, error
-
-BAUD = 921600
-"""Bits a second, unless another number is asked for."""
 
 LONGEST_SHARE = 0.8
 """Of a period that the bytes of an exchange may take; and what those are: docs/protocol.md, Timing."""
@@ -60,7 +58,6 @@ class SerialBed(WireBed):
     ) -> None:
         super().__init__(url, period, secrets.randbelow(messages.NUMBERS))
         self.baud = baud
-        self.warnings: tuple[Diagnostic, ...] = ()
         header = {"line": url, "baud": baud, "period": period, "first": self._number}
         self._writer = None if transcript is None else Writer(transcript, header)
 
@@ -81,6 +78,22 @@ class SerialBed(WireBed):
         line = SerialLine(self._name, self.baud)
         self.warnings = line.warnings
         return line if self._writer is None else Recorded(line, self._writer)
+
+    def line_time(self, about: About) -> float:
+        return 0.0 if "://" in self._name else needed(about.capabilities, self.baud)
+
+
+def _opened_port(opening: Opening) -> SerialBed:
+    port = opening.port
+    return SerialBed(port.name, period=opening.period, baud=port.baud, transcript=opening.transcript())
+
+
+PORT = PortKind(
+    address="LINE",
+    doc="A bed on a serial line, such as /dev/ttyUSB0, socket://HOST:PORT or another URL of pyserial.",
+    open=_opened_port,
+    recognizes=lambda name: True,
+)
 
 
 def exchanged(capabilities: Capability) -> int:

@@ -10,20 +10,23 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Literal
 
-from hw import realtime
+from hw import realtime, refusals
 from hw.bed import Capability
-from hw.beds.serial_line import BAUD
+from hw.beds import emulated
 from hw.beds.wire import WireBed
-from hw.build import Config, build, qemu
-from hw.line import Line
+from hw.build import Config, Shaft, Uncountable, build, qemu
+from hw.line import BAUD, Line
+from hw.ports import Opening, PortKind
 from hw.protocol import messages
 from hw.transcript import Recorded, Writer
 from met.diagnostic import Problem, error
+from met.program.control.plant import plant_c
+from met.substitution.bed import SIMULATION_PARAMETERS
 
 WITHIN = 20.0
 """s in which its process must be there."""
@@ -131,3 +134,49 @@ def _lost(why: str | None) -> Problem:
 
 def _not_started(why: str) -> Problem:
     return Problem(error("E402", f"the bed's firmware does not start: {why}", help="start it again"))
+
+
+def config_of(values: Mapping[str, float], period: float, *, lock_step: bool) -> Config:
+    """The configuration of firmware that simulates a bed.
+
+    values     parameters of its model, SI, by name: `PARAMETERS` and `SIMULATION_PARAMETERS` of met.substitution.bed
+    period     s of a tick
+    lock_step  True where it has no time of its own
+    """
+    names = ("kt", "resistance", "tau_max", "kt_load", "inertia", "f_c", "f_v", "f_cut")
+    return Config(
+        name="simulated",
+        tick_hz=1.0 / period,
+        deadman=emulated.DEADMAN,
+        scales=emulated.scales(values),
+        limits=emulated.limits(values, period),
+        continuous_current=values["i_max"],
+        shaft=Shaft(**{name: values[name] for name in names}),
+        capabilities=Capability.ENCODER | (Capability.LOCK_STEP if lock_step else Capability(0)),
+    )
+
+
+def _opened_port(opening: Opening, kind: Literal["firmware", "qemu"]) -> SimulatedBed:
+    transcript, period = opening.transcript(), opening.period
+    config = config_of(opening.bed_values(), period, lock_step=opening.port.lock_step)
+    text = plant_c(opening.simulated(), opening.joint, case=opening.row, period=period)
+    try:
+        return SimulatedBed(kind, config, text, period=period, transcript=transcript)
+    except Uncountable as reason:
+        raise refusals.uncountable(opening.joint, reason) from None
+
+
+FIRMWARE = PortKind(
+    scheme="firmware",
+    doc="The bed's firmware with the deck's bed as its plant, a program of its own on this machine.",
+    open=partial(_opened_port, kind="firmware"),
+    simulated=True,
+    needs=SIMULATION_PARAMETERS,
+)
+QEMU = PortKind(
+    scheme="qemu",
+    doc="The same as it runs on a Cortex-M3, in an emulator.",
+    open=partial(_opened_port, kind="qemu"),
+    simulated=True,
+    needs=SIMULATION_PARAMETERS,
+)

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
 from hw import refusals
-from hw.bed import LIMITS, About, Bed, Capability, Fault, Sample, State, real_plant
+from hw.bed import LIMITS, About, BedDriver, Capability, Fault, Sample, State, real_plant
 from hw.beds import greeting
 from hw.line import Heard, Line
 from hw.protocol import messages
@@ -42,7 +42,7 @@ _NONSENSE = 1024
 T = TypeVar("T", Greeting, InForce, Reading)
 
 
-class WireBed(Bed):
+class WireBed(BedDriver):
     """period: s, from one exchange to the next, infinite where none are made;  first: the sequence number before the
     first one.
 

@@ -28,7 +28,7 @@ from met.program.motion.courses import recorded
 from met.program.values import NamedValues, answer, parameters, returned
 from met.sensors.sensor import Sensor
 from met.servos.servo import Drive, JointMotion, Parts, Servo, Setpoint
-from met.substitution import Bed, Law
+from met.substitution import BedModel, Law
 from met.trace import Formulas, Graph, Real, Scalar
 from met.vectors import Vector
 
@@ -194,7 +194,7 @@ class System:
         return tuple(each for each in self.working if each.ticks and each.use.divisor % step)
 
     @cached_property
-    def mounted(self) -> tuple[tuple[Actuator, Bed, Law], ...]:
+    def mounted(self) -> tuple[tuple[Actuator, BedModel, Law], ...]:
         """The actuators whose motors are on a bed, in the order of joints, with their beds and laws."""
         uses = {use.joint: use for use in self.structure.substitutions}
         return tuple(

@@ -12,7 +12,7 @@ from met.substitution import (
     torque_balance_observer,
     velocity_tracking,
 )
-from met.substitution.bed import Bed
+from met.substitution.bed import BedModel
 from met.substitution.law import Law
 
 LAWS: tuple[Law, ...] = (
@@ -22,4 +22,4 @@ LAWS: tuple[Law, ...] = (
     bare.LAW,
     measured_acceleration.LAW,
 )
-BEDS: tuple[Bed, ...] = (emulated.BED,)
+BEDS: tuple[BedModel, ...] = (emulated.BED,)

@@ -1,8 +1,10 @@
-"""The declaration of a bed: a motor and its load on one shaft, a wire to it, and what is read back.
+"""The declaration of a bed model: a drive motor and a load motor on one shaft, a wire to them, and what is read back.
 
 The wire carries the drive motor's voltage and the load motor's current, held by the amplifiers from one tick to the
-next, and brings back the filtered rate of the shaft, once a tick. An emulated bed is a model, below; a real one takes
-its place at the wire.
+next, and brings back the filtered rate of the shaft, once a tick. A bed model simulates that; a real bed takes its
+place at the wire, and the model is then what is believed of it. Drivers of real beds are in hw/beds.
+
+`PARAMETERS`, `SIMULATION_PARAMETERS` and `MEMORY` are all that code outside a bed model reads of it by name.
 """
 
 from __future__ import annotations
@@ -28,16 +30,54 @@ Draw = Callable[[str], Real]
 """A normal deviate of mean 0 and variance 1 by the name of what is noisy: one a tick, the same however it is run."""
 
 
-@frozen(kw_only=True)
-class Bed:
-    """The declaration of an emulated bed; one a file.
+PARAMETERS = (
+    Parameter(name="inertia", unit="kg*m^2", doc="inertia of the shaft with both rotors"),
+    Parameter(name="kt_load", unit="N*m/A", doc="torque constant of the load motor"),
+    Parameter(name="f_cut", unit="Hz", doc="cut-off of the tachometer's filter, a Butterworth low-pass of order 2"),
+    Parameter(
+        name="delay", at_most=3.0, whole=True, doc="ticks from reading the rate to acting on it: a whole number to 3"
+    ),
+)
+"""Parameters that every bed model declares, under these names and in these units: the laws read them.
 
-    memory    its state, recorded under its names; `shaft_rate` (rad/s) is among them
+The load current is the law's torque over `kt_load`; the balance of torques has `inertia`; the observer has `inertia`,
+`f_cut` and `delay`. `met bed identify` begins its search at `kt_load` and `f_cut`.
+"""
+
+SIMULATION_PARAMETERS = (
+    Parameter(name="kt", unit="N*m/A", doc="torque constant of the drive motor"),
+    Parameter(name="resistance", unit="ohm", doc="armature resistance of the drive motor"),
+    Parameter(name="tau_max", unit="N*m", doc="largest torque of the drive motor"),
+    Parameter(name="f_c", unit="N*m", doc="Coulomb friction of the shaft"),
+    Parameter(name="f_v", unit="N*m*s/rad", doc="viscous friction of the shaft"),
+    Parameter(name="i_max", unit="A", doc="limit of the load motor's amplifier"),
+)
+"""Parameters that a bed model declares besides where `met bed` is to simulate it.
+
+At `--port emulated` the bed's limit of current is `i_max`; at `firmware` and `qemu` the firmware's guard knows the
+shaft by all of them. A bed model without some of them runs under `met run` and on a real bed; those ports refuse it
+(E429).
+
+`converter_voltage` (V), `converter_current` (A) and `converter_in` (rad/s) are optional: the steps of the bed's
+converters, which become the counts of the wire. Without them, or at 0, a count is 2^-20 of the unit.
+"""
+
+MEMORY = (Memory(name="shaft_rate", unit="rad/s", doc="rate of the shaft itself"),)
+"""Memory that every bed model has. It may have `shaft_angle` (rad) too, which is then what a simulated bed's encoder
+reads; without it the encoder stays at 0."""
+
+
+@frozen(kw_only=True)
+class BedModel:
+    """A bed that the engine simulates; one a file. `check` says what is missing in a declaration.
+
+    parameters  its numbers; `PARAMETERS` are among them
+    memory    its state, recorded under its names; `MEMORY` is among them
     begin     (p, w) -> the memory of a shaft that has turned at w rad/s for long
     advance   (p, held, wire, time, draw) -> the memory after `time` s, by name
     read      (p, held) -> the filtered rate as the computer reads it, rad/s
     taken     (p, wire) -> what the amplifiers make of a command, converters and limits; whether a limit held it back
-    presets   by the word `faults`: what parameters are that a deck does not write
+    presets   by the word `faults`, a parameter of shape text: values of parameters that a deck does not write
     """
 
     name: str
@@ -49,3 +89,40 @@ class Bed:
     read: Callable[[Any, Any], Real]
     taken: Callable[[Any, Wire], tuple[Wire, Truth]]
     presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+
+def check(model: BedModel) -> tuple[str, str] | None:
+    """The first fault of a declaration: words that go on after the model's name, and the remedy. None: it is sound."""
+    for needed in PARAMETERS:
+        found = [parameter for parameter in model.parameters if parameter.name == needed.name]
+        if not found:
+            return _missing("parameter", needed)
+        if any(parameter.unit != needed.unit or parameter.shape != needed.shape for parameter in found):
+            return _other_unit(needed, found[0])
+        if needed.at_most is not None and not all(_within(parameter, needed.at_most) for parameter in found):
+            message = f"lets `{needed.name}` be other than a whole number from 0 to {needed.at_most:g}"
+            return message, f"declare it with `at_least=0.0, at_most={needed.at_most}, whole=True`"
+    for needed_memory in MEMORY:
+        held = next((memory for memory in model.memory if memory.name == needed_memory.name), None)
+        if held is None:
+            return _missing("memory", needed_memory)
+        if held.unit != needed_memory.unit:
+            return _other_unit(needed_memory, held)
+    return None
+
+
+def _missing(kind: str, needed: Parameter | Memory) -> tuple[str, str]:
+    message = f"declares no {kind} `{needed.name}`, which every bed model has"
+    return message, f"`{needed.name}`, {needed.unit}: {needed.doc}"
+
+
+def _other_unit(needed: Parameter | Memory, found: Parameter | Memory) -> tuple[str, str]:
+    if found.unit == needed.unit:
+        return f"declares `{needed.name}`, which is no number", f"`{needed.name}`, {needed.unit}: {needed.doc}"
+    message = f"declares `{needed.name}` in {found.unit}, and every bed model has it in {needed.unit}"
+    return message, f"`{needed.name}`, {needed.unit}: {needed.doc}"
+
+
+def _within(parameter: Parameter, most: float) -> bool:
+    """True where only whole numbers from 0 to `most` are taken."""
+    return parameter.whole and parameter.at_least == 0.0 and parameter.at_most is not None and parameter.at_most <= most

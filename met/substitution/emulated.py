@@ -21,7 +21,7 @@ from met.parameter import Memory, Parameter
 from met.sensors.digital import converted
 from met.servos.motor import TABLE_1, damping, torque
 from met.substitution import butterworth, shaft
-from met.substitution.bed import Bed, Draw, Wire
+from met.substitution.bed import BedModel, Draw, Wire
 from met.trace import Real, Truth, absolute, clip, sin
 
 SUBSTEP = 250e-6
@@ -69,7 +69,7 @@ def taken(p: Any, wire: Wire) -> tuple[Wire, Truth]:
 
 ASSUMED = "assumed: of the size that such motors have"
 
-BED = Bed(
+BED = BedModel(
     name="emulated",
     doc=__doc__,
     parameters=(

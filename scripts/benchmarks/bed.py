@@ -24,10 +24,10 @@ import numpy as np
 import ic
 from benchmarks.benchmark import Benchmark, Target, Untaken
 from hw import realtime, records
+from hw.beds.simulated import config_of
 from hw.build import build
 from hw.case import Asked, pace_of
 from hw.driven import LANES, Driven
-from hw.ports import FIRMWARE, config_of
 from hw.process import talk
 from hw.timing import Timing, timing
 from met.plan import Experiment, Plan
@@ -99,7 +99,7 @@ def _plant() -> Callable[[], float]:
 def _at(line: str, made: Experiment) -> Iterator[str]:
     """The port of a bed with a time of its own, at the other end of a line of this kind."""
     if line == "socket":
-        yield FIRMWARE
+        yield "firmware"
         return
     period = pace_of(made).period
     program = build("host", config_of(bed_values(made, "joint2", 0), period, lock_step=False),

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from hw import conformance
-from hw.bed import Bed
+from hw.bed import BedDriver
 from hw.beds import emulated
 from hw.beds.emulated import EmulatedBed
 from hw.beds.serial_line import SerialBed
@@ -20,12 +20,12 @@ VALUES = {"i_max": 3.0, "converter_voltage": 40 / 4096, "converter_current": 6 /
 
 class TestEmulated(conformance.LockStep, conformance.Simulated):
     @pytest.fixture
-    def bed(self) -> Iterator[Bed]:
+    def bed(self) -> Iterator[BedDriver]:
         scales, limits = emulated.scales(VALUES), emulated.limits(VALUES, 1e-3, voltage=20.0, rate=380.0)
         with EmulatedBed(Shaft(), scales, limits) as bed:
             yield bed
 
-    def outputs(self, bed: Bed) -> tuple[float, float]:
+    def outputs(self, bed: BedDriver) -> tuple[float, float]:
         assert isinstance(bed, EmulatedBed)
         return bed.voltage, bed.current
 
@@ -33,13 +33,13 @@ class TestEmulated(conformance.LockStep, conformance.Simulated):
 class OfDevice(conformance.Conformance):
     device: Device
 
-    def outputs(self, bed: Bed) -> tuple[float, float]:
+    def outputs(self, bed: BedDriver) -> tuple[float, float]:
         return self.device.voltage, self.device.current
 
 
 class TestLockStepOnALine(conformance.LockStep, conformance.Simulated, OfDevice):
     @pytest.fixture
-    def bed(self) -> Iterator[Bed]:
+    def bed(self) -> Iterator[BedDriver]:
         self.device = Device(capabilities=0b111)
         with LineBed(lambda: VirtualLine(self.device, None)) as bed:
             yield bed
@@ -47,19 +47,19 @@ class TestLockStepOnALine(conformance.LockStep, conformance.Simulated, OfDevice)
 
 class TestFreeRunningOnALine(conformance.FreeRunning, conformance.Simulated, OfDevice):
     @pytest.fixture
-    def bed(self) -> Iterator[Bed]:
+    def bed(self) -> Iterator[BedDriver]:
         self.device = Device(lock_step=False, capabilities=0, deadman=0.010)
         self.line = VirtualLine(self.device, None)
         with LineBed(lambda: self.line) as bed:
             yield bed
 
-    def wait(self, bed: Bed, seconds: float) -> None:
+    def wait(self, bed: BedDriver, seconds: float) -> None:
         self.line.sleep(seconds)
 
 
 class TestLockStepOnAPty(conformance.LockStep, conformance.Simulated, OfDevice):
     @pytest.fixture
-    def bed(self, on_pty: Callable[..., str]) -> Iterator[Bed]:
+    def bed(self, on_pty: Callable[..., str]) -> Iterator[BedDriver]:
         self.device = Device()
         with SerialBed(on_pty(self.device), period=self.period) as bed:
             bed.patience = 1.0
@@ -71,7 +71,7 @@ class TestLockStepOnAPty(conformance.LockStep, conformance.Simulated, OfDevice):
 class TestFreeRunningOnAPty(conformance.FreeRunning, conformance.Simulated, OfDevice):
     period = 2e-3
 
-    def test_its_ticks_are_those_of_its_rate(self, bed: Bed) -> None:
+    def test_its_ticks_are_those_of_its_rate(self, bed: BedDriver) -> None:
         """Or fewer: its clock stands still while this machine is busy."""
         about = self.connected(bed)
         began = bed.read().tick
@@ -79,7 +79,7 @@ class TestFreeRunningOnAPty(conformance.FreeRunning, conformance.Simulated, OfDe
         assert 0 < bed.read().tick - began < 0.6 * about.tick_hz
 
     @pytest.fixture
-    def bed(self, on_pty: Callable[..., str]) -> Iterator[Bed]:
+    def bed(self, on_pty: Callable[..., str]) -> Iterator[BedDriver]:
         self.device = Device(lock_step=False)
         with SerialBed(on_pty(self.device), period=self.period) as bed:
             yield bed

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from hw import conformance
-from hw.bed import Bed
+from hw.bed import BedDriver
 from hw.beds.serial_line import SerialBed
 from hw.build import Config, build, qemu
 from tests.hw.firmware.line import FREE, PLANT, STEPPED
@@ -23,7 +23,7 @@ class BehindATerminal(conformance.Conformance):
     config: Config
 
     @pytest.fixture
-    def bed(self, tmp_path: Path) -> Iterator[Bed]:
+    def bed(self, tmp_path: Path) -> Iterator[BedDriver]:
         self.log = tmp_path / "log"
         command = [str(build("host", self.config, PLANT)), "--log", str(self.log)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
@@ -35,7 +35,7 @@ class BehindATerminal(conformance.Conformance):
             finally:
                 process.kill()
 
-    def outputs(self, bed: Bed) -> tuple[float, float]:
+    def outputs(self, bed: BedDriver) -> tuple[float, float]:
         """As the amplifiers were told last."""
         scales = self.config.scales
         held = {"v": 0, "i": 0}
@@ -63,7 +63,7 @@ def listens(path: Path) -> bool:
 @pytest.mark.firmware
 class TestUnderQemu(conformance.LockStep, conformance.Simulated):
     @pytest.fixture
-    def bed(self, tmp_path: Path) -> Iterator[Bed]:
+    def bed(self, tmp_path: Path) -> Iterator[BedDriver]:
         missing = [name for name in ("arm-none-eabi-gcc", "qemu-system-arm") if shutil.which(name) is None]
         if missing:
             pytest.skip(

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from hw.bed import Bed, Fault, State
+from hw.bed import BedDriver, Fault, State
 from hw.beds.serial_line import SerialBed
 from tests.hw import device as model
 from tests.hw.conftest import LineBed, refusal
@@ -399,7 +399,7 @@ def test_an_angle_that_wraps_around_goes_on() -> None:
 @pytest.mark.parametrize(("how", "fault"), [("dead", Fault.TACHOMETER_DEAD), ("reversed", Fault.TACHOMETER_REVERSED)])
 def test_a_tachometer_that_lies_stops_the_model(how: str, fault: Fault) -> None:
     device = Device(tachometer=how)
-    bed: Bed = bed_of(device)
+    bed: BedDriver = bed_of(device)
     bed.connect()
     bed.arm()
     for _ in range(100):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ic
-from hw.bed import Bed
+from hw.bed import BedDriver
 from hw.beds import emulated
 from hw.beds.emulated import EmulatedBed
 from met.backends.llvm import kernel
@@ -36,7 +36,7 @@ class Plant(DeckPlant):
         return 0.0
 
 
-def stepped(experiment: Experiment, bed: Bed) -> list[tuple[float, float, float]]:
+def stepped(experiment: Experiment, bed: BedDriver) -> list[tuple[float, float, float]]:
     """Rate read, voltage and current told, at each tick of the kernel with its wire open."""
     program = build(experiment, wire=True)
     block = kernel.compile(program).block(np.zeros((1, len(program.inputs))))

@@ -188,7 +188,8 @@ class _Phases:
     def read(self, tape: Tape) -> None:
         tape.output("rate", self.beds.reading(tape, self.each))
         tape.output("shaft_rate", tape.read(f"{self.each.joint}.bed.shaft_rate"))
-        tape.output("shaft_angle", tape.read(f"{self.each.joint}.bed.shaft_angle"))
+        knows_angle = any(memory.name == "shaft_angle" for memory in self.each.bed.memory)
+        tape.output("shaft_angle", tape.read(f"{self.each.joint}.bed.shaft_angle") if knows_angle else 0.0)
 
 
 def _settled(experiment: Experiment, joint: str, case: int) -> dict[str, float]:

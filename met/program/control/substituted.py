@@ -22,7 +22,7 @@ from met.program.system import Actuator, System
 from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.motor import Motor, torque
 from met.substitution import balance, observer
-from met.substitution.bed import Bed, Wire
+from met.substitution.bed import BedModel, Wire
 from met.substitution.law import Law, LawInput, LawOutput
 from met.substitution.shaft import lasting
 from met.trace import Real, absolute, clip, sign, where
@@ -48,7 +48,7 @@ class Mounted:
 
     actuator: Actuator
     joint: str
-    bed: Bed
+    bed: BedModel
     law: Law
 
     @property

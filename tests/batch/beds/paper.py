@@ -27,8 +27,8 @@ from scipy import stats
 
 import batch
 import ic
+from hw.beds.simulated import config_of
 from hw.build import build, qemu
-from hw.ports import config_of
 from met import cli
 from met.plan import Experiment
 from met.program.control.plant import bed_values, plant_c

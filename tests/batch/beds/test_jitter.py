@@ -13,7 +13,7 @@ import pytest
 
 from batch.beds.jitter import duration, histogram, lines, off
 from hw import loop
-from hw.bed import About, Bed, Fault, Sample, State
+from hw.bed import About, BedDriver, Fault, Sample, State
 from hw.jitter import kept
 from hw.pace import Pace
 from hw.records import ANSWERED, LATE_WOKEN, LAYOUT
@@ -121,7 +121,7 @@ def test_a_rate_that_is_none(jitter: Callable[..., tuple[int, str, str]], rate: 
 # The loop, looking
 
 
-class Watched(Bed):
+class Watched(BedDriver):
     """A bed that answers, where `silent` does not say otherwise of the look; it may not be told anything."""
 
     def __init__(self, silent: Callable[[int], bool] = lambda n: False) -> None:
@@ -161,7 +161,7 @@ class Watched(Bed):
         raise AssertionError
 
 
-def looked(bed: Bed, exchanges: int, hz: float = 1000.0) -> tuple[loop.Ended, np.ndarray]:
+def looked(bed: BedDriver, exchanges: int, hz: float = 1000.0) -> tuple[loop.Ended, np.ndarray]:
     rows: list[bytes] = []
     ended = loop.drive([bed], lambda e, rates, told: None, Pace(hz, 1), exchanges, rows.append, lock_step=False,
                        armed=False)  # fmt: skip

@@ -26,9 +26,9 @@ from hw import loop, realtime, records
 from hw.bed import Fault, State
 from hw.beds import emulated
 from hw.beds.serial_line import SerialBed
+from hw.beds.simulated import config_of
 from hw.build import build
 from hw.pace import pace
-from hw.ports import config_of
 from met import cli
 from met.plan import Experiment
 from met.program.control.plant import bed_values, plant_c
