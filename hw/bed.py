@@ -22,7 +22,7 @@ from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 
 
-class State(enum.IntEnum):
+class BedState(enum.IntEnum):
     """Of a bed: outputs in the safe state, commands taken, or stopped by a fault that is latched."""
 
     DISARMED = 0
@@ -103,14 +103,14 @@ class About:
 
 
 @frozen
-class Sample:
+class BedSample:
     """What a bed answers: its state, and its sensors at its tick `tick`; None for a sensor that it has not.
 
     rate          of the shaft, behind the tachometer's filter, rad/s;  angle: of the shaft, rad
     faults        that are latched;  refused: what was asked was not possible in this state, and not done
     """
 
-    state: State
+    state: BedState
     greeted: bool
     faults: Fault
     refused: bool
@@ -121,7 +121,7 @@ class Sample:
     acceleration: float | None = None
 
 
-LIMITS = ("voltage", "current", "rate", "voltage_slew", "current_slew")
+LIMIT_NAMES = ("voltage", "current", "rate", "voltage_slew", "current_slew")
 """Those that a session may make tighter: V, A, rad/s, V/s, A/s."""
 
 
@@ -144,40 +144,40 @@ class BedDriver(ABC):
 
     @abstractmethod
     def limit(self, asked: Mapping[str, float]) -> None:
-        """Make limits tighter for this session. asked: those of `LIMITS` that are to change, by name."""
+        """Make limits tighter for this session. asked: those of `LIMIT_NAMES` that are to change, by name."""
 
     @abstractmethod
-    def arm(self) -> Sample:
+    def arm(self) -> BedSample:
         """Have commands taken, with both at zero. The shaft must be slow, and nothing latched."""
 
     @abstractmethod
-    def exchange(self, voltage: float, current: float) -> Sample | None:
+    def exchange(self, voltage: float, current: float) -> BedSample | None:
         """Set the drive's voltage (V) and the load's current (A), and read the sensors. A bed in lock-step advances by
         one tick of the wire, and answers with its end. None: no answer came in time, and it was not asked again. An
         answer may say that the bed is armed no more: look at its state. A command that is no finite number or beyond a
         limit in force is not sent; the bed is stopped, and Problem E408 raised."""
 
     @abstractmethod
-    def read(self) -> Sample:
+    def read(self) -> BedSample:
         """The sensors, with no effect on anything: no deadman is fed."""
 
-    def look(self) -> Sample | None:
+    def look(self) -> BedSample | None:
         """The same, asked once: None where no answer comes within `patience`."""
         return self.read()
 
     @abstractmethod
-    def clear(self) -> Sample:
+    def clear(self) -> BedSample:
         """Unlatch faults, once the shaft is slow: disarmed again."""
 
     @abstractmethod
-    def rest(self, time: float) -> Sample:
+    def rest(self, time: float) -> BedSample:
         """Stop, and let so much time pass, s. A bed in lock-step advances as far as that."""
 
     def line_time(self, about: About) -> float:
         """Time that the bytes of an exchange take on the line, s; 0 where the line's speed is not what counts."""
         return 0.0
 
-    def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> Sample:
+    def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> BedSample:
         """Start a simulated plant anew, disarmed: its shaft turning at rate (rad/s), its noise from the beginning."""
         raise real_plant()
 

@@ -1,4 +1,4 @@
-"""One case driven on beds, in a process of its own: `python -m hw.case`, told what to do in a line of JSON (`Asked`).
+"""One case driven on beds, in a process of its own: `python -m hw.case`, which reads a line of JSON, a `CaseRequest`.
 
 It says how it goes on its standard output, a line of JSON each: {"said": words}, {"bed": joint, "about": ...},
 {"began": true}, at the end {"ended": ...} or {"wrong": diagnostics}. What came of each exchange is in the records.
@@ -16,7 +16,7 @@ from typing import Any
 from hw import loop, process, refusals
 from hw.bed import About, BedDriver, Capability
 from hw.beds import latch
-from hw.driven import LANES, Driven, divisor, substituted
+from hw.driven import LANES, CaseKernel, divisor, substituted
 from hw.pace import Pace, pace
 from hw.ports import Port, opened
 from hw.writer import recording
@@ -29,7 +29,7 @@ from met.run import prepare
 
 
 @frozen
-class Asked:
+class CaseRequest:
     """plan: of one experiment, as text (met.plan.file);  row: of its case table
     ports: by joint;  lock_step: whether the beds have no time of their own;  baud: of serial lines
     records: the file that they go to;  head: what else stands at its beginning;  rest: s of rest before the case
@@ -54,7 +54,7 @@ def pace_of(experiment: Experiment) -> Pace:
     return pace(experiment.structure.schedule.base_hz / divisor(experiment))
 
 
-def run(asked: Asked) -> loop.Ended:
+def run(asked: CaseRequest) -> loop.LoopEnd:
     """Drive the case. Raises Problem."""
     experiment = plan_file.loads(asked.plan).experiments[0]
     of = pace_of(experiment)
@@ -72,7 +72,7 @@ def run(asked: Asked) -> loop.Ended:
         _check_time(abouts, lock_step)
         _check_ticks(abouts, of, lock_step)
         prepared = prepare(experiment, wire=True, late=of.late(lock_step), lanes=LANES)
-        driven = Driven(prepared, asked.row, of.repeats)
+        driven = CaseKernel(prepared, asked.row, of.repeats)
         _check_delay(driven, of, lock_step)
         if not lock_step:
             process.precedence()
@@ -82,7 +82,7 @@ def run(asked: Asked) -> loop.Ended:
         for bed in beds:
             bed.patience = of.patience(lock_step)
         if asked_to_stop():  # nothing was begun
-            return loop.Ended(0, "the host was asked to stop")
+            return loop.LoopEnd(0, "the host was asked to stop")
         head = {**asked.head, "row": asked.row, "servo_hz": of.servo_hz, "repeats": of.repeats,
                 "lock_step": lock_step, "joints": list(joints), "tick_hz": abouts[0].tick_hz,
                 "beds": [{"name": each.name, "firmware": each.firmware} for each in abouts]}  # fmt: skip
@@ -106,10 +106,10 @@ def _rest(beds: Sequence[BedDriver], time: float, asked_to_stop: Callable[[], bo
         beds[0].rest(process.PAUSE)
 
 
-def _greeted(bed: BedDriver, joint: str, experiment: Experiment, asked: Asked) -> About:
+def _greeted(bed: BedDriver, joint: str, experiment: Experiment, asked: CaseRequest) -> About:
     """Who the bed is; a simulated one begins anew, with the case's noise."""
     about, row = bed.connect(), asked.row
-    process.say(bed=joint, about=process.told(about))
+    process.say(bed=joint, about=process.about_as_json(about))
     process.warnings(bed)
     if not asked.clear:
         latch.check(bed, about, asked.ports[joint])
@@ -140,7 +140,7 @@ def _check_ticks(abouts: Sequence[About], of: Pace, lock_step: bool) -> None:
             raise Problem(error("E405", message, help=helps))
 
 
-def _check_delay(driven: Driven, of: Pace, lock_step: bool) -> None:
+def _check_delay(driven: CaseKernel, of: Pace, lock_step: bool) -> None:
     """That the law knows how late its commands are."""
     least = of.late(lock_step)
     for joint in driven.joints:
@@ -160,10 +160,10 @@ def _check_start(experiment: Experiment, joints: Sequence[str], row: int) -> Non
             raise Problem(error("E416", message, help=f"`initial {{ {joint}.qd = 0 rad/s; }}` in the run"))
 
 
-def _driven(asked: Asked) -> dict[str, Any]:
+def _driven(asked: CaseRequest) -> dict[str, Any]:
     ended = run(asked)
     return {"ended": {**asdict(ended), "faults": int(ended.faults)}}
 
 
 if __name__ == "__main__":
-    process.answer(Asked, _driven)
+    process.answer(CaseRequest, _driven)

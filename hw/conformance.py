@@ -24,7 +24,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from hw.bed import About, BedDriver, Capability, Fault, Sample, State
+from hw.bed import About, BedDriver, BedSample, BedState, Capability, Fault
 from met.diagnostic import Problem
 
 
@@ -57,7 +57,7 @@ class Conformance:
 
     # What tests do
 
-    def drive(self, bed: BedDriver, seconds: float, voltage: float = 0.0, current: float = 0.0) -> Sample:
+    def drive(self, bed: BedDriver, seconds: float, voltage: float = 0.0, current: float = 0.0) -> BedSample:
         """So many exchanges, until the bed is armed no more; its last answer."""
         sample = None
         for _ in range(math.ceil(seconds / self.period)):
@@ -65,7 +65,7 @@ class Conformance:
                 self.wait(bed, self.period)
             answer = bed.exchange(voltage, current)
             sample = answer or sample
-            if answer is not None and answer.state != State.ARMED:
+            if answer is not None and answer.state != BedState.ARMED:
                 break
         assert sample is not None, "no answer at all"
         return sample
@@ -85,22 +85,22 @@ class Conformance:
     def is_safe(self, bed: BedDriver) -> None:
         held = self.outputs(bed)
         assert held is None or held == (0.0, 0.0)
-        assert bed.read().state != State.ARMED
+        assert bed.read().state != BedState.ARMED
 
-    def faulted(self, bed: BedDriver, sample: Sample, fault: Fault) -> None:
+    def faulted(self, bed: BedDriver, sample: BedSample, fault: Fault) -> None:
         """It has stopped, for this and nothing else; it stays so, until it is cleared."""
-        assert sample.state == State.STOPPED
+        assert sample.state == BedState.STOPPED
         assert sample.faults & ~Fault.WATCHDOG == fault
         self.is_safe(bed)
         again = bed.exchange(0.0, 0.0)
-        assert again is not None and again.refused and again.state == State.STOPPED
+        assert again is not None and again.refused and again.state == BedState.STOPPED
         assert bed.connect() and bed.read().faults & ~Fault.WATCHDOG == fault  # latched, whoever greets it
         with refused("E406"):
             bed.arm()
         bed.rest(3.0)
         cleared = bed.clear()
-        assert cleared.state == State.DISARMED and not cleared.faults & ~Fault.WATCHDOG
-        assert bed.arm().state == State.ARMED
+        assert cleared.state == BedState.DISARMED and not cleared.faults & ~Fault.WATCHDOG
+        assert bed.arm().state == BedState.ARMED
 
     # Who is there
 
@@ -116,7 +116,7 @@ class Conformance:
     def test_it_is_disarmed_and_safe_once_it_is_greeted(self, bed: BedDriver) -> None:
         self.connected(bed)
         sample = bed.read()
-        assert sample.state == State.DISARMED and sample.greeted and not sample.refused
+        assert sample.state == BedState.DISARMED and sample.greeted and not sample.refused
         assert not sample.faults & ~Fault.WATCHDOG
         self.is_safe(bed)
 
@@ -146,14 +146,14 @@ class Conformance:
     def test_it_arms_with_nothing_commanded(self, bed: BedDriver) -> None:
         self.connected(bed)
         sample = bed.arm()
-        assert sample.state == State.ARMED and not sample.refused
+        assert sample.state == BedState.ARMED and not sample.refused
         assert self.outputs(bed) in (None, (0.0, 0.0))
 
     def test_a_command_takes_hold_as_whole_counts(self, bed: BedDriver) -> None:
         about = self.driven(bed)
         voltage, current = self.share * about.limits.voltage, self.share * about.limits.current
         sample = self.drive(bed, self.period, voltage, current)
-        assert sample.state == State.ARMED and not sample.refused
+        assert sample.state == BedState.ARMED and not sample.refused
         if (held := self.outputs(bed)) is not None:
             scales = about.scales
             assert held == (round(voltage / scales.voltage) * scales.voltage,
@@ -181,7 +181,7 @@ class Conformance:
     def test_a_command_is_refused_while_it_is_not_armed(self, bed: BedDriver) -> None:
         about = self.connected(bed)
         sample = bed.exchange(self.share * about.limits.voltage, 0.0)
-        assert sample is not None and sample.refused and sample.state == State.DISARMED
+        assert sample is not None and sample.refused and sample.state == BedState.DISARMED
         self.is_safe(bed)
 
     def test_it_does_not_arm_twice(self, bed: BedDriver) -> None:
@@ -193,7 +193,7 @@ class Conformance:
         about = self.driven(bed)
         self.drive(bed, self.period, voltage=self.share * about.limits.voltage)
         held = self.outputs(bed)
-        assert bed.read().state == State.ARMED
+        assert bed.read().state == BedState.ARMED
         assert self.outputs(bed) == held
 
     # Stopping
@@ -204,7 +204,7 @@ class Conformance:
         assert bed.stop() and bed.stop()
         self.is_safe(bed)
         sample = bed.exchange(0.0, 0.0)
-        assert sample is not None and sample.refused and sample.state == State.DISARMED
+        assert sample is not None and sample.refused and sample.state == BedState.DISARMED
 
     def test_the_shaft_is_braked_when_it_is_stopped(self, bed: BedDriver) -> None:
         about = self.driven(bed)
@@ -252,7 +252,7 @@ class Conformance:
         place = {"voltage": 0, "current": 1}[which]
         command = [0.0, 0.0]
         command[place] = most * scale
-        assert self.drive(bed, self.period, *command).state == State.ARMED
+        assert self.drive(bed, self.period, *command).state == BedState.ARMED
         command[place] = (most + 1) * scale
         with refused("E408"):
             bed.exchange(*command)
@@ -265,7 +265,7 @@ class Conformance:
         with refused("E408"):
             bed.exchange(2.0 * self.share * about.limits.voltage, 0.0)
         self.driven(bed)
-        assert self.drive(bed, self.period, voltage=2.0 * self.share * about.limits.voltage).state == State.ARMED
+        assert self.drive(bed, self.period, voltage=2.0 * self.share * about.limits.voltage).state == BedState.ARMED
 
     def test_limits_never_become_wider(self, bed: BedDriver) -> None:
         own = self.connected(bed).limits
@@ -306,7 +306,7 @@ class Conformance:
         bed.limit({f"{which}_slew": 0.5 * most / 0.015})
         bed.arm()
         held = {"voltage": 0.0, "current": 0.0}
-        assert self.drive(bed, self.period, **held).state == State.ARMED
+        assert self.drive(bed, self.period, **held).state == BedState.ARMED
         held[which] = most
         self.faulted(bed, self.drive(bed, self.period, **held), Fault.SLEW)
 
@@ -314,7 +314,7 @@ class Conformance:
 
     def test_clearing_a_bed_that_is_disarmed_changes_nothing(self, bed: BedDriver) -> None:
         self.connected(bed)
-        assert bed.clear().state == State.DISARMED
+        assert bed.clear().state == BedState.DISARMED
 
     def test_a_bed_that_is_armed_is_not_cleared(self, bed: BedDriver) -> None:
         self.driven(bed)
@@ -326,7 +326,7 @@ class Conformance:
     def test_only_a_simulated_plant_is_started_anew(self, bed: BedDriver) -> None:
         about = self.connected(bed)
         if Capability.SIMULATED in about.capabilities:
-            assert bed.preset(rate=0.0, seed=1, repeat=2).state == State.DISARMED
+            assert bed.preset(rate=0.0, seed=1, repeat=2).state == BedState.DISARMED
         else:
             with refused("E406"):
                 bed.preset()
@@ -371,7 +371,7 @@ class FreeRunning(Conformance):
 
     def test_it_stays_armed_as_long_as_it_is_spoken_to(self, bed: BedDriver) -> None:
         self.driven(bed)
-        assert self.drive(bed, 0.3).state == State.ARMED
+        assert self.drive(bed, 0.3).state == BedState.ARMED
 
     def test_silence_stops_it(self, bed: BedDriver) -> None:
         about = self.driven(bed)
@@ -385,7 +385,7 @@ class FreeRunning(Conformance):
         for _ in range(60):
             self.wait(bed, 1e-3)
             sample = bed.read()
-        assert sample.state == State.STOPPED and sample.faults & Fault.DEADMAN
+        assert sample.state == BedState.STOPPED and sample.faults & Fault.DEADMAN
 
     def test_its_ticks_are_those_of_its_rate(self, bed: BedDriver) -> None:
         about = self.connected(bed)
@@ -413,4 +413,4 @@ class Simulated(Conformance):
         with refused("E406"):
             bed.arm()
         bed.rest(3.0)
-        assert bed.arm().state == State.ARMED
+        assert bed.arm().state == BedState.ARMED

@@ -20,7 +20,7 @@ LANES = 4
 it: a step of a Panda took 2.2 us, of 16 cases 3.9 us (EPYC with AVX-512)."""
 
 
-class Driven:
+class CaseKernel:
     """One case. prepared: with its wires open (met.run.prepare, wire=True); row: of the case table; repeats: exchanges
     a tick of the servos."""
 

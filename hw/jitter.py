@@ -1,8 +1,8 @@
 """How well this computer and a line keep time, measured with a bed that is not armed, in a process of its own:
-`python -m hw.jitter`, told what to do in a line of JSON (`Asked`).
+`python -m hw.jitter`, told what to do in a line of JSON (`JitterRequest`).
 
 It runs the loop of `hw.loop` as a run has it, but that the bed is read and told nothing. On its standard output is a
-line of JSON each: {"said": words}, {"about": ...}, at the end {"kept": ...} (`Kept`) or {"wrong": diagnostics}.
+line of JSON each: {"said": words}, {"about": ...}, at the end {"kept": ...} (`JitterResult`) or {"wrong": diagnostics}.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from hw.case import pace_of
 from hw.pace import Pace
 from hw.ports import Port, opened
 from hw.records import ANSWERED, LAYOUT
-from hw.timing import Timing, spread, stops, timing
+from hw.timing import Timing, stops, time_spread, timing
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import file as plan_file
 
 
 @frozen
-class Asked:
+class JitterRequest:
     """port, baud: where the bed is;  plan, joint: of a simulated one: an experiment, as text (met.plan.file)
     hz: exchanges a second, 1 a joint each time;  seconds: for so long;  joints: as many as if there were
     """
@@ -42,7 +42,7 @@ class Asked:
 
 
 @frozen
-class Kept:
+class JitterResult:
     """seconds: that it took;  timing: lateness of the first exchange of a period, trips of all
     stops: where a run would have been stopped"""
 
@@ -51,7 +51,7 @@ class Kept:
     stops: int
 
 
-def measure(asked: Asked) -> Kept:
+def measure(asked: JitterRequest) -> JitterResult:
     """Raises Problem."""
     asked_to_stop = process.listening()
     experiment = plan_file.loads(asked.plan).experiments[0] if asked.plan else None
@@ -76,19 +76,19 @@ def measure(asked: Asked) -> Kept:
         if ended.bed >= 0:
             message = f"bed `{about.name}` was reset while it was measured"
             raise Problem(error("E427", message, help="look at its supply, and whether its watchdog resets it"))
-    return kept(np.frombuffer(b"".join(rows), LAYOUT), about.tick_hz, asked.hz)
+    return jitter_result(np.frombuffer(b"".join(rows), LAYOUT), about.tick_hz, asked.hz)
 
 
-def kept(rows: np.ndarray, tick_hz: float, hz: float) -> Kept:
+def jitter_result(rows: np.ndarray, tick_hz: float, hz: float) -> JitterResult:
     """Of the records of one bed that was looked at once for each joint, at so many Hz."""
     first = rows[rows["bed"] == 0]
     own = rows[rows["exchange"] > 0]
     answered = (own["flags"] & ANSWERED) != 0
     found = replace(
-        timing(first, tick_hz), exchanges=len(own), trip=spread((own["ended"] - own["began"])[answered]),
+        timing(first, tick_hz), exchanges=len(own), trip=time_spread((own["ended"] - own["began"])[answered]),
         unanswered=int((~answered).sum()),
     )  # fmt: skip
-    return Kept(float(rows["ended"][-1]) * 1e-9, found, stops(first, 1.0 / hz))
+    return JitterResult(float(rows["ended"][-1]) * 1e-9, found, stops(first, 1.0 / hz))
 
 
 def _nothing(e: int, rates: Sequence[float], told: list[list[float]]) -> None:
@@ -96,4 +96,4 @@ def _nothing(e: int, rates: Sequence[float], told: list[list[float]]) -> None:
 
 
 if __name__ == "__main__":
-    process.answer(Asked, lambda asked: {"kept": asdict(measure(asked))})
+    process.answer(JitterRequest, lambda asked: {"kept": asdict(measure(asked))})

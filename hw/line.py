@@ -8,7 +8,7 @@ BAUD = 921600
 """Bits a second of a serial line, unless a user says otherwise."""
 
 
-class Line(Protocol):
+class BedLine(Protocol):
     """Raises met.diagnostic.Problem E401 where it is lost."""
 
     def now(self) -> float:
@@ -25,10 +25,10 @@ class Line(Protocol):
     def close(self) -> None: ...
 
 
-class Heard:
+class TappedLine:
     """A line, and all that went over it. sent, came: bytes"""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: BedLine) -> None:
         self._line = line
         self.sent, self.came = bytearray(), bytearray()
 

@@ -20,7 +20,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from hw import records
-from hw.bed import BedDriver, Fault, Sample, State
+from hw.bed import BedDriver, BedSample, BedState, Fault
 from hw.pace import MISSED, Pace
 from met.frozen import frozen
 
@@ -37,7 +37,7 @@ class Compute(Protocol):
 
 
 @frozen
-class Ended:
+class LoopEnd:
     """How a loop ended.
 
     exchanges  that were done and answered by all beds, the first sample counted
@@ -59,7 +59,7 @@ Put = Callable[[bytes], None]
 def drive(
     beds: Sequence[BedDriver], compute: Compute, pace: Pace, exchanges: int, put: Put, *, lock_step: bool,
     asked_to_stop: Callable[[], bool] = lambda: False, armed: bool = True,
-) -> Ended:  # fmt: skip
+) -> LoopEnd:  # fmt: skip
     """Arm the beds, drive them through so many exchanges after the first sample, and stop them.
 
     lock_step      whether they have no time of their own
@@ -80,11 +80,11 @@ def drive(
 def _driven(
     beds: Sequence[BedDriver], compute: Compute, pace: Pace, exchanges: int, put: Put, lock_step: bool,
     asked_to_stop: Callable[[], bool], armed: bool,
-) -> Ended:  # fmt: skip
+) -> LoopEnd:  # fmt: skip
     clock, packed = time.perf_counter_ns, records.packed
     period = round(pace.period * 1e9)
     if armed and asked_to_stop():
-        return Ended(0, "the host was asked to stop")
+        return LoopEnd(0, "the host was asked to stop")
     told = [[0.0, 0.0] for _ in beds]
     rates = [0.0] * len(beds)
     missed = [0] * len(beds)
@@ -99,7 +99,7 @@ def _driven(
     origin, computed, ended, gone = clock(), 0, 0, 0
     for e in range(1, exchanges + 1):
         if asked_to_stop():
-            return Ended(e, "the host was asked to stop")
+            return LoopEnd(e, "the host was asked to stop")
         due, flags = e * period + gone, 0
         if lock_step:
             due = clock() - origin
@@ -112,7 +112,7 @@ def _driven(
                     flags = records.LATE_ANSWERED if ended > due else records.LATE_COMPUTED
                 if late >= MISSED * period:
                     if armed:
-                        return Ended(e, f"the host is {late * 1e-6:.3g} ms behind: {_LATE[flags]}")
+                        return LoopEnd(e, f"the host is {late * 1e-6:.3g} ms behind: {_LATE[flags]}")
                     gone += late
         for b, bed in enumerate(beds):
             voltage, current = told[b]
@@ -123,7 +123,7 @@ def _driven(
             if answer is None:
                 missed[b] += 1
                 if armed and missed[b] >= MISSED:
-                    return Ended(e, f"no answer for {MISSED} exchanges", b)
+                    return LoopEnd(e, f"no answer for {MISSED} exchanges", b)
                 continue
             missed[b] = 0
             rates[b] = answer.rate
@@ -131,7 +131,7 @@ def _driven(
                 return ending
         compute(e, rates, told)
         computed = clock() - origin
-    return Ended(exchanges + 1)
+    return LoopEnd(exchanges + 1)
 
 
 _LATE = {
@@ -151,14 +151,14 @@ def _waited(due: int) -> int:
     return now
 
 
-def _ending(e: int, b: int, sample: Sample, armed: bool) -> Ended | None:
+def _ending(e: int, b: int, sample: BedSample, armed: bool) -> LoopEnd | None:
     """Whether a bed takes commands no more, and why; of one that is not to take any, whether it is another than was
     greeted."""
-    if sample.greeted and (not armed or (sample.state == State.ARMED and not sample.refused)):
+    if sample.greeted and (not armed or (sample.state == BedState.ARMED and not sample.refused)):
         return None
     if not sample.greeted:
-        return Ended(e, "the bed was reset", b)
-    if sample.state == State.STOPPED:
+        return LoopEnd(e, "the bed was reset", b)
+    if sample.state == BedState.STOPPED:
         names = ", ".join(fault.name.lower().replace("_", " ") for fault in Fault if fault in sample.faults)  # type: ignore[union-attr]
-        return Ended(e, f"the bed stopped itself: {names or 'it does not say why'}", b, sample.faults)
-    return Ended(e, "the bed is not armed any more" if not sample.refused else "the bed refused a command", b)
+        return LoopEnd(e, f"the bed stopped itself: {names or 'it does not say why'}", b, sample.faults)
+    return LoopEnd(e, "the bed is not armed any more" if not sample.refused else "the bed refused a command", b)

@@ -18,7 +18,7 @@ from typing import Any
 
 from hw.bed import BedDriver
 from hw.line import BAUD
-from hw.transcript import File
+from hw.transcript import TranscriptFile
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.entry_points import EntryPoint, offered
@@ -77,7 +77,7 @@ class Opening:
 
     def transcript(self) -> Callable[[bytes], object] | None:
         """Takes the bytes of a transcript, in a new file; None where none is to be kept. Raises Problem E409."""
-        return None if self.port.transcript is None else File(self.port.transcript)
+        return None if self.port.transcript is None else TranscriptFile(self.port.transcript)
 
 
 def as_asked(name: str, asked: bool) -> bool:

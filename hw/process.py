@@ -58,7 +58,7 @@ def say(**data: Any) -> None:
         os.write(sys.stdout.fileno(), (json.dumps(data) + "\n").encode())
 
 
-def told(about: About) -> dict[str, Any]:
+def about_as_json(about: About) -> dict[str, Any]:
     """Who a bed is, to be said."""
     return {**asdict(about), "capabilities": int(about.capabilities)}
 

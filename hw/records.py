@@ -19,7 +19,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from hw.bed import Sample
+from hw.bed import BedSample
 from met.frozen import frozen
 from met.host.files import parse_json, read_regular
 
@@ -49,7 +49,7 @@ _NONE = math.nan
 
 def packed(
     exchange: int, bed: int, flags: int, times: tuple[int, int, int, int], voltage: float, current: float,
-    sample: Sample | None,
+    sample: BedSample | None,
 ) -> bytes:  # fmt: skip
     """A record. times: due, began, ended, computed."""
     if sample is None:
@@ -79,16 +79,16 @@ class Records:
     cut: int
 
 
-class Unsound(Exception):
+class UnsoundRecords(Exception):
     """A file that holds no records, and why, in words that go on after its name."""
 
 
 def read(path: Path) -> Records:
     """All records up to the first that is not sound; none, and no head, of a file that ends before the first. Raises
-    Unsound, OSError."""
+    UnsoundRecords, OSError."""
     data = read_regular(path)
     if not data.startswith(MAGIC[: len(data)]):
-        raise Unsound("holds no records of a bed")
+        raise UnsoundRecords("holds no records of a bed")
     at = len(MAGIC) + 8
     end = at + int.from_bytes(data[len(MAGIC) : at], "little")
     if len(data) < max(at, end):
@@ -98,7 +98,7 @@ def read(path: Path) -> Records:
         if not isinstance(head, dict):
             raise ValueError
     except ValueError as reason:
-        raise Unsound("has a head that is damaged") from reason
+        raise UnsoundRecords("has a head that is damaged") from reason
     count = (len(data) - end) // SIZE
     rows = np.frombuffer(data, LAYOUT, count, end)
     for n in range(count):

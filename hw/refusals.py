@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hw.bed import About, BedDriver, Fault, Sample, State
+from hw.bed import About, BedDriver, BedSample, BedState, Fault
 from hw.build import Uncountable
 from hw.protocol.frames import Decoder
 from hw.protocol.messages import VERSION
@@ -57,18 +57,18 @@ def remedies(faults: Fault) -> list[str]:
     return [_FAULTS[fault][1] for fault in Fault if fault in faults]
 
 
-def refused(about: About, what: str, sample: Sample) -> Problem:
+def refused(about: About, what: str, sample: BedSample) -> Problem:
     """The bed did not do what was asked (`arm`, `clear` ...), as its answer says."""
     latched = sample.faults & ~Fault.WATCHDOG
     slow = about.limits.arming_rate
     if not sample.greeted:
         why, helps = "it was reset since it was greeted", ["look at its supply, then begin anew"]
-    elif sample.state == State.STOPPED and latched and what != "clear":
+    elif sample.state == BedState.STOPPED and latched and what != "clear":
         why, helps = f"it stopped itself: {words(latched)}", remedies(latched)
     elif abs(sample.rate) > slow:
         why = f"its shaft turns at {sample.rate:.3g} rad/s, and {slow:.3g} rad/s is the most for that"
         helps = ["wait until it has come to rest; a shaft that does not is driven by something"]
-    elif sample.state == State.ARMED:
+    elif sample.state == BedState.ARMED:
         why, helps = "it is armed", ["stop it first"]
     elif Fault.HEAT in latched:
         why, helps = "the load motor has not cooled down to half of its I2t", ["wait, or switch its amplifier off"]

@@ -19,7 +19,7 @@ _HEAD = 64
 """Bytes before the records: how many were put in, in a cache line of their own; how many were taken out, in another."""
 
 
-class Full(Exception):
+class RingFull(Exception):
     """The writer is a whole ring behind: the disk has stalled."""
 
 
@@ -37,7 +37,7 @@ class Ring:
         if self._put - self._taken >= self.room:
             self._taken = _COUNT.unpack_from(self._memory, _HEAD)[0]
             if self._put - self._taken >= self.room:
-                raise Full
+                raise RingFull
         at = 2 * _HEAD + self._put % self.room * SIZE
         self._memory[at : at + SIZE] = record
         self._put += 1

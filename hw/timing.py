@@ -15,7 +15,7 @@ TICK = 1 << 32
 
 
 @frozen
-class Spread:
+class TimeSpread:
     """Of times, s: median, 99th and 99.9th percentiles, largest; and how many are in each of `EDGES`' stretches."""
 
     median: float
@@ -42,9 +42,9 @@ class Timing:
     """
 
     exchanges: int
-    lateness: Spread
-    trip: Spread
-    computing: Spread
+    lateness: TimeSpread
+    trip: TimeSpread
+    computing: TimeSpread
     unanswered: int
     woken: int
     computed: int
@@ -58,12 +58,20 @@ def timing(rows: np.ndarray, tick_hz: float) -> Timing:
     answered = (rows["flags"] & ANSWERED) != 0
     trip = rows["ended"] - rows["began"]
     computing = rows["computed"][1:] - rows["ended"][:-1]
-    woken, computed, waited = (int(((rows["flags"] & flag) != 0).sum())
-                               for flag in (LATE_WOKEN, LATE_COMPUTED, LATE_ANSWERED))  # fmt: skip
+    woken, computed, waited = (
+        int(((rows["flags"] & flag) != 0).sum()) for flag in (LATE_WOKEN, LATE_COMPUTED, LATE_ANSWERED)
+    )
     return Timing(
-        len(rows), spread(rows["began"] - rows["due"]), spread(trip[answered]), spread(computing[computing >= 0]),
-        int((~answered).sum()), woken, computed, waited, _drift(rows[answered], tick_hz),
-    )  # fmt: skip
+        len(rows),
+        time_spread(rows["began"] - rows["due"]),
+        time_spread(trip[answered]),
+        time_spread(computing[computing >= 0]),
+        int((~answered).sum()),
+        woken,
+        computed,
+        waited,
+        _drift(rows[answered], tick_hz),
+    )
 
 
 def stops(rows: np.ndarray, period: float) -> int:
@@ -76,14 +84,14 @@ def stops(rows: np.ndarray, period: float) -> int:
     return fell_silent + int((rows["began"] - rows["due"] >= MISSED * period * 1e9).sum())
 
 
-def spread(times: np.ndarray | Sequence[int]) -> Spread:
+def time_spread(times: np.ndarray | Sequence[int]) -> TimeSpread:
     """Of times in ns."""
     seconds = np.asarray(times, dtype=np.float64) * 1e-9
     if not len(seconds):
-        return Spread(*(float("nan"),) * 4, (0,) * (len(EDGES) + 1))
+        return TimeSpread(*(float("nan"),) * 4, (0,) * (len(EDGES) + 1))
     median, high, highest, largest = np.percentile(seconds, (50, 99, 99.9, 100)).tolist()
     counts = np.bincount(np.searchsorted(EDGES, seconds, side="right"), minlength=len(EDGES) + 1)
-    return Spread(median, high, highest, largest, tuple(counts.tolist()))
+    return TimeSpread(median, high, highest, largest, tuple(counts.tolist()))
 
 
 def _drift(rows: np.ndarray, tick_hz: float) -> float:

@@ -20,7 +20,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from hw.line import Line
+from hw.line import BedLine
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import parse_json, read_regular
@@ -35,7 +35,7 @@ _MOST = 0xFFFF
 
 
 @frozen
-class Record:
+class TranscriptRecord:
     kind: int
     time: float
     data: bytes
@@ -46,11 +46,11 @@ class Transcript:
     """What a file holds. cut: bytes at its end that are no whole record."""
 
     header: Mapping[str, Any]
-    records: tuple[Record, ...]
+    records: tuple[TranscriptRecord, ...]
     cut: int
 
 
-class Writer:
+class TranscriptWriter:
     """Makes records. put: takes the bytes of one, or of the beginning of a file; called once for each."""
 
     def __init__(self, put: Callable[[bytes], object], header: Mapping[str, Any]) -> None:
@@ -67,7 +67,7 @@ class Writer:
         return body + self._crc.to_bytes(4, "little")
 
 
-class File:
+class TranscriptFile:
     """A new file, written without a buffer of this process, so that what was put outlives it."""
 
     def __init__(self, path: str | Path) -> None:
@@ -92,10 +92,10 @@ class File:
         self._file.close()
 
 
-class Recorded:
+class TranscribedLine:
     """A line, and a transcript of it. A transcript that cannot be written goes on without more; it is said once."""
 
-    def __init__(self, line: Line, writer: Writer) -> None:
+    def __init__(self, line: BedLine, writer: TranscriptWriter) -> None:
         self._line, self._writer = line, writer
         self._writing = True
         self._add(OPENED, b"")
@@ -149,7 +149,7 @@ def read(path: str | Path) -> Transcript:
     except OSError as reason:
         helps = "give the file that a run with a bed wrote"
         raise Problem(error("E409", f"{path} cannot be read: {reason.strerror}", help=helps)) from None
-    records = list[Record]()
+    records = list[TranscriptRecord]()
     at, crc = len(MAGIC), 0
     while len(data) - at >= _HEAD.size + 4:
         kind, time, length = _HEAD.unpack_from(data, at)
@@ -159,7 +159,7 @@ def read(path: str | Path) -> Transcript:
             break
         if kind > LOST or not math.isfinite(time):
             break
-        records.append(Record(kind, time, data[at + _HEAD.size : end]))
+        records.append(TranscriptRecord(kind, time, data[at + _HEAD.size : end]))
         at = end + 4
     try:
         if not data.startswith(MAGIC) or not records or records[0].kind != HEADER:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from hw import records, ring
-from hw.ring import Full, Ring
+from hw.ring import Ring, RingFull
 from met.diagnostic import Problem, error
 from met.host import interpreter
 
@@ -48,11 +48,11 @@ _LOOK = 64
 """Records between two looks whether the process is still there."""
 
 
-class Gone(Exception):
+class WriterGone(Exception):
     """The writer has ended before the loop: what is put is written by nobody."""
 
 
-class Writer:
+class RecordsWriter:
     """The writer of one run, from the loop's side."""
 
     def __init__(self, through: Ring, path: Path, head: bytes) -> None:
@@ -75,7 +75,7 @@ class Writer:
         """A record. Raises Gone, Full."""
         self._count += 1
         if self._count % _LOOK == 0 and self._process.poll() is not None:
-            raise Gone
+            raise WriterGone
         self._ring.put(record)
 
     def close(self) -> str:
@@ -93,13 +93,13 @@ class Writer:
 def recording(path: Path, head: Mapping[str, Any], most: int) -> Iterator[Callable[[bytes], None]]:
     """What takes records, so many at most; all are in the file at the end. Raises Problem E413, in the middle of a run,
     too, so that no bed is driven of which nothing is kept."""
-    writer = Writer(ring.make(min(most, RING_BYTES // records.SIZE)), path, json.dumps(head).encode())
+    writer = RecordsWriter(ring.make(min(most, RING_BYTES // records.SIZE)), path, json.dumps(head).encode())
     stalled = ""
     try:
         yield writer.put
-    except Gone:
+    except WriterGone:
         stalled = f"cannot write {path}: its process has ended"
-    except Full:
+    except RingFull:
         stalled = f"cannot write {path}: the disk has taken nothing for minutes"
     finally:
         if wrong := writer.close() or stalled:

@@ -14,7 +14,7 @@ from met.plan import Experiment, Plan
 
 
 @frozen
-class Meant:
+class ChosenBed:
     """port: without its joint;  experiment: None where no deck was given;  joint: of it"""
 
     port: str
@@ -36,12 +36,12 @@ def on_beds(plan: Plan, names: Sequence[str] | None) -> list[Experiment]:
     return found
 
 
-def meant(
+def chosen_bed(
     word: str, source: str | None, names: tuple[str, ...], *, defines: tuple[str, ...] = (),
     include_dirs: tuple[str, ...] = (), settings: tuple[str, ...] = (), quiet: bool = False,
-) -> Meant:  # fmt: skip
+) -> ChosenBed:  # fmt: skip
     """Of `PORT`, or `JOINT=PORT` of a deck; its first case counts. Raises Problem."""
-    found = _meant(word, None if source is None else read_plan(
+    found = _chosen_bed(word, None if source is None else read_plan(
         source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=quiet
     ), names)  # fmt: skip
     if kind_of(found.port).replays:
@@ -52,20 +52,20 @@ def meant(
     return found
 
 
-def _meant(word: str, plan: Plan | None, names: tuple[str, ...]) -> Meant:
+def _chosen_bed(word: str, plan: Plan | None, names: tuple[str, ...]) -> ChosenBed:
     joint, port = split(word)
     if plan is None:
-        return Meant(port)
+        return ChosenBed(port)
     experiment = on_beds(plan, names or None)[0]
     joints = [each.joint for each in experiment.structure.substitutions]
     if joint in joints:
-        return Meant(port, experiment, joint)
+        return ChosenBed(port, experiment, joint)
     if joint:
         raise on_none(word, joint, joints)
     if len(joints) > 1:
         each = " or ".join(f"`--port {joint}={word}`" for joint in joints)
         raise Problem(error("E418", f"port `{word}`: of which joint?", help=f"say {each}"))
-    return Meant(port, experiment, joints[0])
+    return ChosenBed(port, experiment, joints[0])
 
 
 def split(word: str) -> tuple[str, str]:

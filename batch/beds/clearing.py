@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 
-from batch.beds.asking import meant
+from batch.beds.asking import chosen_bed
 from hw import refusals
 from hw.bed import About, Fault
 from hw.beds import latch
@@ -21,7 +21,7 @@ def clear_and_tell(word: str, *, baud: int, form: str, quiet: bool = False, verb
         names = [str(fault.name).lower() for fault in Fault if fault in faults]
         say(json.dumps({"name": about.name, "cleared": names}))
     elif not quiet:
-        say(f"bed `{about.name}` at {word}: {told(faults)}")
+        say(f"bed `{about.name}` at {word}: {cleared_line(faults)}")
         for each in refusals.remedies(faults):
             say(f"  = help: {each}")
 
@@ -31,10 +31,10 @@ def clear(word: str, baud: int) -> tuple[About, Fault]:
     if kind_of(word).simulated:
         helps = "each run begins with one in which nothing is latched"
         raise Problem(error("E425", f"port `{word}` simulates a bed, anew for each command", help=helps))
-    with opened(Port(meant(word, None, ()).port, baud), None, "", 0, math.inf) as bed:
+    with opened(Port(chosen_bed(word, None, ()).port, baud), None, "", 0, math.inf) as bed:
         about = bed.connect()
         return about, latch.cleared(bed, about)
 
 
-def told(faults: Fault) -> str:
+def cleared_line(faults: Fault) -> str:
     return f"cleared: {refusals.words(faults)}" if faults else "nothing was latched"

@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from batch.beds.known import Known
-from batch.beds.made import Made, made
+from batch.beds.known import CampaignRecords
+from batch.beds.made import CaseResult, case_result
 from batch.campaigns import shard
 from batch.campaigns.folder import Folder
 from batch.campaigns.tasks import Done, Section, Task
 from batch.executors import Outcome
 from hw import records
-from hw.case import Asked, pace_of
+from hw.case import CaseRequest, pace_of
 from hw.ports import same_bed
 from hw.process import talk
 from met.diagnostic import Problem, error
@@ -77,7 +77,7 @@ class OnBeds:
         self._waiting: deque[Task] = deque()
         self._told: dict[str, str] = {}
         self.about = ", ".join(dict.fromkeys(ports.by_joint.values()))
-        self.known = Known(ports.by_joint)
+        self.known = CampaignRecords(ports.by_joint)
         self.driving: Driving | None = None
         self._done = 0
         self.ports = ports.by_joint
@@ -91,10 +91,10 @@ class OnBeds:
         self._folder, self._sections, self._tell = folder, sections, tell
         folder.beds.mkdir(exist_ok=True)
         for path in folder.beds.glob("*.records"):
-            with contextlib.suppress(records.Unsound, OSError):
+            with contextlib.suppress(records.UnsoundRecords, OSError):
                 ports = records.read(path).head.get("ports", {})
                 if not isinstance(ports, dict) or not all(isinstance(port, str) for port in ports.values()):
-                    raise records.Unsound("has a head that is damaged")
+                    raise records.UnsoundRecords("has a head that is damaged")
                 self.check(ports, f"{folder.path} holds cases of this campaign")
 
     def know_all(self) -> None:
@@ -113,14 +113,14 @@ class OnBeds:
         for self._done, row in enumerate(section.rows[task.first : task.last]):
             found.append(self._case(section, int(row)))
         self._done = 0
-        made = [each for each, _ in found]
-        history = np.stack([each.rows for each in made]) if section.recorded else None
+        case_result = [each for each, _ in found]
+        history = np.stack([each.rows for each in case_result]) if section.recorded else None
         if history is not None and section.single:
             history = history.astype(np.float32)
         fates = {place: (FAILED, why) for place, (_, why) in enumerate(found) if why}
         computed = shard.Shard(
-            section.key(task.first, task.last), np.stack([each.outputs for each in made]), history,
-            sum(each.seconds for each in made), fates,
+            section.key(task.first, task.last), np.stack([each.outputs for each in case_result]), history,
+            sum(each.seconds for each in case_result), fates,
         )  # fmt: skip
         try:
             shard.write(self._folder.shards / task.name, computed)
@@ -139,7 +139,7 @@ class OnBeds:
                 helps = "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it"
                 raise Problem(error("E353", message, help=helps))
 
-    def _case(self, section: Section, row: int) -> tuple[Made, str]:
+    def _case(self, section: Section, row: int) -> tuple[CaseResult, str]:
         """What came of a case, and why it ended early, "" where it did not."""
         path = self._folder.beds / f"{section.experiment}-{row}.records"
         told = path.with_suffix(".ended")
@@ -147,8 +147,8 @@ class OnBeds:
             if not _recorded(path):
                 path.unlink(missing_ok=True)
                 self._drive(section, row, path, told)
-            found = made(path, section.prepared, row)
-        except records.Unsound as reason:
+            found = case_result(path, section.prepared, row)
+        except records.UnsoundRecords as reason:
             message = f"the file of records of case #{row} {reason}"
             raise Problem(error("E413", message, help=f"remove {path}")) from None
         except OSError as reason:
@@ -174,7 +174,7 @@ class OnBeds:
             joint: str(ports.transcripts / f"{experiment.name}.{row}.{joint}.transcript") for joint in ports.by_joint
         }  # fmt: skip
         begun = [name for name in transcripts.values() if not Path(name).exists()]
-        asked = Asked(
+        asked = CaseRequest(
             plan=plan, row=row, ports=dict(ports.by_joint), records=str(path), lock_step=ports.lock_step,
             baud=ports.baud, rest=ports.rest if self.known.cases else 0.0, transcripts=transcripts, clear=ports.clear,
             head={"key": section.key(), "ports": dict(ports.by_joint)},
@@ -212,5 +212,5 @@ class OnBeds:
 
 
 def _recorded(path: Path) -> bool:
-    """Whether there are records of a bed that was armed. Raises records.Unsound, OSError."""
+    """Whether there are records of a bed that was armed. Raises records.UnsoundRecords, OSError."""
     return path.exists() and len(records.read(path).rows) > 0

@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from batch.beds.asking import meant
+from batch.beds.asking import chosen_bed
 from hw.bed import About, Capability, Limits, Scales
-from hw.identify.driving import Asked
+from hw.identify.driving import MovesRequest
 from hw.process import talk
 from ic.printing.columns import columns, quantity
 from met import models
@@ -25,7 +25,7 @@ from met.plan import file as plan_file
 from met.program.control.plant import bed_values
 
 if TYPE_CHECKING:
-    from hw.identify.fit import Estimate, Found
+    from hw.identify.fit import Estimate, FitResult
 
 UNITS = {
     "kt": "N*m/A", "resistance": "ohm", "tau_max": "N*m", "f_c": "N*m", "f_v": "N*m*s/rad", "inertia": "kg*m^2",
@@ -44,7 +44,7 @@ UNEXPLAINED = 0.1
 
 
 @frozen
-class Sheet:
+class DataSheet:
     """values: what is believed of the bed before, SI, by the names of `UNITS`, and `v_max`, V, where the servo has it
     said: whether `kt_load` is said by the deck, or by who asks"""
 
@@ -52,7 +52,7 @@ class Sheet:
     said: bool
 
 
-def sheet_of(experiment: Experiment, joint: str, kt_load: float | None) -> Sheet:
+def sheet_of(experiment: Experiment, joint: str, kt_load: float | None) -> DataSheet:
     """The motor as its servo has it, the rest as the bed has it, in the first case."""
     inputs = {each.path: float(each.values[0]) for each in experiment.cases.coordinates}
     outputs = experiment.formulas.replay(inputs)
@@ -67,7 +67,7 @@ def sheet_of(experiment: Experiment, joint: str, kt_load: float | None) -> Sheet
     if f"{joint}.servo.v_max" in experiment.parameters:
         values["v_max"] = servo("v_max")
     origin = experiment.parameters[f"{joint}.bed.kt_load"].origin
-    return Sheet(values, kt_load is not None or origin.place is not None)
+    return DataSheet(values, kt_load is not None or origin.place is not None)
 
 
 def identify_and_tell(
@@ -77,7 +77,7 @@ def identify_and_tell(
 ) -> None:  # fmt: skip
     """The command. Raises Problem."""
     say: Callable[[str], None] = (lambda _: None) if quiet or form == "json" else visible.say
-    which = meant(word, source, names, quiet=quiet, **options)
+    which = chosen_bed(word, source, names, quiet=quiet, **options)
     assert which.experiment is not None
     sheet = sheet_of(which.experiment, which.joint, kt_load)
     deck = Path(output or f"{which.joint}.identified.ic")
@@ -88,7 +88,7 @@ def identify_and_tell(
         message = f"joint `{which.joint}`: the load motor's constant, by which torques are measured, is nowhere said"
         helps = "`--kt-load '0.072 N*m/A'`, from its data sheet; or `bed = emulated(kt_load = ..., ...)` in the deck"
         raise Problem(error("E424", message, help=helps))
-    asked = Asked(
+    asked = MovesRequest(
         plan=plan_file.dumps(Plan("", (which.experiment,))), row=0, joint=which.joint, port=which.port,
         records=str(records), sheet=dict(sheet.values), baud=baud, lock_step=lock_step, voltage=voltage,
         current=current, rate=rate,
@@ -109,7 +109,7 @@ def identify_and_tell(
     say(f"{deck} is a deck to include; what was told and read is in {records}")
 
 
-def _check_sheet(sheet: Sheet, joint: str) -> None:
+def _check_sheet(sheet: DataSheet, joint: str) -> None:
     """Raises Problem E424 where the search cannot begin at what is believed."""
     for name, unit in UNITS.items():
         if not 0.0 < sheet.values[name] < math.inf:
@@ -133,7 +133,7 @@ def _check_output(deck: Path, records: Path) -> None:
         raise Problem(error("E305", wrong, help=helps))
 
 
-def check(found: Found, about: About) -> None:
+def check(found: FitResult, about: About) -> None:
     """Raises Problem E423 where the bed is not what the model is."""
     left = float((found.residual**2).mean() ** 0.5)
     worst = int(found.residual.argmax())
@@ -163,7 +163,7 @@ def widened(found: Mapping[str, Estimate], kt_load_error: float) -> dict[str, Es
     return out
 
 
-def told(found: Found, estimates: Mapping[str, Estimate], sheet: Sheet) -> list[str]:
+def told(found: FitResult, estimates: Mapping[str, Estimate], sheet: DataSheet) -> list[str]:
     """For people."""
     rows = [["", "found", "95 % interval", "", "data sheet", "off by"]]
     for name, unit in UNITS.items():
@@ -186,7 +186,7 @@ def told(found: Found, estimates: Mapping[str, Estimate], sheet: Sheet) -> list[
     return out
 
 
-def reasons(found: Found) -> list[str]:
+def reasons(found: FitResult) -> list[str]:
     """Why parameters were not found, in words."""
     missing = [name for name, each in found.parameters.items() if not each.found]
     out = []
@@ -281,7 +281,9 @@ def _packed(words: Iterable[str], indent: int) -> list[str]:
     return [line.rstrip() for line in lines]
 
 
-def as_data(found: Found, estimates: Mapping[str, Estimate], sheet: Sheet, deck: Path, records: Path) -> dict[str, Any]:
+def as_data(
+    found: FitResult, estimates: Mapping[str, Estimate], sheet: DataSheet, deck: Path, records: Path
+) -> dict[str, Any]:
     """For programs; SI."""
     return {
         "deck": str(deck), "records": str(records),
@@ -295,7 +297,7 @@ def as_data(found: Found, estimates: Mapping[str, Estimate], sheet: Sheet, deck:
     }  # fmt: skip
 
 
-def _driven(asked: Asked, say: Callable[[str], None]) -> tuple[About, dict[str, Any]]:
+def _driven(asked: MovesRequest, say: Callable[[str], None]) -> tuple[About, dict[str, Any]]:
     """Who the bed is, and how its moves ended. Raises Problem, and KeyboardInterrupt when the bed was stopped by it."""
     about: About | None = None
     found = dict[str, Any]()
@@ -316,7 +318,7 @@ def _about(data: Mapping[str, Any]) -> About:
     })  # fmt: skip
 
 
-def _fitted(path: Path, about: About, ended: Mapping[str, Any], sheet: Sheet) -> Found:
+def _fitted(path: Path, about: About, ended: Mapping[str, Any], sheet: DataSheet) -> FitResult:
     from hw import records
     from hw.identify.fit import fitted
     from hw.identify.moves import groups, guided
@@ -324,7 +326,7 @@ def _fitted(path: Path, about: About, ended: Mapping[str, Any], sheet: Sheet) ->
 
     try:
         rows = records.read(path).rows
-    except (records.Unsound, OSError) as reason:
+    except (records.UnsoundRecords, OSError) as reason:
         raise Problem(error("E413", f"the records of the moves {reason}", help="run it again")) from None
     what = series(rows, about, ended["began"], lock_step=ended["lock_step"])
     return fitted(what, groups(guided(1.0)), sheet.values)

@@ -7,9 +7,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from batch.beds.asking import Meant, meant
+from batch.beds.asking import ChosenBed, chosen_bed
 from hw.case import pace_of
-from hw.jitter import Asked
+from hw.jitter import JitterRequest
 from hw.ports import kind_of
 from hw.process import talk
 from hw.timing import EDGES
@@ -30,7 +30,7 @@ _FIGURES = (("median", "median"), ("high", "p99"), ("highest", "p99.9"), ("large
 
 
 def measured(
-    asked: Meant, baud: int, hz: float | None, seconds: float, joints: int
+    asked: ChosenBed, baud: int, hz: float | None, seconds: float, joints: int
 ) -> tuple[dict[str, Any], list[str]]:
     """The figures, for programs, and what is told of the measurement. Raises Problem."""
     kind = kind_of(asked.port)
@@ -40,7 +40,7 @@ def measured(
     rate = hz or (HZ if asked.experiment is None else pace_of(asked.experiment).hz)
     simulated = asked.simulated
     plan = "" if simulated is None else plan_file.dumps(Plan("", (simulated,)))
-    question = Asked(asked.port, rate, seconds, joints, baud, plan, asked.joint)
+    question = JitterRequest(asked.port, rate, seconds, joints, baud, plan, asked.joint)
     said = list[str]()
     about, kept = dict[str, Any](), dict[str, Any]()
     for line in talk("hw.jitter", question, said.append, until="kept", goes_on=True):
@@ -61,7 +61,7 @@ def jitter_and_tell(
     joints: int, form: str, quiet: bool = False, verbose: bool = False, **options: Any,
 ) -> bool:  # fmt: skip
     """The command; True where no run would have been stopped. Raises Problem."""
-    asked = meant(word, source, names, quiet=quiet, **options)
+    asked = chosen_bed(word, source, names, quiet=quiet, **options)
     data, said = measured(asked, baud, rate, duration, joints)
     if form == "json":
         say(json.dumps({**data, "warnings": said}, indent=2))

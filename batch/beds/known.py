@@ -15,27 +15,27 @@ from met.frozen import frozen
 
 
 @frozen
-class Case:
+class CaseRecords:
     """tick_hz: of its beds' ticks;  exchanges: its records, by joint."""
 
     tick_hz: float
     exchanges: Mapping[str, np.ndarray]
 
 
-class Known:
+class CampaignRecords:
     """Of the cases that were driven, taken up, or done by an earlier run; by the numbers of experiment and row.
 
     beds  by joint, name and firmware of those that it was on
     """
 
     def __init__(self, joints: Iterable[str]) -> None:
-        self.cases: dict[tuple[int, int], Case] = {}
+        self.cases: dict[tuple[int, int], CaseRecords] = {}
         self.beds: dict[str, list[dict[str, str]]] = {joint: [] for joint in joints}
 
     def add(self, experiment: int, row: int, head: Mapping[str, Any], exchanges: Sequence[np.ndarray]) -> None:
         """A case. head: what stands before its records;  exchanges: by bed."""
         by_joint = dict(zip(head["joints"], exchanges, strict=True))
-        self.cases[experiment, row] = Case(float(head["tick_hz"]), by_joint)
+        self.cases[experiment, row] = CaseRecords(float(head["tick_hz"]), by_joint)
         for joint, about in zip(head["joints"], head["beds"], strict=True):
             if about not in self.beds.setdefault(joint, []):
                 self.beds[joint].append(about)
@@ -48,7 +48,7 @@ class Known:
                 continue
             if (int(experiment), int(row)) in self.cases:
                 continue
-            with contextlib.suppress(records.Unsound, OSError):
+            with contextlib.suppress(records.UnsoundRecords, OSError):
                 found = records.read(path)
                 if found.head:
                     check_head(found)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hw import records
-from hw.driven import Driven
+from hw.driven import CaseKernel
 from hw.records import ANSWERED
 from met.frozen import frozen
 from met.host.files import is_count
@@ -26,7 +26,7 @@ HEAD = {"key", "row", "joints", "beds", "tick_hz", "repeats"}
 
 
 @frozen
-class Made:
+class CaseResult:
     """rows: histories [row, column];  outputs: [output];  whole: whether the case reached its end
     seconds: how long it was driven;  exchanges: the records, by bed;  head: what stands before them"""
 
@@ -51,10 +51,10 @@ def read_rates(found: records.Records, beds: int) -> np.ndarray:
 
 
 def check_head(found: records.Records) -> None:
-    """Raises records.Unsound where the head of a case's records is none, or goes not with what follows."""
+    """Raises records.UnsoundRecords where the head of a case's records is none, or goes not with what follows."""
     head = found.head
     if HEAD - set(head):
-        raise records.Unsound("was written by another version of MET")
+        raise records.UnsoundRecords("was written by another version of MET")
     joints, beds, hz = head["joints"], head["beds"], head["tick_hz"]
     good = (
         isinstance(joints, list) and isinstance(beds, list) and len(joints) == len(beds) > 0
@@ -64,21 +64,21 @@ def check_head(found: records.Records) -> None:
         and bool((found.rows["bed"] < len(joints)).all())
     )  # fmt: skip
     if not good:
-        raise records.Unsound("has a head that is damaged")
+        raise records.UnsoundRecords("has a head that is damaged")
 
 
-def made(path: Path, prepared: Prepared, row: int) -> Made:
-    """What a case's records say. prepared: with its wires open. Raises records.Unsound, OSError."""
+def case_result(path: Path, prepared: Prepared, row: int) -> CaseResult:
+    """What a case's records say. prepared: with its wires open. Raises records.UnsoundRecords, OSError."""
     found = records.read(path)
     check_head(found)
-    driven = Driven(prepared, row)
+    driven = CaseKernel(prepared, row)
     beds = len(driven.joints)
     if found.head["joints"] != list(driven.joints):
-        raise records.Unsound("is of other joints")
+        raise records.UnsoundRecords("is of other joints")
     rows, outputs, done = driven.again(read_rates(found, beds))
     whole = done == driven.ticks
     if not whole and outputs[FAILURE] == 0.0:
         outputs[FAILURE], outputs[TICK] = STOPPED, float(done + 1)
     last = found.rows["ended"][-1] if len(found.rows) else 0
-    return Made(rows, outputs, whole, float(last) * 1e-9,
+    return CaseResult(rows, outputs, whole, float(last) * 1e-9,
                 tuple(found.rows[found.rows["bed"] == bed] for bed in range(beds)), found.head)  # fmt: skip

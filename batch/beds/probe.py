@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from batch.beds.asking import Meant, meant
+from batch.beds.asking import ChosenBed, chosen_bed
 from hw import refusals
-from hw.bed import About, BedDriver, Capability, Fault, Sample
+from hw.bed import About, BedDriver, BedSample, Capability, Fault
 from hw.beds.serial_line import LONGEST_SHARE, exchanged
 from hw.case import pace_of
 from hw.ports import Port, opened
@@ -31,13 +31,13 @@ _SENSORS = (("rate", "rad/s"), ("angle", "rad"), ("drive_current", "A"), ("accel
 
 
 @frozen
-class Found:
+class ProbeResult:
     """trips: s from question to answer, as often as there was one of `ASKED`; empty where there is no line
     needed: s that the bytes of an exchange take, 0 where the line has no baud rate"""
 
     port: str
     about: About
-    sample: Sample
+    sample: BedSample
     warnings: tuple[Diagnostic, ...]
     baud: int
     needed: float
@@ -51,7 +51,7 @@ class Found:
         return math.inf if stepped or longest == 0.0 else LONGEST_SHARE / longest
 
 
-def probe(asked: Meant, baud: int) -> Found:
+def probe(asked: ChosenBed, baud: int) -> ProbeResult:
     """Greet the bed, and read its sensors. Raises Problem."""
     simulated = asked.simulated
     period = math.inf if simulated is None else pace_of(simulated).period
@@ -59,7 +59,7 @@ def probe(asked: Meant, baud: int) -> Found:
         about = bed.connect()
         sample = bed.read()
         trips = _trips(bed) if bed.has_line else ()
-        return Found(asked.port, about, sample, bed.warnings, baud, bed.line_time(about), trips)
+        return ProbeResult(asked.port, about, sample, bed.warnings, baud, bed.line_time(about), trips)
 
 
 def probe_and_tell(
@@ -67,14 +67,14 @@ def probe_and_tell(
     verbose: bool = False, **options: Any,
 ) -> None:  # fmt: skip
     """The command. Raises Problem."""
-    found = probe(meant(word, source, names, quiet=quiet, **options), baud)
+    found = probe(chosen_bed(word, source, names, quiet=quiet, **options), baud)
     if form == "json":
         say(json.dumps(data(found), indent=2))
     elif not quiet:
         say("\n".join(lines(found)))
 
 
-def lines(found: Found) -> list[str]:
+def lines(found: ProbeResult) -> list[str]:
     """For people."""
     about, sample, limits = found.about, found.sample, found.about.limits
     out = [f"bed `{about.name}` at {found.port}"]
@@ -102,7 +102,7 @@ def lines(found: Found) -> list[str]:
     return out
 
 
-def data(found: Found) -> dict[str, Any]:
+def data(found: ProbeResult) -> dict[str, Any]:
     """The same for programs, SI."""
     about, sample = found.about, found.sample
     return {
@@ -153,11 +153,11 @@ def _scales(about: About) -> list[tuple[float, str]]:
     return found + [(value, unit) for each, value, unit in others if each in has]
 
 
-def _read(sample: Sample) -> list[tuple[str, float, str]]:
+def _read(sample: BedSample) -> list[tuple[str, float, str]]:
     return [(name, getattr(sample, name), unit) for name, unit in _SENSORS if getattr(sample, name) is not None]
 
 
-def _line(found: Found) -> list[Sequence[str]]:
+def _line(found: ProbeResult) -> list[Sequence[str]]:
     """What is said of the line, and of the rates that it is fast enough for."""
     if not found.trips and not found.needed:
         return [["line", "none: the bed is in this process"]]

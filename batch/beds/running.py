@@ -9,7 +9,7 @@ from pathlib import Path
 from batch.archive.read import ArchiveFile
 from batch.beds.asking import on_beds, on_none, split
 from batch.beds.executor import OnBeds, Ports
-from batch.beds.telling import Telling, beside, kept_time
+from batch.beds.telling import BedProgress, sidecar_entries, timing_lines
 from batch.campaigns.campaign import Campaign, Wires, prepare
 from batch.campaigns.output import sidecar_path
 from batch.campaigns.performing import perform
@@ -122,10 +122,10 @@ def run_and_tell(
         say(f"  {line}")
     folder = None if transcripts is None else Path(transcripts)
     executor = OnBeds(Ports(by_joint, baud, stepped, rest or 0.0, folder, clear), lambda line: telling.say(f"  {line}"))
-    telling = Telling(executor, quiet=quiet)
+    telling = BedProgress(executor, quiet=quiet)
     performed = perform(
         campaign, executor=executor, fresh=fresh, progress=telling, ready=lambda: say(writing(campaign)),
-        say=telling.say, more=lambda: beside(executor),
+        say=telling.say, more=lambda: sidecar_entries(executor),
     )  # fmt: skip
     if performed.whole:
         executor.check(_ports_before(campaign.output), f"{campaign.output} holds this campaign")
@@ -133,7 +133,7 @@ def run_and_tell(
     with ArchiveFile(campaign.output) as file:
         summaries, worst = summarise(file), worst_cases(file)
         picture, excuse = (None, "") if no_picture else first_picture(file)
-    for line in kept_time(executor):
+    for line in timing_lines(executor):
         say(line)
     ok = all(summary.ok for summary in summaries)
     say("\n".join(told(source, campaign, summaries, worst, picture, excuse, None, performed.seconds, ok, ())))

@@ -13,11 +13,11 @@ from batch.beds.executor import OnBeds
 from batch.beds.jitter import duration, off
 from batch.terminal.progress import Bar
 from hw.records import ANSWERED
-from hw.timing import Spread, Timing, timing
+from hw.timing import TimeSpread, Timing, timing
 from met.messages.visible import say
 
 
-class Telling:
+class BedProgress:
     """Progress of a campaign on beds (`batch.campaigns.drive.Progress`): cases count by the time that is driven."""
 
     def __init__(self, executor: OnBeds, *, quiet: bool, bar: Bar | None = None) -> None:
@@ -67,7 +67,7 @@ WORST = 0.01
 """Share of the exchanges without an answer, or by which a bed's clock is off, from which there is a warning."""
 
 
-def kept_time(executor: OnBeds) -> list[str]:
+def timing_lines(executor: OnBeds) -> list[str]:
     """How well the loop kept its time, in words; a warning where the bed did not."""
     lines = []
     for joint, found in timings(executor).items():
@@ -97,7 +97,7 @@ def kept_time(executor: OnBeds) -> list[str]:
     return lines
 
 
-def beside(executor: OnBeds) -> Mapping[str, Any]:
+def sidecar_entries(executor: OnBeds) -> Mapping[str, Any]:
     """What stands beside the archive: which beds they were, and how well time was kept; s."""
     executor.know_all()
     kept = timings(executor)
@@ -117,6 +117,6 @@ def _figures(found: Timing) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _spread(found: Spread) -> dict[str, float | None]:
+def _spread(found: TimeSpread) -> dict[str, float | None]:
     values = {"median": found.median, "p99": found.high, "p99.9": found.highest, "largest": found.largest}
     return {name: round(value, 9) if math.isfinite(value) else None for name, value in values.items()}

@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from hw import refusals
-from hw.bed import About, BedDriver, Capability, Fault, Limits, Sample, Scales, State
+from hw.bed import About, BedDriver, BedSample, BedState, Capability, Fault, Limits, Scales
 from hw.beds import greeting
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
@@ -80,7 +80,7 @@ class EmulatedBed(BedDriver):
         self._bears = limits.current if bears is None else bears
         self._about: About | None = None
         self._rate = self._counted(plant.start(0.0, 0.0, 0.0))
-        self._state, self._faults, self._tick, self._heat = State.DISARMED, Fault(0), 0, 0.0
+        self._state, self._faults, self._tick, self._heat = BedState.DISARMED, Fault(0), 0, 0.0
         self._volts, self._amperes, self._since = 0, 0, 0
         self.voltage, self.current = 0.0, 0.0
 
@@ -97,22 +97,22 @@ class EmulatedBed(BedDriver):
     def limit(self, asked: Mapping[str, float]) -> None:
         about = self._there()
         tighter = greeting.tighter(about, asked)
-        if self._state != State.DISARMED:
+        if self._state != BedState.DISARMED:
             raise refusals.refused(about, "take tighter limits", self._sample(refused=True))
         own = greeting.in_force(about)
         self._in_force = replace(
             self._in_force, **{name: min(most, getattr(own, name)) for name, most in tighter.items()}
         )
 
-    def arm(self) -> Sample:
+    def arm(self) -> BedSample:
         about = self._there()
-        if self._state != State.DISARMED or not self._slow():
+        if self._state != BedState.DISARMED or not self._slow():
             raise refusals.refused(about, "arm", self._sample(refused=True))
         self._hold(0, 0)
-        self._state, self._since = State.ARMED, 0
+        self._state, self._since = BedState.ARMED, 0
         return self._sample()
 
-    def exchange(self, voltage: float, current: float) -> Sample | None:
+    def exchange(self, voltage: float, current: float) -> BedSample | None:
         about, force, scales = self._there(), self._in_force, self._scales
         volts = greeting.commanded(voltage, scales.voltage, force.voltage)
         amperes = greeting.commanded(current, scales.current, force.current)
@@ -121,7 +121,7 @@ class EmulatedBed(BedDriver):
             if volts is None:
                 raise refusals.no_command(about, "a voltage", voltage, "V", force.voltage * scales.voltage)
             raise refusals.no_command(about, "a current", current, "A", force.current * scales.current)
-        armed = self._state == State.ARMED
+        armed = self._state == BedState.ARMED
         if armed:
             since = max(self._since, 1)
             if (
@@ -135,36 +135,36 @@ class EmulatedBed(BedDriver):
         self._advance()
         return self._sample(refused=not armed)
 
-    def read(self) -> Sample:
+    def read(self) -> BedSample:
         self._there()
         return self._sample()
 
-    def clear(self) -> Sample:
+    def clear(self) -> BedSample:
         about = self._there()
         hot = Fault.HEAT in self._faults and self._heat > self._limits.heat / 2.0
-        if self._state == State.ARMED or (self._state == State.STOPPED and (hot or not self._slow())):
+        if self._state == BedState.ARMED or (self._state == BedState.STOPPED and (hot or not self._slow())):
             raise refusals.refused(about, "clear", self._sample(refused=True))
-        self._state, self._faults = State.DISARMED, Fault(0)
+        self._state, self._faults = BedState.DISARMED, Fault(0)
         return self._sample()
 
-    def rest(self, time: float) -> Sample:
+    def rest(self, time: float) -> BedSample:
         self._there()
         self.stop()
         for _ in range(math.ceil(time / self._plant.period - 1e-6)):
             self._advance()
         return self._sample()
 
-    def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> Sample:
+    def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> BedSample:
         about = self._there()
-        if self._state != State.DISARMED or not math.isfinite(rate):
+        if self._state != BedState.DISARMED or not math.isfinite(rate):
             raise refusals.refused(about, "start its plant anew", self._sample(refused=True))
         self._rate = self._counted(self._plant.start(rate, float(seed), float(repeat)))
         return self._sample()
 
     def stop(self) -> bool:
         self._hold(0, 0)
-        if self._state == State.ARMED:
-            self._state = State.DISARMED
+        if self._state == BedState.ARMED:
+            self._state = BedState.DISARMED
         return True
 
     def close(self) -> None:
@@ -190,7 +190,7 @@ class EmulatedBed(BedDriver):
 
     def _stopped(self, faults: Fault) -> None:
         self._hold(0, 0)
-        self._state = State.STOPPED
+        self._state = BedState.STOPPED
         self._faults |= faults
 
     def _advance(self) -> None:
@@ -200,16 +200,16 @@ class EmulatedBed(BedDriver):
         self._since += 1
         gained = (self.current * self.current - self._bears * self._bears) * self._plant.period
         self._heat = max(0.0, self._heat + gained)
-        if self._state == State.ARMED:
+        if self._state == BedState.ARMED:
             if abs(self._rate) > self._in_force.rate:
                 self._stopped(Fault.RATE)
             if self._heat > self._limits.heat:
                 self._stopped(Fault.HEAT)
 
-    def _sample(self, *, refused: bool = False) -> Sample:
+    def _sample(self, *, refused: bool = False) -> BedSample:
         angle = round(self._plant.shaft_angle / self._scales.angle) * self._scales.angle
         rate = self._rate * self._scales.rate
-        return Sample(self._state, True, self._faults, refused, self._tick, rate, angle)
+        return BedSample(self._state, True, self._faults, refused, self._tick, rate, angle)
 
 
 def _opened_port(opening: Opening) -> EmulatedBed:

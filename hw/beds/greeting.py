@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from hw.bed import LIMITS, About, Capability, Limits, Scales
+from hw.bed import LIMIT_NAMES, About, Capability, Limits, Scales
 from hw.protocol import messages
 from met.diagnostic import Problem, error
 
@@ -18,7 +18,7 @@ _UNITS = {
 }  # fmt: skip
 
 
-def about(found: messages.Greeting) -> About:
+def about(found: messages.HelloAnswer) -> About:
     """Of a bed that this MET can drive. Raises Problem E404."""
     name = found.name.rstrip(b"\0").decode("latin-1").encode("unicode_escape").decode()
     capabilities = Capability(found.capabilities & _KNOWN)
@@ -42,19 +42,19 @@ _KNOWN = sum(Capability)
 _SENSORS = dict(zip(("angle", "drive_current", "acceleration"), messages.SENSORS, strict=True))
 
 
-def in_force(about: About) -> messages.InForce:
+def in_force(about: About) -> messages.LimitsAnswer:
     """The bed's own limits in counts, slews in counts a tick."""
     s, of = about.scales, about.limits
     voltage, current, rate = counts(of.voltage, s.voltage), counts(of.current, s.current), counts(of.rate, s.rate)
     slews = counts(of.voltage_slew / about.tick_hz, s.voltage), counts(of.current_slew / about.tick_hz, s.current)
-    return messages.InForce(voltage, current, rate, *slews)
+    return messages.LimitsAnswer(voltage, current, rate, *slews)
 
 
 def tighter(about: About, asked: Mapping[str, float]) -> dict[str, int]:
-    """Limits that are asked for, by their names in `LIMITS`, in counts, slews in counts a tick. Raises Problem E408,
-    KeyError."""
+    """Limits that are asked for in SI as whole counts, slews in counts a tick; both by their names in `LIMIT_NAMES`.
+    Raises Problem E408 for a number that is no limit, KeyError for another name."""
     s, hz = about.scales, about.tick_hz
-    of = dict(zip(LIMITS, (s.voltage, s.current, s.rate, s.voltage * hz, s.current * hz), strict=True))
+    of = dict(zip(LIMIT_NAMES, (s.voltage, s.current, s.rate, s.voltage * hz, s.current * hz), strict=True))
     for name, value in asked.items():
         if not 0.0 <= value < math.inf:
             message = f"a limit of {_words(name)} of {value:g} {_UNITS[name]} for bed `{about.name}`"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hw import refusals
-from hw.bed import About, BedDriver, Fault, State
+from hw.bed import About, BedDriver, BedState, Fault
 
 COMING_TO_REST = 10.0
 """s that a shaft is given for it."""
@@ -15,7 +15,7 @@ LOOKS = 0.1
 def cleared(bed: BedDriver, about: About) -> Fault:
     """What a bed, which is greeted, had latched; now it is disarmed. Raises Problem E406 where its shaft turns on."""
     sample = bed.read()
-    if sample.state != State.STOPPED:
+    if sample.state != BedState.STOPPED:
         return Fault(0)
     left = COMING_TO_REST
     while abs(sample.rate) > about.limits.arming_rate and left > 0.0:
@@ -27,5 +27,5 @@ def cleared(bed: BedDriver, about: About) -> Fault:
 def check(bed: BedDriver, about: About, port: str) -> None:
     """Raises Problem E406 where a bed, which is greeted, has latched faults."""
     sample = bed.read()
-    if sample.state == State.STOPPED:
+    if sample.state == BedState.STOPPED:
         raise refusals.latched(about, sample.faults, port)

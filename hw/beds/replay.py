@@ -7,11 +7,11 @@ from pathlib import Path
 
 from hw.bed import Scales
 from hw.beds.wire import WireBed
-from hw.line import Line
+from hw.line import BedLine
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
 from hw.protocol.frames import Decoder, unframed
-from hw.transcript import LOST, MAGIC, OPENED, RECEIVED, SENT, Record, Transcript, read
+from hw.transcript import LOST, MAGIC, OPENED, RECEIVED, SENT, Transcript, TranscriptRecord, read
 from met.diagnostic import Problem, error
 from met.host.files import open_regular
 
@@ -37,14 +37,14 @@ class ReplayBed(WireBed):
             helps = "give the transcript of a bed on a serial line"
             raise Problem(error("E409", f"{path} does not say how its bed was driven", help=helps)) from None
         super().__init__(str(path), period, first)
-        self._line_then = _LineThen(self.transcript, str(path))
+        self._line_then = _ReplayedLine(self.transcript, str(path))
 
-    def open(self) -> Line:
+    def open(self) -> BedLine:
         self._line_then.open()
         return self._line_then
 
 
-class _LineThen:
+class _ReplayedLine:
     """The line as it was: its clock stands at what was last sent or received."""
 
     def __init__(self, transcript: Transcript, name: str) -> None:
@@ -85,7 +85,7 @@ class _LineThen:
     def close(self) -> None:
         """Nothing is held."""
 
-    def _next(self, kind: int) -> Record | None:
+    def _next(self, kind: int) -> TranscriptRecord | None:
         if self._at == len(self._records) or self._records[self._at].kind != kind:
             return None
         self._at += 1
@@ -93,10 +93,10 @@ class _LineThen:
 
     def _note(self, data: bytes) -> None:
         for payload in self._decoder.feed(data):
-            if payload[0] == messages.Reading.kind:
+            if payload[0] == messages.SampleAnswer.kind:
                 self._tick = int.from_bytes(payload[5:9], "little")
-            found = messages.answered(payload, 0)
-            if found is not None and isinstance(found[1], messages.Greeting):
+            found = messages.bed_answer(payload, 0)
+            if found is not None and isinstance(found[1], messages.HelloAnswer):
                 self._scales = found[1].scales
 
     def _other(self, asked: str) -> Problem:
@@ -112,12 +112,12 @@ class _LineThen:
 
     def _words(self, frame: bytes) -> str:
         payload = unframed(frame[:-1])
-        found = None if payload is None else messages.asked(payload)
+        found = None if payload is None else messages.host_message(payload)
         if found is None:
             return "no message"
         number, message = found
-        name = type(message).__name__.upper()
-        if isinstance(message, messages.Drive | messages.Step) and self._scales is not None:
+        name = message.word
+        if isinstance(message, messages.DriveMessage | messages.StepMessage) and self._scales is not None:
             voltage, current = message.voltage * self._scales.voltage, message.current * self._scales.current
             return f"{name} {number} of {voltage:.9g} V and {current:.9g} A"
         said = ", ".join(f"{key} {value}" for key, value in message.__dict__.items())
@@ -138,7 +138,7 @@ def is_transcript(name: str) -> bool:
 def _was_in_lock_step(name: str, asked: bool) -> bool:
     """True where a transcript has a STEP: its bed had no time of its own, whatever is asked now."""
     sent = (unframed(each.data[:-1]) for each in read(name).records if each.kind == SENT)
-    return any(payload is not None and payload[0] == messages.Step.kind for payload in sent)
+    return any(payload is not None and payload[0] == messages.StepMessage.kind for payload in sent)
 
 
 def _opened_port(opening: Opening) -> ReplayBed:

@@ -22,10 +22,10 @@ from urllib.parse import urlsplit
 
 from hw.bed import About, Capability
 from hw.beds.wire import WireBed
-from hw.line import BAUD, Line
+from hw.line import BAUD, BedLine
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
-from hw.transcript import Recorded, Writer
+from hw.transcript import TranscribedLine, TranscriptWriter
 from met.diagnostic import Diagnostic, Problem, error
 
 LONGEST_SHARE = 0.8
@@ -59,7 +59,7 @@ class SerialBed(WireBed):
         super().__init__(url, period, secrets.randbelow(messages.NUMBERS))
         self.baud = baud
         header = {"line": url, "baud": baud, "period": period, "first": self._number}
-        self._writer = None if transcript is None else Writer(transcript, header)
+        self._writer = None if transcript is None else TranscriptWriter(transcript, header)
 
     def connect(self) -> About:
         about = super().connect()
@@ -74,10 +74,10 @@ class SerialBed(WireBed):
             raise Problem(error("E405", message, help=f"at least {least} baud, or a lower rate of the servo"))
         return about
 
-    def open(self) -> Line:
+    def open(self) -> BedLine:
         line = SerialLine(self._name, self.baud)
         self.warnings = line.warnings
-        return line if self._writer is None else Recorded(line, self._writer)
+        return line if self._writer is None else TranscribedLine(line, self._writer)
 
     def line_time(self, about: About) -> float:
         return 0.0 if "://" in self._name else needed(about.capabilities, self.baud)

@@ -20,10 +20,10 @@ from hw.bed import Capability
 from hw.beds import emulated
 from hw.beds.wire import WireBed
 from hw.build import Config, Shaft, Uncountable, build, qemu
-from hw.line import BAUD, Line
+from hw.line import BAUD, BedLine
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
-from hw.transcript import Recorded, Writer
+from hw.transcript import TranscribedLine, TranscriptWriter
 from met.diagnostic import Problem, error
 from met.program.control.plant import plant_c
 from met.substitution.bed import SIMULATION_PARAMETERS
@@ -46,12 +46,12 @@ class SimulatedBed(WireBed):
         self._kind, self._lock_step = kind, Capability.LOCK_STEP in config.capabilities
         self._built = build("arm" if kind == "qemu" else "host", config, plant)
         header = {"line": kind, "baud": BAUD, "period": period, "first": self._number}
-        self._writer = None if transcript is None else Writer(transcript, header)
+        self._writer = None if transcript is None else TranscriptWriter(transcript, header)
         self._process: subprocess.Popen[bytes] | None = None
 
-    def open(self) -> Line:
+    def open(self) -> BedLine:
         line = self._here() if self._kind == "firmware" else self._in_an_emulator()
-        return line if self._writer is None else Recorded(line, self._writer)
+        return line if self._writer is None else TranscribedLine(line, self._writer)
 
     def close(self) -> None:
         super().close()
@@ -60,7 +60,7 @@ class SimulatedBed(WireBed):
             self._process.wait()
             self._process = None
 
-    def _here(self) -> Line:
+    def _here(self) -> BedLine:
         ours, theirs = socket.socketpair()
         with theirs:
             number = theirs.fileno()
@@ -70,7 +70,7 @@ class SimulatedBed(WireBed):
         realtime.put_first(self._process.pid)
         return SocketLine(ours)
 
-    def _in_an_emulator(self) -> Line:
+    def _in_an_emulator(self) -> BedLine:
         with tempfile.TemporaryDirectory(prefix="met-bed-") as folder:
             path = Path(folder) / "line"
             self._process = subprocess.Popen(

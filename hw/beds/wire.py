@@ -11,12 +11,12 @@ from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
 from hw import refusals
-from hw.bed import LIMITS, About, BedDriver, Capability, Fault, Sample, State, real_plant
+from hw.bed import LIMIT_NAMES, About, BedDriver, BedSample, BedState, Capability, Fault, real_plant
 from hw.beds import greeting
-from hw.line import Heard, Line
+from hw.line import BedLine, TappedLine
 from hw.protocol import messages
 from hw.protocol.frames import Decoder
-from hw.protocol.messages import Asked, Greeting, InForce, OtherVersion, Reading
+from hw.protocol.messages import HelloAnswer, HostMessage, LimitsAnswer, OtherVersionAnswer, SampleAnswer
 from met.diagnostic import Problem, error
 
 _GREETED, _REFUSED = 1 << 2, 1 << 13
@@ -39,7 +39,7 @@ _NONSENSE = 1024
 """Bytes of a wait without the answer, after which it counts as missing: a line that babbles holds nobody up."""
 
 
-T = TypeVar("T", Greeting, InForce, Reading)
+T = TypeVar("T", HelloAnswer, LimitsAnswer, SampleAnswer)
 
 
 class WireBed(BedDriver):
@@ -52,10 +52,10 @@ class WireBed(BedDriver):
     def __init__(self, name: str, period: float, first: int) -> None:
         self.period, self.confirmed = period, True
         self._name, self._number = name, first
-        self._line: Line | None = None
+        self._line: BedLine | None = None
         self._about: About | None = None
         self._decoder = Decoder()
-        self._in_force = InForce(0, 0, 0, 0, 0)
+        self._in_force = LimitsAnswer(0, 0, 0, 0, 0)
         self._sensors: tuple[tuple[str, float], ...] = ()
         self._step = 0
         """Ticks that a bed in lock-step advances by at an exchange; 0 for one with a time of its own."""
@@ -63,7 +63,7 @@ class WireBed(BedDriver):
         """As it came, and as it is: without the jumps where it wraps around."""
 
     @abstractmethod
-    def open(self) -> Line:
+    def open(self) -> BedLine:
         """A new line. Raises Problem E400, E405."""
 
     def connect(self) -> About:
@@ -79,9 +79,9 @@ class WireBed(BedDriver):
     def _greet(self) -> About:
         line = self._line
         assert line is not None
-        self._line = heard = Heard(line)
+        self._line = heard = TappedLine(line)
         try:
-            found = self._asked_again(messages.Hello(), Greeting, _BOOT)
+            found = self._asked_again(messages.HelloMessage(), HelloAnswer, _BOOT)
         finally:
             self._line = line
         if found is None:
@@ -101,31 +101,33 @@ class WireBed(BedDriver):
     def limit(self, asked: Mapping[str, float]) -> None:
         about = self._there()
         for name, most in greeting.tighter(about, asked).items():
-            found = self._asked(messages.Limit(LIMITS.index(name), most), InForce)
+            found = self._asked(messages.LimitMessage(LIMIT_NAMES.index(name), most), LimitsAnswer)
             if getattr(found, name) > most:
                 message = f"bed `{about.name}` does not take a tighter limit of {name.replace('_', ' ')}"
                 raise Problem(error("E406", message, help="limits are set before it is armed"))
             self._in_force = found
 
-    def arm(self) -> Sample:
+    def arm(self) -> BedSample:
         about = self._there()
         # so that a bed whose answer was lost is asked again before its deadman has it; or says that it has
         waits = _WAITS if self._step else (*(about.deadman / 3,) * 3, _WAITS[-1])
         self.confirmed = False
-        message = messages.Arm(about.session)
-        first = self._answer(message, Reading, waits[0])
-        sample = self._sample(first or self._asked(message, Reading, waits[1:]))
-        if sample.state != State.ARMED or (sample.refused and first is not None):
-            self.confirmed = sample.state != State.ARMED
+        message = messages.ArmMessage(about.session)
+        first = self._answer(message, SampleAnswer, waits[0])
+        sample = self._sample(first or self._asked(message, SampleAnswer, waits[1:]))
+        if sample.state != BedState.ARMED or (sample.refused and first is not None):
+            self.confirmed = sample.state != BedState.ARMED
             raise refusals.refused(about, "arm", sample)
         return sample
 
-    def exchange(self, voltage: float, current: float) -> Sample | None:
+    def exchange(self, voltage: float, current: float) -> BedSample | None:
         about = self._there()
         volts = self._counts("a voltage", voltage, about.scales.voltage, self._in_force.voltage, "V")
         amperes = self._counts("a current", current, about.scales.current, self._in_force.current, "A")
-        command = messages.Step(volts, amperes, self._step) if self._step else messages.Drive(volts, amperes)
-        found = self._answer(command, Reading, self.patience)
+        command = (
+            messages.StepMessage(volts, amperes, self._step) if self._step else messages.DriveMessage(volts, amperes)
+        )
+        found = self._answer(command, SampleAnswer, self.patience)
         return None if found is None else self._sample(found)
 
     def _counts(self, what: str, value: float, scale: float, most: int, unit: str) -> int:
@@ -135,23 +137,23 @@ class WireBed(BedDriver):
             raise refusals.no_command(self._there(), what, value, unit, most * scale)
         return counts
 
-    def read(self) -> Sample:
+    def read(self) -> BedSample:
         self._there()
-        return self._sample(self._asked(messages.Read(), Reading))
+        return self._sample(self._asked(messages.ReadMessage(), SampleAnswer))
 
-    def look(self) -> Sample | None:
+    def look(self) -> BedSample | None:
         self._there()
-        found = self._answer(messages.Read(), Reading, self.patience)
+        found = self._answer(messages.ReadMessage(), SampleAnswer, self.patience)
         return None if found is None else self._sample(found)
 
-    def clear(self) -> Sample:
+    def clear(self) -> BedSample:
         about = self._there()
-        sample = self._sample(self._asked(messages.Clear(), Reading))
-        if sample.state != State.DISARMED:
+        sample = self._sample(self._asked(messages.ClearMessage(), SampleAnswer))
+        if sample.state != BedState.DISARMED:
             raise refusals.refused(about, "clear", sample)
         return sample
 
-    def rest(self, time: float) -> Sample:
+    def rest(self, time: float) -> BedSample:
         about = self._there()
         self.stop()
         if Capability.LOCK_STEP not in about.capabilities:
@@ -162,19 +164,19 @@ class WireBed(BedDriver):
         sample = None if left else self.read()
         while left:
             ticks = min(left, 255)
-            found = self._answer(messages.Step(0, 0, ticks), Reading, _WAITS[-1] + ticks * _SIMULATED)
+            found = self._answer(messages.StepMessage(0, 0, ticks), SampleAnswer, _WAITS[-1] + ticks * _SIMULATED)
             if found is None:
                 raise refusals.silent(about.name, "STEP")
             sample, left = self._sample(found), left - ticks
         assert sample is not None
         return sample
 
-    def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> Sample:
+    def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> BedSample:
         about = self._there()
         if Capability.SIMULATED not in about.capabilities:
             raise real_plant()
         for which, value in ((1, float(seed)), (2, float(repeat)), (0, rate)):
-            sample = self._sample(self._asked(messages.Preset(which, value), Reading))
+            sample = self._sample(self._asked(messages.PresetMessage(which, value), SampleAnswer))
             if sample.refused:
                 raise refusals.refused(about, "start its plant anew", sample)
         return sample
@@ -184,8 +186,8 @@ class WireBed(BedDriver):
             return self.confirmed
         for _ in range(2):  # a transcript that cannot be written is in the way once
             try:
-                found = self._asked_again(messages.Stop(), Reading, _STOP)
-                self.confirmed = found is not None and found.status & messages.STATE != State.ARMED
+                found = self._asked_again(messages.StopMessage(), SampleAnswer, _STOP)
+                self.confirmed = found is not None and found.status & messages.STATE != BedState.ARMED
                 break
             except Problem:
                 self.confirmed = False  # the line is dead: the bed's deadman stops it
@@ -204,25 +206,25 @@ class WireBed(BedDriver):
             raise refusals.not_connected(self._name)
         return self._about
 
-    def _asked(self, message: Asked, kind: type[T], waits: Sequence[float] = _WAITS) -> T:
+    def _asked(self, message: HostMessage, kind: type[T], waits: Sequence[float] = _WAITS) -> T:
         found = self._asked_again(message, kind, waits)
         if found is None:
-            raise refusals.silent(self._there().name, type(message).__name__.upper())
+            raise refusals.silent(self._there().name, message.word)
         return found
 
-    def _asked_again(self, message: Asked, kind: type[T], waits: Sequence[float]) -> T | None:
+    def _asked_again(self, message: HostMessage, kind: type[T], waits: Sequence[float]) -> T | None:
         for wait in waits:
             found = self._answer(message, kind, wait)
             if found is not None:
                 return found
         return None
 
-    def _answer(self, message: Asked, kind: type[T], wait: float) -> T | None:
+    def _answer(self, message: HostMessage, kind: type[T], wait: float) -> T | None:
         """The answer to a message, if it comes in time; what else comes is dropped."""
         line = self._line
         assert line is not None
         self._number = number = (self._number + 1) % messages.NUMBERS
-        line.send(messages.sent(message, number))
+        line.send(messages.frame_of(message, number))
         until, nonsense = line.now() + wait, 0
         while nonsense < _NONSENSE:
             data = line.receive(until)
@@ -230,24 +232,29 @@ class WireBed(BedDriver):
                 return None
             nonsense += len(data)
             for payload in self._decoder.feed(data):
-                found = messages.answered(payload, len(self._sensors))
+                found = messages.bed_answer(payload, len(self._sensors))
                 if found is None or found[0] != number:
                     continue
                 if isinstance(found[1], kind):
                     return found[1]
-                if isinstance(found[1], OtherVersion) and kind is Greeting:
+                if isinstance(found[1], OtherVersionAnswer) and kind is HelloAnswer:
                     raise refusals.other_version(found[1].version)
         return None
 
-    def _sample(self, found: Reading) -> Sample:
+    def _sample(self, found: SampleAnswer) -> BedSample:
         status, scale = found.status, self._there().scales.rate
         read = dict[str, float]()
         for (name, of), counts in zip(self._sensors, found.others, strict=True):
             read[name] = (self._unwrapped(counts) if name == "angle" else counts) * of
-        return Sample(
-            State(status & messages.STATE), bool(status & _GREETED), Fault(status & _FAULTS), bool(status & _REFUSED),
-            found.tick, found.rate * scale, **read,
-        )  # fmt: skip
+        return BedSample(
+            BedState(status & messages.STATE),
+            bool(status & _GREETED),
+            Fault(status & _FAULTS),
+            bool(status & _REFUSED),
+            found.tick,
+            found.rate * scale,
+            **read,
+        )
 
     def _unwrapped(self, counts: int) -> int:
         before, angle = self._angle or (counts, counts)

@@ -1,8 +1,8 @@
 """A bed led through the moves, in a process of its own: `python -m hw.identify.driving`, told what to do in a line of
-JSON (`Asked`).
+JSON (`MovesRequest`).
 
 It says how it goes on its standard output, a line of JSON each: {"said": words}, {"about": ..., "peaks": ...}, at the
-end {"ended": ...} (`Ended`) or {"wrong": diagnostics}. What came of each exchange is in the records. It stops the bed
+end {"ended": ...} (`LoopEnd`) or {"wrong": diagnostics}. What came of each exchange is in the records. It stops the bed
 when it is interrupted, terminated, or its parent is no more.
 """
 
@@ -16,7 +16,7 @@ from hw import loop, process, refusals
 from hw.bed import Capability, Limits
 from hw.beds import latch
 from hw.case import pace_of
-from hw.identify.moves import Guide, Peaks, guided
+from hw.identify.moves import MoveGuide, Peaks, guided
 from hw.ports import Port, opened
 from hw.writer import recording
 from met.diagnostic import Problem, error
@@ -31,7 +31,7 @@ TURNS = 4.0
 
 
 @frozen
-class Asked:
+class MovesRequest:
     """plan: of one experiment, as text (met.plan.file);  row: of its case table;  joint: whose motor is on the bed
     port, baud, lock_step, transcript: as of hw.ports.Port;  records: the file that they go to
     sheet: what is believed of the bed, by the names of hw.identify.model.MOTOR, and `v_max`, V
@@ -53,7 +53,7 @@ class Asked:
 
 
 @frozen
-class Ended:
+class MovesResult:
     """began: of each move, the exchange at which the bed was at rest;  lock_step: whether the bed has no time of its
     own;  seconds: that it took"""
 
@@ -62,7 +62,7 @@ class Ended:
     seconds: float
 
 
-def peaks(limits: Limits, sheet: Mapping[str, float], asked: Asked) -> tuple[Peaks, float]:
+def peaks(limits: Limits, sheet: Mapping[str, float], asked: MovesRequest) -> tuple[Peaks, float]:
     """What the moves may ask for, and the rate, rad/s, up to which those go that are to reach the drive's largest
     torque. Raises Problem E421."""
     for name, value, most, unit in (("voltage", asked.voltage, limits.voltage, "V"),
@@ -86,7 +86,7 @@ def peaks(limits: Limits, sheet: Mapping[str, float], asked: Asked) -> tuple[Pea
     return Peaks(voltage, current, rate), min(top, SHARE * rate)
 
 
-def run(asked: Asked) -> Ended:
+def run(asked: MovesRequest) -> MovesResult:
     """Lead the bed through the moves. Raises Problem."""
     experiment = plan_file.loads(asked.plan).experiments[0]
     of = pace_of(experiment)
@@ -105,8 +105,8 @@ def run(asked: Asked) -> Ended:
         bed.limit({"voltage": most.voltage + scales.voltage, "current": most.current + scales.current})
         # a change of command is of whole counts too
         slews = [SHARE * slew for slew in (about.limits.voltage_slew, about.limits.current_slew)]
-        guide = Guide(guided(top), most, of.period, (slews[0], slews[1]))
-        process.say(about=process.told(about), peaks={**asdict(most), "top": top})
+        guide = MoveGuide(guided(top), most, of.period, (slews[0], slews[1]))
+        process.say(about=process.about_as_json(about), peaks={**asdict(most), "top": top})
         if not lock_step:
             process.precedence()
         bed.patience = of.patience(lock_step)
@@ -131,8 +131,8 @@ def run(asked: Asked) -> Ended:
             where = f"in move {count} ({guided(top)[count - 1].name})" if count else "before the first move"
             message = f"bed `{about.name}` at {seconds:.3g} s, {where}: {ended.why}"
             raise Problem(error("E420", message, help=remedies))
-        return Ended(tuple(guide.began), lock_step, seconds)
+        return MovesResult(tuple(guide.began), lock_step, seconds)
 
 
 if __name__ == "__main__":
-    process.answer(Asked, lambda asked: {"ended": asdict(run(asked))})
+    process.answer(MovesRequest, lambda asked: {"ended": asdict(run(asked))})

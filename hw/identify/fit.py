@@ -53,7 +53,7 @@ class Estimate:
 
 
 @frozen
-class Found:
+class FitResult:
     """parameters: by name, of the motor and the bed;  ripple: rms of the misalignment's torque, N m, once, twice a turn
     residual   rms of what was read less what is simulated, rad/s, by move;  rate: rms of what was read, rad/s
     limited    share of the time at which the drive was at its largest torque
@@ -68,7 +68,7 @@ class Found:
     settled: bool
 
 
-def fitted(series: Series, groups: Sequence[int], start: Mapping[str, float]) -> Found:
+def fitted(series: Series, groups: Sequence[int], start: Mapping[str, float]) -> FitResult:
     """groups: of each move, from 0 on;  start: parameters to begin with, of `MOTOR`. One that the moves do not tell
     stays what it is there: `kt_load`, unless the drive motor's current was measured; `tau_max` and `f_v`, where the
     drive was never at its largest torque.
@@ -113,7 +113,7 @@ def fitted(series: Series, groups: Sequence[int], start: Mapping[str, float]) ->
     counts = np.bincount(series.move, ~np.isnan(series.rate), minlength=series.moves)
     by_move = np.sqrt(np.bincount(series.move, residual**2, minlength=series.moves) / counts)
     rate = float(np.sqrt(np.nanmean(series.rate**2)))
-    return Found(estimates, (ripple[0], ripple[1]), by_move, rate, limited, settled)
+    return FitResult(estimates, (ripple[0], ripple[1]), by_move, rate, limited, settled)
 
 
 class _Search:

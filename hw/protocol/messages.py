@@ -6,6 +6,7 @@ Fields that the wire has no room for raise `struct.error`: whoever sends checks 
 from __future__ import annotations
 
 import struct
+from typing import get_args
 
 from hw.bed import Capability, Limits, Scales
 from hw.protocol.frames import framed
@@ -28,18 +29,20 @@ _HEAD = struct.Struct("<BH")
 
 
 @frozen
-class Hello:
-    """Who is there? version: the highest that the host speaks."""
+class HelloMessage:
+    """HELLO, the question who is there. version: the highest of the protocol that the host speaks."""
 
+    word = "HELLO"
     kind = 0x01
     layout = struct.Struct("<B")
     version: int = VERSION
 
 
 @frozen
-class Limit:
-    """A tighter limit. which: 0 voltage, 1 current, 2 rate, 3 voltage slew, 4 current slew; slews in counts a tick."""
+class LimitMessage:
+    """LIMIT, a tighter limit, in counts. which: 0 voltage, 1 current, 2 rate; 3 voltage and 4 current slew, a tick."""
 
+    word = "LIMIT"
     kind = 0x02
     layout = struct.Struct("<Bi")
     which: int
@@ -47,18 +50,20 @@ class Limit:
 
 
 @frozen
-class Arm:
-    """session: as the bed said it when it was greeted."""
+class ArmMessage:
+    """ARM: have commands taken from here on. session: the number that the bed gave in its answer to HELLO."""
 
+    word = "ARM"
     kind = 0x03
     layout = struct.Struct("<I")
     session: int
 
 
 @frozen
-class Drive:
-    """What the amplifiers are to hold from now on."""
+class DriveMessage:
+    """DRIVE: voltage and current, in counts, that the amplifiers hold from now on."""
 
+    word = "DRIVE"
     kind = 0x04
     layout = struct.Struct("<iix")
     voltage: int
@@ -66,9 +71,10 @@ class Drive:
 
 
 @frozen
-class Step:
-    """The same, of a bed in lock-step, and let so many ticks pass, 1 to 255."""
+class StepMessage:
+    """STEP: as DRIVE, for a bed in lock-step, which then advances by so many ticks, 1 to 255."""
 
+    word = "STEP"
     kind = 0x05
     layout = struct.Struct("<iiB")
     voltage: int
@@ -77,51 +83,63 @@ class Step:
 
 
 @frozen
-class Stop:
-    """Disarm."""
+class StopMessage:
+    """STOP: go to the safe state, disarmed."""
 
+    word = "STOP"
     kind = 0x06
     layout = struct.Struct("<")
 
 
 @frozen
-class Clear:
-    """Unlatch faults."""
+class ClearMessage:
+    """CLEAR: forget the faults that are latched."""
 
+    word = "CLEAR"
     kind = 0x07
     layout = struct.Struct("<")
 
 
 @frozen
-class Read:
-    """The present state, please."""
+class ReadMessage:
+    """READ: answer with the present state and sensors."""
 
+    word = "READ"
     kind = 0x08
     layout = struct.Struct("<")
 
 
 @frozen
-class Preset:
-    """Of a simulated plant. which: 0 start anew at so many rad/s, 1 seed, 2 repeat."""
+class PresetMessage:
+    """PRESET, for a simulated plant. which: 0 start anew at so many rad/s, 1 seed of the noise, 2 its repeat."""
 
+    word = "PRESET"
     kind = 0x09
     layout = struct.Struct("<Bd")
     which: int
     value: float
 
 
-Asked = Hello | Limit | Arm | Drive | Step | Stop | Clear | Read | Preset
-_ASKED: dict[int, type[Asked]] = {
-    each.kind: each for each in (Hello, Limit, Arm, Drive, Step, Stop, Clear, Read, Preset)
-}
+HostMessage = (
+    HelloMessage
+    | LimitMessage
+    | ArmMessage
+    | DriveMessage
+    | StepMessage
+    | StopMessage
+    | ClearMessage
+    | ReadMessage
+    | PresetMessage
+)
+_HOST_MESSAGES: dict[int, type[HostMessage]] = {message.kind: message for message in get_args(HostMessage)}
 
 
 # What the bed answers
 
 
 @frozen
-class Greeting:
-    """firmware, name: as they stand, with their zeros."""
+class HelloAnswer:
+    """The answer to HELLO. firmware, name: the bytes as they come, filled up with zeros; the rest as in `About`."""
 
     kind = 0x81
     version: int
@@ -136,15 +154,15 @@ class Greeting:
 
 
 @frozen
-class OtherVersion:
-    """The greeting of a bed that speaks another version: of the rest nothing is known."""
+class OtherVersionAnswer:
+    """The answer to HELLO of a bed that speaks another version of the protocol: the rest of it cannot be read."""
 
     version: int
 
 
 @frozen
-class InForce:
-    """The limits in force, slews in counts a tick."""
+class LimitsAnswer:
+    """LIMITS: the limits in force, in counts; slews in counts a tick."""
 
     kind = 0x82
     voltage: int
@@ -155,8 +173,9 @@ class InForce:
 
 
 @frozen
-class Reading:
-    """status: its bits; others: angle, drive current, acceleration, of those that the bed has."""
+class SampleAnswer:
+    """SAMPLE: status bits, tick, rate in counts. others: counts of angle, drive current and acceleration, those that
+    the bed has."""
 
     kind = 0x84
     status: int
@@ -165,7 +184,7 @@ class Reading:
     others: tuple[int, ...]
 
 
-Answer = Greeting | OtherVersion | InForce | Reading
+Answer = HelloAnswer | OtherVersionAnswer | LimitsAnswer | SampleAnswer
 
 _GREETING = struct.Struct("<BHBHI8s16s15d")
 _IN_FORCE = struct.Struct("<BH5i")
@@ -175,39 +194,39 @@ SENSORS = (Capability.ENCODER, Capability.DRIVE_CURRENT, Capability.ACCELEROMETE
 """The capabilities that each add a number to a SAMPLE, in its order."""
 
 
-def sent(message: Asked, number: int) -> bytes:
-    """The frame of a message."""
+def frame_of(message: HostMessage, number: int) -> bytes:
+    """The frame of a message with its sequence number, as it goes over the line."""
     body = message.layout.pack(*message.__dict__.values())
     return framed(_HEAD.pack(message.kind, number) + body)
 
 
-def asked(payload: bytes) -> tuple[int, Asked] | None:
-    """Number and message of a payload from the host; None of one that means nothing."""
+def host_message(payload: bytes) -> tuple[int, HostMessage] | None:
+    """Sequence number and message of a payload from the host; None for a payload that is no message."""
     kind, number = _HEAD.unpack_from(payload)
-    message = _ASKED.get(kind)
+    message = _HOST_MESSAGES.get(kind)
     if message is None or len(payload) != _HEAD.size + message.layout.size:
         return None
     return number, message(*message.layout.unpack_from(payload, _HEAD.size))
 
 
-def answered(payload: bytes, sensors: int) -> tuple[int, Answer] | None:
-    """Number and message of a payload from a bed with so many of `SENSORS`; None of one that means nothing."""
+def bed_answer(payload: bytes, sensors: int) -> tuple[int, Answer] | None:
+    """Sequence number and answer of a payload from a bed. sensors: how many of `SENSORS` it has; None: no answer."""
     kind = payload[0]
-    if kind == Reading.kind:
+    if kind == SampleAnswer.kind:
         layout = _READINGS[sensors]
         if len(payload) != layout.size:
             return None
         _, number, status, tick, rate, *others = layout.unpack(payload)
         if status & STATE == STATE:
             return None
-        return number, Reading(status, tick, rate, tuple(others))
-    if kind == Greeting.kind and len(payload) > _HEAD.size and payload[_HEAD.size] != VERSION:
-        return _HEAD.unpack_from(payload)[1], OtherVersion(payload[_HEAD.size])
-    if kind == Greeting.kind and len(payload) == _GREETING.size:
+        return number, SampleAnswer(status, tick, rate, tuple(others))
+    if kind == HelloAnswer.kind and len(payload) > _HEAD.size and payload[_HEAD.size] != VERSION:
+        return _HEAD.unpack_from(payload)[1], OtherVersionAnswer(payload[_HEAD.size])
+    if kind == HelloAnswer.kind and len(payload) == _GREETING.size:
         _, number, version, capabilities, session, firmware, name, *x = _GREETING.unpack(payload)
         scales, limits = Scales(*x[2:8]), Limits(*x[8:])
-        return number, Greeting(version, capabilities, session, firmware, name, x[0], x[1], scales, limits)
-    if kind == InForce.kind and len(payload) == _IN_FORCE.size:
+        return number, HelloAnswer(version, capabilities, session, firmware, name, x[0], x[1], scales, limits)
+    if kind == LimitsAnswer.kind and len(payload) == _IN_FORCE.size:
         _, number, *limits_in_force = _IN_FORCE.unpack(payload)
-        return number, InForce(*limits_in_force)
+        return number, LimitsAnswer(*limits_in_force)
     return None

@@ -26,8 +26,8 @@ from benchmarks.benchmark import Benchmark, Target, Untaken
 from hw import realtime, records
 from hw.beds.simulated import config_of
 from hw.build import build
-from hw.case import Asked, pace_of
-from hw.driven import LANES, Driven
+from hw.case import CaseRequest, pace_of
+from hw.driven import LANES, CaseKernel
 from hw.process import talk
 from hw.timing import Timing, timing
 from met.plan import Experiment, Plan
@@ -63,7 +63,7 @@ def _step(share: float) -> Callable[[], float]:
     clock = time.perf_counter_ns
 
     def measure() -> float:
-        driven = Driven(prepared, 0)
+        driven = CaseKernel(prepared, 0)
         rates, told = [0.0], [[0.0, 0.0]]
         driven(0, rates, told)
         times = np.zeros(driven.last, dtype=np.int64)
@@ -123,7 +123,9 @@ def _kept(line: str) -> tuple[Timing, int]:
         with tempfile.TemporaryDirectory() as folder, _at(line, made) as port:
             path = Path(folder) / "one.records"
             said = list[str]()
-            for _ in talk("hw.case", Asked(plan=plan, row=0, ports={"joint2": port}, records=str(path)), said.append):
+            for _ in talk(
+                "hw.case", CaseRequest(plan=plan, row=0, ports={"joint2": port}, records=str(path)), said.append
+            ):
                 pass
             rows = records.read(path)
         hz = rows.head["tick_hz"]

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from hw.beds.wire import WireBed
-from hw.line import Line
-from hw.transcript import Recorded, Writer
+from hw.line import BedLine
+from hw.transcript import TranscribedLine, TranscriptWriter
 from met.diagnostic import Problem
 from met.messages.render import render
 from tests.hw.device import Device
@@ -22,17 +22,17 @@ class LineBed(WireBed):
     """A bed on the lines that `open_line` gives; its transcript, where asked for, in `records`."""
 
     def __init__(
-        self, open_line: Callable[[], Line], period: float = 1e-3, first: int = 100, recorded: bool = False
+        self, open_line: Callable[[], BedLine], period: float = 1e-3, first: int = 100, recorded: bool = False
     ) -> None:
         super().__init__("a line", period, first)
         self._open_line = open_line
         self.records: list[bytes] = []
         header = {"line": "a line", "period": period, "first": first}
-        self._writer = Writer(self.records.append, header) if recorded else None
+        self._writer = TranscriptWriter(self.records.append, header) if recorded else None
 
-    def open(self) -> Line:
+    def open(self) -> BedLine:
         line = self._open_line()
-        return line if self._writer is None else Recorded(line, self._writer)
+        return line if self._writer is None else TranscribedLine(line, self._writer)
 
     @property
     def number(self) -> int:

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from hw.bed import Fault, Limits, Sample, State
+from hw.bed import BedSample, BedState, Fault, Limits
 from hw.beds import emulated
 from hw.beds.emulated import EmulatedBed
 from met.diagnostic import Problem
@@ -51,10 +51,10 @@ def test_a_load_that_is_loaded_for_too_long_stops_it() -> None:
     bed.connect()
     bed.arm()
     samples = [bed.exchange(0.0, 0.9) for _ in range(1000)]
-    assert all(sample is not None and sample.state == State.ARMED for sample in samples)
+    assert all(sample is not None and sample.state == BedState.ARMED for sample in samples)
     ticks = 0
-    sample: Sample | None = None
-    while sample is None or sample.state == State.ARMED:
+    sample: BedSample | None = None
+    while sample is None or sample.state == BedState.ARMED:
         sample, ticks = bed.exchange(0.0, 2.0), ticks + 1
     assert sample.faults == Fault.HEAT and (bed.voltage, bed.current) == (0.0, 0.0)
     assert ticks == math.ceil(0.5 / ((round(2.0 / (6 / 4096)) * 6 / 4096) ** 2 - 1.0) * 1e3)
@@ -75,7 +75,7 @@ def test_a_whole_change_of_command_within_a_tick_is_no_fault_unless_it_is_made_o
     bed.arm()
     for way in (1.0, -1.0, 1.0):
         sample = bed.exchange(way * 60.0, way * 3.0)
-        assert sample is not None and sample.state == State.ARMED
+        assert sample is not None and sample.state == BedState.ARMED
 
 
 def test_why_it_does_not_take_limits_while_it_is_armed() -> None:

@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 
 from hw import transcript
-from hw.bed import Fault, Sample, State
+from hw.bed import BedSample, BedState, Fault
 from hw.beds.replay import ReplayBed
 from hw.beds.serial_line import SerialBed
 from hw.beds.wire import WireBed
@@ -46,24 +46,24 @@ def answers_of(device: Device | Board, number: int) -> list[tuple[int, int, int]
     return [struct.unpack_from("<HIi", answer, 3) for answer in device.answers.get(number, []) if answer[0] == 0x84]
 
 
-def is_true(device: Device | Board, number: int, sample: Sample) -> bool:
+def is_true(device: Device | Board, number: int, sample: BedSample) -> bool:
     """Whether the device did answer so."""
     status = sample.state | sample.greeted << 2 | sample.faults | sample.refused << 13
     return (status, sample.tick, round(sample.rate / device.scales[2])) in answers_of(device, number)
 
 
-def ended(sample: Sample | None) -> str:
+def ended(sample: BedSample | None) -> str:
     """Why whoever drives a bed stops after this answer; nothing where it goes on."""
-    if sample is None or (sample.state == State.ARMED and sample.greeted):
+    if sample is None or (sample.state == BedState.ARMED and sample.greeted):
         return ""
     if not sample.greeted:
         return "reset seen"
-    if sample.state == State.STOPPED:
+    if sample.state == BedState.STOPPED:
         return "stopped itself: " + "|".join(str(each.name) for each in Fault if each in sample.faults)
     return "disarmed"
 
 
-def drive(bed: WireBed, then: Callable[[Sample | None], None]) -> str:
+def drive(bed: WireBed, then: Callable[[BedSample | None], None]) -> str:
     """From greeting it to an end, in a word."""
     try:
         about = bed.connect()
@@ -105,9 +105,9 @@ def endings(
 
     bed = LineBed(open_line, PERIOD, first=65000, recorded=True)
     bed.patience = 0.9 * PERIOD
-    samples, began = list[Sample | None](), 0.0
+    samples, began = list[BedSample | None](), 0.0
 
-    def judge(sample: Sample | None) -> None:
+    def judge(sample: BedSample | None) -> None:
         nonlocal began
         found["exchanges"] += 1
         found["answered" if sample is not None else "missed"] += 1
@@ -142,7 +142,7 @@ def endings(
     assert kept.cut == 0
     assert (count[transcript.SENT], count[transcript.RECEIVED]) == (logged["sent"], logged["received"])
 
-    again, replayed = list[Sample | None](), ReplayBed(path)
+    again, replayed = list[BedSample | None](), ReplayBed(path)
     for end in ends:
         assert drive(replayed, again.append) == end
         replayed.stop()
@@ -205,7 +205,7 @@ def test_without_a_look_at_the_numbers_wrong_answers_would_be_taken(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bed: list[LineBed] = []
-    make, answered = LineBed.__init__, messages.answered
+    make, answered = LineBed.__init__, messages.bed_answer
 
     def noted(self: LineBed, *words: Any, **more: Any) -> None:
         make(self, *words, **more)
@@ -216,7 +216,7 @@ def test_without_a_look_at_the_numbers_wrong_answers_would_be_taken(
         return None if found is None else (bed[0].number, found[1])
 
     monkeypatch.setattr(LineBed, "__init__", noted)
-    monkeypatch.setattr(messages, "answered", any_number)
+    monkeypatch.setattr(messages, "bed_answer", any_number)
     with pytest.raises(AssertionError, match="a wrong answer was taken"):
         endings("delay", lock_step=True, exchanges=2000, folder=tmp_path)
 
@@ -231,7 +231,7 @@ def test_faults_among_real_bytes(kind: str, on_pty: Callable[..., str]) -> None:
         bed.arm()
         found = [bed.exchange(0.1 * math.sin(0.1 * n), 0.0) for n in range(300)]
         taken = [sample for sample in found if sample is not None]
-        assert len(taken) > 200 and all(sample.state == State.ARMED for sample in taken)
+        assert len(taken) > 200 and all(sample.state == BedState.ARMED for sample in taken)
         given = {answer for number in device.answers for answer in answers_of(device, number)}
         assert {(1 | 4, sample.tick, round(sample.rate / device.scales[2])) for sample in taken} <= given
         assert [sample.tick for sample in taken] == sorted({sample.tick for sample in taken})

@@ -13,12 +13,12 @@ import pytest
 
 import ic
 from hw import loop, records
-from hw.bed import About, Capability, Limits, Sample
+from hw.bed import About, BedSample, Capability, Limits
 from hw.beds import emulated
 from hw.beds.emulated import EmulatedBed
-from hw.identify.driving import Asked, peaks
-from hw.identify.fit import Found, fitted
-from hw.identify.moves import Guide, Peaks, groups, guided
+from hw.identify.driving import MovesRequest, peaks
+from hw.identify.fit import FitResult, fitted
+from hw.identify.moves import MoveGuide, Peaks, groups, guided
 from hw.identify.series import Series, series
 from hw.pace import pace
 from met.diagnostic import Problem
@@ -61,7 +61,7 @@ class OwnTime(EmulatedBed):
 
     asked = 0
 
-    def exchange(self, voltage: float, current: float) -> Sample | None:
+    def exchange(self, voltage: float, current: float) -> BedSample | None:
         self.asked += 1
         answer = self.read()
         super().exchange(voltage, current)
@@ -79,18 +79,18 @@ class Measuring(EmulatedBed):
         self._chance = np.random.default_rng(1)
         return replace(about, capabilities=about.capabilities | Capability.DRIVE_CURRENT)
 
-    def read(self) -> Sample:
+    def read(self) -> BedSample:
         return self._measured(super().read())
 
-    def arm(self) -> Sample:
+    def arm(self) -> BedSample:
         return self._measured(super().arm())
 
-    def exchange(self, voltage: float, current: float) -> Sample | None:
+    def exchange(self, voltage: float, current: float) -> BedSample | None:
         answer = super().exchange(voltage, current)
         self.volts = voltage
         return None if answer is None else self._measured(answer)
 
-    def _measured(self, sample: Sample) -> Sample:
+    def _measured(self, sample: BedSample) -> BedSample:
         p = self.values
         torque = p["kt"] / p["resistance"] * (self.volts - p["kt"] * self._plant.shaft_rate)  # type: ignore[attr-defined]
         torque = min(max(torque, -p["tau_max"]), p["tau_max"])
@@ -108,7 +108,7 @@ def moved(
     about = bed.connect()
     bed.preset(seed=seed)
     moves = guided(186.0 if voltage == 20.0 else 60.0)
-    guide = Guide(moves, Peaks(voltage, 2.0, 500.0), 1e-3, (4e4, 6e3))
+    guide = MoveGuide(moves, Peaks(voltage, 2.0, 500.0), 1e-3, (4e4, 6e3))
     out: list[bytes] = []
     loop.drive([bed], guide, pace(1000.0), guide.exchanges, out.append, lock_step=True,
                asked_to_stop=lambda: guide.done or guide.stuck)  # fmt: skip
@@ -118,13 +118,13 @@ def moved(
     return found, groups(moves), list(zip(rows["voltage"], rows["current"], rows["rate"], strict=True))
 
 
-def outside(found: Found, truth: Mapping[str, float]) -> list[str]:
+def outside(found: FitResult, truth: Mapping[str, float]) -> list[str]:
     """Parameters whose interval the truth is not in."""
     return [name for name, each in found.parameters.items()
             if each.found and not each.low <= truth[name] <= each.high]  # fmt: skip
 
 
-def identified(folder: Path, seed: int, faults: str) -> tuple[Found, dict[str, float]]:
+def identified(folder: Path, seed: int, faults: str) -> tuple[FitResult, dict[str, float]]:
     truth = hidden(seed)
     what, its, _ = moved(experiment(folder, truth, faults), seed)
     return fitted(what, its, {**SHEET, "kt_load": truth["kt_load"]}), truth
@@ -174,7 +174,7 @@ def test_moves_keep_within_their_peaks_and_slews_and_end_at_rest(tmp_path: Path)
 
 
 def test_a_slew_that_is_small_is_kept(tmp_path: Path) -> None:
-    guide = Guide(guided(100.0), Peaks(10.0, 1.0, 500.0), 1e-3, (500.0, 50.0))
+    guide = MoveGuide(guided(100.0), Peaks(10.0, 1.0, 500.0), 1e-3, (500.0, 50.0))
     told, before = [[0.0, 0.0]], (0.0, 0.0)
     for e in range(3000):
         guide(e, [0.0], told)
@@ -184,7 +184,7 @@ def test_a_slew_that_is_small_is_kept(tmp_path: Path) -> None:
 
 
 def test_a_move_is_over_where_the_shaft_is_too_fast() -> None:
-    guide = Guide(guided(100.0), Peaks(10.0, 1.0, 50.0), 1e-3, (1e5, 1e5))
+    guide = MoveGuide(guided(100.0), Peaks(10.0, 1.0, 50.0), 1e-3, (1e5, 1e5))
     told = [[0.0, 0.0]]
     for e in range(81):
         guide(e, [0.0], told)
@@ -194,7 +194,7 @@ def test_a_move_is_over_where_the_shaft_is_too_fast() -> None:
 
 
 def test_a_shaft_that_does_not_come_to_rest_is_found_out() -> None:
-    guide = Guide(guided(100.0), Peaks(10.0, 1.0, 50.0), 1e-3, (1e5, 1e5))
+    guide = MoveGuide(guided(100.0), Peaks(10.0, 1.0, 50.0), 1e-3, (1e5, 1e5))
     for e in range(3001):
         guide(e, [3.0], [[0.0, 0.0]])
     assert guide.stuck and not guide.began
@@ -225,7 +225,7 @@ def test_friction_and_back_emf_are_not_told_apart_where_the_drive_never_reaches_
 
 
 LIMITS = Limits(60.0, 3.0, 1000.0, 5.0, 1e5, 1e4, 9.0)
-ASKED = Asked(plan="", row=0, joint="", port="", records="", sheet=SHEET)
+ASKED = MovesRequest(plan="", row=0, joint="", port="", records="", sheet=SHEET)
 
 
 def test_peaks_are_of_the_bed_and_the_servo() -> None:

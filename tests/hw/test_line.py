@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from hw.bed import BedDriver, Fault, State
+from hw.bed import BedDriver, BedState, Fault
 from hw.beds.serial_line import SerialBed
 from tests.hw import device as model
 from tests.hw.conftest import LineBed, refusal
@@ -367,7 +367,7 @@ def test_the_answer_to_arm_that_was_lost_is_asked_for_again() -> None:
     bed.connect()
     line.lose = True
     sample = bed.arm()
-    assert sample.state == State.ARMED and device.state == model.ARMED
+    assert sample.state == BedState.ARMED and device.state == model.ARMED
 
 
 def test_numbers_go_around() -> None:
@@ -405,7 +405,7 @@ def test_a_tachometer_that_lies_stops_the_model(how: str, fault: Fault) -> None:
     for _ in range(100):
         sample = bed.exchange(5.0, 0.0)
         assert sample is not None
-        if sample.state == State.STOPPED:
+        if sample.state == BedState.STOPPED:
             break
     assert sample.faults == fault and (device.voltage, device.current) == (0.0, 0.0)
 
@@ -424,7 +424,7 @@ def test_the_watchdog_is_told_and_is_no_reason_not_to_arm() -> None:
     bed = bed_of(Device(by_watchdog=True))
     bed.connect()
     assert bed.read().faults == Fault.WATCHDOG
-    assert bed.arm().state == State.ARMED
+    assert bed.arm().state == BedState.ARMED
 
 
 def test_frames_of_the_model_are_those_of_the_page() -> None:

@@ -13,20 +13,20 @@ from pathlib import Path
 import pytest
 
 from hw import transcript
-from hw.bed import Sample, State
+from hw.bed import BedSample, BedState
 from hw.beds.replay import ReplayBed
 from hw.beds.serial_line import SerialBed
-from hw.transcript import File, Record, Writer
+from hw.transcript import TranscriptFile, TranscriptRecord, TranscriptWriter
 from met.diagnostic import Problem
 from tests.hw.conftest import LineBed, said
 from tests.hw.device import Device
 from tests.hw.relay import VirtualLine
 
 
-def written(path: Path, count: int = 20) -> list[Record]:
-    records = [Record(1 + n % 4, 0.125 * n, bytes(range(n))) for n in range(count)]
+def written(path: Path, count: int = 20) -> list[TranscriptRecord]:
+    records = [TranscriptRecord(1 + n % 4, 0.125 * n, bytes(range(n))) for n in range(count)]
     put = list[bytes]()
-    writer = Writer(put.append, {"line": "x", "period": 0.001, "first": 3})
+    writer = TranscriptWriter(put.append, {"line": "x", "period": 0.001, "first": 3})
     for record in records:
         writer.add(record.kind, record.time, record.data)
     path.write_bytes(b"".join(put))
@@ -99,7 +99,7 @@ def test_a_transcript_that_is_not_there(tmp_path: Path) -> None:
 def test_a_transcript_is_not_overwritten(tmp_path: Path) -> None:
     (tmp_path / "t").touch()
     with pytest.raises(Problem) as caught:
-        File(tmp_path / "t")
+        TranscriptFile(tmp_path / "t")
     assert said(caught.value) == (
         f"error[E409]: {tmp_path / 't'} is there already\n"
         " = help: give another name: what was said to a bed is not overwritten"
@@ -108,7 +108,7 @@ def test_a_transcript_is_not_overwritten(tmp_path: Path) -> None:
 
 def test_a_transcript_that_does_not_say_how_it_was_driven(tmp_path: Path) -> None:
     put = list[bytes]()
-    Writer(put.append, {"line": "x"})
+    TranscriptWriter(put.append, {"line": "x"})
     (tmp_path / "t").write_bytes(b"".join(put))
     with pytest.raises(Problem) as caught:
         ReplayBed(tmp_path / "t")
@@ -120,8 +120,8 @@ def test_a_transcript_that_does_not_say_how_it_was_driven(tmp_path: Path) -> Non
 
 CHILD = """
 import sys
-from hw.transcript import File, Writer
-writer = Writer(File(sys.argv[1]), {"line": "x", "period": 0.001, "first": 3})
+from hw.transcript import TranscriptFile, TranscriptWriter
+writer = TranscriptWriter(TranscriptFile(sys.argv[1]), {"line": "x", "period": 0.001, "first": 3})
 n = 0
 while True:
     writer.add(1, float(n), n.to_bytes(8, "little") * 3)
@@ -148,10 +148,10 @@ def test_a_killed_writer_loses_nothing_that_was_written(tmp_path: Path) -> None:
 # Replay
 
 
-def run(bed: SerialBed | ReplayBed | LineBed, count: int = 50, other: int = -1) -> list[Sample | None]:
+def run(bed: SerialBed | ReplayBed | LineBed, count: int = 50, other: int = -1) -> list[BedSample | None]:
     bed.connect()
     bed.limit({"voltage": 5.0})
-    samples: list[Sample | None] = [bed.preset(rate=1.0, seed=4), bed.arm()]
+    samples: list[BedSample | None] = [bed.preset(rate=1.0, seed=4), bed.arm()]
     for n in range(count):
         voltage = 0.02 * n if n != other else 1.25
         samples.append(bed.exchange(voltage, -0.001 * n))
@@ -161,9 +161,9 @@ def run(bed: SerialBed | ReplayBed | LineBed, count: int = 50, other: int = -1) 
 
 
 @pytest.fixture
-def recorded(tmp_path: Path, on_pty: Callable[..., str]) -> tuple[Path, list[Sample | None]]:
+def recorded(tmp_path: Path, on_pty: Callable[..., str]) -> tuple[Path, list[BedSample | None]]:
     path = tmp_path / "run.transcript"
-    file = File(path)
+    file = TranscriptFile(path)
     with SerialBed(on_pty(Device(capabilities=0b111)), period=1e-3, transcript=file) as bed:
         bed.patience = 1.0
         samples = run(bed)
@@ -171,14 +171,14 @@ def recorded(tmp_path: Path, on_pty: Callable[..., str]) -> tuple[Path, list[Sam
     return path, samples
 
 
-def test_a_transcript_replays_to_the_same_bits(recorded: tuple[Path, list[Sample | None]]) -> None:
+def test_a_transcript_replays_to_the_same_bits(recorded: tuple[Path, list[BedSample | None]]) -> None:
     path, samples = recorded
     with ReplayBed(path) as bed:
         assert run(bed) == samples
-    assert None not in samples and any(sample is not None and sample.state == State.ARMED for sample in samples)
+    assert None not in samples and any(sample is not None and sample.state == BedState.ARMED for sample in samples)
 
 
-def test_what_was_asked_otherwise_is_told(recorded: tuple[Path, list[Sample | None]]) -> None:
+def test_what_was_asked_otherwise_is_told(recorded: tuple[Path, list[BedSample | None]]) -> None:
     path, _ = recorded
     first = int(transcript.read(path).header["first"])
     at = first + 1 + 1 + 3 + 1 + 31  # HELLO, LIMIT, PRESET, ARM, and 31 exchanges
@@ -192,7 +192,7 @@ def test_what_was_asked_otherwise_is_told(recorded: tuple[Path, list[Sample | No
     )
 
 
-def test_a_replay_that_goes_on_longer_is_told(recorded: tuple[Path, list[Sample | None]]) -> None:
+def test_a_replay_that_goes_on_longer_is_told(recorded: tuple[Path, list[BedSample | None]]) -> None:
     path, _ = recorded
     with ReplayBed(path) as bed:
         run(bed)
@@ -204,7 +204,7 @@ def test_a_replay_that_goes_on_longer_is_told(recorded: tuple[Path, list[Sample 
     )
 
 
-def test_a_run_that_crashed_replays_to_its_end(recorded: tuple[Path, list[Sample | None]]) -> None:
+def test_a_run_that_crashed_replays_to_its_end(recorded: tuple[Path, list[BedSample | None]]) -> None:
     path, _ = recorded
     data = path.read_bytes()
     path.write_bytes(data[:2000])
@@ -228,7 +228,7 @@ def test_a_disk_that_is_full_is_told_once_and_the_bed_is_stopped() -> None:
 
     device = Device()
     bed = LineBed(lambda: VirtualLine(device, None))
-    bed._writer = Writer(Full(), {})
+    bed._writer = TranscriptWriter(Full(), {})
     bed.connect()
     bed.arm()
     with pytest.raises(Problem) as caught:

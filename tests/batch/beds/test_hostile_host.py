@@ -22,9 +22,9 @@ import pytest
 
 import batch
 from batch.beds.executor import OnBeds, Ports
-from batch.beds.telling import kept_time, timings
+from batch.beds.telling import timing_lines, timings
 from hw import records, transcript
-from hw.bed import Fault, Sample, State
+from hw.bed import BedSample, BedState, Fault
 from hw.protocol import messages
 from hw.protocol.frames import unframed
 from hw.writer import recording
@@ -126,7 +126,7 @@ def named(pid: int, word: bytes) -> list[int]:
 
 def test_a_bed_that_does_not_stop_is_told() -> None:
     def deaf(device: Device, frame: bytes) -> bytes:
-        return b"" if kind(frame) == messages.Stop.kind else device.take(frame)
+        return b"" if kind(frame) == messages.StopMessage.kind else device.take(frame)
 
     device = Device()
     with served(device, deaf) as port:
@@ -152,8 +152,8 @@ def test_an_interrupt_while_it_rests_ends_it_at_once_and_arms_nothing(here: Path
     kinds = set[type]()
     if second.exists():
         sent = [unframed(each.data[:-1]) for each in transcript.read(second).records if each.kind == transcript.SENT]
-        kinds = {type(messages.asked(each)[1]) for each in sent if each is not None}  # type: ignore[index]
-    assert messages.Arm not in kinds
+        kinds = {type(messages.host_message(each)[1]) for each in sent if each is not None}  # type: ignore[index]
+    assert messages.ArmMessage not in kinds
     assert took < 3.0
 
 
@@ -205,7 +205,7 @@ def test_a_run_in_a_container_is_not_asked_to_stop() -> None:
 
 
 def test_a_writer_that_is_gone_ends_the_run(here: Path) -> None:
-    record = records.packed(0, 0, 0, (0, 0, 0, 0), 0.0, 0.0, Sample(State.ARMED, True, Fault(0), False, 0, 0.0))
+    record = records.packed(0, 0, 0, (0, 0, 0, 0), 0.0, 0.0, BedSample(BedState.ARMED, True, Fault(0), False, 0, 0.0))
     count = 0
     with pytest.raises(Problem) as told, recording(here / "r.records", {}, 2000) as put:
         while not (found := named(os.getpid(), b"hw.writer")):  # it has a name once it is begun
@@ -259,7 +259,7 @@ def test_a_bed_that_stops_itself_at_the_last_exchange_is_a_failed_case() -> None
 
     def at_last(device: Device, frame: bytes) -> bytes:
         nonlocal steps
-        steps += kind(frame) == messages.Step.kind
+        steps += kind(frame) == messages.StepMessage.kind
         if steps == 200 and device.state != STOPPED:
             device.stop(RATE)
         return device.take(frame)
@@ -314,7 +314,9 @@ def test_beds_of_runs_at_other_rates_have_each_its_own_ticks() -> None:
 
 
 def test_exchanges_without_an_answer_are_told_in_lock_step() -> None:
-    assert "unanswered: 3" in "\n".join(kept_time(known(rows_of(200, 1000.0, silent=3), hz=(1000.0,), lock_step=True)))
+    assert "unanswered: 3" in "\n".join(
+        timing_lines(known(rows_of(200, 1000.0, silent=3), hz=(1000.0,), lock_step=True))
+    )
 
 
 def test_rest_does_not_change_the_bits_of_a_simulated_bed() -> None:

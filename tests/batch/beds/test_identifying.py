@@ -18,8 +18,8 @@ from hw.bed import About, Capability, Limits, Scales
 from hw.beds import emulated
 from hw.beds.emulated import EmulatedBed
 from hw.identify import driving
-from hw.identify.driving import Asked
-from hw.identify.fit import Estimate, Found
+from hw.identify.driving import MovesRequest
+from hw.identify.fit import Estimate, FitResult
 from met import cli
 from met.diagnostic import Problem
 from met.plan import Experiment, Plan
@@ -157,7 +157,7 @@ def test_moves_that_are_cut_short(
     monkeypatch.setattr(driving, "opened", lambda *_: bed)
     monkeypatch.setattr("hw.process.listening", lambda: lambda: False)
     sheet = dict(sheet_of(of, "shoulder", None).values)
-    asked = Asked(plan=plan_file.dumps(Plan("", (of,))), row=0, joint="shoulder", port="emulated",
+    asked = MovesRequest(plan=plan_file.dumps(Plan("", (of,))), row=0, joint="shoulder", port="emulated",
                   records=str(here / "a.records"), sheet=sheet, rate=rate)  # fmt: skip
     with pytest.raises(Problem) as caught:
         driving.run(asked)
@@ -179,7 +179,7 @@ error[E423]: bed `bench`: no parameters were settled on in the time that the sea
  = help: begin nearer: the servo's motor in the deck is where it begins"""),
 ])  # fmt: skip
 def test_a_bed_that_is_no_motor_bed(settled: bool, message: str) -> None:
-    found = Found({}, (0.0, 0.0), np.array([10.0, 12.0]), 100.0, 0.2, settled)
+    found = FitResult({}, (0.0, 0.0), np.array([10.0, 12.0]), 100.0, 0.2, settled)
     with pytest.raises(Problem) as caught:
         check(found, ABOUT)
     assert said(caught.value) == message

@@ -13,8 +13,8 @@ import pytest
 
 from batch.beds.jitter import duration, histogram, lines, off
 from hw import loop
-from hw.bed import About, BedDriver, Fault, Sample, State
-from hw.jitter import kept
+from hw.bed import About, BedDriver, BedSample, BedState, Fault
+from hw.jitter import jitter_result
 from hw.pace import Pace
 from hw.records import ANSWERED, LATE_WOKEN, LAYOUT
 from met import cli
@@ -126,12 +126,12 @@ class Watched(BedDriver):
 
     def __init__(self, silent: Callable[[int], bool] = lambda n: False) -> None:
         self._silent, self.looks, self.stopped = silent, 0, False
-        self.sample = Sample(State.STOPPED, True, Fault.DEADMAN, False, 0, 0.0)
+        self.sample = BedSample(BedState.STOPPED, True, Fault.DEADMAN, False, 0, 0.0)
 
-    def read(self) -> Sample:
+    def read(self) -> BedSample:
         return self.sample
 
-    def look(self) -> Sample | None:
+    def look(self) -> BedSample | None:
         self.looks += 1
         return None if self._silent(self.looks) else self.sample
 
@@ -142,26 +142,26 @@ class Watched(BedDriver):
     def connect(self) -> About:
         raise AssertionError
 
-    def arm(self) -> Sample:
+    def arm(self) -> BedSample:
         raise AssertionError
 
-    def exchange(self, voltage: float, current: float) -> Sample | None:
+    def exchange(self, voltage: float, current: float) -> BedSample | None:
         raise AssertionError
 
     def limit(self, asked: Mapping[str, float]) -> None:
         raise AssertionError
 
-    def clear(self) -> Sample:
+    def clear(self) -> BedSample:
         raise AssertionError
 
-    def rest(self, time: float) -> Sample:
+    def rest(self, time: float) -> BedSample:
         raise AssertionError
 
     def close(self) -> None:
         raise AssertionError
 
 
-def looked(bed: BedDriver, exchanges: int, hz: float = 1000.0) -> tuple[loop.Ended, np.ndarray]:
+def looked(bed: BedDriver, exchanges: int, hz: float = 1000.0) -> tuple[loop.LoopEnd, np.ndarray]:
     rows: list[bytes] = []
     ended = loop.drive([bed], lambda e, rates, told: None, Pace(hz, 1), exchanges, rows.append, lock_step=False,
                        armed=False)  # fmt: skip
@@ -171,7 +171,7 @@ def looked(bed: BedDriver, exchanges: int, hz: float = 1000.0) -> tuple[loop.End
 def test_looking_goes_on_through_silence_that_would_end_a_run() -> None:
     bed = Watched(silent=lambda n: 10 <= n < 20 or 30 <= n < 33)
     ended, rows = looked(bed, 40)
-    assert ended == loop.Ended(41) and bed.looks == 40 and bed.stopped
+    assert ended == loop.LoopEnd(41) and bed.looks == 40 and bed.stopped
     assert ((rows["flags"] & ANSWERED) == 0).sum() == 13
 
 
@@ -192,7 +192,7 @@ def test_looking_goes_on_where_the_host_was_late_without_making_up_for_it() -> N
 def test_a_bed_that_was_reset_ends_it() -> None:
     bed = Watched()
     bed.sample = replace(bed.sample, greeted=False)
-    assert looked(bed, 10)[0] == loop.Ended(0, "the bed was reset", 0)
+    assert looked(bed, 10)[0] == loop.LoopEnd(0, "the bed was reset", 0)
 
 
 # Figures
@@ -216,7 +216,7 @@ def rows_of(count: int, *, silent: tuple[int, ...] = (), late: tuple[int, ...] =
 
 
 def test_figures_of_records() -> None:
-    found = kept(rows_of(101), 1000.0, 1000.0)
+    found = jitter_result(rows_of(101), 1000.0, 1000.0)
     timing = found.timing
     assert (timing.exchanges, timing.unanswered, timing.woken, timing.waited, found.stops) == (100, 0, 0, 0, 0)
     assert timing.lateness.median == timing.lateness.highest == pytest.approx(3e-6)
@@ -226,11 +226,11 @@ def test_figures_of_records() -> None:
 
 def test_where_a_run_would_have_been_stopped() -> None:
     silent = (*range(10, 16), 30, 32, 34, *range(50, 54), *range(60, 65))
-    assert kept(rows_of(101, silent=silent), 1000.0, 1000.0).stops == 2  # of six, and of five; four are borne
-    found = kept(rows_of(101, late=(20, 40, 41)), 1000.0, 1000.0)
+    assert jitter_result(rows_of(101, silent=silent), 1000.0, 1000.0).stops == 2  # of six, and of five; four are borne
+    found = jitter_result(rows_of(101, late=(20, 40, 41)), 1000.0, 1000.0)
     assert (found.stops, found.timing.woken) == (3, 3)
-    assert kept(rows_of(3), 1000.0, 1000.0).stops == 0
-    assert math.isnan(kept(rows_of(3), 1000.0, 1000.0).timing.drift)
+    assert jitter_result(rows_of(3), 1000.0, 1000.0).stops == 0
+    assert math.isnan(jitter_result(rows_of(3), 1000.0, 1000.0).timing.drift)
 
 
 def test_bars_show_what_is_there_at_all() -> None:

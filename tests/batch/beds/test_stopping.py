@@ -23,7 +23,7 @@ import pytest
 import batch
 import ic
 from hw import loop, realtime, records
-from hw.bed import Fault, State
+from hw.bed import BedState, Fault
 from hw.beds import emulated
 from hw.beds.serial_line import SerialBed
 from hw.beds.simulated import config_of
@@ -71,7 +71,7 @@ class BedHost:
         lines = [line.split() for line in self._log.read_text(encoding="utf-8").splitlines()]
         return [(int(ns), output, int(counts)) for ns, _, output, counts in lines]
 
-    def faults(self) -> tuple[State, Fault]:
+    def faults(self) -> tuple[BedState, Fault]:
         with SerialBed(self.terminal, period=PERIOD) as bed:
             bed.connect()
             sample = bed.read()
@@ -146,7 +146,7 @@ def killed(host: BedHost, here: Path) -> float:
         time.sleep(0.5)
     log = host.log()
     assert [each[1:] for each in log[-2:]] == [("i", 0), ("v", 0)]
-    assert host.faults() == (State.STOPPED, Fault.DEADMAN)
+    assert host.faults() == (BedState.STOPPED, Fault.DEADMAN)
 
     found = records.read(path)
     assert found.rows["exchange"].tolist() == list(range(len(found.rows))) and len(found.rows) >= 290  # and a head
@@ -179,7 +179,7 @@ def test_a_host_that_is_told_to_end_stops_its_bed(host: BedHost, here: Path, how
         _, complaint = process.communicate(timeout=30.0)
         assert "Traceback" not in complaint
         assert [each[1:] for each in host.log()[-2:]] == [("i", 0), ("v", 0)]
-        if host.faults() == (State.DISARMED, Fault(0)) and process.returncode == status:
+        if host.faults() == (BedState.DISARMED, Fault(0)) and process.returncode == status:
             break
         shutil.rmtree(here / "a.h5.campaign", ignore_errors=True)
         (here / "a.h5").unlink(missing_ok=True)
@@ -200,7 +200,7 @@ def test_a_case_s_process_that_is_killed_is_told_and_the_bed_stops(host: BedHost
     assert process.returncode == cli.NO, complaint
     assert "the host was gone" in said
     assert [each[1:] for each in host.log()[-2:]] == [("i", 0), ("v", 0)]
-    assert host.faults() == (State.STOPPED, Fault.DEADMAN)
+    assert host.faults() == (BedState.STOPPED, Fault.DEADMAN)
 
 
 def _children(pid: int) -> list[str]:
@@ -221,7 +221,7 @@ def test_an_exception_in_the_middle_stops_the_bed(host: BedHost) -> None:
         bed.connect()
         with pytest.raises(Wrong):
             loop.drive([bed], compute, pace(100.0), 100, lambda record: None, lock_step=False)
-        assert bed.read().state in (State.DISARMED, State.STOPPED)
+        assert bed.read().state in (BedState.DISARMED, BedState.STOPPED)
         log = host.log()
     assert any(output == "v" and counts > 0 for _, output, counts in log)
     assert [each[1:] for each in log[-2:]] == [("i", 0), ("v", 0)]

@@ -12,13 +12,13 @@ import pytest
 import batch
 import ic
 from batch.beds.executor import Driving, OnBeds, Ports
-from batch.beds.known import Case
-from batch.beds.telling import Telling, kept_time, timings
-from batch.beds.telling import beside as written_beside
+from batch.beds.known import CaseRecords
+from batch.beds.telling import BedProgress, timing_lines, timings
+from batch.beds.telling import sidecar_entries as written_beside
 from batch.campaigns.folder import Folder
 from batch.terminal.progress import Bar
 from hw import records
-from hw.bed import Fault, Sample, State
+from hw.bed import BedSample, BedState, Fault
 from hw.records import SIZE
 from met import cli
 from tests.batch.beds.listening import DECK
@@ -65,7 +65,7 @@ def test_cases_of_an_earlier_run_count_as_well(here: Path) -> None:
     executor.open(folder, {}, lambda: None)
     head = {"key": "", "row": 3, "repeats": 1, "joints": ["shoulder", "elbow"], "tick_hz": 1000.0,
             "beds": [{"name": each, "firmware": "00"} for each in ("one", "two")]}  # fmt: skip
-    sample = Sample(State.ARMED, True, Fault(0), False, 7, 0.0)
+    sample = BedSample(BedState.ARMED, True, Fault(0), False, 7, 0.0)
     with (folder.beds / "0-3.records").open("wb") as file:
         records.begin(file, head)
         for e in range(3):
@@ -86,7 +86,7 @@ def test_nothing_of_beds_stands_beside_other_archives(here: Path) -> None:
 def test_a_case_is_told_by_the_time_that_is_on_the_disk(here: Path) -> None:
     stream, now = io.StringIO(), [0.0]
     executor = OnBeds(Ports({"shoulder": "emulated"}, 921600))
-    telling = Telling(executor, quiet=False, bar=Bar(stream, lambda: now[0]))
+    telling = BedProgress(executor, quiet=False, bar=Bar(stream, lambda: now[0]))
     telling.begin("wired", 4, 1, 0, "emulated")
     path = here / "0-0.records"
     path.write_bytes(bytes(15_000 * SIZE))
@@ -99,7 +99,7 @@ def test_a_case_is_told_by_the_time_that_is_on_the_disk(here: Path) -> None:
 
 
 def test_a_quiet_run_tells_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    telling = Telling(OnBeds(Ports({}, 921600)), quiet=True)
+    telling = BedProgress(OnBeds(Ports({}, 921600)), quiet=True)
     telling.begin("wired", 4, 1, 0, "emulated")
     telling.advance(1, 0)
     telling.say("anything")
@@ -115,7 +115,7 @@ def test_the_clock_of_a_bed_goes_on_from_case_to_case() -> None:
     second["due"] = second["due"] * (1.0 + 1e-4)
     second["began"], second["ended"] = second["due"], second["due"]
     for row, rows in enumerate((first, second)):
-        executor.known.cases[0, row] = Case(1000.0, {"shoulder": rows})
+        executor.known.cases[0, row] = CaseRecords(1000.0, {"shoulder": rows})
     found = timings(executor)["shoulder"]
     assert found.exchanges == 398
     assert found.drift == pytest.approx(-0.5e-4, rel=1e-3)
@@ -123,8 +123,8 @@ def test_the_clock_of_a_bed_goes_on_from_case_to_case() -> None:
 
 def told(rows: np.ndarray, hz: float) -> list[str]:
     executor = OnBeds(Ports({"shoulder": "/dev/ttyUSB0"}, 921600))
-    executor.known.cases[0, 0] = Case(hz, {"shoulder": rows})
-    return kept_time(executor)
+    executor.known.cases[0, 0] = CaseRecords(hz, {"shoulder": rows})
+    return timing_lines(executor)
 
 
 HEAD = "shoulder: 200 exchanges; late by 3 us, p99 3 us; answered in 100 us, p99 100 us; computed in "

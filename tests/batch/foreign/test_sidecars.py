@@ -277,7 +277,7 @@ GOOD_HEAD = {"key": "k", "row": 0, "joints": ["a"], "beds": [{"name": "b", "firm
 def test_records_with_a_head_that_is_none_count_as_none(name: str, value: Any) -> None:
     rows = np.empty(0, records.LAYOUT)
     check_head(records.Records(GOOD_HEAD, rows, 0))
-    with pytest.raises(records.Unsound, match="has a head that is damaged"):
+    with pytest.raises(records.UnsoundRecords, match="has a head that is damaged"):
         check_head(records.Records({**GOOD_HEAD, name: value}, rows, 0))
 
 
