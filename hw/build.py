@@ -45,10 +45,19 @@ _FLAGS: Mapping[Kind, tuple[str, ...]] = {
     "host": ("-O2",),
     "library": ("-O2", "-shared", "-fPIC"),
     "arm": (
-        "-O2", "-mcpu=cortex-m3", "-mthumb", "-ffreestanding", "-nostdlib", "-static", "-ffunction-sections",
-        "-fdata-sections", "-fno-tree-loop-distribute-patterns", "-Wl,--gc-sections", "-Wl,--fatal-warnings",
+        "-O2",
+        "-mcpu=cortex-m3",
+        "-mthumb",
+        "-ffreestanding",
+        "-nostdlib",
+        "-static",
+        "-ffunction-sections",
+        "-fdata-sections",
+        "-fno-tree-loop-distribute-patterns",
+        "-Wl,--gc-sections",
+        "-Wl,--fatal-warnings",
     ),
-}  # fmt: skip
+}
 
 
 @frozen(kw_only=True)
@@ -158,9 +167,13 @@ def build(
     texts["config.c"] = config_c(config, plant=plant_c is not None, firmware=stamp)
     version = subprocess.run([compiler, "--version"], capture_output=True, text=True).stdout
     name = cache.key(
-        kind, compiler, version, *words, *(each for pair in sorted(texts.items()) for each in pair),
+        kind,
+        compiler,
+        version,
+        *words,
+        *(each for pair in sorted(texts.items()) for each in pair),
         *(each for path in [*files, *read] for each in (path.name, path.read_text(encoding="utf-8"))),
-    )  # fmt: skip
+    )
     return _kept(name, _PRODUCTS[kind], lambda folder: _compile(kind, compiler, words, files, texts, folder))
 
 
@@ -178,11 +191,30 @@ def qemu(elf: Path, socket: Path) -> list[str]:
     """The command that runs an ELF file of kind "arm", its line a UNIX socket that it makes; it starts once someone has
     connected. Problem E412: there is no emulator."""
     if shutil.which(EMULATOR) is None:
-        raise Problem(error("E412", f"there is no `{EMULATOR}`, which runs the firmware for ARM",
-                            help="on Debian or Ubuntu: apt-get install qemu-system-arm"))  # fmt: skip
+        raise Problem(
+            error(
+                "E412",
+                f"there is no `{EMULATOR}`, which runs the firmware for ARM",
+                help="on Debian or Ubuntu: apt-get install qemu-system-arm",
+            )
+        )
     line = f"socket,id=line,path={str(socket).replace(',', ',,')},server=on,wait=on"
-    return [EMULATOR, "-M", "lm3s6965evb", "-nodefaults", "-display", "none", "-monitor", "none",
-            "-chardev", line, "-serial", "chardev:line", "-kernel", str(elf)]  # fmt: skip
+    return [
+        EMULATOR,
+        "-M",
+        "lm3s6965evb",
+        "-nodefaults",
+        "-display",
+        "none",
+        "-monitor",
+        "none",
+        "-chardev",
+        line,
+        "-serial",
+        "chardev:line",
+        "-kernel",
+        str(elf),
+    ]
 
 
 # Counts.
@@ -235,9 +267,11 @@ def counted(config: Config) -> tuple[dict[str, int], Limits, float]:
 
 
 _STEPS = {
-    "voltage": "converter_voltage", "voltage_slew": "converter_voltage",
-    "rate": "converter_in", "arming_rate": "converter_in",
-}  # fmt: skip
+    "voltage": "converter_voltage",
+    "voltage_slew": "converter_voltage",
+    "rate": "converter_in",
+    "arming_rate": "converter_in",
+}
 """The parameter of a deck's bed that is what is counted by; `converter_current` of all others."""
 
 
@@ -341,9 +375,22 @@ def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
     if Capability.LOCK_STEP in capabilities and not plant and Capability.SIMULATED not in capabilities:
         raise ValueError("lock-step is for simulated plants")
     announced = (
-        config.tick_hz, deadman, s.voltage, s.current, s.rate, s.angle, s.drive_current, s.acceleration, limits.voltage,
-        limits.current, limits.rate, limits.arming_rate, limits.voltage_slew, limits.current_slew, limits.heat,
-    )  # fmt: skip
+        config.tick_hz,
+        deadman,
+        s.voltage,
+        s.current,
+        s.rate,
+        s.angle,
+        s.drive_current,
+        s.acceleration,
+        limits.voltage,
+        limits.current,
+        limits.rate,
+        limits.arming_rate,
+        limits.voltage_slew,
+        limits.current_slew,
+        limits.heat,
+    )
     in_force = ("voltage", "current", "rate", "voltage_slew", "current_slew")
     lines = [
         "/* One bed's numbers, written by hw/build.py. */",
@@ -392,8 +439,13 @@ def _sources(kind: Kind, *, plant: bool) -> list[Path]:
 def _compiler(kind: Kind) -> str:
     if kind == "arm":
         if shutil.which(CROSS_COMPILER) is None:
-            raise Problem(error("E411", f"there is no `{CROSS_COMPILER}`, which builds the firmware for ARM",
-                                help="on Debian or Ubuntu: apt-get install gcc-arm-none-eabi"))  # fmt: skip
+            raise Problem(
+                error(
+                    "E411",
+                    f"there is no `{CROSS_COMPILER}`, which builds the firmware for ARM",
+                    help="on Debian or Ubuntu: apt-get install gcc-arm-none-eabi",
+                )
+            )
         return CROSS_COMPILER
     wanted = [os.environ["CC"]] if os.environ.get("CC") else ["gcc", "clang"]
     for each in wanted:
@@ -402,8 +454,13 @@ def _compiler(kind: Kind) -> str:
     if os.environ.get("CC"):
         said = f"there is no C compiler `{wanted[0]}`, which $CC names, to build the firmware with"
         raise Problem(error("E410", said, help="name one that is there, or unset CC"))
-    raise Problem(error("E410", "there is no C compiler to build the firmware with, neither `gcc` nor `clang`",
-                        help="on Debian or Ubuntu: apt-get install gcc libc6-dev"))  # fmt: skip
+    raise Problem(
+        error(
+            "E410",
+            "there is no C compiler to build the firmware with, neither `gcc` nor `clang`",
+            help="on Debian or Ubuntu: apt-get install gcc libc6-dev",
+        )
+    )
 
 
 def _compile(
@@ -418,8 +475,13 @@ def _compile(
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
         first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip()[:200])
-        raise Problem(error("E411" if kind == "arm" else "E410", f"`{compiler}` does not build the firmware: {first}",
-                            help="a compiler of C11 is needed: gcc 10 or clang 12, or newer"))  # fmt: skip
+        raise Problem(
+            error(
+                "E411" if kind == "arm" else "E410",
+                f"`{compiler}` does not build the firmware: {first}",
+                help="a compiler of C11 is needed: gcc 10 or clang 12, or newer",
+            )
+        )
 
 
 def _fused() -> tuple[str, ...]:
@@ -493,8 +555,11 @@ def _is_sound(found: Path, name: str) -> bool:
 def _trim(root: Path, keep: Path) -> None:
     """Removes the folders longest unused while all are more than `LIMIT` bytes."""
     with contextlib.suppress(OSError):
-        folders = [(path.stat().st_mtime, sum(each.stat().st_size for each in path.iterdir()), path)
-                   for path in root.iterdir() if not path.name.startswith(".")]  # fmt: skip
+        folders = [
+            (path.stat().st_mtime, sum(each.stat().st_size for each in path.iterdir()), path)
+            for path in root.iterdir()
+            if not path.name.startswith(".")
+        ]
         total = sum(size for _, size, _ in folders)
         for _, size, path in sorted(folders):
             if total <= LIMIT:

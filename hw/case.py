@@ -83,14 +83,21 @@ def run(asked: CaseRequest) -> loop.LoopEnd:
             bed.patience = of.patience(lock_step)
         if asked_to_stop():  # nothing was begun
             return loop.LoopEnd(0, "the host was asked to stop")
-        head = {**asked.head, "row": asked.row, "servo_hz": of.servo_hz, "repeats": of.repeats,
-                "lock_step": lock_step, "joints": list(joints), "tick_hz": abouts[0].tick_hz,
-                "beds": [{"name": each.name, "firmware": each.firmware} for each in abouts]}  # fmt: skip
+        head = {
+            **asked.head,
+            "row": asked.row,
+            "servo_hz": of.servo_hz,
+            "repeats": of.repeats,
+            "lock_step": lock_step,
+            "joints": list(joints),
+            "tick_hz": abouts[0].tick_hz,
+            "beds": [{"name": each.name, "firmware": each.firmware} for each in abouts],
+        }
         with recording(Path(asked.records), head, (driven.exchanges + 1) * len(beds)) as put:
             process.say(began=True)
             ended = loop.drive(
                 beds, driven, of, driven.exchanges, put, lock_step=lock_step, asked_to_stop=asked_to_stop
-            )  # fmt: skip
+            )
         refusals.check_stopped(beds, abouts, ended.why)
         return ended
     finally:

@@ -156,8 +156,10 @@ class Conformance:
         assert sample.state == BedState.ARMED and not sample.refused
         if (held := self.outputs(bed)) is not None:
             scales = about.scales
-            assert held == (round(voltage / scales.voltage) * scales.voltage,
-                            round(current / scales.current) * scales.current)  # fmt: skip
+            assert held == (
+                round(voltage / scales.voltage) * scales.voltage,
+                round(current / scales.current) * scales.current,
+            )
 
     @pytest.mark.parametrize("way", [1.0, -1.0])
     @pytest.mark.parametrize("motor", ["drive", "load"])

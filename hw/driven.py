@@ -38,8 +38,10 @@ class CaseKernel:
         """The servos' last tick."""
         self._rates = [self.block.inputs[program.inputs.index(f"wire:{joint}.rate")] for joint in self.joints]
         names = ("voltage", "current")
-        self._told = [[self.block.outputs[program.outputs.index(f"wire:{joint}.{name}")] for name in names]
-                      for joint in self.joints]  # fmt: skip
+        self._told = [
+            [self.block.outputs[program.outputs.index(f"wire:{joint}.{name}")] for name in names]
+            for joint in self.joints
+        ]
 
     @property
     def exchanges(self) -> int:
@@ -89,8 +91,9 @@ class CaseKernel:
 
 def substituted(prepared: Prepared) -> tuple[str, ...]:
     """The joints whose motors are on beds, in the order of the program's wires."""
-    return tuple(name.removeprefix("wire:").removesuffix(".rate") for name in prepared.program.inputs
-                 if name.startswith("wire:"))  # fmt: skip
+    return tuple(
+        name.removeprefix("wire:").removesuffix(".rate") for name in prepared.program.inputs if name.startswith("wire:")
+    )
 
 
 def divisor(experiment: Experiment) -> int:

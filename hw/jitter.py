@@ -69,10 +69,15 @@ def measure(asked: JitterRequest) -> JitterResult:
         bed.patience = of.patience(False)
         begun = time.perf_counter()
         ended = loop.drive(
-            [bed] * asked.joints, _nothing, of, math.ceil(asked.seconds * asked.hz), rows.append,
-            lock_step=False, armed=False,
+            [bed] * asked.joints,
+            _nothing,
+            of,
+            math.ceil(asked.seconds * asked.hz),
+            rows.append,
+            lock_step=False,
+            armed=False,
             asked_to_stop=lambda: asked_to_stop() or time.perf_counter() - begun > asked.seconds,
-        )  # fmt: skip
+        )
         if ended.bed >= 0:
             message = f"bed `{about.name}` was reset while it was measured"
             raise Problem(error("E427", message, help="look at its supply, and whether its watchdog resets it"))
@@ -85,9 +90,11 @@ def jitter_result(rows: np.ndarray, tick_hz: float, hz: float) -> JitterResult:
     own = rows[rows["exchange"] > 0]
     answered = (own["flags"] & ANSWERED) != 0
     found = replace(
-        timing(first, tick_hz), exchanges=len(own), trip=time_spread((own["ended"] - own["began"])[answered]),
+        timing(first, tick_hz),
+        exchanges=len(own),
+        trip=time_spread((own["ended"] - own["began"])[answered]),
         unanswered=int((~answered).sum()),
-    )  # fmt: skip
+    )
     return JitterResult(float(rows["ended"][-1]) * 1e-9, found, stops(first, 1.0 / hz))
 
 

@@ -57,9 +57,16 @@ Put = Callable[[bytes], None]
 
 
 def drive(
-    beds: Sequence[BedDriver], compute: Compute, pace: Pace, exchanges: int, put: Put, *, lock_step: bool,
-    asked_to_stop: Callable[[], bool] = lambda: False, armed: bool = True,
-) -> LoopEnd:  # fmt: skip
+    beds: Sequence[BedDriver],
+    compute: Compute,
+    pace: Pace,
+    exchanges: int,
+    put: Put,
+    *,
+    lock_step: bool,
+    asked_to_stop: Callable[[], bool] = lambda: False,
+    armed: bool = True,
+) -> LoopEnd:
     """Arm the beds, drive them through so many exchanges after the first sample, and stop them.
 
     lock_step      whether they have no time of their own
@@ -78,9 +85,15 @@ def drive(
 
 
 def _driven(
-    beds: Sequence[BedDriver], compute: Compute, pace: Pace, exchanges: int, put: Put, lock_step: bool,
-    asked_to_stop: Callable[[], bool], armed: bool,
-) -> LoopEnd:  # fmt: skip
+    beds: Sequence[BedDriver],
+    compute: Compute,
+    pace: Pace,
+    exchanges: int,
+    put: Put,
+    lock_step: bool,
+    asked_to_stop: Callable[[], bool],
+    armed: bool,
+) -> LoopEnd:
     clock, packed = time.perf_counter_ns, records.packed
     period = round(pace.period * 1e9)
     if armed and asked_to_stop():
@@ -135,9 +148,10 @@ def _driven(
 
 
 _LATE = {
-    records.LATE_COMPUTED: "it computed too long", records.LATE_WOKEN: "it was not woken in time",
+    records.LATE_COMPUTED: "it computed too long",
+    records.LATE_WOKEN: "it was not woken in time",
     records.LATE_ANSWERED: "it waited for answers",
-}  # fmt: skip
+}
 
 
 def _waited(due: int) -> int:

@@ -106,9 +106,11 @@ def talk(
              is raised in the end
     """
     process = subprocess.Popen(
-        interpreter.command(module), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        interpreter.command(module),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
         env={**interpreter.environment(), _STARTED_BY: str(os.getpid())},
-    )  # fmt: skip
+    )
     assert process.stdin is not None and process.stdout is not None
     interrupted: KeyboardInterrupt | None = None
     came = False

@@ -25,12 +25,26 @@ from met.host.files import parse_json, read_regular
 
 MAGIC = b"MET bed records 1\n"
 
-LAYOUT = np.dtype([
-    ("exchange", "<u4"), ("bed", "<u2"), ("flags", "<u2"), ("status", "<u4"), ("tick", "<u4"),
-    ("due", "<i8"), ("began", "<i8"), ("ended", "<i8"), ("computed", "<i8"),
-    ("voltage", "<f8"), ("current", "<f8"),
-    ("rate", "<f8"), ("angle", "<f8"), ("drive_current", "<f8"), ("acceleration", "<f8"), ("crc", "<u4"),
-])  # fmt: skip
+LAYOUT = np.dtype(
+    [
+        ("exchange", "<u4"),
+        ("bed", "<u2"),
+        ("flags", "<u2"),
+        ("status", "<u4"),
+        ("tick", "<u4"),
+        ("due", "<i8"),
+        ("began", "<i8"),
+        ("ended", "<i8"),
+        ("computed", "<i8"),
+        ("voltage", "<f8"),
+        ("current", "<f8"),
+        ("rate", "<f8"),
+        ("angle", "<f8"),
+        ("drive_current", "<f8"),
+        ("acceleration", "<f8"),
+        ("crc", "<u4"),
+    ]
+)
 """exchange, bed: their numbers from 0;  flags: `ANSWERED` and others;  status: state and faults;  tick: the bed's
 due, began, ended, computed: ns of the host's clock from the first exchange: when it was to begin, began, was answered,
 and when the kernel was done with the answer before it
@@ -48,19 +62,32 @@ _NONE = math.nan
 
 
 def packed(
-    exchange: int, bed: int, flags: int, times: tuple[int, int, int, int], voltage: float, current: float,
+    exchange: int,
+    bed: int,
+    flags: int,
+    times: tuple[int, int, int, int],
+    voltage: float,
+    current: float,
     sample: BedSample | None,
-) -> bytes:  # fmt: skip
+) -> bytes:
     """A record. times: due, began, ended, computed."""
     if sample is None:
         body = _BODY.pack(exchange, bed, flags, 0, 0, *times, voltage, current, _NONE, _NONE, _NONE, _NONE)
     else:
         body = _BODY.pack(
-            exchange, bed, flags | ANSWERED, sample.state | sample.faults, sample.tick, *times, voltage, current,
-            sample.rate, _NONE if sample.angle is None else sample.angle,
+            exchange,
+            bed,
+            flags | ANSWERED,
+            sample.state | sample.faults,
+            sample.tick,
+            *times,
+            voltage,
+            current,
+            sample.rate,
+            _NONE if sample.angle is None else sample.angle,
             _NONE if sample.drive_current is None else sample.drive_current,
             _NONE if sample.acceleration is None else sample.acceleration,
-        )  # fmt: skip
+        )
     return body + zlib.crc32(body).to_bytes(4, "little")
 
 

@@ -61,9 +61,13 @@ class RecordsWriter:
         os.set_inheritable(self._alive, False)
         command = interpreter.command("hw.writer", str(through.file), str(through.room), str(read), str(path))
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, pass_fds=[through.file, read],
-            start_new_session=True, env=interpreter.environment(),
-        )  # fmt: skip
+            command,
+            stdin=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            pass_fds=[through.file, read],
+            start_new_session=True,
+            env=interpreter.environment(),
+        )
         os.close(read)
         assert self._process.stdin is not None
         with contextlib.suppress(BrokenPipeError):  # it has ended, and is heard of at the first look

@@ -37,13 +37,23 @@ def on_beds(plan: Plan, names: Sequence[str] | None) -> list[Experiment]:
 
 
 def chosen_bed(
-    word: str, source: str | None, names: tuple[str, ...], *, defines: tuple[str, ...] = (),
-    include_dirs: tuple[str, ...] = (), settings: tuple[str, ...] = (), quiet: bool = False,
-) -> ChosenBed:  # fmt: skip
+    word: str,
+    source: str | None,
+    names: tuple[str, ...],
+    *,
+    defines: tuple[str, ...] = (),
+    include_dirs: tuple[str, ...] = (),
+    settings: tuple[str, ...] = (),
+    quiet: bool = False,
+) -> ChosenBed:
     """Of `PORT`, or `JOINT=PORT` of a deck; its first case counts. Raises Problem."""
-    found = _chosen_bed(word, None if source is None else read_plan(
-        source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=quiet
-    ), names)  # fmt: skip
+    found = _chosen_bed(
+        word,
+        None
+        if source is None
+        else read_plan(source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=quiet),
+        names,
+    )
     if kind_of(found.port).replays:
         helps = "give the line that it was made on; `met bed run --port FILE` replays it"
         raise Problem(error("E428", f"{found.port} is a transcript, and no bed that could be asked", help=helps))

@@ -113,15 +113,18 @@ class OnBeds:
         for self._done, row in enumerate(section.rows[task.first : task.last]):
             found.append(self._case(section, int(row)))
         self._done = 0
-        case_result = [each for each, _ in found]
-        history = np.stack([each.rows for each in case_result]) if section.recorded else None
+        results = [each for each, _ in found]
+        history = np.stack([each.rows for each in results]) if section.recorded else None
         if history is not None and section.single:
             history = history.astype(np.float32)
         fates = {place: (FAILED, why) for place, (_, why) in enumerate(found) if why}
         computed = shard.Shard(
-            section.key(task.first, task.last), np.stack([each.outputs for each in case_result]), history,
-            sum(each.seconds for each in case_result), fates,
-        )  # fmt: skip
+            section.key(task.first, task.last),
+            np.stack([each.outputs for each in results]),
+            history,
+            sum(each.seconds for each in results),
+            fates,
+        )
         try:
             shard.write(self._folder.shards / task.name, computed)
         except OSError as reason:
@@ -170,15 +173,27 @@ class OnBeds:
         ports = self._ports
         experiment = section.prepared.experiment
         plan = plan_file.dumps(Plan("", (replace(experiment, notes=()),)))
-        transcripts = {} if ports.transcripts is None else {
-            joint: str(ports.transcripts / f"{experiment.name}.{row}.{joint}.transcript") for joint in ports.by_joint
-        }  # fmt: skip
+        transcripts = (
+            {}
+            if ports.transcripts is None
+            else {
+                joint: str(ports.transcripts / f"{experiment.name}.{row}.{joint}.transcript")
+                for joint in ports.by_joint
+            }
+        )
         begun = [name for name in transcripts.values() if not Path(name).exists()]
         asked = CaseRequest(
-            plan=plan, row=row, ports=dict(ports.by_joint), records=str(path), lock_step=ports.lock_step,
-            baud=ports.baud, rest=ports.rest if self.known.cases else 0.0, transcripts=transcripts, clear=ports.clear,
+            plan=plan,
+            row=row,
+            ports=dict(ports.by_joint),
+            records=str(path),
+            lock_step=ports.lock_step,
+            baud=ports.baud,
+            rest=ports.rest if self.known.cases else 0.0,
+            transcripts=transcripts,
+            clear=ports.clear,
             head={"key": section.key(), "ports": dict(ports.by_joint)},
-        )  # fmt: skip
+        )
         structure, schedule = experiment.structure, experiment.structure.schedule
         exchange_hz = pace_of(experiment).hz * len(structure.substitutions)
         self.driving = Driving(path, exchange_hz, schedule.ticks / schedule.base_hz)

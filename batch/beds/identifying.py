@@ -28,9 +28,15 @@ if TYPE_CHECKING:
     from hw.identify.fit import Estimate, FitResult
 
 UNITS = {
-    "kt": "N*m/A", "resistance": "ohm", "tau_max": "N*m", "f_c": "N*m", "f_v": "N*m*s/rad", "inertia": "kg*m^2",
-    "kt_load": "N*m/A", "f_cut": "Hz",
-}  # fmt: skip
+    "kt": "N*m/A",
+    "resistance": "ohm",
+    "tau_max": "N*m",
+    "f_c": "N*m",
+    "f_v": "N*m*s/rad",
+    "inertia": "kg*m^2",
+    "kt_load": "N*m/A",
+    "f_cut": "Hz",
+}
 """Of what is found or given, in the order in which it is told."""
 
 OF_SERVO = {"kt": "kt", "resistance": "resistance", "tau_max": "tau_max", "f_c": "f_c", "f_v": "f_v", "inertia": "j_m"}
@@ -71,10 +77,23 @@ def sheet_of(experiment: Experiment, joint: str, kt_load: float | None) -> DataS
 
 
 def identify_and_tell(
-    word: str, source: str, names: tuple[str, ...], *, baud: int, lock_step: bool, kt_load: float | None,
-    kt_load_error: float, voltage: float | None, current: float | None, rate: float | None, output: str | None,
-    form: str, quiet: bool = False, verbose: bool = False, **options: Any,
-) -> None:  # fmt: skip
+    word: str,
+    source: str,
+    names: tuple[str, ...],
+    *,
+    baud: int,
+    lock_step: bool,
+    kt_load: float | None,
+    kt_load_error: float,
+    voltage: float | None,
+    current: float | None,
+    rate: float | None,
+    output: str | None,
+    form: str,
+    quiet: bool = False,
+    verbose: bool = False,
+    **options: Any,
+) -> None:
     """The command. Raises Problem."""
     say: Callable[[str], None] = (lambda _: None) if quiet or form == "json" else visible.say
     which = chosen_bed(word, source, names, quiet=quiet, **options)
@@ -89,10 +108,18 @@ def identify_and_tell(
         helps = "`--kt-load '0.072 N*m/A'`, from its data sheet; or `bed = emulated(kt_load = ..., ...)` in the deck"
         raise Problem(error("E424", message, help=helps))
     asked = MovesRequest(
-        plan=plan_file.dumps(Plan("", (which.experiment,))), row=0, joint=which.joint, port=which.port,
-        records=str(records), sheet=dict(sheet.values), baud=baud, lock_step=lock_step, voltage=voltage,
-        current=current, rate=rate,
-    )  # fmt: skip
+        plan=plan_file.dumps(Plan("", (which.experiment,))),
+        row=0,
+        joint=which.joint,
+        port=which.port,
+        records=str(records),
+        sheet=dict(sheet.values),
+        baud=baud,
+        lock_step=lock_step,
+        voltage=voltage,
+        current=current,
+        rate=rate,
+    )
     records.unlink(missing_ok=True)  # of an attempt that found nothing: there is no deck
     about, ended = _driven(asked, say)
     found = _fitted(records, about, ended, sheet)
@@ -141,10 +168,14 @@ def check(found: FitResult, about: About) -> None:
         message = f"bed `{about.name}`: no parameters were settled on in the time that the search is given"
         raise Problem(error("E423", message, help="begin nearer: the servo's motor in the deck is where it begins"))
     if not left < UNEXPLAINED * found.rate:
-        message = (f"bed `{about.name}` does not do what a motor bed does: {left:.3g} of {found.rate:.3g} rad/s, rms, "
-                   f"are left unexplained, most in move {worst + 1}")  # fmt: skip
-        helps = ("look whether voltage, current and rate have their signs and scales, and whether the servo's motor in "
-                 "the deck is the one on the bed")  # fmt: skip
+        message = (
+            f"bed `{about.name}` does not do what a motor bed does: {left:.3g} of {found.rate:.3g} rad/s, rms, "
+            f"are left unexplained, most in move {worst + 1}"
+        )
+        helps = (
+            "look whether voltage, current and rate have their signs and scales, and whether the servo's motor in "
+            "the deck is the one on the bed"
+        )
         raise Problem(error("E423", message, help=helps))
 
 
@@ -173,8 +204,9 @@ def told(found: FitResult, estimates: Mapping[str, Estimate], sheet: DataSheet) 
         if each.found:
             off = f"{math.log(each.value / believed) / math.log(each.high / each.value):+.3g}"
         interval = f"{digits(each, each.low)} to {digits(each, each.high)}" if each.high > each.low else ""
-        rows.append([name, f"{digits(each, each.value)} {unit}", interval, share if interval else "",
-                     f"{believed:.6g}", off])  # fmt: skip
+        rows.append(
+            [name, f"{digits(each, each.value)} {unit}", interval, share if interval else "", f"{believed:.6g}", off]
+        )
     left = float((found.residual**2).mean() ** 0.5)
     out = columns(rows, right=(3, 4, 5))
     out.append("`off by`: found less the data sheet's, in halves of the interval")
@@ -191,13 +223,17 @@ def reasons(found: FitResult) -> list[str]:
     missing = [name for name, each in found.parameters.items() if not each.found]
     out = []
     if "kt_load" in missing:
-        out.append("kt_load, by which torques are measured, for the bed does not measure its drive's current; kt, "
-                   "found as back-EMF, does not depend on it")  # fmt: skip
+        out.append(
+            "kt_load, by which torques are measured, for the bed does not measure its drive's current; kt, "
+            "found as back-EMF, does not depend on it"
+        )
     rest = [name for name in missing if name != "kt_load"]
     if rest:
-        out.append(f"{' and '.join(rest)}, which the moves do not tell: the drive was at its largest torque "
-                   f"{found.limited:.0%} of the time (`--voltage` more); what is found holds for what is "
-                   "given")  # fmt: skip
+        out.append(
+            f"{' and '.join(rest)}, which the moves do not tell: the drive was at its largest torque "
+            f"{found.limited:.0%} of the time (`--voltage` more); what is found holds for what is "
+            "given"
+        )
     return out
 
 
@@ -212,9 +248,11 @@ def digits(each: Estimate, value: float) -> str:
 
 def origin_of(about: About, ended: Mapping[str, Any], estimates: Mapping[str, Estimate]) -> list[str]:
     """What the deck says of where its numbers are from."""
-    reference = "drive current as the bed measures it" if estimates["kt_load"].found else (
-        f"the load motor's {digits(estimates['kt_load'], estimates['kt_load'].value)} N m/A, which was given"
-    )  # fmt: skip
+    reference = (
+        "drive current as the bed measures it"
+        if estimates["kt_load"].found
+        else (f"the load motor's {digits(estimates['kt_load'], estimates['kt_load'].value)} N m/A, which was given")
+    )
     return [
         f"Found by `met bed identify` on bed `{about.name}`, firmware {about.firmware}, in {len(ended['began'])} moves",
         f"of {ended['seconds']:.3g} s altogether, with the 95 % interval of each. Torques are measured by",
@@ -234,10 +272,16 @@ def included(
     bed = [*(f"{name} = {head}_{name}" for name in UNITS), *_believed(experiment, use)]
     motor = (f"{own} = {head}_{name}; " for name, own in OF_SERVO.items())
     uses = (
-        [f"substitute {joint} {{", f"    bed = {use.bed}(", *_packed([f"{each}," for each in bed[:-1]] + bed[-1:], 8),
-         "    );", f"    law = {use.law};", "}"],
+        [
+            f"substitute {joint} {{",
+            f"    bed = {use.bed}(",
+            *_packed([f"{each}," for each in bed[:-1]] + bed[-1:], 8),
+            "    );",
+            f"    law = {use.law};",
+            "}",
+        ],
         [f"servo found like {servo.definition} {{", *_packed(motor, 4), "}"],
-    )  # fmt: skip
+    )
     lines = [
         "#pragma once",
         f"// {deck.name}: the motor bed of joint {joint}",
@@ -262,12 +306,21 @@ def included(
 
 def _believed(experiment: Experiment, use: Substitution) -> list[str]:
     """What else the deck says of the bed."""
-    said = {path.rpartition(".")[2]: each for path, each in experiment.parameters.items()
-            if path.startswith(f"{use.joint}.bed.") and each.origin.kind == "deck"}  # fmt: skip
-    own = [f"{name} = {quantity(each.value, each.unit)}" for name, each in said.items()
-           if name not in UNITS and not each.origin.note and isinstance(each.value, float)]  # fmt: skip
-    faults = [f"faults = {word}" for word, values in models.find("bed", use.bed).presets.items()
-              if values and all(name in said and said[name].origin.note for name in values)]  # fmt: skip
+    said = {
+        path.rpartition(".")[2]: each
+        for path, each in experiment.parameters.items()
+        if path.startswith(f"{use.joint}.bed.") and each.origin.kind == "deck"
+    }
+    own = [
+        f"{name} = {quantity(each.value, each.unit)}"
+        for name, each in said.items()
+        if name not in UNITS and not each.origin.note and isinstance(each.value, float)
+    ]
+    faults = [
+        f"faults = {word}"
+        for word, values in models.find("bed", use.bed).presets.items()
+        if values and all(name in said and said[name].origin.note for name in values)
+    ]
     return own + faults
 
 
@@ -286,15 +339,25 @@ def as_data(
 ) -> dict[str, Any]:
     """For programs; SI."""
     return {
-        "deck": str(deck), "records": str(records),
+        "deck": str(deck),
+        "records": str(records),
         "parameters": {
-            name: {"value": each.value, "low": each.low, "high": each.high, "found": each.found, "unit": UNITS[name],
-                   "data_sheet": sheet.values[name]}
-            for name in UNITS for each in [estimates[name]]
+            name: {
+                "value": each.value,
+                "low": each.low,
+                "high": each.high,
+                "found": each.found,
+                "unit": UNITS[name],
+                "data_sheet": sheet.values[name],
+            }
+            for name in UNITS
+            for each in [estimates[name]]
         },
-        "residual": float((found.residual**2).mean() ** 0.5), "rate": found.rate,
-        "misalignment": list(found.ripple), "limited": found.limited,
-    }  # fmt: skip
+        "residual": float((found.residual**2).mean() ** 0.5),
+        "rate": found.rate,
+        "misalignment": list(found.ripple),
+        "limited": found.limited,
+    }
 
 
 def _driven(asked: MovesRequest, say: Callable[[str], None]) -> tuple[About, dict[str, Any]]:
@@ -304,18 +367,24 @@ def _driven(asked: MovesRequest, say: Callable[[str], None]) -> tuple[About, dic
     for line in talk("hw.identify.driving", asked, lambda words: say(f"  {words}"), until="ended"):
         if "about" in line:
             about, most = _about(line["about"]), line["peaks"]
-            say(f"bed `{about.name}`, firmware {about.firmware}: moves up to {most['voltage']:.3g} V, "
-                f"{most['current']:.3g} A and {most['rate']:.3g} rad/s, a minute or so")  # fmt: skip
+            say(
+                f"bed `{about.name}`, firmware {about.firmware}: moves up to {most['voltage']:.3g} V, "
+                f"{most['current']:.3g} A and {most['rate']:.3g} rad/s, a minute or so"
+            )
         found = line.get("ended", found)
     assert about is not None
     return about, found
 
 
 def _about(data: Mapping[str, Any]) -> About:
-    return About(**{
-        **data, "capabilities": Capability(data["capabilities"]), "scales": Scales(**data["scales"]),
-        "limits": Limits(**data["limits"]),
-    })  # fmt: skip
+    return About(
+        **{
+            **data,
+            "capabilities": Capability(data["capabilities"]),
+            "scales": Scales(**data["scales"]),
+            "limits": Limits(**data["limits"]),
+        }
+    )
 
 
 def _fitted(path: Path, about: About, ended: Mapping[str, Any], sheet: DataSheet) -> FitResult:

@@ -48,18 +48,33 @@ def measured(
         kept = line.get("kept", kept)
     timing = kept["timing"]
     return {
-        "port": asked.port, **about, "rate_hz": rate, "joints": joints, "seconds": kept["seconds"],
+        "port": asked.port,
+        **about,
+        "rate_hz": rate,
+        "joints": joints,
+        "seconds": kept["seconds"],
         "exchanges": timing["exchanges"],
         **{name: _spread(timing[name]) for name, _ in _SPREADS},
         "misses": {name: timing[name] for name in ("woken", "computed", "waited", "unanswered")},
-        "stops": kept["stops"], "clock": timing["drift"] if math.isfinite(timing["drift"]) else None,
-    }, said  # fmt: skip
+        "stops": kept["stops"],
+        "clock": timing["drift"] if math.isfinite(timing["drift"]) else None,
+    }, said
 
 
 def jitter_and_tell(
-    word: str, source: str | None, names: tuple[str, ...], *, baud: int, rate: float | None, duration: float,
-    joints: int, form: str, quiet: bool = False, verbose: bool = False, **options: Any,
-) -> bool:  # fmt: skip
+    word: str,
+    source: str | None,
+    names: tuple[str, ...],
+    *,
+    baud: int,
+    rate: float | None,
+    duration: float,
+    joints: int,
+    form: str,
+    quiet: bool = False,
+    verbose: bool = False,
+    **options: Any,
+) -> bool:
     """The command; True where no run would have been stopped. Raises Problem."""
     asked = chosen_bed(word, source, names, quiet=quiet, **options)
     data, said = measured(asked, baud, rate, duration, joints)
@@ -74,15 +89,20 @@ def lines(data: Mapping[str, Any]) -> list[str]:
     """For people."""
     misses = data["misses"]
     each = "" if data["joints"] == 1 else f" in {data['joints']} each period"
-    out = [f"bed `{data['name']}` at {data['port']}, not armed: {data['exchanges']:,} exchanges{each} at "
-           f"{data['rate_hz']:g} Hz in {data['seconds']:.3g} s"]  # fmt: skip
+    out = [
+        f"bed `{data['name']}` at {data['port']}, not armed: {data['exchanges']:,} exchanges{each} at "
+        f"{data['rate_hz']:g} Hz in {data['seconds']:.3g} s"
+    ]
     for name, words in _SPREADS:
         spread = data[name]
         figures = ", ".join(f"{told} {duration(spread[figure])}" for figure, told in _FIGURES)
         out += ["", f"{words}: {figures}", *histogram(spread["histogram"])]
     late = sum(misses[name] for name in ("woken", "computed", "waited"))
-    out += ["", f"a period late: {late:,} (woken too late {misses['woken']:,}, computing {misses['computed']:,}, "
-            f"waiting {misses['waited']:,}); unanswered: {misses['unanswered']:,}"]  # fmt: skip
+    out += [
+        "",
+        f"a period late: {late:,} (woken too late {misses['woken']:,}, computing {misses['computed']:,}, "
+        f"waiting {misses['waited']:,}); unanswered: {misses['unanswered']:,}",
+    ]
     times = "never" if not data["stops"] else "once" if data["stops"] == 1 else f"{data['stops']:,} times"
     out.append(f"a run would have been stopped {times}, by five periods of lateness or silence")
     if data["clock"] is not None:
@@ -130,6 +150,7 @@ def _spread(found: Mapping[str, Any]) -> dict[str, Any]:
     edges = [0.0, *EDGES, None]
     return {
         **{name: found[name] if math.isfinite(found[name]) else None for name, _ in _FIGURES},
-        "histogram": [{"from": edges[at], "to": edges[at + 1], "count": count}
-                      for at, count in enumerate(found["counts"])],
-    }  # fmt: skip
+        "histogram": [
+            {"from": edges[at], "to": edges[at + 1], "count": count} for at, count in enumerate(found["counts"])
+        ],
+    }

@@ -57,12 +57,17 @@ def check_head(found: records.Records) -> None:
         raise records.UnsoundRecords("was written by another version of MET")
     joints, beds, hz = head["joints"], head["beds"], head["tick_hz"]
     good = (
-        isinstance(joints, list) and isinstance(beds, list) and len(joints) == len(beds) > 0
+        isinstance(joints, list)
+        and isinstance(beds, list)
+        and len(joints) == len(beds) > 0
         and all(isinstance(joint, str) for joint in joints)
         and all(isinstance(bed, dict) and all(isinstance(word, str) for word in bed.values()) for bed in beds)
-        and isinstance(hz, int | float) and hz > 0 and is_count(head["repeats"]) and head["repeats"] > 0
+        and isinstance(hz, int | float)
+        and hz > 0
+        and is_count(head["repeats"])
+        and head["repeats"] > 0
         and bool((found.rows["bed"] < len(joints)).all())
-    )  # fmt: skip
+    )
     if not good:
         raise records.UnsoundRecords("has a head that is damaged")
 
@@ -80,5 +85,11 @@ def case_result(path: Path, prepared: Prepared, row: int) -> CaseResult:
     if not whole and outputs[FAILURE] == 0.0:
         outputs[FAILURE], outputs[TICK] = STOPPED, float(done + 1)
     last = found.rows["ended"][-1] if len(found.rows) else 0
-    return CaseResult(rows, outputs, whole, float(last) * 1e-9,
-                tuple(found.rows[found.rows["bed"] == bed] for bed in range(beds)), found.head)  # fmt: skip
+    return CaseResult(
+        rows,
+        outputs,
+        whole,
+        float(last) * 1e-9,
+        tuple(found.rows[found.rows["bed"] == bed] for bed in range(beds)),
+        found.head,
+    )

@@ -63,9 +63,16 @@ def probe(asked: ChosenBed, baud: int) -> ProbeResult:
 
 
 def probe_and_tell(
-    word: str, source: str | None, names: tuple[str, ...], *, baud: int, form: str, quiet: bool = False,
-    verbose: bool = False, **options: Any,
-) -> None:  # fmt: skip
+    word: str,
+    source: str | None,
+    names: tuple[str, ...],
+    *,
+    baud: int,
+    form: str,
+    quiet: bool = False,
+    verbose: bool = False,
+    **options: Any,
+) -> None:
     """The command. Raises Problem."""
     found = probe(chosen_bed(word, source, names, quiet=quiet, **options), baud)
     if form == "json":
@@ -83,14 +90,17 @@ def lines(found: ProbeResult) -> list[str]:
         ["firmware", f"{about.firmware}, version {about.version} of the protocol, session {about.session}"],
         ["has", ", ".join(["drive voltage", "load current", "tachometer", *capabilities(about)])],
         ["ticks", f"{number(about.tick_hz)} Hz; stops itself after {number(1e3 * about.deadman)} ms without a command"],
-        ["limits", f"{number(limits.voltage)} V, {number(limits.voltage_slew)} V/s; {number(limits.current)} A, "
-         f"{number(limits.current_slew)} A/s, I2t {number(limits.heat)} A^2 s; {number(limits.rate)} rad/s, armed "
-         f"below {number(limits.arming_rate)} rad/s"],
+        [
+            "limits",
+            f"{number(limits.voltage)} V, {number(limits.voltage_slew)} V/s; {number(limits.current)} A, "
+            f"{number(limits.current_slew)} A/s, I2t {number(limits.heat)} A^2 s; {number(limits.rate)} rad/s, armed "
+            f"below {number(limits.arming_rate)} rad/s",
+        ],
         ["a count", ", ".join(quantity(value, unit) for value, unit in _scales(about))],
         ["sensors", ", ".join(sensors)],
         ["state", sample.state.name.lower()],
         *_line(found),
-    ]  # fmt: skip
+    ]
     out += columns(rows)
     for fault in Fault:
         if fault in sample.faults:
@@ -112,8 +122,11 @@ def data(found: ProbeResult) -> dict[str, Any]:
         "scales": {name: value if math.isfinite(value) else None for name, value in asdict(about.scales).items()},
         "state": sample.state.name.lower(),
         "sensors": {name: value for name, value, _ in _read(sample)},
-        "faults": [{"name": str(fault.name).lower(), "message": refusals.words(fault), "help": refusals.remedies(fault)}
-                   for fault in Fault if fault in sample.faults],
+        "faults": [
+            {"name": str(fault.name).lower(), "message": refusals.words(fault), "help": refusals.remedies(fault)}
+            for fault in Fault
+            if fault in sample.faults
+        ],
         "warnings": [{"code": each.code, "message": each.message, "help": list(each.help)} for each in found.warnings],
         "line": {
             "bytes": exchanged(about.capabilities),
@@ -122,17 +135,19 @@ def data(found: ProbeResult) -> dict[str, Any]:
             "answered_in_at_most": max(found.trips, default=None),
             "fastest_hz": found.fastest if math.isfinite(found.fastest) else None,
         },
-    }  # fmt: skip
+    }
 
 
 def capabilities(about: About) -> list[str]:
     """In words: those that not every bed has."""
     words = {
-        Capability.WATCHDOG: "a watchdog of its own", Capability.LOCK_STEP: "no time of its own",
+        Capability.WATCHDOG: "a watchdog of its own",
+        Capability.LOCK_STEP: "no time of its own",
         Capability.SIMULATED: "no motor: it is simulated",
-    }  # fmt: skip
-    return [words.get(each, str(each.name).lower().replace("_", " "))
-            for each in Capability if each in about.capabilities]  # fmt: skip
+    }
+    return [
+        words.get(each, str(each.name).lower().replace("_", " ")) for each in Capability if each in about.capabilities
+    ]
 
 
 def _trips(bed: BedDriver) -> tuple[float, ...]:
@@ -148,8 +163,11 @@ def _trips(bed: BedDriver) -> tuple[float, ...]:
 def _scales(about: About) -> list[tuple[float, str]]:
     s, has = about.scales, about.capabilities
     found = [(s.voltage, "V"), (s.current, "A"), (s.rate, "rad/s")]
-    others = ((Capability.ENCODER, s.angle, "rad"), (Capability.DRIVE_CURRENT, s.drive_current, "A of the drive"),
-              (Capability.ACCELEROMETER, s.acceleration, "rad/s^2"))  # fmt: skip
+    others = (
+        (Capability.ENCODER, s.angle, "rad"),
+        (Capability.DRIVE_CURRENT, s.drive_current, "A of the drive"),
+        (Capability.ACCELEROMETER, s.acceleration, "rad/s^2"),
+    )
     return found + [(value, unit) for each, value, unit in others if each in has]
 
 
@@ -168,8 +186,10 @@ def _line(found: ProbeResult) -> list[Sequence[str]]:
     if found.trips:
         lost = ASKED - len(found.trips)
         median, longest = statistics.median(found.trips), max(found.trips)
-        said.append(f"answered in {1e3 * median:.3g} ms, at most {1e3 * longest:.3g} ms, {ASKED} times asked"
-                    + (f", {lost} times without an answer" if lost else ""))  # fmt: skip
+        said.append(
+            f"answered in {1e3 * median:.3g} ms, at most {1e3 * longest:.3g} ms, {ASKED} times asked"
+            + (f", {lost} times without an answer" if lost else "")
+        )
     if not math.isfinite(found.fastest):
         return [["line", "; ".join(said)], ["rates", "all: the bed waits for the computer"]]
     words = [f"{hz:g} Hz {'yes' if hz <= found.fastest else 'no'}" for hz in RATES]

@@ -55,9 +55,14 @@ def ports_of(given: Sequence[str], experiments: Sequence[Experiment]) -> dict[st
 
 
 def campaign_of(
-    plan: Plan, names: Sequence[str] | None, ports: Sequence[str], *, lock_step: bool = False,
-    output: str | Path | None = None, cases: Sequence[str] | None = None,
-) -> tuple[Campaign, dict[str, str], bool]:  # fmt: skip
+    plan: Plan,
+    names: Sequence[str] | None,
+    ports: Sequence[str],
+    *,
+    lock_step: bool = False,
+    output: str | Path | None = None,
+    cases: Sequence[str] | None = None,
+) -> tuple[Campaign, dict[str, str], bool]:
     """What will be run; by joint its ports; whether the beds have no time of their own. Raises Problem."""
     asked = on_beds(plan, names)
     by_joint = ports_of(ports, asked)
@@ -124,9 +129,14 @@ def run_and_tell(
     executor = OnBeds(Ports(by_joint, baud, stepped, rest or 0.0, folder, clear), lambda line: telling.say(f"  {line}"))
     telling = BedProgress(executor, quiet=quiet)
     performed = perform(
-        campaign, executor=executor, fresh=fresh, progress=telling, ready=lambda: say(writing(campaign)),
-        say=telling.say, more=lambda: sidecar_entries(executor),
-    )  # fmt: skip
+        campaign,
+        executor=executor,
+        fresh=fresh,
+        progress=telling,
+        ready=lambda: say(writing(campaign)),
+        say=telling.say,
+        more=lambda: sidecar_entries(executor),
+    )
     if performed.whole:
         executor.check(_ports_before(campaign.output), f"{campaign.output} holds this campaign")
         say(f"nothing is missing: {campaign.output} has all of it (`--fresh` drives it again)")

@@ -101,20 +101,32 @@ def sidecar_entries(executor: OnBeds) -> Mapping[str, Any]:
     """What stands beside the archive: which beds they were, and how well time was kept; s."""
     executor.know_all()
     kept = timings(executor)
-    return {"beds": [
-        {"joint": joint, "port": port, "baud": executor.baud, "lock_step": executor.lock_step,
-         "beds": executor.known.beds[joint], "timing": _figures(kept[joint]) if joint in kept else None}
-        for joint, port in executor.ports.items()
-    ]}  # fmt: skip
+    return {
+        "beds": [
+            {
+                "joint": joint,
+                "port": port,
+                "baud": executor.baud,
+                "lock_step": executor.lock_step,
+                "beds": executor.known.beds[joint],
+                "timing": _figures(kept[joint]) if joint in kept else None,
+            }
+            for joint, port in executor.ports.items()
+        ]
+    }
 
 
 def _figures(found: Timing) -> dict[str, Any]:
     spreads = {"lateness": found.lateness, "trip": found.trip, "computing": found.computing}
     return {
-        "exchanges": found.exchanges, **{name: _spread(each) for name, each in spreads.items()},
-        "woken_late": found.woken, "computed_late": found.computed, "answered_late": found.waited,
-        "unanswered": found.unanswered, "clock": found.drift if math.isfinite(found.drift) else None,
-    }  # fmt: skip
+        "exchanges": found.exchanges,
+        **{name: _spread(each) for name, each in spreads.items()},
+        "woken_late": found.woken,
+        "computed_late": found.computed,
+        "answered_late": found.waited,
+        "unanswered": found.unanswered,
+        "clock": found.drift if math.isfinite(found.drift) else None,
+    }
 
 
 def _spread(found: TimeSpread) -> dict[str, float | None]:

@@ -48,8 +48,14 @@ class Amount(click.ParamType):
 
 
 PORT = click.option("--port", "word", metavar="[JOINT=]PORT", required=True, help="Where the bed is.")
-BAUD = click.option("--baud", type=click.IntRange(1, 2**31 - 1), default=921600, show_default=True, metavar="BAUD",
-                    help="Of a serial line.")  # fmt: skip
+BAUD = click.option(
+    "--baud",
+    type=click.IntRange(1, 2**31 - 1),
+    default=921600,
+    show_default=True,
+    metavar="BAUD",
+    help="Of a serial line.",
+)
 
 
 class BedCommands(click.Group):
@@ -113,8 +119,14 @@ def clear(word: str, **options: Any) -> int:
 @BAUD
 @click.option("--rate", type=Hertz(), metavar="RATE", help="Of exchanges [the deck's, else 1 kHz].")
 @click.option("--duration", type=SECONDS, metavar="TIME", default=10.0, show_default="10 s", help="For so long.")
-@click.option("--joints", type=click.IntRange(min=1, max=64), metavar="N", default=1, show_default=True, help="So many "
-              "exchanges each period, one after another, as joints on such beds would need.")  # fmt: skip
+@click.option(
+    "--joints",
+    type=click.IntRange(min=1, max=64),
+    metavar="N",
+    default=1,
+    show_default=True,
+    help="So many exchanges each period, one after another, as joints on such beds would need.",
+)
 @deck_options
 @format_option
 @loudness_options
@@ -145,10 +157,20 @@ def _check(source: str | None, names: tuple[str, ...], options: dict[str, Any]) 
 @PORT
 @BAUD
 @click.option("--lock-step", is_flag=True, help="Of simulated firmware: it has no time of its own.")
-@click.option("--kt-load", type=Amount("N*m/A"), metavar="CONSTANT", help="Torque constant of the load motor, by "
-              "which torques are measured [the deck's bed's].")  # fmt: skip
-@click.option("--kt-load-error", type=click.FloatRange(0.0, 50.0), metavar="PERCENT", default=0.0, show_default=True,
-              help="Half of its 95 % interval; it widens what is measured by it.")  # fmt: skip
+@click.option(
+    "--kt-load",
+    type=Amount("N*m/A"),
+    metavar="CONSTANT",
+    help="Torque constant of the load motor, by which torques are measured [the deck's bed's].",
+)
+@click.option(
+    "--kt-load-error",
+    type=click.FloatRange(0.0, 50.0),
+    metavar="PERCENT",
+    default=0.0,
+    show_default=True,
+    help="Half of its 95 % interval; it widens what is measured by it.",
+)
 @click.option("--voltage", type=Amount("V"), metavar="VOLTAGE", help="Most of the moves [the servo's v_max].")
 @click.option("--current", type=Amount("A"), metavar="CURRENT", help="Most of the moves [what balances the drive].")
 @click.option("--rate", type=Amount("rad/s"), metavar="RATE", help="Above it a move is over [0.8 of the bed's limit].")
@@ -173,15 +195,28 @@ def identify(word: str, source: str, names: tuple[str, ...], **options: Any) -> 
 @bed.command(short_help="Run a deck whose joints' motors are on beds.")
 @click.argument("source", metavar="DECK|PLAN.json")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
-@click.option("--port", "ports", multiple=True, metavar="[JOINT=]PORT", required=True, help="Where the bed is; of "
-              "several beds each.")  # fmt: skip
+@click.option(
+    "--port",
+    "ports",
+    multiple=True,
+    metavar="[JOINT=]PORT",
+    required=True,
+    help="Where the bed is; of several beds each.",
+)
 @BAUD
-@click.option("--lock-step", is_flag=True, help="Of simulated firmware: it has no time of its own, so "
-              "that a run has the same bits each time.")  # fmt: skip
+@click.option(
+    "--lock-step",
+    is_flag=True,
+    help="Of simulated firmware: it has no time of its own, so that a run has the same bits each time.",
+)
 @click.option("--rest", type=SECONDS, metavar="TIME", help="Let the motors cool between cases (`30 s`).")
 @click.option("--transcripts", metavar="DIR", help="Write what goes over the lines into files in this folder.")
-@click.option("--clear", is_flag=True, help="Before each case, clear what its bed has latched: a sweep then goes on "
-              "after a case whose bed stopped itself.")  # fmt: skip
+@click.option(
+    "--clear",
+    is_flag=True,
+    help="Before each case, clear what its bed has latched: a sweep then goes on "
+    "after a case whose bed stopped itself.",
+)
 @click.option("--force", is_flag=True, help="Arm the bed also where a law has no margin of stability.")
 @click.option("-o", "--output", metavar="FILE", help="The archive [as `met run` calls it].")
 @click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'.")

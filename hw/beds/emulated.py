@@ -87,9 +87,16 @@ class EmulatedBed(BedDriver):
     def connect(self) -> About:
         capabilities = Capability.ENCODER | Capability.LOCK_STEP | Capability.SIMULATED
         about = About(
-            self._name, messages.VERSION, "0" * 16, 1, capabilities, 1.0 / self._plant.period, DEADMAN, self._scales,
+            self._name,
+            messages.VERSION,
+            "0" * 16,
+            1,
+            capabilities,
+            1.0 / self._plant.period,
+            DEADMAN,
+            self._scales,
             self._limits,
-        )  # fmt: skip
+        )
         self.stop()
         self._about, self._in_force = about, greeting.in_force(about)
         return about

@@ -13,9 +13,17 @@ DEADMAN = (0.010, 0.020)
 """s, between which a bed's is: docs/protocol.md, States."""
 
 _UNITS = {
-    "voltage": "V", "current": "A", "rate": "rad/s", "angle": "rad", "drive_current": "A",
-    "acceleration": "rad/s^2", "arming_rate": "rad/s", "voltage_slew": "V/s", "current_slew": "A/s", "heat": "A^2 s",
-}  # fmt: skip
+    "voltage": "V",
+    "current": "A",
+    "rate": "rad/s",
+    "angle": "rad",
+    "drive_current": "A",
+    "acceleration": "rad/s^2",
+    "arming_rate": "rad/s",
+    "voltage_slew": "V/s",
+    "current_slew": "A/s",
+    "heat": "A^2 s",
+}
 
 
 def about(found: messages.HelloAnswer) -> About:
@@ -33,9 +41,16 @@ def about(found: messages.HelloAnswer) -> About:
         helps = "correct the configuration in its firmware"
         raise Problem([error("E404", f"bed `{name}` cannot be driven: {each}", help=helps) for each in wrong])
     return About(
-        name, found.version, found.firmware.hex(), found.session, capabilities, found.tick_hz, found.deadman,
-        found.scales, found.limits,
-    )  # fmt: skip
+        name,
+        found.version,
+        found.firmware.hex(),
+        found.session,
+        capabilities,
+        found.tick_hz,
+        found.deadman,
+        found.scales,
+        found.limits,
+    )
 
 
 _KNOWN = sum(Capability)

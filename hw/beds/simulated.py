@@ -39,9 +39,14 @@ class SimulatedBed(WireBed):
     """
 
     def __init__(
-        self, kind: Literal["firmware", "qemu"], config: Config, plant: str, *, period: float,
+        self,
+        kind: Literal["firmware", "qemu"],
+        config: Config,
+        plant: str,
+        *,
+        period: float,
         transcript: Callable[[bytes], object] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__(kind, period, secrets.randbelow(messages.NUMBERS))
         self._kind, self._lock_step = kind, Capability.LOCK_STEP in config.capabilities
         self._built = build("arm" if kind == "qemu" else "host", config, plant)
@@ -74,9 +79,12 @@ class SimulatedBed(WireBed):
         with tempfile.TemporaryDirectory(prefix="met-bed-") as folder:
             path = Path(folder) / "line"
             self._process = subprocess.Popen(
-                qemu(self._built, path), stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                start_new_session=True, preexec_fn=partial(realtime.end_with_parent, signal.SIGKILL),
-            )  # fmt: skip
+                qemu(self._built, path),
+                stdin=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+                preexec_fn=partial(realtime.end_with_parent, signal.SIGKILL),
+            )
             if not self._lock_step:
                 realtime.put_first(self._process.pid)
             end = time.monotonic() + WITHIN
@@ -128,8 +136,13 @@ class SocketLine:
 
 
 def _lost(why: str | None) -> Problem:
-    return Problem(error("E401", f"the line to the bed's firmware was lost: {(why or 'it does not say why').lower()}",
-                         help="its process has ended: start again"))  # fmt: skip
+    return Problem(
+        error(
+            "E401",
+            f"the line to the bed's firmware was lost: {(why or 'it does not say why').lower()}",
+            help="its process has ended: start again",
+        )
+    )
 
 
 def _not_started(why: str) -> Problem:

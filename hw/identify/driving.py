@@ -65,9 +65,11 @@ class MovesResult:
 def peaks(limits: Limits, sheet: Mapping[str, float], asked: MovesRequest) -> tuple[Peaks, float]:
     """What the moves may ask for, and the rate, rad/s, up to which those go that are to reach the drive's largest
     torque. Raises Problem E421."""
-    for name, value, most, unit in (("voltage", asked.voltage, limits.voltage, "V"),
-                                    ("current", asked.current, limits.current, "A"),
-                                    ("rate", asked.rate, limits.rate, "rad/s")):  # fmt: skip
+    for name, value, most, unit in (
+        ("voltage", asked.voltage, limits.voltage, "V"),
+        ("current", asked.current, limits.current, "A"),
+        ("rate", asked.rate, limits.rate, "rad/s"),
+    ):
         if value is not None and value > most:
             message = f"a {name} of {value:.6g} {unit} is beyond the bed's limit, {most:.6g} {unit}"
             raise Problem(error("E421", message, help=f"give `--{name}` less, or leave it out"))
@@ -110,13 +112,24 @@ def run(asked: MovesRequest) -> MovesResult:
         if not lock_step:
             process.precedence()
         bed.patience = of.patience(lock_step)
-        head = {"joint": asked.joint, "hz": of.hz, "lock_step": lock_step, "tick_hz": about.tick_hz,
-                "bed": about.name, "firmware": about.firmware}  # fmt: skip
+        head = {
+            "joint": asked.joint,
+            "hz": of.hz,
+            "lock_step": lock_step,
+            "tick_hz": about.tick_hz,
+            "bed": about.name,
+            "firmware": about.firmware,
+        }
         with recording(Path(asked.records), head, guide.exchanges + 1) as put:
             ended = loop.drive(
-                [bed], guide, of, guide.exchanges, put, lock_step=lock_step,
+                [bed],
+                guide,
+                of,
+                guide.exchanges,
+                put,
+                lock_step=lock_step,
                 asked_to_stop=lambda: asked_to_stop() or guide.done or guide.stuck,
-            )  # fmt: skip
+            )
         refusals.check_stopped([bed], [about], "" if guide.done else ended.why)
         seconds = ended.exchanges * of.period
         if guide.stuck:

@@ -21,7 +21,7 @@ from met.servos.motor import damping, torque
 from met.substitution import butterworth, shaft
 from met.substitution.emulated import SUBSTEP
 from met.trace import cos, sin
-from met.trace.program import CallPhase, Phase, Program, Tape, Unless0
+from met.trace.program import Phase, Program, Tape, Unless0
 from met.trace.recorder import record
 
 MOTOR = ("kt", "resistance", "tau_max", "f_c", "f_v", "inertia", "kt_load", "f_cut")
@@ -50,9 +50,11 @@ def _kernel(count: int) -> Kernel:
         w, angle, x = tape.read("rate"), tape.input("angle"), (tape.read("filtered"), tape.read("slope"))
         for _ in range(count):
             ripple = (
-                p["sin_1"] * sin(angle) + p["cos_1"] * cos(angle)
-                + p["sin_2"] * sin(2.0 * angle) + p["cos_2"] * cos(2.0 * angle)
-            )  # fmt: skip
+                p["sin_1"] * sin(angle)
+                + p["cos_1"] * cos(angle)
+                + p["sin_2"] * sin(2.0 * angle)
+                + p["cos_2"] * cos(2.0 * angle)
+            )
             smooth = torque(p["kt"], p["resistance"], p["tau_max"], voltage, w) + load - p["f_v"] * w + ripple
             after = shaft.slid(w, smooth, p["f_c"], inertia=p["inertia"], decay=decay, time=h)
             x = butterworth.along_line(of, x, w, after)

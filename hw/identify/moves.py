@@ -94,10 +94,12 @@ def _slow() -> list[Move]:
 
     found = []
     for share in (1.0, -1.0):
-        found += [Move("slow", 1.6, ramps(share * 0.12, 0.0, 1.6)),
-                  Move("slow", 1.6, ramps(share * 0.25, 0.0, 0.8)),
-                  Move("slow", 1.6, ramps(0.0, share * 0.6, 1.6)),
-                  Move("slow", 1.2, ramps(0.0, share * 0.9, 0.6))]  # fmt: skip
+        found += [
+            Move("slow", 1.6, ramps(share * 0.12, 0.0, 1.6)),
+            Move("slow", 1.6, ramps(share * 0.25, 0.0, 0.8)),
+            Move("slow", 1.6, ramps(0.0, share * 0.6, 1.6)),
+            Move("slow", 1.2, ramps(0.0, share * 0.9, 0.6)),
+        ]
     return found
 
 
@@ -133,12 +135,17 @@ def _mixed() -> list[Move]:
 
         return lambda: profile
 
-    tones = [(1.3, 3.1, 7.9, 2.3, 5.7), (0.9, 2.7, 11.3, 1.7, 8.3), (1.9, 4.3, 13.7, 3.7, 6.1),
-             (2.9, 5.3, 9.1, 1.1, 10.7)]  # fmt: skip
+    tones = [
+        (1.3, 3.1, 7.9, 2.3, 5.7),
+        (0.9, 2.7, 11.3, 1.7, 8.3),
+        (1.9, 4.3, 13.7, 3.7, 6.1),
+        (2.9, 5.3, 9.1, 1.1, 10.7),
+    ]
     return [
         Move("mixed", 1.2, sines((sign * 0.3, 0.2, sign * 0.15), (0.3, sign * 0.3), each))
-        for each in tones for sign in (1.0, -1.0)
-    ]  # fmt: skip
+        for each in tones
+        for sign in (1.0, -1.0)
+    ]
 
 
 class MoveGuide:

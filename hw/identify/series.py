@@ -40,8 +40,9 @@ class Series:
         take = np.concatenate(at)
         numbers = np.repeat(np.arange(len(at)), [len(each) for each in at])
         amperes = None if self.drive_current is None else self.drive_current[take]
-        return Series(self.time[take], self.voltage[take], self.current[take], self.angle[take], self.rate[take],
-                      amperes, numbers)  # fmt: skip
+        return Series(
+            self.time[take], self.voltage[take], self.current[take], self.angle[take], self.rate[take], amperes, numbers
+        )
 
 
 def series(rows: np.ndarray, about: About, began: Sequence[int], *, lock_step: bool) -> Series:
@@ -58,8 +59,10 @@ def series(rows: np.ndarray, about: About, began: Sequence[int], *, lock_step: b
     span = np.repeat(np.arange(len(spans)), spans)
     time = ticks[span] / spans[span] / about.tick_hz
     held = rows[ends if lock_step else ends - 1]
-    voltage, current = (np.rint(held[name] / scale) * scale
-                        for name, scale in (("voltage", scales.voltage), ("current", scales.current)))  # fmt: skip
+    voltage, current = (
+        np.rint(held[name] / scale) * scale
+        for name, scale in (("voltage", scales.voltage), ("current", scales.current))
+    )
     angle = read["angle"]
     if np.isnan(angle).any():
         means = 0.5 * (read["rate"][1:] + read["rate"][:-1])

@@ -147,9 +147,16 @@ class Device:
     def own(self) -> None:
         volts, amperes, rate = self.scales[:3]
         of = self.limits
-        self.mine = [math.floor(x + 1e-6) for x in (
-            of[0] / volts, of[1] / amperes, of[2] / rate, of[4] / self.tick_hz / volts, of[5] / self.tick_hz / amperes,
-        )]  # fmt: skip
+        self.mine = [
+            math.floor(x + 1e-6)
+            for x in (
+                of[0] / volts,
+                of[1] / amperes,
+                of[2] / rate,
+                of[4] / self.tick_hz / volts,
+                of[5] / self.tick_hz / amperes,
+            )
+        ]
         self.force = list(self.mine)
 
     def safe(self) -> None:
@@ -300,8 +307,10 @@ class Device:
         before = (max(1, self.since), self.volts, self.amperes), (self.first[0] + 1, *self.first[1:])
         if abs(voltage) > self.force[0] or abs(current) > self.force[1]:
             self.stop(RANGE)
-        elif any(abs(voltage - volts) > ticks * self.force[3] or abs(current - amperes) > ticks * self.force[4]
-                 for ticks, volts, amperes in before):  # fmt: skip
+        elif any(
+            abs(voltage - volts) > ticks * self.force[3] or abs(current - amperes) > ticks * self.force[4]
+            for ticks, volts, amperes in before
+        ):
             self.stop(SLEW)
         else:
             self.hold(voltage, current)

@@ -19,9 +19,19 @@ from met.diagnostic import Problem, error
 from tests.hw.device import Device
 
 KINDS = (
-    "drop", "flip", "truncate", "duplicate", "delay", "reorder", "split", "stall", "garbage", "cut", "reboot",
+    "drop",
+    "flip",
+    "truncate",
+    "duplicate",
+    "delay",
+    "reorder",
+    "split",
+    "stall",
+    "garbage",
+    "cut",
+    "reboot",
     "version",
-)  # fmt: skip
+)
 """cut: the line ends in the middle of a frame; version: the device is another one from now on."""
 
 STALL = 0.050

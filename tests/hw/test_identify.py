@@ -28,10 +28,26 @@ from tests.hw.conftest import said
 
 pytestmark = pytest.mark.slow
 
-UNITS = {"kt": "N*m/A", "resistance": "ohm", "tau_max": "N*m", "f_c": "N*m", "f_v": "N*m*s/rad", "inertia": "kg*m^2",
-         "kt_load": "N*m/A", "f_cut": "Hz"}  # fmt: skip
-SHEET = {"kt": 0.061, "resistance": 2.05, "tau_max": 0.144, "f_c": 0.0205, "f_v": 2.58e-5, "inertia": 6.38e-5,
-         "kt_load": 0.072, "f_cut": 50.0}  # fmt: skip
+UNITS = {
+    "kt": "N*m/A",
+    "resistance": "ohm",
+    "tau_max": "N*m",
+    "f_c": "N*m",
+    "f_v": "N*m*s/rad",
+    "inertia": "kg*m^2",
+    "kt_load": "N*m/A",
+    "f_cut": "Hz",
+}
+SHEET = {
+    "kt": 0.061,
+    "resistance": 2.05,
+    "tau_max": 0.144,
+    "f_c": 0.0205,
+    "f_v": 2.58e-5,
+    "inertia": 6.38e-5,
+    "kt_load": 0.072,
+    "f_cut": 50.0,
+}
 TOLD = [name for name in UNITS if name != "kt_load"]
 
 DECK = """\
@@ -110,8 +126,15 @@ def moved(
     moves = guided(186.0 if voltage == 20.0 else 60.0)
     guide = MoveGuide(moves, Peaks(voltage, 2.0, 500.0), 1e-3, (4e4, 6e3))
     out: list[bytes] = []
-    loop.drive([bed], guide, pace(1000.0), guide.exchanges, out.append, lock_step=True,
-               asked_to_stop=lambda: guide.done or guide.stuck)  # fmt: skip
+    loop.drive(
+        [bed],
+        guide,
+        pace(1000.0),
+        guide.exchanges,
+        out.append,
+        lock_step=True,
+        asked_to_stop=lambda: guide.done or guide.stuck,
+    )
     assert guide.done
     rows = np.frombuffer(b"".join(out), records.LAYOUT)
     found = series(rows, about, guide.began, lock_step=kind is not OwnTime)
@@ -120,8 +143,7 @@ def moved(
 
 def outside(found: FitResult, truth: Mapping[str, float]) -> list[str]:
     """Parameters whose interval the truth is not in."""
-    return [name for name, each in found.parameters.items()
-            if each.found and not each.low <= truth[name] <= each.high]  # fmt: skip
+    return [name for name, each in found.parameters.items() if each.found and not each.low <= truth[name] <= each.high]
 
 
 def identified(folder: Path, seed: int, faults: str) -> tuple[FitResult, dict[str, float]]:
@@ -235,14 +257,23 @@ def test_peaks_are_of_the_bed_and_the_servo() -> None:
     assert peaks(replace(LIMITS, voltage=12.0, current=1.0, rate=100.0), SHEET, ASKED)[0] == Peaks(12.0, 0.8, 80.0)
 
 
-@pytest.mark.parametrize(("more", "message"), [
-    ({"voltage": 61.0}, """\
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (
+            {"voltage": 61.0},
+            """\
 error[E421]: a voltage of 61 V is beyond the bed's limit, 60 V
- = help: give `--voltage` less, or leave it out"""),
-    ({"voltage": 1.0}, """\
+ = help: give `--voltage` less, or leave it out""",
+        ),
+        (
+            {"voltage": 1.0},
+            """\
 error[E421]: 1 V is too little for the moves: the shaft's friction takes 0.689 V
- = help: `--voltage`, or the bed's own limit, of 2.76 V at least"""),
-])  # fmt: skip
+ = help: `--voltage`, or the bed's own limit, of 2.76 V at least""",
+        ),
+    ],
+)
 def test_what_the_moves_cannot_be(more: dict[str, float], message: str) -> None:
     with pytest.raises(Problem) as caught:
         peaks(LIMITS, SHEET, replace(ASKED, **more))

@@ -48,16 +48,28 @@ def test_nobody_there() -> None:
 @pytest.mark.parametrize(
     ("answer", "said", "helps"),
     [
-        (lambda frame: b"\x8f\x01\0" * 3, "162 bytes came, and no frame that decodes",
-         ("give the baud rate that the bed has, `--baud`", "is another device on this line?")),
-        (lambda frame: b"\xff" * 2000, "36,000 bytes came, and no frame that decodes",
-         ("give the baud rate that the bed has, `--baud`", "is another device on this line?")),
-        (lambda frame: frame, "what comes back is what was sent, 18 of 18 frames",
-         ("take away a loop-back plug, or a bridge between its two wires", "switch a modem's echo off")),
-        (lambda frame: model.frame(b"\x84\0\0" + bytes(10)), "18 frames came, and no answer among them",
-         ("is another computer on the same line?", "is it the firmware of a bed, of this version?")),
+        (
+            lambda frame: b"\x8f\x01\0" * 3,
+            "162 bytes came, and no frame that decodes",
+            ("give the baud rate that the bed has, `--baud`", "is another device on this line?"),
+        ),
+        (
+            lambda frame: b"\xff" * 2000,
+            "36,000 bytes came, and no frame that decodes",
+            ("give the baud rate that the bed has, `--baud`", "is another device on this line?"),
+        ),
+        (
+            lambda frame: frame,
+            "what comes back is what was sent, 18 of 18 frames",
+            ("take away a loop-back plug, or a bridge between its two wires", "switch a modem's echo off"),
+        ),
+        (
+            lambda frame: model.frame(b"\x84\0\0" + bytes(10)),
+            "18 frames came, and no answer among them",
+            ("is another computer on the same line?", "is it the firmware of a bed, of this version?"),
+        ),
     ],
-)  # fmt: skip
+)
 def test_somebody_there_who_does_not_answer(
     answer: Callable[[bytes], bytes], said: str, helps: tuple[str, str]
 ) -> None:
@@ -244,24 +256,59 @@ def test_a_line_that_babbles_holds_nobody_up() -> None:
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
-        ("DEADMAN", ("no new command came within the deadman's time",
-                     "the computer or the line was late: leave the computer less to do, or exchange at a lower rate")),
-        ("RANGE", ("a command was beyond a limit",
-                   "limits that the host knows are checked before: it has others than the bed; greet the bed anew")),
-        ("SLEW", ("a command changed faster than a limit",
-                  "command it more smoothly, or give the bed a wider limit of slew where it can bear it")),
-        ("RATE", ("the shaft was faster than its limit",
-                  "look whether the load drives the shaft; lower the rate that is asked for")),
+        (
+            "DEADMAN",
+            (
+                "no new command came within the deadman's time",
+                "the computer or the line was late: leave the computer less to do, or exchange at a lower rate",
+            ),
+        ),
+        (
+            "RANGE",
+            (
+                "a command was beyond a limit",
+                "limits that the host knows are checked before: it has others than the bed; greet the bed anew",
+            ),
+        ),
+        (
+            "SLEW",
+            (
+                "a command changed faster than a limit",
+                "command it more smoothly, or give the bed a wider limit of slew where it can bear it",
+            ),
+        ),
+        (
+            "RATE",
+            (
+                "the shaft was faster than its limit",
+                "look whether the load drives the shaft; lower the rate that is asked for",
+            ),
+        ),
         ("CURRENT", ("a current was beyond its limit", "look for a short circuit or a shaft that is held")),
         ("HEAT", ("the load motor was loaded for too long", "let it cool, and load it less, or for less time")),
-        ("TACHOMETER_DEAD", ("torque did not change the measured rate",
-                             "look whether the tachometer is connected, and whether the shaft is free")),
-        ("TACHOMETER_REVERSED", ("the measured rate changed against the torque",
-                                 "exchange the two wires of the tachometer, or of the motor")),
-        ("NOISE", ("too many frames did not decode",
-                   "look at the line's cable, its shield and its ground; try a lower baud rate")),
+        (
+            "TACHOMETER_DEAD",
+            (
+                "torque did not change the measured rate",
+                "look whether the tachometer is connected, and whether the shaft is free",
+            ),
+        ),
+        (
+            "TACHOMETER_REVERSED",
+            (
+                "the measured rate changed against the torque",
+                "exchange the two wires of the tachometer, or of the motor",
+            ),
+        ),
+        (
+            "NOISE",
+            (
+                "too many frames did not decode",
+                "look at the line's cable, its shield and its ground; try a lower baud rate",
+            ),
+        ),
     ],
-)  # fmt: skip
+)
 def test_why_a_bed_does_not_arm(fault: str, said: tuple[str, str]) -> None:
     device = Device()
     bed = bed_of(device)

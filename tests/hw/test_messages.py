@@ -55,9 +55,18 @@ def test_what_a_bed_answers_byte_by_byte() -> None:
     hello += struct.pack("<15d", *numbers)
     assert messages.bed_answer(hello, 0) == (
         0x1234,
-        HelloAnswer(1, 0x25, 0x01020304, b"FIRMWARE", b"bench".ljust(16, b"\0"), 1.0, 2.0, Scales(*numbers[2:8]),
-                 Limits(*numbers[8:])),
-    )  # fmt: skip
+        HelloAnswer(
+            1,
+            0x25,
+            0x01020304,
+            b"FIRMWARE",
+            b"bench".ljust(16, b"\0"),
+            1.0,
+            2.0,
+            Scales(*numbers[2:8]),
+            Limits(*numbers[8:]),
+        ),
+    )
     limits = b"\x82\x34\x12" + struct.pack("<5i", 1, 2, 3, 4, 5)
     assert messages.bed_answer(limits, 0) == (0x1234, LimitsAnswer(1, 2, 3, 4, 5))
     sample = b"\x84\x34\x12" + struct.pack("<HIi", 5, 7, -9)

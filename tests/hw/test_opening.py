@@ -91,22 +91,34 @@ def test_an_address_at_which_nobody_listens() -> None:
 @pytest.mark.parametrize(
     ("url", "why", "remedy"),
     [
-        ("wire://x", "invalid URL, protocol 'wire' not known",
-         "such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217://HOST:PORT"),
+        (
+            "wire://x",
+            "invalid URL, protocol 'wire' not known",
+            "such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217://HOST:PORT",
+        ),
         ("loop://?x=y", "unknown option: 'x'", "such as /dev/ttyUSB0, socket://HOST:PORT or rfc2217://HOST:PORT"),
         ("hwgrep://[", "unterminated character set at position 0", "is there someone who listens at that address?"),
         ("socket://localhost", "it names no port", "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
         ("socket://localhost:0", "it names no port", "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
         ("socket://:7000", "it names no host", "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
         ("rfc2217://bench", "it names no port", "write `rfc2217://HOST:PORT`, where PORT is 1 to 65535"),
-        ("socket://bench:serial", "it is no address of a host and a port",
-         "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
-        ("socket://bench:70000", "it is no address of a host and a port",
-         "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
-        ("socket://[::1", "it is no address of a host and a port",
-         "write `socket://HOST:PORT`, where PORT is 1 to 65535"),
+        (
+            "socket://bench:serial",
+            "it is no address of a host and a port",
+            "write `socket://HOST:PORT`, where PORT is 1 to 65535",
+        ),
+        (
+            "socket://bench:70000",
+            "it is no address of a host and a port",
+            "write `socket://HOST:PORT`, where PORT is 1 to 65535",
+        ),
+        (
+            "socket://[::1",
+            "it is no address of a host and a port",
+            "write `socket://HOST:PORT`, where PORT is 1 to 65535",
+        ),
     ],
-)  # fmt: skip
+)
 def test_an_address_that_is_none(url: str, why: str, remedy: str) -> None:
     assert refusal(SerialBed(url, period=1e-3).connect) == (
         f"error[E400]: {url} cannot be opened: {why}\n = help: {remedy}"
@@ -142,8 +154,10 @@ def test_an_adapter_that_keeps_bytes_back(tmp_path: Path, monkeypatch: pytest.Mo
     (tmp_path / "ttyUSB7" / "latency_timer").write_text("16\n")
     [found] = serial_line.latency("/dev/ttyUSB7")
     assert (found.code, found.severity, found.message) == (
-        "E405", "warning", "the adapter of /dev/ttyUSB7 keeps bytes back for up to 16 ms: exchanges will be late",
-    )  # fmt: skip
+        "E405",
+        "warning",
+        "the adapter of /dev/ttyUSB7 keeps bytes back for up to 16 ms: exchanges will be late",
+    )
     file = tmp_path / "ttyUSB7" / "latency_timer"
     assert found.help == (f"`echo 1 | sudo tee {file}`, after each time that it is plugged in",)
     file.write_text("1\n")

@@ -63,15 +63,21 @@ def test_a_run_is_the_same_to_the_bit_inside_the_kernel_in_process_and_over_a_li
 ) -> None:
     (tmp_path / "bench.ic").write_text(DECK.format(duration=duration), encoding="utf-8")
     experiment = ic.compile(tmp_path / "bench.ic", select=["bench"]).experiments[0]
-    values = {path.removeprefix("shoulder.bed."): quantity.value for path, quantity in experiment.parameters.items()
-              if path.startswith("shoulder.bed.")}  # fmt: skip
+    values = {
+        path.removeprefix("shoulder.bed."): quantity.value
+        for path, quantity in experiment.parameters.items()
+        if path.startswith("shoulder.bed.")
+    }
     plant = Plant(experiment, "shoulder")
     scales, limits = emulated.scales(values), emulated.limits(values, plant.period)
     assert scales.voltage == values["converter_voltage"] > 0.0
     device = Device(
-        plant=Plant(experiment, "shoulder"), tick_hz=1000.0, capabilities=0,  # type: ignore[arg-type]
-        scales=tuple(scales.__dict__.values()), limits=tuple(limits.__dict__.values()),
-    )  # fmt: skip
+        plant=Plant(experiment, "shoulder"),
+        tick_hz=1000.0,
+        capabilities=0,  # type: ignore[arg-type]
+        scales=tuple(scales.__dict__.values()),
+        limits=tuple(limits.__dict__.values()),
+    )
     here = stepped(experiment, EmulatedBed(plant, scales, limits))
     assert stepped(experiment, LineBed(lambda: VirtualLine(device, None))) == here
     inside = run(prepare(experiment))

@@ -140,16 +140,33 @@ def draw(path: Path) -> None:
         instants, run, seeds = at_the_paper_s_rates(Path(folder))
     mean, band = seeds.mean(axis=0), reach(seeds)
     figure = Figure(figsize=(9.0, 5.4), dpi=150, facecolor=SURFACE, layout="constrained")
-    figure.suptitle("The paper's figures 7 and 8 over the wire: servos 100 Hz, wire 500 Hz, dynamics 25 Hz",
-                    x=0.01, ha="left", color=INK, fontsize=11)  # fmt: skip
+    figure.suptitle(
+        "The paper's figures 7 and 8 over the wire: servos 100 Hz, wire 500 Hz, dynamics 25 Hz",
+        x=0.01,
+        ha="left",
+        color=INK,
+        fontsize=11,
+    )
     grid = figure.subplots(2, 2, width_ratios=(1.7, 1.0), sharex="col")
     for joint, (whole, near) in enumerate(grid):
         for axes, scale, level in ((whole, 1.0, 0.0), (near, 100.0 / SLOW, mean[:, joint])):
             low, high = (scale * (mean[:, joint] + side * band[:, joint] - level) for side in (-1.0, 1.0))
-            axes.fill_between(instants, low, high, color=BEHIND, alpha=0.35, linewidth=0.0,
-                              label=f"95 % of {SEEDS} seeds, emulated bed")  # fmt: skip
-            axes.plot(instants, scale * (run[:, joint] - level), color=LINE, linewidth=0.9,
-                      label="firmware on a Cortex-M3 (QEMU)")  # fmt: skip
+            axes.fill_between(
+                instants,
+                low,
+                high,
+                color=BEHIND,
+                alpha=0.35,
+                linewidth=0.0,
+                label=f"95 % of {SEEDS} seeds, emulated bed",
+            )
+            axes.plot(
+                instants,
+                scale * (run[:, joint] - level),
+                color=LINE,
+                linewidth=0.9,
+                label="firmware on a Cortex-M3 (QEMU)",
+            )
             axes.set_facecolor(SURFACE)
             axes.grid(color=MUTED, alpha=0.15, linewidth=0.8)
             axes.tick_params(colors=MUTED)

@@ -48,19 +48,29 @@ error[E406]: bed `model` has stopped itself, and is to be cleared first: torque 
 """
     )
     assert not Path("a.h5").exists()
-    assert met_bed("clear", "--port", port) == (cli.YES, f"""\
+    assert met_bed("clear", "--port", port) == (
+        cli.YES,
+        f"""\
 bed `model` at {port}: cleared: torque did not change the measured rate
   = help: look whether the tachometer is connected, and whether the shaft is free
-""", "")  # fmt: skip
+""",
+        "",
+    )
     assert met_bed("clear", "--port", port, "--format", "json")[1] == '{"name": "model", "cleared": []}\n'
     assert device.state == DISARMED
     status, said, complaint = run(met_bed, port, "--lock-step")
     assert (status, complaint) == (cli.YES, "") and "the case reached its end" in said
 
 
-@pytest.mark.parametrize("begun", [
-    b"", records.MAGIC[:5], records.MAGIC, records.MAGIC + (400).to_bytes(8, "little") + b'{"key": "',
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "begun",
+    [
+        b"",
+        records.MAGIC[:5],
+        records.MAGIC,
+        records.MAGIC + (400).to_bytes(8, "little") + b'{"key": "',
+    ],
+)
 def test_records_that_were_cut_short_before_the_first_are_made_anew(
     met_bed: Met, monkeypatch: pytest.MonkeyPatch, begun: bytes
 ) -> None:
@@ -165,8 +175,9 @@ def test_a_transcript_of_another_run_is_refused_and_then_the_right_one_is_replay
     assert met_bed("run", "deck.ic", "tuning", "--port", "firmware", "-o", "a.h5", *words)[0] == cli.YES
     for row, status in ((1, cli.BAD_INPUT), (0, cli.YES)):
         port = f"kept/tuning.{row}.shoulder.transcript"
-        found, _, complaint = met_bed("run", "deck.ic", "tuning", "--case", "#0", "--port", port, "-o", "b.h5",
-                                      "--no-picture")  # fmt: skip
+        found, _, complaint = met_bed(
+            "run", "deck.ic", "tuning", "--case", "#0", "--port", port, "-o", "b.h5", "--no-picture"
+        )
         assert found == status and ("error[E407]" in complaint) == (row == 1)
     assert batch.open("b.h5").q.values.tobytes() == batch.open("a.h5").q.values[:1].tobytes()
 
@@ -188,12 +199,15 @@ def test_cases_that_were_driven_elsewhere_are_not_taken_for_driven_here(
     met_bed: Met, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert run(met_bed, "emulated")[0] == cli.YES
-    assert run(met_bed, "firmware", "--lock-step")[0::2] == (cli.BAD_INPUT, """\
+    assert run(met_bed, "firmware", "--lock-step")[0::2] == (
+        cli.BAD_INPUT,
+        """\
 error[E353]: a.h5 holds this campaign, driven at `emulated`, and is left as it is
  = help: `--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it
 
 1 error
-""")  # fmt: skip
+""",
+    )
     assert "nothing is missing" in run(met_bed, "emulated")[1]
 
     def ended(self: OnBeds, task: object) -> None:

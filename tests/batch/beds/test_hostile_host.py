@@ -137,9 +137,26 @@ def test_a_bed_that_does_not_stop_is_told() -> None:
 
 
 def test_an_interrupt_while_it_rests_ends_it_at_once_and_arms_nothing(here: Path) -> None:
-    process = subprocess.Popen([*MET, "run", "deck.ic", "rested", "--port", "firmware", "--rest", "8 s",
-                                "--transcripts", "k", "-o", "a.h5", "--no-picture"], start_new_session=True,
-                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
+    process = subprocess.Popen(
+        [
+            *MET,
+            "run",
+            "deck.ic",
+            "rested",
+            "--port",
+            "firmware",
+            "--rest",
+            "8 s",
+            "--transcripts",
+            "k",
+            "-o",
+            "a.h5",
+            "--no-picture",
+        ],
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     second = here / "k" / "rested.1.shoulder.transcript"
     while not second.exists() or second.stat().st_size < 400:
         assert process.poll() is None
@@ -220,9 +237,12 @@ def test_a_writer_that_is_gone_ends_the_run(here: Path) -> None:
 
 
 def test_an_emulator_ends_with_who_drives_it(here: Path) -> None:
-    process = subprocess.Popen([*MET, "run", "deck.ic", "long", "--port", "qemu", "--lock-step", "-o", "a.h5",
-                                "--no-picture"], start_new_session=True, stdout=subprocess.DEVNULL,
-                               stderr=subprocess.DEVNULL)  # fmt: skip
+    process = subprocess.Popen(
+        [*MET, "run", "deck.ic", "long", "--port", "qemu", "--lock-step", "-o", "a.h5", "--no-picture"],
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     path = here / "a.h5.campaign" / "beds" / "0-0.records"
     while not path.exists() or path.stat().st_size < 10_000:
         if process.poll() is not None:
@@ -233,16 +253,23 @@ def test_an_emulator_ends_with_who_drives_it(here: Path) -> None:
     process.wait()
     time.sleep(1.0)
     with contextlib.suppress(ProcessLookupError):
-        state = Path(f"/proc/{emulator}/stat").read_text().rpartition(")")[2].split()[0] if Path(
-            f"/proc/{emulator}").exists() else "X"  # fmt: skip
+        state = (
+            Path(f"/proc/{emulator}/stat").read_text().rpartition(")")[2].split()[0]
+            if Path(f"/proc/{emulator}").exists()
+            else "X"
+        )
         if state not in "XZ":
             os.kill(emulator, signal.SIGKILL)
             raise AssertionError("it goes on")
 
 
 def test_an_interrupt_of_identify_is_one() -> None:
-    process = subprocess.Popen([*MET, "identify", "deck.ic", "wired", "--port", "firmware"], start_new_session=True,
-                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)  # fmt: skip
+    process = subprocess.Popen(
+        [*MET, "identify", "deck.ic", "wired", "--port", "firmware"],
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     while not Path("shoulder.identified.records").exists():
         assert process.poll() is None
         time.sleep(0.02)

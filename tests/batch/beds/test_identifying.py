@@ -107,16 +107,25 @@ def test_the_servo_is_the_data_sheet_and_what_is_asked_goes_before_the_deck() ->
     assert asked.values["kt_load"] == 0.08 and asked.said
 
 
-@pytest.mark.parametrize(("words", "message"), [
-    (("--port", "/dev/null"), """\
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ("--port", "/dev/null"),
+            """\
 error[E424]: joint `shoulder`: the load motor's constant, by which torques are measured, is nowhere said
  = help: `--kt-load '0.072 N*m/A'`, from its data sheet; or `bed = emulated(kt_load = ..., ...)` in the deck
-"""),
-    (("--port", "emulated", "--current", "4 A"), """\
+""",
+        ),
+        (
+            ("--port", "emulated", "--current", "4 A"),
+            """\
 error[E421]: a current of 4 A is beyond the bed's limit, 3 A
  = help: give `--current` less, or leave it out
-"""),
-])  # fmt: skip
+""",
+        ),
+    ],
+)
 def test_what_is_said_of_what_is_wrong(
     identify: Callable[..., tuple[int, str, str]], words: tuple[str, ...], message: str
 ) -> None:
@@ -137,15 +146,24 @@ class Driven(EmulatedBed):
         return replace(answer, rate=answer.rate + 4.0) if self.driven else answer
 
 
-@pytest.mark.parametrize(("rate", "message"), [
-    (100.0, """\
+@pytest.mark.parametrize(
+    ("rate", "message"),
+    [
+        (
+            100.0,
+            """\
 error[E420]: bed `emulated` at 0.447 s, in move 1 (steps): the bed stopped itself: rate
  = help: look whether the load drives the shaft; lower the rate that is asked for
- = help: `--voltage`, `--current` and `--rate` make the moves smaller"""),
-    (None, """\
+ = help: `--voltage`, `--current` and `--rate` make the moves smaller""",
+        ),
+        (
+            None,
+            """\
 error[E422]: bed `emulated` does not come to rest before the first move, at 0 V and 0 A
- = help: look what drives its shaft, and whether its tachometer reads 0 at rest"""),
-])  # fmt: skip
+ = help: look what drives its shaft, and whether its tachometer reads 0 at rest""",
+        ),
+    ],
+)
 def test_moves_that_are_cut_short(
     rate: float | None, message: str, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -157,8 +175,15 @@ def test_moves_that_are_cut_short(
     monkeypatch.setattr(driving, "opened", lambda *_: bed)
     monkeypatch.setattr("hw.process.listening", lambda: lambda: False)
     sheet = dict(sheet_of(of, "shoulder", None).values)
-    asked = MovesRequest(plan=plan_file.dumps(Plan("", (of,))), row=0, joint="shoulder", port="emulated",
-                  records=str(here / "a.records"), sheet=sheet, rate=rate)  # fmt: skip
+    asked = MovesRequest(
+        plan=plan_file.dumps(Plan("", (of,))),
+        row=0,
+        joint="shoulder",
+        port="emulated",
+        records=str(here / "a.records"),
+        sheet=sheet,
+        rate=rate,
+    )
     with pytest.raises(Problem) as caught:
         driving.run(asked)
     assert said(caught.value) == message
@@ -169,15 +194,24 @@ def test_moves_that_are_cut_short(
 ABOUT = About("bench", 1, "0" * 16, 1, Capability(0), 1e3, 0.02, Scales(*[1.0] * 6), Limits(*[1.0] * 7))
 
 
-@pytest.mark.parametrize(("settled", "message"), [
-    (True, """\
+@pytest.mark.parametrize(
+    ("settled", "message"),
+    [
+        (
+            True,
+            """\
 error[E423]: bed `bench` does not do what a motor bed does: 11 of 100 rad/s, rms, are left unexplained, most in move 2
  = help: look whether voltage, current and rate have their signs and scales, and whether the servo's motor in the deck \
-is the one on the bed"""),
-    (False, """\
+is the one on the bed""",
+        ),
+        (
+            False,
+            """\
 error[E423]: bed `bench`: no parameters were settled on in the time that the search is given
- = help: begin nearer: the servo's motor in the deck is where it begins"""),
-])  # fmt: skip
+ = help: begin nearer: the servo's motor in the deck is where it begins""",
+        ),
+    ],
+)
 def test_a_bed_that_is_no_motor_bed(settled: bool, message: str) -> None:
     found = FitResult({}, (0.0, 0.0), np.array([10.0, 12.0]), 100.0, 0.2, settled)
     with pytest.raises(Problem) as caught:

@@ -57,16 +57,25 @@ def test_so_many_exchanges_a_period_as_joints_and_none_of_them_a_command(
     assert not any(value for _, value in device.outputs)
 
 
-@pytest.mark.parametrize(("words", "message"), [
-    ("deck.ic wired --port emulated", """\
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            "deck.ic wired --port emulated",
+            """\
 error[E426]: an emulated bed has no time of its own, so that nothing can be late
  = help: `--port firmware` has one, over a pseudo-terminal
-"""),
-    ("--port firmware", """\
+""",
+        ),
+        (
+            "--port firmware",
+            """\
 error[E425]: port `firmware` simulates a deck's bed, and there is no deck
  = help: give a deck, and the name of a run in it that substitutes a joint
-"""),
-])  # fmt: skip
+""",
+        ),
+    ],
+)
 def test_what_is_wrong(jitter: Callable[..., tuple[int, str, str]], words: str, message: str) -> None:
     status, said, complaint = jitter(*words.split())
     assert (status, said) == (cli.BAD_INPUT, "")
@@ -108,11 +117,14 @@ def test_a_line_that_is_too_slow_for_all_joints_is_refused(
     assert complaint.startswith(f"error[E405]: {port} at 921600 baud: an exchange takes 80% of its period of 0.5 ms")
 
 
-@pytest.mark.parametrize(("rate", "message"), [
-    ("fast", "`fast` is no rate: write `1 kHz` or `500 Hz`"),
-    ("1 ms", "`1 ms` is no rate: write `1 kHz` or `500 Hz`"),
-    ("0.1 Hz", "`0.1 Hz` is no rate to exchange at: 1 Hz to 100 kHz"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("rate", "message"),
+    [
+        ("fast", "`fast` is no rate: write `1 kHz` or `500 Hz`"),
+        ("1 ms", "`1 ms` is no rate: write `1 kHz` or `500 Hz`"),
+        ("0.1 Hz", "`0.1 Hz` is no rate to exchange at: 1 Hz to 100 kHz"),
+    ],
+)
 def test_a_rate_that_is_none(jitter: Callable[..., tuple[int, str, str]], rate: str, message: str) -> None:
     status, _, complaint = jitter("--port", "/dev/nobody", "--rate", rate)
     assert status == cli.BAD_INPUT and message in complaint
@@ -163,8 +175,9 @@ class Watched(BedDriver):
 
 def looked(bed: BedDriver, exchanges: int, hz: float = 1000.0) -> tuple[loop.LoopEnd, np.ndarray]:
     rows: list[bytes] = []
-    ended = loop.drive([bed], lambda e, rates, told: None, Pace(hz, 1), exchanges, rows.append, lock_step=False,
-                       armed=False)  # fmt: skip
+    ended = loop.drive(
+        [bed], lambda e, rates, told: None, Pace(hz, 1), exchanges, rows.append, lock_step=False, armed=False
+    )
     return ended, np.frombuffer(b"".join(rows), LAYOUT)
 
 
@@ -246,28 +259,60 @@ def test_bars_show_what_is_there_at_all() -> None:
 
 def test_times_in_three_digits() -> None:
     assert [duration(each) for each in (2.5e-6, 999.6e-6, 1e-3, 1.8e-3, 0.02, 3.0, None, math.nan)] == [
-        "2.5 us", "1 ms", "1 ms", "1.8 ms", "20 ms", "3 s", "-", "-"
-    ]  # fmt: skip
+        "2.5 us",
+        "1 ms",
+        "1 ms",
+        "1.8 ms",
+        "20 ms",
+        "3 s",
+        "-",
+        "-",
+    ]
 
 
 def test_how_far_a_clock_is_off() -> None:
     assert [off(each) for each in (5e-5, -1e-15, -9.9e-3, -0.5, 1.0, math.nan)] == [
-        "+50 ppm", "+0 ppm", "-9,900 ppm", "-50 %", "+100 %", "not known"
-    ]  # fmt: skip
+        "+50 ppm",
+        "+0 ppm",
+        "-9,900 ppm",
+        "-50 %",
+        "+100 %",
+        "not known",
+    ]
 
 
 def test_it_is_told() -> None:
-    spread = {"median": 3e-6, "high": 5e-6, "highest": 1e-3, "largest": None,
-              "histogram": [{"from": 2e-6, "to": 5e-6, "count": 9}]}  # fmt: skip
-    data = {"name": "one", "port": "/dev/ttyUSB0", "exchanges": 12000, "joints": 3, "rate_hz": 1000.0, "seconds": 4.0,
-            "lateness": spread, "trip": spread, "clock": 5e-5, "stops": 1,
-            "misses": {"woken": 1, "computed": 0, "waited": 2, "unanswered": 3}}  # fmt: skip
+    spread = {
+        "median": 3e-6,
+        "high": 5e-6,
+        "highest": 1e-3,
+        "largest": None,
+        "histogram": [{"from": 2e-6, "to": 5e-6, "count": 9}],
+    }
+    data = {
+        "name": "one",
+        "port": "/dev/ttyUSB0",
+        "exchanges": 12000,
+        "joints": 3,
+        "rate_hz": 1000.0,
+        "seconds": 4.0,
+        "lateness": spread,
+        "trip": spread,
+        "clock": 5e-5,
+        "stops": 1,
+        "misses": {"woken": 1, "computed": 0, "waited": 2, "unanswered": 3},
+    }
     bar = "  < 5 us  9  " + "█" * 40
     assert lines(data) == [
         "bed `one` at /dev/ttyUSB0, not armed: 12,000 exchanges in 3 each period at 1000 Hz in 4 s",
-        "", "late: median 3 us, p99 5 us, p99.9 1 ms, max -", bar,
-        "", "answered in: median 3 us, p99 5 us, p99.9 1 ms, max -", bar,
-        "", "a period late: 3 (woken too late 1, computing 0, waiting 2); unanswered: 3",
+        "",
+        "late: median 3 us, p99 5 us, p99.9 1 ms, max -",
+        bar,
+        "",
+        "answered in: median 3 us, p99 5 us, p99.9 1 ms, max -",
+        bar,
+        "",
+        "a period late: 3 (woken too late 1, computing 0, waiting 2); unanswered: 3",
         "a run would have been stopped once, by five periods of lateness or silence",
         "the bed's clock against the computer's: +50 ppm",
-    ]  # fmt: skip
+    ]

@@ -27,8 +27,10 @@ def tools() -> None:
     packages = {CROSS_COMPILER: "gcc-arm-none-eabi", EMULATOR: "qemu-system-arm"}
     missing = [name for name in packages if shutil.which(name) is None]
     if missing:
-        pytest.skip(f"no {' and no '.join(missing)}; on Debian or Ubuntu: "
-                    f"apt-get install {' '.join(packages[name] for name in missing)}")  # fmt: skip
+        pytest.skip(
+            f"no {' and no '.join(missing)}; on Debian or Ubuntu: "
+            f"apt-get install {' '.join(packages[name] for name in missing)}"
+        )
 
 
 @pytest.mark.compiler

@@ -26,7 +26,9 @@ def probe(met_bed: Callable[..., tuple[int, str, str]]) -> Callable[..., tuple[i
 
 
 def test_an_emulated_bed(probe: Callable[..., tuple[int, str, str]]) -> None:
-    assert probe("deck.ic", "wired", "--port", "emulated") == (cli.YES, """\
+    assert probe("deck.ic", "wired", "--port", "emulated") == (
+        cli.YES,
+        """\
 bed `emulated` at emulated
   firmware  0000000000000000, version 1 of the protocol, session 1
   has       drive voltage, load current, tachometer, encoder, no time of its own, no motor: it is simulated
@@ -36,7 +38,9 @@ bed `emulated` at emulated
   sensors   rate 0 rad/s, angle 0 rad
   state     disarmed
   line      none: the bed is in this process
-""", "")  # fmt: skip
+""",
+        "",
+    )
 
 
 def test_firmware_as_data(probe: Callable[..., tuple[int, str, str]]) -> None:
@@ -109,45 +113,78 @@ def test_an_adapter_that_keeps_bytes_back_is_warned_of(
 """ in probe("--port", port)[1]
 
 
-@pytest.mark.parametrize(("words", "message"), [
-    ("--port emulated", """\
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            "--port emulated",
+            """\
 error[E425]: port `emulated` simulates a deck's bed, and there is no deck
  = help: give a deck, and the name of a run in it that substitutes a joint
-"""),
-    ("deck.ic both --port qemu", """\
+""",
+        ),
+        (
+            "deck.ic both --port qemu",
+            """\
 error[E418]: port `qemu`: of which joint?
  = help: say `--port shoulder=qemu` or `--port elbow=qemu`
-"""),
-    ("deck.ic wired --port elbow=firmware", """\
+""",
+        ),
+        (
+            "deck.ic wired --port elbow=firmware",
+            """\
 error[E418]: port `elbow=firmware`: joint `elbow` is on no bed here
  = help: on a bed here: `shoulder`
-"""),
-    ("deck.ic both --port wrist=firmware", """\
+""",
+        ),
+        (
+            "deck.ic both --port wrist=firmware",
+            """\
 error[E418]: port `wrist=firmware`: joint `wrist` is on no bed here
  = help: on a bed here: `shoulder`, `elbow`
-"""),
-    ("--port elbow=firmware", """\
+""",
+        ),
+        (
+            "--port elbow=firmware",
+            """\
 error[E425]: port `firmware` simulates a deck's bed, and there is no deck
  = help: give a deck, and the name of a run in it that substitutes a joint
-"""),
-    ("--port elbow=/dev/nobody", """\
+""",
+        ),
+        (
+            "--port elbow=/dev/nobody",
+            """\
 error[E400]: /dev/nobody cannot be opened: no such file or directory
-"""),
-    ("--port socket://localhost:1/?logging=no=thing", """\
-error[E400]: socket://localhost:1/?logging=no=thing cannot be opened: """),
-    ("deck.ic soft --port emulated", """\
+""",
+        ),
+        (
+            "--port socket://localhost:1/?logging=no=thing",
+            """\
+error[E400]: socket://localhost:1/?logging=no=thing cannot be opened: """,
+        ),
+        (
+            "deck.ic soft --port emulated",
+            """\
 error[E333]: no joint is on a bed here
  = help: a run says so: `substitute JOINT { }`
  = help: name the run or sweep that does, if it is another one
-"""),
-    ("--port old.transcript", """\
+""",
+        ),
+        (
+            "--port old.transcript",
+            """\
 error[E428]: old.transcript is a transcript, and no bed that could be asked
  = help: give the line that it was made on; `met bed run --port FILE` replays it
-"""),
-    ("--port /dev/nobody", """\
+""",
+        ),
+        (
+            "--port /dev/nobody",
+            """\
 error[E400]: /dev/nobody cannot be opened: no such file or directory
-"""),
-])  # fmt: skip
+""",
+        ),
+    ],
+)
 def test_what_is_wrong(probe: Callable[..., tuple[int, str, str]], here: Path, words: str, message: str) -> None:
     (here / "old.transcript").write_bytes(b"MET bed transcript 1\n")
     status, said, complaint = probe(*words.split())

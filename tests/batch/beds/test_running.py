@@ -84,8 +84,10 @@ def test_a_slow_servo_is_repeated_on_the_wire(bed: Callable[..., tuple[int, str,
 def test_it_is_not_driven_again_unless_it_is_asked_for(bed: Callable[..., tuple[int, str, str]]) -> None:
     assert bed("wired", "--port", "emulated", "-o", "a.h5")[0] == cli.YES
     before = Path("a.h5").stat().st_mtime_ns
-    assert "nothing is missing: a.h5 has all of it (`--fresh` drives it again)" in bed(
-        "wired", "--port", "emulated", "-o", "a.h5")[1]  # fmt: skip
+    assert (
+        "nothing is missing: a.h5 has all of it (`--fresh` drives it again)"
+        in bed("wired", "--port", "emulated", "-o", "a.h5")[1]
+    )
     assert Path("a.h5").stat().st_mtime_ns == before
     assert bed("wired", "--port", "emulated", "-o", "a.h5", "--fresh")[0] == cli.YES
 
@@ -101,51 +103,84 @@ def test_a_transcript_is_replayed_to_the_same_bits(bed: Callable[..., tuple[int,
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("words", "message"), [
-    (("moving", "--port", "emulated"), """\
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ("moving", "--port", "emulated"),
+            """\
 error[E416]: joint `shoulder` begins with a rate, and a bed's shaft begins at rest
  = help: `initial { shoulder.qd = 0 rad/s; }` in the run
-"""),
-    (("wired", "--port", "firmware"), """\
+""",
+        ),
+        (
+            ("wired", "--port", "firmware"),
+            """\
 error[E415]: joint `shoulder`: its law takes the bed's delay for none, and over a wire it is a tick
  = help: `bed = emulated(delay = 1, ...)` in the deck says so
-"""),
-    (("both", "--port", "emulated"), """\
+""",
+        ),
+        (
+            ("both", "--port", "emulated"),
+            """\
 error[E418]: port `emulated`: of which joint?
  = help: each has its own: `--port shoulder=... --port elbow=...`
-"""),
-    (("both", "--port", "elbow=emulated"), """\
+""",
+        ),
+        (
+            ("both", "--port", "elbow=emulated"),
+            """\
 error[E418]: no port for the bed of joint `shoulder`
  = help: `--port JOINT=PORT`: a serial line, `emulated`, `firmware`, `qemu`, or a transcript
-"""),
-    (("both", "--port", "elbow=emulated", "--port", "elbow=firmware"), """\
+""",
+        ),
+        (
+            ("both", "--port", "elbow=emulated", "--port", "elbow=firmware"),
+            """\
 error[E418]: joint `elbow` has two ports
  = help: leave one of the two out
-"""),
-    (("both", "--port", "elbow=emulated", "--port", "shoulder=firmware"), """\
+""",
+        ),
+        (
+            ("both", "--port", "elbow=emulated", "--port", "shoulder=firmware"),
+            """\
 error[E414]: some of the beds have a time of their own, and some have none
  = help: give all beds ports of one kind
-"""),
-    (("soft", "--port", "emulated"), """\
+""",
+        ),
+        (
+            ("soft", "--port", "emulated"),
+            """\
 error[E333]: no joint is on a bed here
  = help: a run says so: `substitute JOINT { }`
  = help: name the run or sweep that does, if it is another one
-"""),
-    (("unstable", "--port", "emulated"), """\
+""",
+        ),
+        (
+            ("unstable", "--port", "emulated"),
+            """\
 error[E419]: case #0, shoulder: r = 1.37, stable to 1.2 with measured_acceleration at 100 Hz: it would not be stable
  = help: `met margin` says what would be; a lighter arm, a faster servo or another law
  = help: `--force` arms it all the same
-"""),
-    (("light", "--port", "emulated"), """\
+""",
+        ),
+        (
+            ("light", "--port", "emulated"),
+            """\
 error[E419]: case #3, shoulder: r = 0.149, stable from 0.181 to 4.01 with measured_acceleration at 1000 Hz: \
 it would not be stable
  = help: `met margin` says what would be; a lower gain of the servo's rate loop, a faster servo or a heavier arm
  = help: `--force` arms it all the same
-"""),
-    (("wired", "--port", "/dev/nobody"), """\
+""",
+        ),
+        (
+            ("wired", "--port", "/dev/nobody"),
+            """\
 error[E400]: /dev/nobody cannot be opened: no such file or directory
-"""),
-])  # fmt: skip
+""",
+        ),
+    ],
+)
 def test_what_is_wrong(
     bed: Callable[..., tuple[int, str, str]], here: Path, words: tuple[str, ...], message: str
 ) -> None:
@@ -161,11 +196,13 @@ def test_of_a_sweep_the_least_margin_is_said_once_a_joint_and_of_which_case(here
     plan = ic.compile(here / "deck.ic", select=names)
     said = [check_margins(prepare(plan, experiments=[name]), force=False) for name in names]
     assert said == [
-        ["shoulder: r = 1.54, stable to 5.35 with measured_acceleration at 1000 Hz"
-         " (case #1, the least margin of 3 cases)"],
+        [
+            "shoulder: r = 1.54, stable to 5.35 with measured_acceleration at 1000 Hz"
+            " (case #1, the least margin of 3 cases)"
+        ],
         ["shoulder: r = 1.37, stable to more than 2e+03 with velocity_tracking at 100 Hz"],
         ["shoulder: r = 1.37, stable to 5.35 with measured_acceleration at 1000 Hz"],
-    ]  # fmt: skip
+    ]
     some = check_margins(prepare(plan, experiments=["heavy"], cases=["#0", "#2"]), force=False)
     assert some[0].endswith(" (case #2, the least margin of 2 cases)")
 
@@ -175,8 +212,20 @@ def test_killed_midway_everything_up_to_then_is_in_the_archive(here: Path) -> No
     """SIGKILL of the process that drives the bed, and of who started it."""
     text = DECK.replace("duration = 1 s;\n    record ", "duration = 300 s;\n    record ")
     (here / "deck.ic").write_text(text)
-    command = [sys.executable, "-m", "met.cli", "bed", "run", "deck.ic", "wired", "--port", "emulated", "-o", "a.h5",
-               "--no-picture"]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "met.cli",
+        "bed",
+        "run",
+        "deck.ic",
+        "wired",
+        "--port",
+        "emulated",
+        "-o",
+        "a.h5",
+        "--no-picture",
+    ]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
     path = here / "a.h5.campaign" / "beds" / "0-0.records"
     end = time.monotonic() + 60.0

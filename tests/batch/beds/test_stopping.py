@@ -59,8 +59,9 @@ class BedHost:
 
     def __init__(self, experiment: Experiment, log: Path) -> None:
         self.values = bed_values(experiment, "shoulder", 0)
-        program = build("host", config_of(self.values, PERIOD, lock_step=False),
-                        plant_c(experiment, "shoulder", period=PERIOD))  # fmt: skip
+        program = build(
+            "host", config_of(self.values, PERIOD, lock_step=False), plant_c(experiment, "shoulder", period=PERIOD)
+        )
         self._log = log
         self.process = subprocess.Popen([program, "--log", log], stdout=subprocess.PIPE, text=True)
         realtime.put_first(self.process.pid)
@@ -96,8 +97,21 @@ def host(here: Path) -> Iterator[BedHost]:
 
 
 def command(terminal: str) -> list[str]:
-    return [sys.executable, "-m", "met.cli", "bed", "run", "deck.ic", "wired", "--port", terminal, "-o", "a.h5",
-            "--no-picture", "--clear"]  # fmt: skip
+    return [
+        sys.executable,
+        "-m",
+        "met.cli",
+        "bed",
+        "run",
+        "deck.ic",
+        "wired",
+        "--port",
+        terminal,
+        "-o",
+        "a.h5",
+        "--no-picture",
+        "--clear",
+    ]
 
 
 def running(terminal: str, here: Path, *words: str) -> subprocess.Popen[str]:
@@ -105,8 +119,13 @@ def running(terminal: str, here: Path, *words: str) -> subprocess.Popen[str]:
     which then is begun anew."""
     path = here / "a.h5.campaign" / "beds" / "0-0.records"
     for _ in range(30):
-        process = subprocess.Popen([*command(terminal), *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                   text=True, start_new_session=True)  # fmt: skip
+        process = subprocess.Popen(
+            [*command(terminal), *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
         while not path.exists() or path.stat().st_size < 300 * records.SIZE:
             if process.poll() is not None:
                 break
@@ -165,9 +184,13 @@ def killed(host: BedHost, here: Path) -> float:
     return (log[-1][0] - at) * NS
 
 
-@pytest.mark.parametrize(("how", "status"), [
-    ("Ctrl-C", 130), *(pytest.param(*each, marks=slow) for each in (("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", -1))),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("how", "status"),
+    [
+        ("Ctrl-C", 130),
+        *(pytest.param(*each, marks=slow) for each in (("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", -1))),
+    ],
+)
 def test_a_host_that_is_told_to_end_stops_its_bed(host: BedHost, here: Path, how: str, status: int) -> None:
     """By STOP, before a deadman would; where this machine was too busy for that, once more."""
     for _ in range(5):

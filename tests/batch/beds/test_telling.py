@@ -54,17 +54,29 @@ def test_beds_stand_beside_the_archive(here: Path) -> None:
 @pytest.mark.slow
 def test_beds_in_lock_step_have_no_timing(here: Path) -> None:
     assert beside("wired", "--port", "emulated") == [
-        {"joint": "shoulder", "port": "emulated", "baud": 921600, "lock_step": True,
-         "beds": [{"name": "emulated", "firmware": "0" * 16}], "timing": None},
-    ]  # fmt: skip
+        {
+            "joint": "shoulder",
+            "port": "emulated",
+            "baud": 921600,
+            "lock_step": True,
+            "beds": [{"name": "emulated", "firmware": "0" * 16}],
+            "timing": None,
+        },
+    ]
 
 
 def test_cases_of_an_earlier_run_count_as_well(here: Path) -> None:
     executor, folder = OnBeds(Ports({"elbow": "a", "shoulder": "b"}, 921600)), Folder(here / "a.h5.campaign")
     folder.path.mkdir()
     executor.open(folder, {}, lambda: None)
-    head = {"key": "", "row": 3, "repeats": 1, "joints": ["shoulder", "elbow"], "tick_hz": 1000.0,
-            "beds": [{"name": each, "firmware": "00"} for each in ("one", "two")]}  # fmt: skip
+    head = {
+        "key": "",
+        "row": 3,
+        "repeats": 1,
+        "joints": ["shoulder", "elbow"],
+        "tick_hz": 1000.0,
+        "beds": [{"name": each, "firmware": "00"} for each in ("one", "two")],
+    }
     sample = BedSample(BedState.ARMED, True, Fault(0), False, 7, 0.0)
     with (folder.beds / "0-3.records").open("wb") as file:
         records.begin(file, head)

@@ -23,7 +23,7 @@ SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g")
 
 SHAFT = Shaft(
     kt=0.061, resistance=2.05, tau_max=0.144, kt_load=0.072, inertia=6.38e-5, f_c=0.0205, f_v=2.58e-5, f_cut=50.0
-)  # fmt: skip
+)
 """The paper's table 1."""
 
 PLAIN = Config(

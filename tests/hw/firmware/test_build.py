@@ -47,8 +47,11 @@ def test_limits_are_counted_down_and_told_as_counted() -> None:
 def test_a_limit_that_is_a_whole_count_loses_none() -> None:
     for scale in (0.1, 0.3, 1e-3, 40 / 4096, 1 / 3):
         for count in (1, 7, 2047, 10**6):
-            odd = replace(PLAIN, scales=replace(PLAIN.scales, rate=scale),
-                          limits=replace(PLAIN.limits, rate=count * scale, arming_rate=scale))  # fmt: skip
+            odd = replace(
+                PLAIN,
+                scales=replace(PLAIN.scales, rate=scale),
+                limits=replace(PLAIN.limits, rate=count * scale, arming_rate=scale),
+            )
             assert counted(odd)[0]["rate"] == count
 
 
@@ -65,10 +68,11 @@ def test_a_limit_that_is_a_whole_count_loses_none() -> None:
         ({"scales": replace(PLAIN.scales, voltage=1e-9)}, "voltage is 2e+10 counts, not 1 to 2147483646"),
         ({"limits": replace(PLAIN.limits, heat=1e12)}, "the current's scale is too fine for the I2t of the load"),
         ({"trip": math.inf}, "load trip is 4.611686018e+18 counts, not 1 to 2147483646"),
-        ({"scales": replace(PLAIN.scales, voltage=5e-324)},
-         "voltage is 4.611686018e+18 counts, not 1 to 2147483646"),
-        ({"shaft": replace(SHAFT, inertia=1e-18)},
-         "the scales are too fine, or the shaft too light, for the tachometer's guard"),
+        ({"scales": replace(PLAIN.scales, voltage=5e-324)}, "voltage is 4.611686018e+18 counts, not 1 to 2147483646"),
+        (
+            {"shaft": replace(SHAFT, inertia=1e-18)},
+            "the scales are too fine, or the shaft too light, for the tachometer's guard",
+        ),
         ({"shaft": replace(SHAFT, f_cut=1e-8)}, "the tachometer's filter is too slow for its guard"),
         ({"shaft": replace(SHAFT, f_cut=0.0)}, "the shaft's f_cut is 0, not a number above 0"),
         ({"shaft": replace(SHAFT, f_c=-0.01)}, "the shaft's f_c is -0.01, not a number above 0"),
@@ -78,7 +82,7 @@ def test_a_limit_that_is_a_whole_count_loses_none() -> None:
         ({"name": "b\0"}, "the name 'b\\x00' is not 1 to 16 printable characters of ASCII"),
         ({"name": "caf\xe9"}, "the name 'caf\xe9' is not 1 to 16 printable characters of ASCII"),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_counted_is_said(change: dict[str, object], said: str) -> None:
     with pytest.raises(ValueError) as found:
         config_c(replace(PLAIN, **change), plant=False)  # type: ignore[arg-type]
@@ -93,14 +97,20 @@ def test_what_cannot_be_counted_is_said(change: dict[str, object], said: str) ->
         ("converter_current = 10 A", "current is 0 counts, not 1 to 2147483646", "a smaller `converter_current`"),
         ("i_max = 1e6 A", "current is 1.048576e+12 counts, not 1 to 2147483646", "a larger `converter_current`"),
         ("i_max = 100 A", "the current's scale is too fine for the I2t of the load", "a larger `converter_current`"),
-        ("inertia = 1e-18 kg*m^2", "the scales are too fine, or the shaft too light, for the tachometer's guard",
-         "a larger `inertia` or `converter_in`"),
-        ("inertia = 1e-320 kg*m^2", "the scales are too fine, or the shaft too light, for the tachometer's guard",
-         "a larger `inertia` or `converter_in`"),
+        (
+            "inertia = 1e-18 kg*m^2",
+            "the scales are too fine, or the shaft too light, for the tachometer's guard",
+            "a larger `inertia` or `converter_in`",
+        ),
+        (
+            "inertia = 1e-320 kg*m^2",
+            "the scales are too fine, or the shaft too light, for the tachometer's guard",
+            "a larger `inertia` or `converter_in`",
+        ),
         ("f_cut = 1e-8 Hz", "the tachometer's filter is too slow for its guard", "a larger `f_cut`"),
         ("i_max = 1e200 A", "limit of heat is inf, not a number above 0", "numbers of a size that a bed may have"),
     ],
-)  # fmt: skip
+)
 def test_a_deck_s_bed_that_firmware_cannot_count_is_said(bed: str, reason: str, remedy: str) -> None:
     experiment = compiled(deck(bed=f"emulated({bed})"), "on_bench")
     with pytest.raises(Problem) as found:
@@ -203,8 +213,9 @@ def of_another_name(path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("spoil", [emptied, cut, Path.unlink, others_may_write_it, others_may_write_its_folder,
-                                   of_another_name])  # fmt: skip
+@pytest.mark.parametrize(
+    "spoil", [emptied, cut, Path.unlink, others_may_write_it, others_may_write_its_folder, of_another_name]
+)
 def test_what_is_not_as_it_was_built_is_built_anew(
     fresh: Path, spoil: Callable[[Path], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -427,5 +438,9 @@ def test_the_port_of_the_readme_reads_what_it_says(tmp_path: Path, monkeypatch: 
     assert read(2041, 2056, 2053, -7) == (10, -7, 10, 8, 0)
     assert read(2061, 2036, 2043, 7) == (-10, 7, -10, -8, 0)
     assert [read(each, 2046, 2048, 0)[0] == 2**31 - 1 for each in (0, 15, 16, 4079, 4080)] == [
-        True, True, False, False, True
-    ]  # fmt: skip
+        True,
+        True,
+        False,
+        False,
+        True,
+    ]

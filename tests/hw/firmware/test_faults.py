@@ -79,11 +79,19 @@ def test_a_fault_makes_the_outputs_safe_within_the_tick_and_stays(device: Device
 
 @pytest.mark.parametrize(
     "within",
-    [lambda d: d.tick(14), lambda d: d.drive(500, 50), lambda d: d.drive(-300, 50), lambda d: d.drive(100, 800),
-     lambda d: d.drive(100, -700), lambda d: sensed(d, rate=3500), lambda d: sensed(d, rate=-3500),
-     lambda d: sensed(d, load_current=1650), lambda d: sensed(d, drive_current=-800),
-     lambda d: d.raw(b"\x05\x05\0" * 15)],
-)  # fmt: skip
+    [
+        lambda d: d.tick(14),
+        lambda d: d.drive(500, 50),
+        lambda d: d.drive(-300, 50),
+        lambda d: d.drive(100, 800),
+        lambda d: d.drive(100, -700),
+        lambda d: sensed(d, rate=3500),
+        lambda d: sensed(d, rate=-3500),
+        lambda d: sensed(d, load_current=1650),
+        lambda d: sensed(d, drive_current=-800),
+        lambda d: d.raw(b"\x05\x05\0" * 15),
+    ],
+)
 def test_at_its_limit_nothing_stops(device: Device, within: Callable[[Device], object]) -> None:
     within(device)
     assert device.read().status == wire.ARMED | wire.GREETED
@@ -274,9 +282,16 @@ def test_noise_of_before_arming_does_not_count() -> None:
 
 @pytest.mark.parametrize(
     "bad",
-    [b"\x05\x05\0", b"\1" * 40 + b"\0", frame(77, 1), frame(wire.READ, 1, b"x"), frame(wire.STEP, 1, bytes(8) + b"\1"),
-     frame(wire.DRIVE, 1, bytes(8) + b"\1"), frame(wire.PRESET, 1, bytes(9))],
-)  # fmt: skip
+    [
+        b"\x05\x05\0",
+        b"\1" * 40 + b"\0",
+        frame(77, 1),
+        frame(wire.READ, 1, b"x"),
+        frame(wire.STEP, 1, bytes(8) + b"\1"),
+        frame(wire.DRIVE, 1, bytes(8) + b"\1"),
+        frame(wire.PRESET, 1, bytes(9)),
+    ],
+)
 def test_whatever_is_dropped_is_noise(device: Device, bad: bytes) -> None:
     device.raw(bad * 16)
     assert device.outputs() == SAFE
@@ -326,9 +341,13 @@ class Turning:
 @pytest.mark.parametrize("voltage", [4.0, -4.0, 3.0])
 @pytest.mark.parametrize(
     ("told", "fault"),
-    [(lambda y: 0.0, wire.DEAD), (lambda y: 3.0, wire.DEAD), (lambda y: -y, wire.REVERSED),
-     (lambda y: -0.5 * y, wire.REVERSED)],
-)  # fmt: skip
+    [
+        (lambda y: 0.0, wire.DEAD),
+        (lambda y: 3.0, wire.DEAD),
+        (lambda y: -y, wire.REVERSED),
+        (lambda y: -0.5 * y, wire.REVERSED),
+    ],
+)
 def test_a_tachometer_that_does_not_tell_the_truth_stops_the_bed(
     voltage: float, told: Callable[[float], float], fault: int
 ) -> None:
@@ -359,8 +378,15 @@ def test_a_tachometer_that_dies_on_the_way_stops_the_bed() -> None:
 def test_a_sound_one_lets_it_run_through_starts_stops_and_turns(told: Callable[[float], float]) -> None:
     bed = Turning(told)
     for voltage, current in (
-        (4.0, 0.0), (-4.0, 0.0), (0.0, 0.0), (4.0, -1.4), (0.0, 1.4), (3.0, -0.4), (0.6, 0.0), (0.0, 0.0),
-    ):  # fmt: skip
+        (4.0, 0.0),
+        (-4.0, 0.0),
+        (0.0, 0.0),
+        (4.0, -1.4),
+        (0.0, 1.4),
+        (3.0, -0.4),
+        (0.6, 0.0),
+        (0.0, 0.0),
+    ):
         for _ in range(250):
             assert bed.tick(voltage, current), (voltage, current, bed.device.read())
 

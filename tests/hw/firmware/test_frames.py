@@ -18,9 +18,14 @@ from tests.hw.firmware.wire import frame, framed, payloads, told
 pytestmark = pytest.mark.compiler
 
 BODIES = {
-    wire.HELLO: b"\1", wire.LIMIT: b"\0\1\0\0\0", wire.ARM: b"\xee\xff\xc0\0", wire.DRIVE: bytes(9), wire.STOP: b"",
-    wire.CLEAR: b"", wire.READ: b"",
-}  # fmt: skip
+    wire.HELLO: b"\1",
+    wire.LIMIT: b"\0\1\0\0\0",
+    wire.ARM: b"\xee\xff\xc0\0",
+    wire.DRIVE: bytes(9),
+    wire.STOP: b"",
+    wire.CLEAR: b"",
+    wire.READ: b"",
+}
 SENSING = replace(PLAIN, capabilities=SENSORS)
 SIMULATED = replace(PLAIN, capabilities=LOCK_STEP)
 FREE_SIMULATED = replace(PLAIN, capabilities=Capability.SIMULATED)
@@ -61,8 +66,22 @@ def test_hello_tells_who_is_there() -> None:
     assert (found.version, found.capabilities, found.session) == (1, 0, 0xC0FFEE)
     assert found.name == b"a bed for tests\0"
     assert found.numbers == (
-        1000.0, 0.015, 0.01, 0.002, 0.1, 0.001, 0.005, 0.25, 20.0, 3.0, 350.0, 2.0, 4000.0, 1500.0, 1.0,
-    )  # fmt: skip
+        1000.0,
+        0.015,
+        0.01,
+        0.002,
+        0.1,
+        0.001,
+        0.005,
+        0.25,
+        20.0,
+        3.0,
+        350.0,
+        2.0,
+        4000.0,
+        1500.0,
+        1.0,
+    )
     assert any(found.firmware)
 
 

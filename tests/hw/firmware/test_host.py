@@ -211,9 +211,17 @@ def test_on_a_socket_it_answers_and_ends_when_nobody_is_at_the_other_end() -> No
             assert process.wait(5.0) == 0
 
 
-@pytest.mark.parametrize("words", [
-    ["--log"], ["--lock-step"], ["--line"], ["--log", "/nowhere/at/all"], ["--line", "77"], ["--line", "0x3"],
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--log"],
+        ["--lock-step"],
+        ["--line"],
+        ["--log", "/nowhere/at/all"],
+        ["--line", "77"],
+        ["--line", "0x3"],
+    ],
+)
 def test_what_it_does_not_understand_it_says(words: list[str]) -> None:
     program = build("host", FREE, PLANT)
     done = subprocess.run([program, *words], capture_output=True, text=True, stdin=subprocess.DEVNULL)

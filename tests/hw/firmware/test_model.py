@@ -28,8 +28,10 @@ NUMBERS = st.one_of(st.just(1), st.just(1), st.just(1), st.integers(0, 65535), s
 LIMIT_BODY = st.builds(lambda which, value: struct.pack("<Bi", which, value), st.integers(0, 6), COUNTS)
 COMMAND = st.builds(
     lambda voltage, current, last: struct.pack("<iiB", voltage, current, last),
-    COUNTS, COUNTS, st.sampled_from([0, 1, 2, 14, 15, 30]),
-)  # fmt: skip
+    COUNTS,
+    COUNTS,
+    st.sampled_from([0, 1, 2, 14, 15, 30]),
+)
 PRESET_BODY = st.builds(
     lambda which, value: bytes([which]) + value, st.integers(0, 4), st.binary(min_size=8, max_size=8)
 )
@@ -56,8 +58,11 @@ ACTS = st.lists(
 )
 # what gets to armed at once, so that most of what follows is about that
 OPENING = [(wire.HELLO, 1, b"\1"), (wire.ARM, 1, struct.pack("<I", 0xC0FFEE))]
-HOT = [*OPENING, *[(wire.DRIVE, 1, struct.pack("<iiB", 0, i, 0)) for i in (700, 1400)],
-       *[("tick", 14), (wire.DRIVE, 1, struct.pack("<iiB", 0, 1400, 0))] * 20]  # fmt: skip
+HOT = [
+    *OPENING,
+    *[(wire.DRIVE, 1, struct.pack("<iiB", 0, i, 0)) for i in (700, 1400)],
+    *[("tick", 14), (wire.DRIVE, 1, struct.pack("<iiB", 0, 1400, 0))] * 20,
+]
 
 
 def said(payload: bytes) -> tuple[object, ...]:

@@ -127,9 +127,14 @@ def test_behind_a_terminal_too() -> None:
 @pytest.mark.compiler
 @pytest.mark.parametrize(
     ("law", "command"),
-    [("velocity_tracking", REVERSING), ("torque_balance_observer", REVERSING), ("torque_balance", "slow"),
-     ("bare", REVERSING), ("velocity_tracking", "0 * slow")],
-)  # fmt: skip
+    [
+        ("velocity_tracking", REVERSING),
+        ("torque_balance_observer", REVERSING),
+        ("torque_balance", "slow"),
+        ("bare", REVERSING),
+        ("velocity_tracking", "0 * slow"),
+    ],
+)
 @pytest.mark.parametrize("faults", ["none", "typical"])
 def test_no_guard_speaks_up_in_a_run_however_heavy_the_arm(law: str, command: str, faults: str) -> None:
     """r of 0.5, 1.5, 5 and 20; 1 kHz; starts, reversals, and standing still."""

@@ -19,8 +19,10 @@ TESTS = ("test_frames.py", "test_states.py", "test_faults.py", "test_lock_step.p
 
 @pytest.mark.slow
 def test_the_core_s_tests_pass_with_the_address_and_undefined_behaviour_sanitizers() -> None:
-    found = [subprocess.run(["gcc", f"-print-file-name={name}"], capture_output=True, text=True).stdout.strip()
-             for name in ("libasan.so", "libubsan.so")]  # fmt: skip
+    found = [
+        subprocess.run(["gcc", f"-print-file-name={name}"], capture_output=True, text=True).stdout.strip()
+        for name in ("libasan.so", "libubsan.so")
+    ]
     environment = {
         **os.environ,
         "MET_TEST_SANITIZE": "1",
@@ -31,8 +33,7 @@ def test_the_core_s_tests_pass_with_the_address_and_undefined_behaviour_sanitize
     }
     words = [sys.executable, "-m", "pytest", "-q", "-p", "no:xdist", "-p", "no:cacheprovider"]
     words += [str(HERE / each) for each in TESTS]
-    done = subprocess.run(words, env=environment, capture_output=True, text=True, cwd=HERE.parents[2],
-                          timeout=300)  # fmt: skip
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, cwd=HERE.parents[2], timeout=300)
     assert done.returncode == 0, (done.stdout + done.stderr)[-4000:]
     assert " passed" in done.stdout and "skipped" not in done.stdout
 
