@@ -23,7 +23,8 @@ from met.frozen import frozen
 
 
 class BedState(enum.IntEnum):
-    """Of a bed: outputs in the safe state, commands taken, or stopped by a fault that is latched."""
+    """The state of a bed: disarmed, its outputs safe; armed, so that it takes commands; or stopped by a latched
+    fault."""
 
     DISARMED = 0
     ARMED = 1
@@ -31,7 +32,7 @@ class BedState(enum.IntEnum):
 
 
 class Fault(enum.IntFlag):
-    """Why a bed stopped; the bits of the protocol's status."""
+    """The reasons for which a bed stops itself; the values are the bits of the protocol's status."""
 
     DEADMAN = 1 << 3
     RANGE = 1 << 4
@@ -46,7 +47,8 @@ class Fault(enum.IntFlag):
 
 
 class Capability(enum.IntFlag):
-    """What a bed can, besides drive voltage, load current and tachometer."""
+    """The properties of a bed beyond drive voltage, load current and tachometer; the values are bits of the
+    protocol."""
 
     ENCODER = 1 << 0
     DRIVE_CURRENT = 1 << 1
@@ -58,7 +60,8 @@ class Capability(enum.IntFlag):
 
 @frozen
 class Scales:
-    """The value of a count: voltage V, current A, rate rad/s, angle rad, drive current A, acceleration rad/s^2."""
+    """The quantity that one count stands for: voltage V, current A, rate rad/s, angle rad, drive current A,
+    acceleration rad/s^2."""
 
     voltage: float
     current: float
@@ -70,8 +73,8 @@ class Scales:
 
 @frozen
 class Limits:
-    """Beyond which a bed stops itself: voltage V, current A, rate rad/s, slews V/s and A/s, heat (I2t of the load)
-    A^2 s; arming_rate rad/s: above it a bed does not arm."""
+    """The limits beyond which a bed stops itself: voltage V, current A, rate rad/s, slews V/s and A/s, heat (I2t of
+    the load motor) A^2 s. Above arming_rate, rad/s, it does not arm."""
 
     voltage: float
     current: float
@@ -84,7 +87,7 @@ class Limits:
 
 @frozen
 class About:
-    """Who is there, as a bed says when it is greeted.
+    """A bed's description of itself, its answer when it is greeted.
 
     firmware  first eight bytes of the SHA-256 of what was built, in hexadecimal
     session   another number after each boot
@@ -104,10 +107,12 @@ class About:
 
 @frozen
 class BedSample:
-    """What a bed answers: its state, and its sensors at its tick `tick`; None for a sensor that it has not.
+    """One answer of a bed: its state, and its sensors as they were at its tick `tick`. A sensor that it lacks is
+    None.
 
-    rate          of the shaft, behind the tachometer's filter, rad/s;  angle: of the shaft, rad
-    faults        that are latched;  refused: what was asked was not possible in this state, and not done
+    rate     rate of the shaft behind the tachometer's filter, rad/s;  angle: of the shaft, rad
+    faults   the faults that are latched
+    refused  True where the bed did not do what was asked, as it may not in this state
     """
 
     state: BedState
@@ -122,7 +127,7 @@ class BedSample:
 
 
 LIMIT_NAMES = ("voltage", "current", "rate", "voltage_slew", "current_slew")
-"""Those that a session may make tighter: V, A, rad/s, V/s, A/s."""
+"""The limits that a host may make tighter for a session: V, A, rad/s, V/s, A/s."""
 
 
 class BedDriver(ABC):
@@ -140,7 +145,7 @@ class BedDriver(ABC):
 
     @abstractmethod
     def connect(self) -> About:
-        """Greet the bed. It is disarmed afterwards, and its limits are its own."""
+        """Greet the bed, and return its description. It is disarmed afterwards, and its limits are its own."""
 
     @abstractmethod
     def limit(self, asked: Mapping[str, float]) -> None:
@@ -148,7 +153,7 @@ class BedDriver(ABC):
 
     @abstractmethod
     def arm(self) -> BedSample:
-        """Have commands taken, with both at zero. The shaft must be slow, and nothing latched."""
+        """Let the bed take commands, both of them 0 to begin with. The shaft must be slow, and no fault latched."""
 
     @abstractmethod
     def exchange(self, voltage: float, current: float) -> BedSample | None:
@@ -159,19 +164,19 @@ class BedDriver(ABC):
 
     @abstractmethod
     def read(self) -> BedSample:
-        """The sensors, with no effect on anything: no deadman is fed."""
+        """Read the sensors. Nothing else changes: the deadman is not fed."""
 
     def look(self) -> BedSample | None:
-        """The same, asked once: None where no answer comes within `patience`."""
+        """Read the sensors, asking once: None where no answer comes within `patience`."""
         return self.read()
 
     @abstractmethod
     def clear(self) -> BedSample:
-        """Unlatch faults, once the shaft is slow: disarmed again."""
+        """Forget the latched faults once the shaft is slow; the bed is disarmed then."""
 
     @abstractmethod
     def rest(self, time: float) -> BedSample:
-        """Stop, and let so much time pass, s. A bed in lock-step advances as far as that."""
+        """Stop, and let `time` s pass. A bed in lock-step advances as far as that."""
 
     def line_time(self, about: About) -> float:
         """Time that the bytes of an exchange take on the line, s; 0 where the line's speed is not what counts."""
@@ -183,12 +188,12 @@ class BedDriver(ABC):
 
     @abstractmethod
     def stop(self) -> bool:
-        """The safe state, as surely as it can be had: asked for again until it is confirmed, or the line is dead. Gives
-        back whether it was confirmed."""
+        """Bring the bed into the safe state. This is asked for again until the bed confirms it or the line is dead.
+        Returns True where it was confirmed."""
 
     @abstractmethod
     def close(self) -> None:
-        """Stop, and let go of the line."""
+        """Stop the bed, and release the line."""
 
     def __enter__(self) -> Self:
         return self

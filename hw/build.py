@@ -29,15 +29,15 @@ from met.host import cache
 Kind = Literal["host", "library", "arm"]
 
 FIRMWARE = Path(__file__).with_name("firmware")
-"""Where the C sources are."""
+"""The folder with the C sources."""
 
 WARNINGS = ("-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror", "-ffp-contract=off")
-"""What every source is compiled with: all warnings are errors, and no multiply-add is formed that is not written."""
+"""Flags for every source: all warnings are errors, and no multiply-add is formed that is not written."""
 
 CROSS_COMPILER, EMULATOR = "arm-none-eabi-gcc", "qemu-system-arm"
 
 LIMIT = 1 << 28
-"""Bytes above which the products longest unused are removed."""
+"""Size of the folder of products, bytes, above which those longest unused are removed."""
 
 _PRODUCTS: Mapping[Kind, str] = {"host": "bed-host", "library": "libbed.so", "arm": "bed.elf"}
 
@@ -107,30 +107,32 @@ class Config:
 # Of the numbers of hw/firmware/core/guard.h.
 
 FRICTION = 2.0
-"""Dry friction that may be there, over that of the data sheet: a shaft breaks away at more than it slides at."""
+"""Largest dry friction that the guard allows for, over the data sheet's: a shaft breaks away at more than it slides
+at."""
 
 TOLERANCE = 0.25
-"""Share by which a torque may be off: 10 % of a torque constant, and a winding hotter by 40 K, 0.39 % a kelvin."""
+"""Share by which a torque may differ from the data sheet's: 10 % of a torque constant, and a winding hotter by 40 K,
+at 0.39 % a kelvin."""
 
 CHANGE = 0.01
-"""Change of the rate that must be sure, over the rate's limit: above a tachometer's noise, below what does harm. At
-least 16 counts."""
+"""Share of the limit of rate by which the rate must surely change before the guard judges: above a tachometer's
+noise, below what does harm. At least 16 counts."""
 
 LAG = 3.0
-"""Time in which the tachometer's filter forgets, over its delay of sqrt(2)/(2 pi f_cut): a twentieth is left."""
+"""Time for which the tachometer's filter remembers, in units of its delay sqrt(2)/(2 pi f_cut): a twentieth is left."""
 
 _ROOM = 1 << 60
-"""What no product of the guards' whole numbers may reach."""
+"""Bound on the products of the guard's whole numbers, so that they fit into 64 bits."""
 
 GUARD_BITS = 24
-"""Of a fraction in the tachometer's guard; fewer where a tick of a light shaft is many fine counts."""
+"""Bits behind the point in the guard's fractions; fewer where a tick of a light shaft is many fine counts."""
 
 _BEYOND = 2.0**62
-"""What any larger number counts as: nothing is taken that is so large."""
+"""The number that stands for any larger one: none of this size is accepted."""
 
 
 class Uncountable(ValueError):
-    """A config that a device cannot count with. remedy: what there is to change in a deck's bed."""
+    """A configuration whose numbers the device cannot count. remedy: the change to the deck's bed."""
 
     def __init__(self, message: str, remedy: str) -> None:
         super().__init__(message)
@@ -221,10 +223,10 @@ def qemu(elf: Path, socket: Path) -> list[str]:
 
 
 def counted(config: Config) -> tuple[dict[str, int], Limits, float]:
-    """What the device counts with, and the limits and deadman in SI that are just that.
+    """The numbers of a configuration in the device's counts, and the limits and deadman in SI that these are.
 
-    Names are those of `bed_limit` in hw/firmware/core/bed.h, and arming_rate, load_trip, drive_trip, deadman (ticks),
-    heat, continuous. Uncountable where something is out of range.
+    Names are those of `bed_limit` in hw/firmware/core/bed.h, and arming_rate, load_trip, drive_trip, deadman
+    (ticks), heat, continuous. Raises Uncountable where one is out of range.
     """
     s, limits, hz = config.scales, config.limits, config.tick_hz
     given = {**_fields(s, "scale of "), **_fields(limits, "limit of "), "tick rate": hz}
@@ -272,7 +274,7 @@ _STEPS = {
     "rate": "converter_in",
     "arming_rate": "converter_in",
 }
-"""The parameter of a deck's bed that is what is counted by; `converter_current` of all others."""
+"""The parameter of a deck's bed that sets each scale; the scales that are not here are set by `converter_current`."""
 
 
 def _fields(of: Scales | Limits, what: str) -> dict[str, float]:
@@ -285,7 +287,7 @@ def _check_above_0(what: str, value: float, *, or_0: bool = False) -> None:
 
 
 def _whole(value: float) -> int:
-    """Down to a whole number, but for what rounding has left below one."""
+    """A number rounded down to a whole one, where what rounding took off a whole number does not count."""
     return math.floor(min(value, _BEYOND) * (1.0 + 1e-12))
 
 
@@ -343,7 +345,7 @@ _PERIOD = re.compile(r"\bplant_period\s*=\s*([^;]*?)\s*;")
 
 
 def _check_period(config: Config, plant_c: str) -> None:
-    """That a plant's period is a tick. ValueError."""
+    """Raise ValueError where the plant's period is not a tick."""
     found = _PERIOD.search(plant_c)
     word = "" if found is None else found[1]
     macro = re.search(rf"#\s*define\s+{re.escape(word)}\s+(\S+)", plant_c) if word.isidentifier() else None
@@ -485,7 +487,8 @@ def _compile(
 
 
 def _fused() -> tuple[str, ...]:
-    """The word by which a plant has this processor's fused multiply-add; without it, one in software: the same bits."""
+    """The flag by which a plant uses this processor's fused multiply-add. Without it one in software gives the same
+    bits."""
     with contextlib.suppress(OSError):
         flags = re.search(r"^flags\s*:(.*)$", Path("/proc/cpuinfo").read_text(encoding="utf-8"), re.MULTILINE)
         if flags is not None and "fma" in flags[1].split():
@@ -531,11 +534,11 @@ def _kept(name: str, product: str, make: Callable[[Path], None]) -> Path:
 
 
 _SUM = "sum"
-"""The file beside a product by which it is known again."""
+"""Name of the file beside a product with its checksum."""
 
 
 def _is_sound(found: Path, name: str) -> bool:
-    """Whether a product is there as it was made; one that is not is taken away."""
+    """True where a product is there as it was made; a damaged one is removed."""
     if not found.parent.exists():
         return False
     data, told = cache.read(found), cache.read(found.with_name(_SUM))
@@ -553,7 +556,7 @@ def _is_sound(found: Path, name: str) -> bool:
 
 
 def _trim(root: Path, keep: Path) -> None:
-    """Removes the folders longest unused while all are more than `LIMIT` bytes."""
+    """Remove the folders longest unused while all together are larger than `LIMIT` bytes."""
     with contextlib.suppress(OSError):
         folders = [
             (path.stat().st_mtime, sum(each.stat().st_size for each in path.iterdir()), path)

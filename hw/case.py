@@ -30,11 +30,14 @@ from met.run import prepare
 
 @frozen
 class CaseRequest:
-    """plan: of one experiment, as text (met.plan.file);  row: of its case table
-    ports: by joint;  lock_step: whether the beds have no time of their own;  baud: of serial lines
-    records: the file that they go to;  head: what else stands at its beginning;  rest: s of rest before the case
-    transcripts: by joint, files that what goes over the line is written to
-    clear: whether faults that a bed has latched are cleared; else it is not driven
+    """The case that the process is to drive.
+
+    plan         plan of one experiment, as text (met.plan.file);  row: of its case table
+    ports        by joint;  lock_step: True where the beds have no time of their own;  baud: of serial lines
+    records      the file that the records go to;  head: what else stands at its beginning
+    rest         s of rest before the case
+    transcripts  by joint, files for what goes over the line
+    clear        True: faults that a bed has latched are cleared first; False: such a bed is not driven
     """
 
     plan: str
@@ -50,7 +53,7 @@ class CaseRequest:
 
 
 def pace_of(experiment: Experiment) -> Pace:
-    """How often the beds of an experiment are spoken to."""
+    """The rate at which the beds of an experiment exchange."""
     return pace(experiment.structure.schedule.base_hz / divisor(experiment))
 
 
@@ -106,7 +109,7 @@ def run(asked: CaseRequest) -> loop.LoopEnd:
 
 
 def _rest(beds: Sequence[BedDriver], time: float, asked_to_stop: Callable[[], bool]) -> None:
-    """All of them, at once, for so long, s, or until the host is asked to stop."""
+    """Let all beds rest for `time` s at once, or until the host is asked to stop."""
     for _ in range(math.ceil(time / process.PAUSE - 1e-6)):
         if asked_to_stop():
             return
@@ -114,7 +117,7 @@ def _rest(beds: Sequence[BedDriver], time: float, asked_to_stop: Callable[[], bo
 
 
 def _greeted(bed: BedDriver, joint: str, experiment: Experiment, asked: CaseRequest) -> About:
-    """Who the bed is; a simulated one begins anew, with the case's noise."""
+    """Greet a bed, and return its description. A simulated one begins anew, with the case's noise."""
     about, row = bed.connect(), asked.row
     process.say(bed=joint, about=process.about_as_json(about))
     process.warnings(bed)
@@ -130,7 +133,7 @@ def _greeted(bed: BedDriver, joint: str, experiment: Experiment, asked: CaseRequ
 
 
 def _check_time(abouts: Sequence[About], lock_step: bool) -> None:
-    """That the beds have a time of their own, or none, as is expected."""
+    """Raise Problem E414 where a bed has a time of its own, and should have none, or the other way round."""
     for about in abouts:
         if (Capability.LOCK_STEP in about.capabilities) != lock_step:
             message = f"bed `{about.name}` has {'a' if lock_step else 'no'} time of its own"
@@ -139,7 +142,7 @@ def _check_time(abouts: Sequence[About], lock_step: bool) -> None:
 
 
 def _check_ticks(abouts: Sequence[About], of: Pace, lock_step: bool) -> None:
-    """That the beds read their sensors as often as they are spoken to; clocks are off by less than 1 %."""
+    """Raise Problem E405 where a bed reads its sensors less often than it is asked. Clocks may be off by 1 %."""
     for about in abouts:
         if not lock_step and about.tick_hz < 0.99 * of.hz:
             message = f"bed `{about.name}` ticks at {about.tick_hz:g} Hz, and would be spoken to at {of.hz:g} Hz"
@@ -148,7 +151,7 @@ def _check_ticks(abouts: Sequence[About], of: Pace, lock_step: bool) -> None:
 
 
 def _check_delay(driven: CaseKernel, of: Pace, lock_step: bool) -> None:
-    """That the law knows how late its commands are."""
+    """Raise Problem E415 where the law takes its commands for earlier than they are."""
     least = of.late(lock_step)
     for joint in driven.joints:
         if driven.delay(joint) < least:
@@ -157,7 +160,7 @@ def _check_delay(driven: CaseKernel, of: Pace, lock_step: bool) -> None:
 
 
 def _check_start(experiment: Experiment, joints: Sequence[str], row: int) -> None:
-    """That the shafts begin at rest, as a bed's does."""
+    """Raise Problem E416 where a joint on a bed begins with a rate: a bed's shaft begins at rest."""
     inputs = {coordinate.path: float(coordinate.values[row]) for coordinate in experiment.cases.coordinates}
     outputs = experiment.formulas.replay(inputs)
     for joint in joints:

@@ -30,14 +30,15 @@ from met.diagnostic import Problem
 
 @contextlib.contextmanager
 def refused(code: str) -> Iterator[None]:
-    """What is inside raises a Problem of this code."""
+    """Expect a Problem of this code, and no other."""
     with pytest.raises(Problem) as caught:
         yield
     assert [each.code for each in caught.value.diagnostics] == [code]
 
 
 class Conformance:
-    """period: s, from one exchange to the next;  share: of the limits, what moves the shaft in these tests."""
+    """The tests that hold for every bed. period: s from one exchange to the next;  share: of the limits, by which
+    the tests move the shaft"""
 
     period = 1e-3
     share = 0.1
@@ -48,17 +49,17 @@ class Conformance:
         raise NotImplementedError
 
     def outputs(self, bed: BedDriver) -> tuple[float, float] | None:
-        """What the amplifiers hold, V and A; None where only a meter can see it."""
+        """The voltage (V) and current (A) that the amplifiers hold; None where only a meter can see them."""
         return None
 
     def wait(self, bed: BedDriver, seconds: float) -> None:
-        """Say nothing to the bed for so long."""
+        """Say nothing to the bed for `seconds`."""
         time.sleep(seconds)
 
     # What tests do
 
     def drive(self, bed: BedDriver, seconds: float, voltage: float = 0.0, current: float = 0.0) -> BedSample:
-        """So many exchanges, until the bed is armed no more; its last answer."""
+        """Exchange for `seconds`, or until the bed is no longer armed. Returns its last answer."""
         sample = None
         for _ in range(math.ceil(seconds / self.period)):
             if not self._lock_step:
@@ -76,7 +77,7 @@ class Conformance:
         return about
 
     def driven(self, bed: BedDriver, **limits: float) -> About:
-        """Connected and armed, under these limits."""
+        """Connect and arm the bed, under these limits."""
         about = self.connected(bed)
         bed.limit(limits)
         bed.arm()
@@ -88,7 +89,7 @@ class Conformance:
         assert bed.read().state != BedState.ARMED
 
     def faulted(self, bed: BedDriver, sample: BedSample, fault: Fault) -> None:
-        """It has stopped, for this and nothing else; it stays so, until it is cleared."""
+        """Assert that the bed has stopped for this fault alone, and stays so until it is cleared."""
         assert sample.state == BedState.STOPPED
         assert sample.faults & ~Fault.WATCHDOG == fault
         self.is_safe(bed)
@@ -335,7 +336,7 @@ class Conformance:
 
 
 class LockStep(Conformance):
-    """Without a time of their own."""
+    """The tests for a bed without a time of its own."""
 
     def test_it_advances_by_the_same_ticks_with_each_exchange_and_with_nothing_else(self, bed: BedDriver) -> None:
         about = self.driven(bed)
@@ -369,7 +370,7 @@ class LockStep(Conformance):
 
 
 class FreeRunning(Conformance):
-    """With a time of their own."""
+    """The tests for a bed with a time of its own."""
 
     def test_it_stays_armed_as_long_as_it_is_spoken_to(self, bed: BedDriver) -> None:
         self.driven(bed)
@@ -397,7 +398,7 @@ class FreeRunning(Conformance):
 
 
 class Simulated(Conformance):
-    """Without a motor."""
+    """The tests for a bed without a motor."""
 
     def test_a_plant_is_started_at_a_rate(self, bed: BedDriver) -> None:
         about = self.connected(bed)

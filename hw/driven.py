@@ -21,8 +21,11 @@ it: a step of a Panda took 2.2 us, of 16 cases 3.9 us (EPYC with AVX-512)."""
 
 
 class CaseKernel:
-    """One case. prepared: with its wires open (met.run.prepare, wire=True); row: of the case table; repeats: exchanges
-    a tick of the servos."""
+    """The kernel of one case, stepped at the servos' ticks.
+
+    prepared  the run with its wires open (met.run.prepare, wire=True)
+    row       of the case table;  repeats: exchanges a tick of the servos
+    """
 
     def __init__(self, prepared: Prepared, row: int, repeats: int = 1) -> None:
         self.prepared, self.row = prepared, row
@@ -45,11 +48,11 @@ class CaseKernel:
 
     @property
     def exchanges(self) -> int:
-        """After the first sample, until the servos' last tick."""
+        """The number of exchanges after the first sample, until the servos' last tick."""
         return self.last * self.repeats
 
     def __call__(self, e: int, rates: Sequence[float], told: list[list[float]]) -> None:
-        """Steps to the instant of exchange e, where the servos tick then (`hw.loop.Compute`)."""
+        """Step to the instant of exchange e where the servos tick then, and write the commands (`hw.loop.Compute`)."""
         tick, between = divmod(e, self.repeats)
         if between:
             return
@@ -65,8 +68,10 @@ class CaseKernel:
         return bed_values(self.prepared.experiment, joint, self.row)["delay"]
 
     def again(self, rates: Iterable[Sequence[float]]) -> tuple[np.ndarray, np.ndarray, int]:
-        """Histories [row, column], outputs [output] and the last base tick of a run in which these rates were read at
-        the servos' ticks from 0 on; not-a-number after it."""
+        """Run from rates that were read before, at the servos' ticks from 0 on.
+
+        Returns histories [row, column], not-a-number after the last rate; outputs [output]; and the last base tick.
+        """
         program, schedule = self.prepared.program, self.prepared.experiment.structure.schedule
         rows = np.full((schedule.rows if program.columns else 0, program.columns), np.nan)
         record = schedule.record
@@ -97,5 +102,5 @@ def substituted(prepared: Prepared) -> tuple[str, ...]:
 
 
 def divisor(experiment: Experiment) -> int:
-    """Base ticks a tick of the servos whose motors are on beds."""
+    """The number of base ticks in a tick of the servos whose motors are on beds."""
     return round(servo_period(experiment) * experiment.structure.schedule.base_hz)

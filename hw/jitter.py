@@ -28,8 +28,11 @@ from met.plan import file as plan_file
 
 @frozen
 class JitterRequest:
-    """port, baud: where the bed is;  plan, joint: of a simulated one: an experiment, as text (met.plan.file)
-    hz: exchanges a second, 1 a joint each time;  seconds: for so long;  joints: as many as if there were
+    """The measurement that the process is to make.
+
+    port, baud   where the bed is
+    plan, joint  for a simulated bed: plan of one experiment, as text (met.plan.file), and its joint; else ""
+    hz, joints   periods a second, and exchanges in each, one a joint;  seconds: length of the measurement
     """
 
     port: str
@@ -43,8 +46,8 @@ class JitterRequest:
 
 @frozen
 class JitterResult:
-    """seconds: that it took;  timing: lateness of the first exchange of a period, trips of all
-    stops: where a run would have been stopped"""
+    """The measurement. seconds: that it took;  timing: lateness of the first exchange of a period, trips of all;
+    stops: how often a run would have been stopped"""
 
     seconds: float
     timing: Timing
@@ -52,7 +55,7 @@ class JitterResult:
 
 
 def measure(asked: JitterRequest) -> JitterResult:
-    """Raises Problem."""
+    """Measure the timing of exchanges with a bed that is not armed. Raises Problem."""
     asked_to_stop = process.listening()
     experiment = plan_file.loads(asked.plan).experiments[0] if asked.plan else None
     period = 1.0 / (asked.hz * asked.joints) if experiment is None else pace_of(experiment).period
@@ -85,7 +88,7 @@ def measure(asked: JitterRequest) -> JitterResult:
 
 
 def jitter_result(rows: np.ndarray, tick_hz: float, hz: float) -> JitterResult:
-    """Of the records of one bed that was looked at once for each joint, at so many Hz."""
+    """The figures from the records of one bed that was read once for each joint, `hz` times a second."""
     first = rows[rows["bed"] == 0]
     own = rows[rows["exchange"] > 0]
     answered = (own["flags"] & ANSWERED) != 0
@@ -99,7 +102,7 @@ def jitter_result(rows: np.ndarray, tick_hz: float, hz: float) -> JitterResult:
 
 
 def _nothing(e: int, rates: Sequence[float], told: list[list[float]]) -> None:
-    """What is computed."""
+    """Compute no commands: the bed is only read."""
 
 
 if __name__ == "__main__":

@@ -9,24 +9,25 @@ BAUD = 921600
 
 
 class BedLine(Protocol):
-    """Raises met.diagnostic.Problem E401 where it is lost."""
+    """A line to a bed. Its methods raise met.diagnostic.Problem E401 where it is lost."""
 
     def now(self) -> float:
-        """Its clock, s."""
+        """The time of the line's clock, s."""
 
     def send(self, frame: bytes) -> None: ...
 
     def receive(self, until: float) -> bytes:
-        """What has come, at once; else what comes first until that time of its clock; else nothing."""
+        """The bytes that have come; where there are none, those that come first until this time of the line's clock,
+        s; else b""."""
 
     def sleep(self, seconds: float) -> None:
-        """Let its clock go on by so many."""
+        """Let `seconds` pass on the line's clock."""
 
     def close(self) -> None: ...
 
 
 class TappedLine:
-    """A line, and all that went over it. sent, came: bytes"""
+    """A line that keeps all bytes that go over it: `sent`, and `came`."""
 
     def __init__(self, line: BedLine) -> None:
         self._line = line

@@ -25,23 +25,23 @@ from hw.pace import MISSED, Pace
 from met.frozen import frozen
 
 SPIN = 60e-6
-"""s before an exchange is due at which the host wakes, and looks at the clock until then: a process that sleeps wakes
-some 50 us late. Never longer: who only looks at clocks is throttled."""
+"""Time before an exchange, s, at which the host wakes to watch the clock: a process that sleeps wakes some 50 us
+late. Not longer, for the system throttles a process that only watches clocks."""
 
 
 class Compute(Protocol):
-    """What to tell the beds after exchange e. rates: rad/s, one a bed; told: [voltage V, current A] of each, changed in
-    place."""
+    """Computes the commands after exchange e. rates: rad/s, one a bed; told: [voltage V, current A] of each bed,
+    changed in place."""
 
     def __call__(self, e: int, rates: Sequence[float], told: list[list[float]]) -> None: ...
 
 
 @frozen
 class LoopEnd:
-    """How a loop ended.
+    """The end of a loop.
 
-    exchanges  that were done and answered by all beds, the first sample counted
-    why        it ended early, in words; "" where it did not
+    exchanges  number that were done and answered by all beds, the first sample counted
+    why        the reason of an early end, in words; "" where it did not end early
     bed        the number of the bed on which it ended; -1 for none
     faults     that this bed had latched
     """
@@ -53,7 +53,7 @@ class LoopEnd:
 
 
 Put = Callable[[bytes], None]
-"""Takes a record (hw/records.py)."""
+"""Takes a record, as bytes (hw/records.py)."""
 
 
 def drive(
@@ -155,7 +155,7 @@ _LATE = {
 
 
 def _waited(due: int) -> int:
-    """Sleeps until a time of the clock, ns; the time then."""
+    """Wait until a time of the clock, ns. Returns the time then."""
     clock = time.perf_counter_ns
     left = (due - clock()) * 1e-9 - SPIN
     if left > 0.0:
@@ -166,8 +166,7 @@ def _waited(due: int) -> int:
 
 
 def _ending(e: int, b: int, sample: BedSample, armed: bool) -> LoopEnd | None:
-    """Whether a bed takes commands no more, and why; of one that is not to take any, whether it is another than was
-    greeted."""
+    """The end of the loop where a bed takes commands no more, or, if it is only read, where it was reset; else None."""
     if sample.greeted and (not armed or (sample.state == BedState.ARMED and not sample.refused)):
         return None
     if not sample.greeted:

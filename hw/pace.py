@@ -12,36 +12,37 @@ from met.frozen import frozen
 SLOWEST_HZ = 500.0
 LOCK_STEP_PATIENCE, SHORTEST_PATIENCE = 1.0, 0.002
 MISSED = 5
-"""Exchanges in a row without an answer, or periods that the host is behind, after which it stops."""
+"""Exchanges in a row without an answer, or periods of lateness, after which the host stops the beds."""
 
 
 @frozen
 class Pace:
-    """servo_hz: rate of the substituted joints' servos, Hz;  repeats: exchanges a tick of theirs."""
+    """The rate of exchanges. servo_hz: rate of the substituted joints' servos, Hz;  repeats: exchanges a tick of
+    theirs"""
 
     servo_hz: float
     repeats: int
 
     @property
     def hz(self) -> float:
-        """Of the wire."""
+        """The rate of exchanges on the wire, Hz."""
         return self.servo_hz * self.repeats
 
     @property
     def period(self) -> float:
-        """From exchange to exchange, s."""
+        """The time from one exchange to the next, s."""
         return 1.0 / self.hz
 
     def patience(self, lock_step: bool) -> float:
-        """How long to wait for an answer, s: an emulator that has no time of its own may be slow."""
+        """The time to wait for an answer, s. It is long in lock-step, where an emulator may be slow."""
         return LOCK_STEP_PATIENCE if lock_step else max(self.period, SHORTEST_PATIENCE)
 
     def late(self, lock_step: bool) -> int:
-        """Ticks of the servo that pass between reading a rate and acting on it, at least: a bed with a time of its own
-        is told at the next exchange, one in lock-step at once."""
+        """The least number of servo ticks from reading a rate to acting on it: a bed with a time of its own is told
+        at the next exchange, one in lock-step at once."""
         return 0 if lock_step or self.repeats > 1 else 1
 
 
 def pace(servo_hz: float) -> Pace:
-    """Of servos that tick at this rate, Hz."""
+    """The pace of exchanges for servos that tick at this rate, Hz."""
     return Pace(servo_hz, max(1, math.ceil(SLOWEST_HZ / servo_hz - 1e-9)))

@@ -32,7 +32,7 @@ ENTRY_POINTS = "met.bed_ports"
 
 @frozen
 class Port:
-    """What a user says of a port.
+    """The port that a user gives, with what belongs to it.
 
     name        as written after `--port`: /dev/ttyUSB0, `firmware`, `SCHEME:ADDRESS` ...
     baud        bits a second of a serial line
@@ -47,13 +47,13 @@ class Port:
 
     @property
     def address(self) -> str:
-        """What stands behind `SCHEME:`."""
+        """The part of the name behind `SCHEME:`."""
         return self.name.partition(":")[2]
 
 
 @frozen
 class Opening:
-    """What a driver is opened for.
+    """All that a driver is opened with.
 
     period      s from one exchange to the next; infinite where the bed is only read
     experiment  the run or sweep that has a joint on the bed; None where no deck was given
@@ -113,7 +113,7 @@ class PortKind:
 
     @property
     def written(self) -> str:
-        """How a user writes such a port: `firmware`, `SCHEME:ADDRESS`, `FILE`."""
+        """The way in which a user writes such a port: `firmware`, `SCHEME:ADDRESS`, `FILE`."""
         return ":".join(part for part in (self.scheme, self.address) if part)
 
     def has(self, name: str) -> bool:
@@ -197,13 +197,13 @@ def own_kinds() -> tuple[PortKind, ...]:
 
 
 def ports_in_words() -> str:
-    """What a user may write after `--port`, in a line: "a serial line, `emulated`, ... or a transcript"."""
+    """All that a user may write after `--port`, in words: "a serial line, `emulated`, ... or a transcript"."""
     schemes = [f"`{kind.written}`" for kind in kinds() if kind.scheme]
     return f"a serial line, {', '.join(schemes)}, or a transcript"
 
 
 def _of_others(scheme: str | None) -> tuple[PortKind, ...]:
-    """What other packages offer, of this scheme or (None) all. Raises Problem E215."""
+    """The kinds of port that other packages offer, of this scheme or, with None, all. Raises Problem E215."""
     found: dict[str, PortKind] = {}
     for point in offered(ENTRY_POINTS):
         if scheme not in (None, point.name):

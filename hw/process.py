@@ -28,11 +28,11 @@ from met.host import interpreter
 from met.messages.render import to_json
 
 PAUSE = 0.1
-"""s between two looks at how far it is, while nothing is said."""
+"""s between two calls of `idle` while the process says nothing."""
 
 _STARTED_BY = "MET_STARTED_BY"
-"""The variable of the environment that has the number of who started the process: an orphan's parent need not be 1, nor
-is a parent of that number gone in a container."""
+"""The environment variable with the process id of the one that started this process. An orphan's parent need not be
+1, and in a container a parent of that id need not have ended."""
 
 Question = TypeVar("Question")
 
@@ -41,7 +41,8 @@ Question = TypeVar("Question")
 
 
 def listening() -> Callable[[], bool]:
-    """Hear signals from here on, but those that `nohup` or a shell had ignored; whether one has asked to stop."""
+    """Hear signals from here on, but those that `nohup` or a shell had ignored. Returns a function that is True once
+    one has asked to stop."""
     heard: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         if number == signal.SIGTERM or signal.getsignal(number) != signal.SIG_IGN:
@@ -53,13 +54,13 @@ def listening() -> Callable[[], bool]:
 
 
 def say(**data: Any) -> None:
-    """A line, whoever still reads it."""
+    """Write a line of JSON to the standard output, whether or not someone still reads it."""
     with contextlib.suppress(BrokenPipeError):
         os.write(sys.stdout.fileno(), (json.dumps(data) + "\n").encode())
 
 
 def about_as_json(about: About) -> dict[str, Any]:
-    """Who a bed is, to be said."""
+    """The description of a bed, as `say` writes it."""
     return {**asdict(about), "capabilities": int(about.capabilities)}
 
 
@@ -76,7 +77,7 @@ def precedence() -> None:
 
 
 def answer(question: Callable[..., Question], do: Callable[[Question], Mapping[str, Any]]) -> None:
-    """All of the process: read what is asked, do it, and say what came of it or what is wrong."""
+    """The whole of the process: read the question, do it, and say the result, or what is wrong."""
     try:
         found = do(question(**json.loads(sys.stdin.readline())))
     except Problem as problem:

@@ -11,14 +11,14 @@ import os
 import signal
 
 PRIORITY = 50
-"""Among processes of SCHED_FIFO: above the kernel's threaded interrupts of most systems no further is needed."""
+"""Priority of the process under SCHED_FIFO: above the threaded interrupts of most kernels."""
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 _PR_SET_PDEATHSIG = 1
 
 
 def take_precedence() -> list[str]:
-    """Do it for this process; what was not allowed, in words, with its remedy."""
+    """Take precedence for this process. Returns what the system did not allow, in words, each with its remedy."""
     gc.collect()
     gc.freeze()
     gc.disable()
@@ -39,14 +39,14 @@ def take_precedence() -> list[str]:
 
 
 def put_first(process: int) -> None:
-    """Have another process, with threads that it will start, go before this one, where that is allowed: a bed's
-    firmware that runs here, whose deadman else speaks up on a busy machine."""
+    """Let another process, and threads that it will start, run before this one, where that is allowed. It is for a
+    bed's firmware that runs here: on a busy machine its deadman would act."""
     with contextlib.suppress(AttributeError, OSError):
         os.sched_setscheduler(process, os.SCHED_FIFO, os.sched_param(PRIORITY + 1))
 
 
 def end_with_parent(number: signal.Signals) -> None:
-    """Have the system send this process a signal when its parent is no more, where it can."""
+    """Let the system send this process a signal when its parent ends, where it can."""
     with contextlib.suppress(AttributeError, OSError):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
 

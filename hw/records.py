@@ -70,7 +70,7 @@ def packed(
     current: float,
     sample: BedSample | None,
 ) -> bytes:
-    """A record. times: due, began, ended, computed."""
+    """The bytes of a record. times: due, began, ended, computed, in ns from the first exchange."""
     if sample is None:
         body = _BODY.pack(exchange, bed, flags, 0, 0, *times, voltage, current, _NONE, _NONE, _NONE, _NONE)
     else:
@@ -92,14 +92,15 @@ def packed(
 
 
 def begin(file: IO[bytes], head: dict[str, Any]) -> None:
-    """Write what stands before the records."""
+    """Write the magic line and the head, which stand before the records."""
     text = json.dumps(head).encode()
     file.write(MAGIC + len(text).to_bytes(8, "little") + text)
 
 
 @frozen
 class Records:
-    """A file of records. cut: bytes at its end that are no whole record, which a killed writer leaves."""
+    """The contents of a file of records. cut: bytes at its end that are no whole record, which a killed writer
+    leaves."""
 
     head: dict[str, Any]
     rows: np.ndarray
@@ -107,12 +108,12 @@ class Records:
 
 
 class UnsoundRecords(Exception):
-    """A file that holds no records, and why, in words that go on after its name."""
+    """A file that holds no records. Its text is the reason, in words that go on after the file's name."""
 
 
 def read(path: Path) -> Records:
-    """All records up to the first that is not sound; none, and no head, of a file that ends before the first. Raises
-    UnsoundRecords, OSError."""
+    """Read all records up to the first that is not sound. A file that ends before the first has none, and an empty
+    head. Raises UnsoundRecords, OSError."""
     data = read_regular(path)
     if not data.startswith(MAGIC[: len(data)]):
         raise UnsoundRecords("holds no records of a bed")

@@ -49,7 +49,7 @@ _FAULTS = {
 
 
 def words(faults: Fault) -> str:
-    """What happened, in words."""
+    """Faults in words: what happened."""
     return "; ".join(_FAULTS[fault][0] for fault in Fault if fault in faults)
 
 
@@ -58,7 +58,7 @@ def remedies(faults: Fault) -> list[str]:
 
 
 def refused(about: About, what: str, sample: BedSample) -> Problem:
-    """The bed did not do what was asked (`arm`, `clear` ...), as its answer says."""
+    """The error for a bed that did not do what was asked (`arm`, `clear` ...), as its answer says."""
     latched = sample.faults & ~Fault.WATCHDOG
     slow = about.limits.arming_rate
     if not sample.greeted:
@@ -78,14 +78,15 @@ def refused(about: About, what: str, sample: BedSample) -> Problem:
 
 
 def latched(about: About, faults: Fault, port: str) -> Problem:
-    """A bed that stopped itself before it was greeted, and was not told to forget it."""
+    """The error for a bed that had stopped itself before it was greeted, and whose faults are still latched."""
     message = f"bed `{about.name}` has stopped itself, and is to be cleared first: {words(faults & ~Fault.WATCHDOG)}"
     own = f"then `met bed clear --port {port}`; `met bed run --clear` does so before each case"
     return Problem(error("E406", message, help=[*remedies(faults & ~Fault.WATCHDOG), own]))
 
 
 def check_stopped(beds: Sequence[BedDriver], abouts: Sequence[About], why: str) -> None:
-    """Raises Problem where a bed that was driven has not confirmed that it is not armed. why: it was to stop early."""
+    """Raise Problem where a bed that was driven has not confirmed that it is disarmed. why: the reason of an early
+    end."""
     unsure = [about.name for bed, about in zip(beds, abouts, strict=True) if not bed.stop()]
     if unsure:
         early = f"{why}; " if why else ""
@@ -106,7 +107,7 @@ def other_version(version: int) -> Problem:
 
 
 def no_greeting(name: str, sent: bytes, came: bytes) -> Problem:
-    """No answer to HELLO, asked for again and again; what was sent, and what came instead of one."""
+    """The error for a bed that does not answer HELLO: what was sent, and what came instead of an answer."""
     message = f"nobody answers HELLO on {name}"
     asked, decoder = set(sent.split(b"\0")) - {b""}, Decoder()
     ours = sum(frame in asked for frame in came.split(b"\0"))
@@ -126,20 +127,21 @@ def no_greeting(name: str, sent: bytes, came: bytes) -> Problem:
 
 
 def silent(name: str, asked: str) -> Problem:
-    """No answer to what is safe to ask again, and was; or to a STEP, which is not."""
+    """The error for a question without an answer: one that was asked again and again, or a STEP, which is asked
+    once."""
     message = f"bed `{name}` does not answer {asked}"
     return Problem(error("E402", message, help="it was there before: look at its supply and at the line"))
 
 
 def no_command(about: About, what: str, value: float, unit: str, most: float) -> Problem:
-    """A voltage or a current that is not sent."""
+    """The error for a voltage or a current that is beyond a limit, and so is not sent."""
     said = "no finite number" if value - value != 0.0 else f"beyond the limit of {most:.6g} {unit}"
     message = f"{what} of {value:.6g} {unit} for bed `{about.name}` is {said}; the bed was stopped"
     return Problem(error("E408", message, help="the simulation diverges, or asks more than the bed may give"))
 
 
 def uncountable(joint: str, reason: Uncountable) -> Problem:
-    """A deck's bed of which firmware cannot count the numbers."""
+    """The error for a deck's bed whose numbers the firmware cannot count."""
     message = f"the bed of joint `{joint}` cannot be one of firmware: {reason}"
     helps = (f"give the deck's bed {reason.remedy}", "`--port emulated` has it as it is")
     return Problem(error("E404", message, help=helps))

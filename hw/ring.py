@@ -16,7 +16,7 @@ from hw.records import SIZE
 
 _COUNT = struct.Struct("<Q")
 _HEAD = 64
-"""Bytes before the records: how many were put in, in a cache line of their own; how many were taken out, in another."""
+"""Bytes before the records: the number of records put in, and in another cache line the number taken out."""
 
 
 class RingFull(Exception):
@@ -24,7 +24,7 @@ class RingFull(Exception):
 
 
 class Ring:
-    """file: of the shared memory (`make`);  room: records."""
+    """A ring of records in shared memory. file: of the memory, from `make`;  room: number of records"""
 
     def __init__(self, file: int, room: int) -> None:
         self.file, self.room = file, room
@@ -33,7 +33,7 @@ class Ring:
         self._taken = _COUNT.unpack_from(self._memory, _HEAD)[0]
 
     def put(self, record: bytes) -> None:
-        """One more. Raises Full."""
+        """Put a record in. Raises RingFull."""
         if self._put - self._taken >= self.room:
             self._taken = _COUNT.unpack_from(self._memory, _HEAD)[0]
             if self._put - self._taken >= self.room:
@@ -44,7 +44,7 @@ class Ring:
         _COUNT.pack_into(self._memory, 0, self._put)
 
     def take(self) -> Iterator[bytes]:
-        """Those that are there, each once; it counts as taken when the next is asked for."""
+        """Take the records that are there, each once. A record counts as taken when the next is asked for."""
         there = _COUNT.unpack_from(self._memory, 0)[0]
         while self._taken < there:
             at = 2 * _HEAD + self._taken % self.room * SIZE
@@ -61,7 +61,8 @@ class Ring:
 
 
 def make(room: int) -> Ring:
-    """Of so many records, in memory that has no name: it is gone with the last process that has it open."""
+    """A ring with room for so many records, in memory without a name: it is gone with the last process that has it
+    open."""
     file = os.memfd_create("met-bed-records")
     os.ftruncate(file, 2 * _HEAD + room * SIZE)
     return Ring(file, room)

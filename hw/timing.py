@@ -11,12 +11,13 @@ from hw.records import ANSWERED, LATE_ANSWERED, LATE_COMPUTED, LATE_WOKEN
 from met.frozen import frozen
 
 TICK = 1 << 32
-"""A bed counts its ticks modulo this."""
+"""The number of a bed's ticks after which its count begins again at 0."""
 
 
 @frozen
 class TimeSpread:
-    """Of times, s: median, 99th and 99.9th percentiles, largest; and how many are in each of `EDGES`' stretches."""
+    """The distribution of times: median, 99th and 99.9th percentile and largest, s; and the counts in the bins of
+    `EDGES`."""
 
     median: float
     high: float
@@ -26,18 +27,18 @@ class TimeSpread:
 
 
 EDGES = tuple(1e-6 * step * 10**power for power in range(5) for step in (1, 2, 5))
-"""s: where one stretch of a histogram ends and the next begins; the first is all below, the last all above."""
+"""Ends of the bins of a histogram, s. The first bin is all below the first of them, the last bin all above the last."""
 
 
 @frozen
 class Timing:
-    """Of one bed, or of all where they are taken together.
+    """The timing of exchanges with one bed, or with all.
 
     lateness    from when an exchange was due to when it began;  trip: from there to its answer
     computing   from an answer to when the next command was known
     unanswered  exchanges without an answer
-    woken, computed, waited  exchanges that began a period late or more, for the host woke too late, computed too long,
-                or waited for the answer before
+    woken, computed, waited  exchanges that began a period late or more, for the host woke too late, computed too
+                             long, or waited for the answer before
     drift       of the bed's clock against the host's, as a share; not-a-number where that is not known
     """
 
@@ -53,7 +54,7 @@ class Timing:
 
 
 def timing(rows: np.ndarray, tick_hz: float) -> Timing:
-    """Of the records of one bed, the first sample left out. tick_hz: rate of the bed's ticks."""
+    """The timing of one bed from its records, without the first sample. tick_hz: rate of the bed's ticks."""
     rows = rows[rows["exchange"] > 0]
     answered = (rows["flags"] & ANSWERED) != 0
     trip = rows["ended"] - rows["began"]
@@ -75,8 +76,8 @@ def timing(rows: np.ndarray, tick_hz: float) -> Timing:
 
 
 def stops(rows: np.ndarray, period: float) -> int:
-    """How often a run would have been stopped by lateness or silence, of the records of one bed that was only looked
-    at. period: s, of the wire."""
+    """The number of times that a run would have been stopped by lateness or silence, from the records of one bed
+    that was only read. period: s, of the wire."""
     rows = rows[rows["exchange"] > 0]
     silent = ((rows["flags"] & ANSWERED) == 0).astype(int)
     long = np.convolve(silent, np.ones(MISSED, int), "valid") == MISSED if len(rows) >= MISSED else np.zeros(0, bool)
@@ -85,7 +86,7 @@ def stops(rows: np.ndarray, period: float) -> int:
 
 
 def time_spread(times: np.ndarray | Sequence[int]) -> TimeSpread:
-    """Of times in ns."""
+    """The distribution of times in ns."""
     seconds = np.asarray(times, dtype=np.float64) * 1e-9
     if not len(seconds):
         return TimeSpread(*(float("nan"),) * 4, (0,) * (len(EDGES) + 1))
@@ -95,7 +96,7 @@ def time_spread(times: np.ndarray | Sequence[int]) -> TimeSpread:
 
 
 def _drift(rows: np.ndarray, tick_hz: float) -> float:
-    """By a straight line through the host's times over the bed's ticks: its slope, but for one."""
+    """The drift of the bed's clock: the slope of its ticks over the host's times, less 1."""
     if len(rows) < 10:
         return float("nan")
     ticks = np.unwrap(rows["tick"].astype(np.float64), period=float(TICK))

@@ -28,7 +28,7 @@ from met.host.files import parse_json, read_regular
 MAGIC = b"MET bed transcript 1\n"
 
 HEADER, OPENED, SENT, RECEIVED, LOST = range(5)
-"""Kinds of records. OPENED: the line was, without bytes; LOST: it was, and why, in words."""
+"""Kinds of records. OPENED: the line was opened, without bytes; LOST: the line was lost, with the reason in words."""
 
 _HEAD = struct.Struct("<BdH")
 _MOST = 0xFFFF
@@ -43,7 +43,7 @@ class TranscriptRecord:
 
 @frozen
 class Transcript:
-    """What a file holds. cut: bytes at its end that are no whole record."""
+    """The contents of a transcript's file. cut: bytes at its end that are no whole record."""
 
     header: Mapping[str, Any]
     records: tuple[TranscriptRecord, ...]
@@ -51,7 +51,8 @@ class Transcript:
 
 
 class TranscriptWriter:
-    """Makes records. put: takes the bytes of one, or of the beginning of a file; called once for each."""
+    """Writes a transcript. put: takes the bytes of one record, or of the file's beginning; it is called once for
+    each."""
 
     def __init__(self, put: Callable[[bytes], object], header: Mapping[str, Any]) -> None:
         self._put, self._crc = put, 0
@@ -68,10 +69,10 @@ class TranscriptWriter:
 
 
 class TranscriptFile:
-    """A new file, written without a buffer of this process, so that what was put outlives it."""
+    """A new file, written without a buffer in this process, so that what was put outlives it."""
 
     def __init__(self, path: str | Path) -> None:
-        """Its folder is made where it is not there."""
+        """Make the file, and its folder where there is none."""
         try:
             with contextlib.suppress(FileExistsError):  # no folder: then no file can be made in it
                 Path(path).parent.mkdir(parents=True, exist_ok=True)
@@ -87,13 +88,14 @@ class TranscriptFile:
         self._file.write(data)
 
     def close(self) -> None:
-        """All of it is on the disk then."""
+        """Put all of it on the disk, and close it."""
         os.fsync(self._file.fileno())
         self._file.close()
 
 
 class TranscribedLine:
-    """A line, and a transcript of it. A transcript that cannot be written goes on without more; it is said once."""
+    """A line with a transcript of what goes over it. Where the transcript cannot be written, that is raised once,
+    and the line goes on without it."""
 
     def __init__(self, line: BedLine, writer: TranscriptWriter) -> None:
         self._line, self._writer = line, writer
@@ -143,7 +145,7 @@ class TranscribedLine:
 
 
 def read(path: str | Path) -> Transcript:
-    """All records up to the first that is not sound. Raises Problem E409."""
+    """Read all records of a transcript up to the first that is not sound. Raises Problem E409."""
     try:
         data = read_regular(path)
     except OSError as reason:

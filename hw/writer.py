@@ -25,10 +25,10 @@ from met.diagnostic import Problem, error
 from met.host import interpreter
 
 RING_BYTES = 64 << 20
-"""Of records that may wait for the disk: minutes of them."""
+"""Largest size of the ring, bytes: records of some minutes may wait for the disk."""
 
 PAUSE = 0.005
-"""s between looks into the ring."""
+"""s between two looks into the ring."""
 
 
 def write(through: Ring, pipe: int, path: Path, head: bytes) -> None:
@@ -45,15 +45,15 @@ def write(through: Ring, pipe: int, path: Path, head: bytes) -> None:
 
 
 _LOOK = 64
-"""Records between two looks whether the process is still there."""
+"""Number of records between two checks that the process is still there."""
 
 
 class WriterGone(Exception):
-    """The writer has ended before the loop: what is put is written by nobody."""
+    """The writer's process has ended before the loop: nobody writes the records."""
 
 
 class RecordsWriter:
-    """The writer of one run, from the loop's side."""
+    """The process that writes the records of a run, from the loop's side."""
 
     def __init__(self, through: Ring, path: Path, head: bytes) -> None:
         self._ring, self._path, self._count = through, path, 0
@@ -76,14 +76,14 @@ class RecordsWriter:
             self._process.stdin.close()
 
     def put(self, record: bytes) -> None:
-        """A record. Raises Gone, Full."""
+        """Hand over a record. Raises WriterGone, RingFull."""
         self._count += 1
         if self._count % _LOOK == 0 and self._process.poll() is not None:
             raise WriterGone
         self._ring.put(record)
 
     def close(self) -> str:
-        """Have all of it on the disk; why it is not, in words, "" where it is."""
+        """Wait until all records are on the disk. Returns why they are not, in words; "" where they are."""
         os.close(self._alive)
         assert self._process.stderr is not None
         with self._process.stderr as stderr:
@@ -95,8 +95,8 @@ class RecordsWriter:
 
 @contextlib.contextmanager
 def recording(path: Path, head: Mapping[str, Any], most: int) -> Iterator[Callable[[bytes], None]]:
-    """What takes records, so many at most; all are in the file at the end. Raises Problem E413, in the middle of a run,
-    too, so that no bed is driven of which nothing is kept."""
+    """Give a function that takes records, at most `most`. All are in the file at the end. Raises Problem E413, in
+    the middle of a run too, so that no bed is driven without records."""
     writer = RecordsWriter(ring.make(min(most, RING_BYTES // records.SIZE)), path, json.dumps(head).encode())
     stalled = ""
     try:
@@ -111,7 +111,7 @@ def recording(path: Path, head: Mapping[str, Any], most: int) -> Iterator[Callab
 
 
 def main() -> None:
-    """The process."""
+    """The process that writes the records."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # it ends with the loop
     memory, room, pipe = map(int, sys.argv[1:4])

@@ -15,7 +15,8 @@ from met.plan import Experiment, Plan
 
 @frozen
 class ChosenBed:
-    """port: without its joint;  experiment: None where no deck was given;  joint: of it"""
+    """The bed that a user chose. port: without its joint;  experiment: None where no deck was given;  joint: of the
+    experiment, on that bed"""
 
     port: str
     experiment: Experiment | None = None
@@ -28,7 +29,7 @@ class ChosenBed:
 
 
 def on_beds(plan: Plan, names: Sequence[str] | None) -> list[Experiment]:
-    """Those of a plan's experiments that have motors on beds. Raises Problem E310, E333."""
+    """The experiments of a plan, all or those of these names, that have motors on beds. Raises Problem E310, E333."""
     found = [each for each in experiments_named(plan, names) if each.structure.substitutions]
     if not found:
         helps = ["a run says so: `substitute JOINT { }`", "name the run or sweep that does, if it is another one"]
@@ -46,7 +47,7 @@ def chosen_bed(
     settings: tuple[str, ...] = (),
     quiet: bool = False,
 ) -> ChosenBed:
-    """Of `PORT`, or `JOINT=PORT` of a deck; its first case counts. Raises Problem."""
+    """The bed of `PORT`, or of `JOINT=PORT` with a deck, whose first case counts. Raises Problem."""
     found = _chosen_bed(
         word,
         None
@@ -79,12 +80,12 @@ def _chosen_bed(word: str, plan: Plan | None, names: tuple[str, ...]) -> ChosenB
 
 
 def split(word: str) -> tuple[str, str]:
-    """Joint and port of `JOINT=PORT`, or none and `PORT`, which may have a `=` in its path or address."""
+    """Joint and port of `JOINT=PORT`; "" and the port of `PORT`, which may have a `=` in its path or address."""
     joint, equals, port = word.partition("=")
     return (joint, port) if equals and joint.isidentifier() and not os.path.exists(word) else ("", word)
 
 
 def on_none(word: str, joint: str, joints: Sequence[str]) -> Problem:
-    """Of a port that is given to another joint than those on beds."""
+    """The error for a port of a joint that is not on a bed."""
     on = ", ".join(f"`{each}`" for each in joints)
     return Problem(error("E418", f"port `{word}`: joint `{joint}` is on no bed here", help=f"on a bed here: {on}"))

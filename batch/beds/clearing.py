@@ -15,7 +15,7 @@ from met.messages.visible import say
 
 
 def clear_and_tell(word: str, *, baud: int, form: str, quiet: bool = False, verbose: bool = False) -> None:
-    """The command. Raises Problem."""
+    """Run `met bed clear`. Raises Problem."""
     about, faults = clear(word, baud)
     if form == "json":
         names = [str(fault.name).lower() for fault in Fault if fault in faults]
@@ -27,7 +27,8 @@ def clear_and_tell(word: str, *, baud: int, form: str, quiet: bool = False, verb
 
 
 def clear(word: str, baud: int) -> tuple[About, Fault]:
-    """Who the bed at a port is, and what it had latched. It is not armed. Raises Problem."""
+    """Clear the faults of the bed at a port, without arming it. Returns its description and the faults. Raises
+    Problem."""
     if kind_of(word).simulated:
         helps = "each run begins with one in which nothing is latched"
         raise Problem(error("E425", f"port `{word}` simulates a bed, anew for each command", help=helps))

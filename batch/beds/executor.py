@@ -34,13 +34,19 @@ from met.plan import file as plan_file
 from met.run import FAILED
 
 ANOTHER, FULL = "E407", "E413"
-"""What says nothing of a bed that is armed: another transcript, a full disk. What else is wrong is what came of it."""
+"""Codes of errors that say nothing about a bed that was armed: another transcript's, a full disk. Any other error is
+the end of the case."""
 
 
 @frozen
 class Ports:
-    """Where the beds are. by_joint: port by joint;  transcripts: a folder for what goes over the lines, or None
-    rest: s before each case but the first, for the motors to cool;  clear: whether faults are cleared before a case"""
+    """The ports of a campaign, and how its cases are driven.
+
+    by_joint     port by joint
+    transcripts  a folder for what goes over the lines; None: none is kept
+    rest         s before each case but the first, for the motors to cool
+    clear        True: faults are cleared before each case
+    """
 
     by_joint: Mapping[str, str]
     baud: int
@@ -52,7 +58,7 @@ class Ports:
 
 @frozen
 class Driving:
-    """A case that is being driven. exchange_hz: with all its beds together;  seconds: that it lasts"""
+    """The case that is being driven. exchange_hz: exchanges a second with all its beds;  seconds: length of the case"""
 
     records: Path
     exchange_hz: float
@@ -60,7 +66,7 @@ class Driving:
 
     @property
     def done(self) -> float:
-        """s of it that are on the disk."""
+        """Seconds of the case whose records are on the disk."""
         try:
             return min(self.records.stat().st_size / records.SIZE / self.exchange_hz, self.seconds)
         except OSError:
@@ -68,7 +74,7 @@ class Driving:
 
 
 class OnBeds:
-    """The executor. say: takes what is told of a bed, as it comes."""
+    """The executor that drives cases on beds, one after another. say: takes lines about the beds, as they come"""
 
     workers = 1
 
@@ -98,7 +104,7 @@ class OnBeds:
                 self.check(ports, f"{folder.path} holds cases of this campaign")
 
     def know_all(self) -> None:
-        """Know of the cases, too, that an earlier run of the campaign has done."""
+        """Add the records of cases that an earlier run of the campaign has driven."""
         self.known.add_all(self._folder.beds)
 
     def submit(self, task: Task) -> None:
@@ -135,7 +141,8 @@ class OnBeds:
         self._waiting.clear()
 
     def check(self, before: Mapping[str, str], what: str) -> None:
-        """Raises Problem E353 where cases were driven at other ports, by joint; what: and where those cases are."""
+        """Raise Problem E353 where cases were driven at other ports. before: port by joint;  what: says where those
+        cases are"""
         for joint, port in before.items():
             if not same_bed(port, self.ports.get(joint, "")):
                 message = f"{what}, driven at `{port}`, and is left as it is"
@@ -143,7 +150,7 @@ class OnBeds:
                 raise Problem(error("E353", message, help=helps))
 
     def _case(self, section: Section, row: int) -> tuple[CaseResult, str]:
-        """What came of a case, and why it ended early, "" where it did not."""
+        """Drive a case, or take up its records. Returns the result, and why it ended early, "" where it did not."""
         path = self._folder.beds / f"{section.experiment}-{row}.records"
         told = path.with_suffix(".ended")
         try:
@@ -169,7 +176,8 @@ class OnBeds:
         return found, f"t = {at:g} s: {why}"
 
     def _drive(self, section: Section, row: int, path: Path, told: Path) -> None:
-        """Raises Problem, OSError, and KeyboardInterrupt when the case's process has stopped the beds."""
+        """Drive a case in a process of its own. Raises Problem, OSError, and KeyboardInterrupt once that process has
+        stopped the beds."""
         ports = self._ports
         experiment = section.prepared.experiment
         plan = plan_file.dumps(Plan("", (replace(experiment, notes=()),)))
@@ -220,12 +228,12 @@ class OnBeds:
                     file.write(json.dumps(ended).encode())
 
     def _greeted(self, joint: str, bed: str) -> None:
-        """Say which bed it is, where it is not the one of the case before."""
+        """Say which bed a joint is on, where it is another than in the case before."""
         if self._told.get(joint) != bed:
             self._told[joint] = bed
             self._say(f"{joint}: {bed}")
 
 
 def _recorded(path: Path) -> bool:
-    """Whether there are records of a bed that was armed. Raises records.UnsoundRecords, OSError."""
+    """True where the file has records of a bed that was armed. Raises records.UnsoundRecords, OSError."""
     return path.exists() and len(records.read(path).rows) > 0

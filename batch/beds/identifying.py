@@ -37,29 +37,35 @@ UNITS = {
     "kt_load": "N*m/A",
     "f_cut": "Hz",
 }
-"""Of what is found or given, in the order in which it is told."""
+"""The parameters that are found or given, with their units, in the order of the table."""
 
 OF_SERVO = {"kt": "kt", "resistance": "resistance", "tau_max": "tau_max", "f_c": "f_c", "f_v": "f_v", "inertia": "j_m"}
-"""What the data sheet says of it is the servo's parameter of this name."""
+"""The servo's parameter that is the data sheet of each of these parameters."""
 
 MEASURED_BY = ("resistance", "tau_max", "f_c", "f_v", "inertia")
-"""What is as wrong as the load motor's torque constant, where that is given: all torques are measured by it."""
+"""The parameters with the relative error of the load motor's torque constant, where that is given: all torques are
+measured by it."""
 
 UNEXPLAINED = 0.1
-"""Share of what was read, rms, that may be left of it: a bed of which more is left is another thing than the model."""
+"""Largest share of the measured rate, rms, that may be left unexplained. A bed with more of it is not what the model
+is."""
 
 
 @frozen
 class DataSheet:
-    """values: what is believed of the bed before, SI, by the names of `UNITS`, and `v_max`, V, where the servo has it
-    said: whether `kt_load` is said by the deck, or by who asks"""
+    """The parameters that are believed before a bed is identified.
+
+    values  SI, by the names of `UNITS`, and `v_max`, V, where the servo has it
+    said    True where `kt_load` is given by the deck or by the user, and is no default
+    """
 
     values: Mapping[str, float]
     said: bool
 
 
 def sheet_of(experiment: Experiment, joint: str, kt_load: float | None) -> DataSheet:
-    """The motor as its servo has it, the rest as the bed has it, in the first case."""
+    """The data sheet of a joint's motor in the first case: the motor as the servo has it, the rest as the bed has
+    it."""
     inputs = {each.path: float(each.values[0]) for each in experiment.cases.coordinates}
     outputs = experiment.formulas.replay(inputs)
 
@@ -94,7 +100,7 @@ def identify_and_tell(
     verbose: bool = False,
     **options: Any,
 ) -> None:
-    """The command. Raises Problem."""
+    """Run `met bed identify`. Raises Problem."""
     say: Callable[[str], None] = (lambda _: None) if quiet or form == "json" else visible.say
     which = chosen_bed(word, source, names, quiet=quiet, **options)
     assert which.experiment is not None
@@ -137,7 +143,8 @@ def identify_and_tell(
 
 
 def _check_sheet(sheet: DataSheet, joint: str) -> None:
-    """Raises Problem E424 where the search cannot begin at what is believed."""
+    """Raise Problem E424 where a parameter of the data sheet is not a number above 0, so that the search cannot
+    begin."""
     for name, unit in UNITS.items():
         if not 0.0 < sheet.values[name] < math.inf:
             message = f"joint `{joint}`: the search cannot begin at {name} = {sheet.values[name]:g} {unit}"
@@ -146,7 +153,8 @@ def _check_sheet(sheet: DataSheet, joint: str) -> None:
 
 
 def _check_output(deck: Path, records: Path) -> None:
-    """Raises Problem E305 where the deck would not be written, or over another, or the records over what is no file."""
+    """Raise Problem E305 where the deck cannot be written or is there already, or the records would replace
+    something that is no regular file."""
     wrong, helps = "", "give another name with `-o`"
     if deck.suffix != ".ic":
         wrong, helps = f"cannot write {deck}: it is to be a deck, which ends in .ic", f"`-o {deck.with_suffix('.ic')}`"
@@ -161,7 +169,7 @@ def _check_output(deck: Path, records: Path) -> None:
 
 
 def check(found: FitResult, about: About) -> None:
-    """Raises Problem E423 where the bed is not what the model is."""
+    """Raise Problem E423 where the bed does not do what the model does."""
     left = float((found.residual**2).mean() ** 0.5)
     worst = int(found.residual.argmax())
     if not found.settled:
@@ -180,7 +188,8 @@ def check(found: FitResult, about: About) -> None:
 
 
 def widened(found: Mapping[str, Estimate], kt_load_error: float) -> dict[str, Estimate]:
-    """With the interval of the load motor's constant, where that is given: a share of it."""
+    """The estimates with the error of a given torque constant in their intervals. kt_load_error: half of its own 95
+    % interval, as a share"""
     from hw.identify.fit import Estimate
 
     if found["kt_load"].found or not kt_load_error:
@@ -219,7 +228,7 @@ def told(found: FitResult, estimates: Mapping[str, Estimate], sheet: DataSheet) 
 
 
 def reasons(found: FitResult) -> list[str]:
-    """Why parameters were not found, in words."""
+    """The reasons for which parameters were not found, in words."""
     missing = [name for name, each in found.parameters.items() if not each.found]
     out = []
     if "kt_load" in missing:
@@ -238,7 +247,7 @@ def reasons(found: FitResult) -> list[str]:
 
 
 def digits(each: Estimate, value: float) -> str:
-    """To two digits of half its interval; six where it is given."""
+    """A number to two digits of half its interval; to six digits where it was given."""
     half = each.high - each.value
     if half <= 0.0:
         return f"{value:.6g}"
@@ -247,7 +256,7 @@ def digits(each: Estimate, value: float) -> str:
 
 
 def origin_of(about: About, ended: Mapping[str, Any], estimates: Mapping[str, Estimate]) -> list[str]:
-    """What the deck says of where its numbers are from."""
+    """The remark at the head of the deck that says where its numbers are from."""
     reference = (
         "drive current as the bed measures it"
         if estimates["kt_load"].found
@@ -263,7 +272,7 @@ def origin_of(about: About, ended: Mapping[str, Any], estimates: Mapping[str, Es
 def included(
     deck: Path, experiment: Experiment, joint: str, estimates: Mapping[str, Estimate], origin: Sequence[str]
 ) -> str:
-    """The deck to include, laid out as `met fmt` does."""
+    """The text of the deck to include, laid out as `met fmt` does."""
     from ic.formatting.formatter import formatted
 
     head = re.sub(r"\W", "_", joint)
@@ -305,7 +314,7 @@ def included(
 
 
 def _believed(experiment: Experiment, use: Substitution) -> list[str]:
-    """What else the deck says of the bed."""
+    """The other parameters of the bed that the deck writes."""
     said = {
         path.rpartition(".")[2]: each
         for path, each in experiment.parameters.items()
@@ -325,7 +334,7 @@ def _believed(experiment: Experiment, use: Substitution) -> list[str]:
 
 
 def _packed(words: Iterable[str], indent: int) -> list[str]:
-    """Words in lines, none of them broken."""
+    """Words put into lines, without breaking one."""
     lines = [" " * indent]
     for word in words:
         if len(lines[-1]) + len(word) > 105:
@@ -337,7 +346,7 @@ def _packed(words: Iterable[str], indent: int) -> list[str]:
 def as_data(
     found: FitResult, estimates: Mapping[str, Estimate], sheet: DataSheet, deck: Path, records: Path
 ) -> dict[str, Any]:
-    """For programs; SI."""
+    """The result for programs, SI."""
     return {
         "deck": str(deck),
         "records": str(records),
@@ -361,7 +370,8 @@ def as_data(
 
 
 def _driven(asked: MovesRequest, say: Callable[[str], None]) -> tuple[About, dict[str, Any]]:
-    """Who the bed is, and how its moves ended. Raises Problem, and KeyboardInterrupt when the bed was stopped by it."""
+    """Lead the bed through the moves. Returns its description and the course of the moves. Raises Problem, and
+    KeyboardInterrupt once the bed is stopped."""
     about: About | None = None
     found = dict[str, Any]()
     for line in talk("hw.identify.driving", asked, lambda words: say(f"  {words}"), until="ended"):

@@ -20,10 +20,10 @@ from met.plan import Plan
 from met.plan import file as plan_file
 
 HZ, SECONDS = 1000.0, 10.0
-"""What is measured where nothing else is asked for, nor a deck has a rate."""
+"""Rate (Hz) and length (s) of a measurement where the user gives none, and no deck has a rate."""
 
 WIDTH = 40
-"""Characters of the longest bar."""
+"""Length of the longest bar, characters."""
 
 _SPREADS = (("lateness", "late"), ("trip", "answered in"))
 _FIGURES = (("median", "median"), ("high", "p99"), ("highest", "p99.9"), ("largest", "max"))
@@ -32,7 +32,8 @@ _FIGURES = (("median", "median"), ("high", "p99"), ("highest", "p99.9"), ("large
 def measured(
     asked: ChosenBed, baud: int, hz: float | None, seconds: float, joints: int
 ) -> tuple[dict[str, Any], list[str]]:
-    """The figures, for programs, and what is told of the measurement. Raises Problem."""
+    """Measure the timing at a port. Returns the figures for programs, and the process's lines about the measurement.
+    Raises Problem."""
     kind = kind_of(asked.port)
     if kind.simulated and kind.lock_step(asked.port, False):
         message = "an emulated bed has no time of its own, so that nothing can be late"
@@ -75,7 +76,7 @@ def jitter_and_tell(
     verbose: bool = False,
     **options: Any,
 ) -> bool:
-    """The command; True where no run would have been stopped. Raises Problem."""
+    """Run `met bed jitter`. Returns True where no run would have been stopped. Raises Problem."""
     asked = chosen_bed(word, source, names, quiet=quiet, **options)
     data, said = measured(asked, baud, rate, duration, joints)
     if form == "json":
@@ -86,7 +87,7 @@ def jitter_and_tell(
 
 
 def lines(data: Mapping[str, Any]) -> list[str]:
-    """For people."""
+    """The figures for people, line by line."""
     misses = data["misses"]
     each = "" if data["joints"] == 1 else f" in {data['joints']} each period"
     out = [
@@ -111,7 +112,8 @@ def lines(data: Mapping[str, Any]) -> list[str]:
 
 
 def histogram(stretches: Sequence[Mapping[str, Any]]) -> list[str]:
-    """A bar for each stretch from the first that is not empty to the last; what is there at all can be seen."""
+    """A bar for each bin from the first to the last that is not empty. A bin with any count has a bar that can be
+    seen."""
     full = [at for at, each in enumerate(stretches) if each["count"]]
     if not full:
         return ["  (none)"]
@@ -127,7 +129,7 @@ def histogram(stretches: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def duration(seconds: float | None) -> str:
-    """`2.5 us`, `1.2 ms`, `3 s`; three digits; `-` where it is not known."""
+    """A time in words: `2.5 us`, `1.2 ms`, `3 s`, three digits; `-` where it is not known."""
     if seconds is None or math.isnan(seconds):
         return "-"
     for scale, unit in ((1e-6, "us"), (1e-3, "ms")):
@@ -137,7 +139,7 @@ def duration(seconds: float | None) -> str:
 
 
 def off(share: float) -> str:
-    """By how much a clock is off: `+12.3 ppm`, from 1 % on in percent."""
+    """The drift of a clock in words: `+12.3 ppm`; from 1 % on in percent."""
     if math.isnan(share):
         return "not known"
     if abs(share) >= 0.01:

@@ -16,16 +16,17 @@ from met.frozen import frozen
 
 @frozen
 class CaseRecords:
-    """tick_hz: of its beds' ticks;  exchanges: its records, by joint."""
+    """The records of one case. tick_hz: rate of its beds' ticks, Hz;  exchanges: by joint"""
 
     tick_hz: float
     exchanges: Mapping[str, np.ndarray]
 
 
 class CampaignRecords:
-    """Of the cases that were driven, taken up, or done by an earlier run; by the numbers of experiment and row.
+    """The records of all cases of a campaign that were driven, in this run or an earlier one.
 
-    beds  by joint, name and firmware of those that it was on
+    cases  by the numbers of experiment and row
+    beds   by joint, name and firmware of the beds that it was on
     """
 
     def __init__(self, joints: Iterable[str]) -> None:
@@ -33,7 +34,7 @@ class CampaignRecords:
         self.beds: dict[str, list[dict[str, str]]] = {joint: [] for joint in joints}
 
     def add(self, experiment: int, row: int, head: Mapping[str, Any], exchanges: Sequence[np.ndarray]) -> None:
-        """A case. head: what stands before its records;  exchanges: by bed."""
+        """Add a case. head: of its file of records;  exchanges: its records, bed by bed."""
         by_joint = dict(zip(head["joints"], exchanges, strict=True))
         self.cases[experiment, row] = CaseRecords(float(head["tick_hz"]), by_joint)
         for joint, about in zip(head["joints"], head["beds"], strict=True):
@@ -41,7 +42,7 @@ class CampaignRecords:
                 self.beds[joint].append(about)
 
     def add_all(self, folder: Path) -> None:
-        """Those in a folder that are not known yet."""
+        """Add the cases in a folder that are not here yet."""
         for path in sorted(folder.glob("*.records")):
             experiment, _, row = path.stem.partition("-")
             if not (experiment.isdecimal() and row.isdecimal()):
@@ -56,5 +57,5 @@ class CampaignRecords:
                     self.add(int(experiment), int(row), found.head, rows)
 
     def of(self, joint: str) -> list[tuple[float, np.ndarray]]:
-        """Of each case on a joint's bed: Hz of its ticks, and its records."""
+        """The rate of ticks (Hz) and the records of each case on a joint's bed."""
         return [(case.tick_hz, case.exchanges[joint]) for case in self.cases.values() if joint in case.exchanges]

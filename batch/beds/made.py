@@ -22,13 +22,16 @@ from met.run import STOPPED, Prepared
 FAILURE, TICK = OUTPUTS.index("failure"), OUTPUTS.index("failure.tick")
 
 HEAD = {"key", "row", "joints", "beds", "tick_hz", "repeats"}
-"""Of a case's records."""
+"""Keys that the head of a case's file of records must have."""
 
 
 @frozen
 class CaseResult:
-    """rows: histories [row, column];  outputs: [output];  whole: whether the case reached its end
-    seconds: how long it was driven;  exchanges: the records, by bed;  head: what stands before them"""
+    """The result of one case, made from its records.
+
+    rows     histories [row, column];  outputs: [output];  whole: True where the case reached its end
+    seconds  for which it was driven;  exchanges: the records, by bed;  head: of the file of records
+    """
 
     rows: np.ndarray
     outputs: np.ndarray
@@ -39,7 +42,7 @@ class CaseResult:
 
 
 def read_rates(found: records.Records, beds: int) -> np.ndarray:
-    """Rates as the kernel had them, [servo tick, bed]: where no answer came, the one before."""
+    """The rates as the kernel had them, [servo tick, bed]. Where no answer came it had the one before."""
     repeats = int(found.head["repeats"])
     rows = found.rows[: len(found.rows) // beds * beds].reshape(-1, beds)
     rates = rows["rate"].copy()
@@ -51,7 +54,7 @@ def read_rates(found: records.Records, beds: int) -> np.ndarray:
 
 
 def check_head(found: records.Records) -> None:
-    """Raises records.UnsoundRecords where the head of a case's records is none, or goes not with what follows."""
+    """Raise records.UnsoundRecords where the head of a case's records is damaged, or does not fit the records."""
     head = found.head
     if HEAD - set(head):
         raise records.UnsoundRecords("was written by another version of MET")
@@ -73,7 +76,8 @@ def check_head(found: records.Records) -> None:
 
 
 def case_result(path: Path, prepared: Prepared, row: int) -> CaseResult:
-    """What a case's records say. prepared: with its wires open. Raises records.UnsoundRecords, OSError."""
+    """Make a case's result from its file of records. prepared: the run with its wires open. Raises
+    records.UnsoundRecords, OSError."""
     found = records.read(path)
     check_head(found)
     driven = CaseKernel(prepared, row)

@@ -22,18 +22,21 @@ from met.frozen import frozen
 from met.messages.visible import say
 
 ASKED = 32
-"""Times that the sensors are read, for the time that an answer takes."""
+"""The number of times that the sensors are read, to measure how long an answer takes."""
 
 RATES = (500.0, 1000.0, 2000.0, 4000.0)
-"""Hz, of which it is said whether the line is fast enough."""
+"""Rates in Hz for which the probe says whether the line is fast enough."""
 
 _SENSORS = (("rate", "rad/s"), ("angle", "rad"), ("drive_current", "A"), ("acceleration", "rad/s^2"))
 
 
 @frozen
 class ProbeResult:
-    """trips: s from question to answer, as often as there was one of `ASKED`; empty where there is no line
-    needed: s that the bytes of an exchange take, 0 where the line has no baud rate"""
+    """The bed at a port, and its line.
+
+    trips   s from question to answer, for each of the `ASKED` questions that had one; empty where there is no line
+    needed  s that the bytes of an exchange take; 0 where the line has no baud rate
+    """
 
     port: str
     about: About
@@ -45,7 +48,8 @@ class ProbeResult:
 
     @property
     def fastest(self) -> float:
-        """Hz, of which an exchange takes the largest share of a period that it may; infinite in lock-step."""
+        """The rate of exchanges, Hz, at which one takes the largest share of a period that it may; infinite in
+        lock-step."""
         longest = max(self.needed, statistics.median(self.trips) if self.trips else 0.0)
         stepped = Capability.LOCK_STEP in self.about.capabilities
         return math.inf if stepped or longest == 0.0 else LONGEST_SHARE / longest
@@ -73,7 +77,7 @@ def probe_and_tell(
     verbose: bool = False,
     **options: Any,
 ) -> None:
-    """The command. Raises Problem."""
+    """Run `met bed probe`. Raises Problem."""
     found = probe(chosen_bed(word, source, names, quiet=quiet, **options), baud)
     if form == "json":
         say(json.dumps(data(found), indent=2))
@@ -82,7 +86,7 @@ def probe_and_tell(
 
 
 def lines(found: ProbeResult) -> list[str]:
-    """For people."""
+    """The result for people, line by line."""
     about, sample, limits = found.about, found.sample, found.about.limits
     out = [f"bed `{about.name}` at {found.port}"]
     sensors = (f"{name.replace('_', ' ')} {quantity(value, unit)}" for name, value, unit in _read(sample))
@@ -113,7 +117,7 @@ def lines(found: ProbeResult) -> list[str]:
 
 
 def data(found: ProbeResult) -> dict[str, Any]:
-    """The same for programs, SI."""
+    """The result for programs, SI."""
     about, sample = found.about, found.sample
     return {
         "port": found.port,
@@ -139,7 +143,7 @@ def data(found: ProbeResult) -> dict[str, Any]:
 
 
 def capabilities(about: About) -> list[str]:
-    """In words: those that not every bed has."""
+    """The properties that not every bed has, in words."""
     words = {
         Capability.WATCHDOG: "a watchdog of its own",
         Capability.LOCK_STEP: "no time of its own",
@@ -176,7 +180,7 @@ def _read(sample: BedSample) -> list[tuple[str, float, str]]:
 
 
 def _line(found: ProbeResult) -> list[Sequence[str]]:
-    """What is said of the line, and of the rates that it is fast enough for."""
+    """Rows about the line, and about the rates for which it is fast enough."""
     if not found.trips and not found.needed:
         return [["line", "none: the bed is in this process"]]
     said = []

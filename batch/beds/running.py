@@ -27,7 +27,7 @@ from met.plan import Experiment, Plan
 
 
 def ports_of(given: Sequence[str], experiments: Sequence[Experiment]) -> dict[str, str]:
-    """By joint, of words `PORT` or `JOINT=PORT`. Raises Problem E418."""
+    """The port of each joint on a bed, from words `PORT` or `JOINT=PORT`. Raises Problem E418."""
     joints = list(dict.fromkeys(each.joint for one in experiments for each in one.structure.substitutions))
     found: dict[str, str] = {}
     for word in given:
@@ -63,7 +63,7 @@ def campaign_of(
     output: str | Path | None = None,
     cases: Sequence[str] | None = None,
 ) -> tuple[Campaign, dict[str, str], bool]:
-    """What will be run; by joint its ports; whether the beds have no time of their own. Raises Problem."""
+    """The campaign, its ports by joint, and True where the beds have no time of their own. Raises Problem."""
     asked = on_beds(plan, names)
     by_joint = ports_of(ports, asked)
     for each in asked:
@@ -80,7 +80,7 @@ def campaign_of(
 
 
 def check_margins(campaign: Campaign, *, force: bool) -> list[str]:
-    """What is said of stability before a bed is armed. Raises Problem E419 where a law has no margin."""
+    """Lines about the laws' stability, before a bed is armed. Raises Problem E419 where a law has no margin."""
     said = []
     for part in campaign.parts:
         for each in zip(*margins(part.experiment, part.rows.tolist()), strict=True):
@@ -151,7 +151,7 @@ def run_and_tell(
 
 
 def _ports_before(archive: Path) -> dict[str, str]:
-    """Where the beds were that an archive was driven on, by joint, as its sidecar says. Raises Problem E302."""
+    """The ports, by joint, at which an archive was driven, from the file beside it. Raises Problem E302."""
     path = sidecar_path(archive)
     try:
         return {str(each["joint"]): str(each["port"]) for each in read_json(path).get("beds", ())}

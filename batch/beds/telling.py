@@ -18,7 +18,8 @@ from met.messages.visible import say
 
 
 class BedProgress:
-    """Progress of a campaign on beds (`batch.campaigns.drive.Progress`): cases count by the time that is driven."""
+    """Progress of a campaign on beds (`batch.campaigns.drive.Progress`): a case counts by the time that it has been
+    driven."""
 
     def __init__(self, executor: OnBeds, *, quiet: bool, bar: Bar | None = None) -> None:
         self._executor, self._quiet = executor, quiet
@@ -43,14 +44,14 @@ class BedProgress:
             self._bar.end()
 
     def say(self, line: str) -> None:
-        """A line, where the bar was."""
+        """Write a line in the bar's place."""
         if not self._quiet:
             self._bar.end()
             say(line)
 
 
 def timings(executor: OnBeds) -> dict[str, Timing]:
-    """By joint, over all cases that were driven or taken up; nothing of beds in lock-step, which have no time."""
+    """The timing of each joint's bed, over all cases; none where the beds are in lock-step and have no time."""
     found = {}
     for joint in executor.ports:
         cases = executor.known.of(joint)
@@ -64,11 +65,11 @@ def timings(executor: OnBeds) -> dict[str, Timing]:
 
 
 WORST = 0.01
-"""Share of the exchanges without an answer, or by which a bed's clock is off, from which there is a warning."""
+"""Share of exchanges without an answer, and error of a bed's clock, above which there is a warning."""
 
 
 def timing_lines(executor: OnBeds) -> list[str]:
-    """How well the loop kept its time, in words; a warning where the bed did not."""
+    """Lines about how well the loop kept its time, with a warning where the bed did not."""
     lines = []
     for joint, found in timings(executor).items():
         late = found.woken + found.computed + found.waited
@@ -98,7 +99,7 @@ def timing_lines(executor: OnBeds) -> list[str]:
 
 
 def sidecar_entries(executor: OnBeds) -> Mapping[str, Any]:
-    """What stands beside the archive: which beds they were, and how well time was kept; s."""
+    """The entries for the file beside the archive: the beds, and how well time was kept, s."""
     executor.know_all()
     kept = timings(executor)
     return {

@@ -21,17 +21,18 @@ from met.program.control.plant import Plant
 from met.substitution.bed import SIMULATION_PARAMETERS
 
 FINE = 2.0**-20
-"""V, A and rad/s of a count where the bed's converter has no resolution: up to 2047 of each, and nothing to round in
-the product with it."""
+"""V, A or rad/s of a count where the bed's converter has no resolution. Commands reach 2047 of the unit, and a
+product with the count is exact."""
 
 FINE_ANGLE = 2.0**-16
-"""rad of a count."""
+"""rad of a count of the encoder."""
 
 ARMING_RATE = 5.0
-"""rad/s: a shaft that no one would call turning, and ten times what typical noise of a tachometer comes to."""
+"""Rate above which the bed does not arm, rad/s: no one would call that turning, and typical noise of a tachometer is
+a tenth of it."""
 
 DEADMAN = 0.020
-"""s; told, though nothing waits for it."""
+"""The deadman's time that the bed announces, s. Nothing waits for it in lock-step."""
 
 
 class SteppedPlant(Protocol):
@@ -40,17 +41,18 @@ class SteppedPlant(Protocol):
     period: float
 
     def start(self, rate: float, seed: float, repeat: float) -> float:
-        """A shaft that has turned at rate (rad/s) for long, noise from its beginning: the filtered rate, rad/s."""
+        """Let the shaft have turned at rate (rad/s) for long, with noise from its beginning. Returns the filtered
+        rate, rad/s."""
 
     def tick(self, voltage: float, current: float) -> float:
-        """One tick under what the amplifiers hold, V and A: the filtered rate after it, rad/s."""
+        """Advance one tick under what the amplifiers hold, V and A. Returns the filtered rate after it, rad/s."""
 
     @property
     def shaft_angle(self) -> float: ...
 
 
 def scales(values: Mapping[str, float]) -> Scales:
-    """Of a bed with these parameters (met.substitution): a count is a step of its converters."""
+    """The counts of a bed with these parameters (met.substitution.bed): a count is a step of its converters."""
     volts, amperes, rate = (
         values.get(name, 0.0) or FINE for name in ("converter_voltage", "converter_current", "converter_in")
     )
@@ -58,16 +60,19 @@ def scales(values: Mapping[str, float]) -> Scales:
 
 
 def limits(values: Mapping[str, float], period: float, *, voltage: float = 60.0, rate: float = 1000.0) -> Limits:
-    """Of a bed with these parameters: the current is that of its load's amplifier; what is not asked for (V, rad/s) is
-    wide, and within a tick of period s the whole of it may be commanded. It bears its largest current for ever."""
+    """The limits of a bed with these parameters. Its current is that of the load's amplifier, which it bears for
+    ever. The others are wide unless given (V, rad/s), and within a tick of `period` s all of a range may be
+    commanded."""
     current = values["i_max"]
     heat = current * current  # not a power, which overflows with an error
     return Limits(voltage, current, rate, ARMING_RATE, 2.0 * voltage / period, 2.0 * current / period, heat)
 
 
 class EmulatedBed(BedDriver):
-    """plant: at rest when the bed is made;  bears: A that its load motor bears for ever, its limit unless given.
+    """A bed in this process, in lock-step: a plant under the states, limits and counts of a real bed.
 
+    plant             at rest when the driver is made
+    bears             A that the load motor bears for ever; its limit unless given
     voltage, current  what the amplifiers hold: V, A
     """
 
@@ -184,7 +189,8 @@ class EmulatedBed(BedDriver):
         return self._about
 
     def _counted(self, rate: float) -> int:
-        """What cannot be read is faster than every limit."""
+        """The rate in whole counts; one that has no count, or is not a number, is the largest, which is beyond every
+        limit."""
         counts = rate / self._scales.rate
         return round(counts) if abs(counts) < messages.MOST else messages.MOST
 
@@ -201,7 +207,7 @@ class EmulatedBed(BedDriver):
         self._faults |= faults
 
     def _advance(self) -> None:
-        """A tick of the plant, and what a bed watches at its end."""
+        """Advance the plant by a tick, and stop where the rate or the heat is beyond its limit."""
         self._rate = self._counted(self._plant.tick(self.voltage, self.current))
         self._tick += 1
         self._since += 1

@@ -10,7 +10,7 @@ from hw.protocol import messages
 from met.diagnostic import Problem, error
 
 DEADMAN = (0.010, 0.020)
-"""s, between which a bed's is: docs/protocol.md, States."""
+"""Shortest and longest deadman that a bed may have, s (docs/protocol.md, States)."""
 
 _UNITS = {
     "voltage": "V",
@@ -27,7 +27,7 @@ _UNITS = {
 
 
 def about(found: messages.HelloAnswer) -> About:
-    """Of a bed that this MET can drive. Raises Problem E404."""
+    """The description of a bed from its answer to HELLO. Raises Problem E404 where MET cannot drive such a bed."""
     name = found.name.rstrip(b"\0").decode("latin-1").encode("unicode_escape").decode()
     capabilities = Capability(found.capabilities & _KNOWN)
     wrong = [*_scales(found.scales, capabilities), *_limits(found.limits, found.scales)]
@@ -78,7 +78,7 @@ def tighter(about: About, asked: Mapping[str, float]) -> dict[str, int]:
 
 
 def commanded(value: float, scale: float, most: int) -> int | None:
-    """A command's counts, the nearest; None where it is no finite number, or beyond the limit in force."""
+    """A command as whole counts, the nearest ones; None where it is no finite number, or beyond the limit in force."""
     of = value / scale
     if of - of != 0.0:
         return None
@@ -87,7 +87,7 @@ def commanded(value: float, scale: float, most: int) -> int | None:
 
 
 def ticks(about: About, period: float) -> int:
-    """Of a bed in lock-step in a period of so many seconds. Raises Problem E405."""
+    """The number of ticks that a bed in lock-step makes in a period, s. Raises Problem E405 where it is not whole."""
     found = period * about.tick_hz
     whole = round(found)
     if not 1 <= whole <= 255 or abs(found - whole) > 1e-6 * whole:
@@ -98,7 +98,8 @@ def ticks(about: About, period: float) -> int:
 
 
 def counts(value: float, scale: float) -> int:
-    """The whole counts in a limit; what is off a count by rounding alone is that count."""
+    """The whole counts in a limit, rounded down; a limit that only rounding has made smaller than a count has that
+    count."""
     return math.floor(min(value / scale + 1e-6, messages.MOST))
 
 

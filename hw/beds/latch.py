@@ -6,14 +6,15 @@ from hw import refusals
 from hw.bed import About, BedDriver, BedState, Fault
 
 COMING_TO_REST = 10.0
-"""s that a shaft is given for it."""
+"""Longest time for which a shaft may go on turning before faults are cleared, s."""
 
 LOOKS = 0.1
-"""s between two looks at it."""
+"""Time between two looks at the shaft's rate, s."""
 
 
 def cleared(bed: BedDriver, about: About) -> Fault:
-    """What a bed, which is greeted, had latched; now it is disarmed. Raises Problem E406 where its shaft turns on."""
+    """Clear the faults that a greeted bed has latched, and return them; it is disarmed then. Raises Problem E406
+    where its shaft turns on."""
     sample = bed.read()
     if sample.state != BedState.STOPPED:
         return Fault(0)
@@ -25,7 +26,7 @@ def cleared(bed: BedDriver, about: About) -> Fault:
 
 
 def check(bed: BedDriver, about: About, port: str) -> None:
-    """Raises Problem E406 where a bed, which is greeted, has latched faults."""
+    """Raise Problem E406 where a greeted bed has latched faults. port: as the user wrote it, for the remedy."""
     sample = bed.read()
     if sample.state == BedState.STOPPED:
         raise refusals.latched(about, sample.faults, port)

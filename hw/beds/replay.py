@@ -16,14 +16,16 @@ from met.diagnostic import Problem, error
 from met.host.files import open_regular
 
 LONGEST = 1000.0
-"""Seconds between two exchanges that no bed waits."""
+"""A period between exchanges that no bed has, s: a header that says more is damaged."""
 
 
 class ReplayBed(WireBed):
-    """path: of the transcript. Raises Problem E409; its methods E407 where what is asked is not what was asked,
-    E401 where it ends.
+    """A bed that answers from the transcript in the file `path`.
 
-    transcript  the whole of it; header: as `SerialBed` wrote it
+    Raises Problem E409 where the file is no transcript. The methods raise E407 where the host asks for something
+    else than it asked then, and E401 where the transcript ends.
+
+    transcript  the whole transcript, with the header that `SerialBed` wrote
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -45,7 +47,7 @@ class ReplayBed(WireBed):
 
 
 class _ReplayedLine:
-    """The line as it was: its clock stands at what was last sent or received."""
+    """The line of a transcript: its clock stands at what was last sent or received."""
 
     def __init__(self, transcript: Transcript, name: str) -> None:
         self._records, self._name, self._at = transcript.records, name, 0
@@ -80,10 +82,10 @@ class _ReplayedLine:
         return b""  # then it did not come in time
 
     def sleep(self, seconds: float) -> None:
-        """What came of it is in the records."""
+        """Do nothing: what came meanwhile is in the records."""
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: no line is held."""
 
     def _next(self, kind: int) -> TranscriptRecord | None:
         if self._at == len(self._records) or self._records[self._at].kind != kind:
@@ -100,7 +102,8 @@ class _ReplayedLine:
                 self._scales = found[1].scales
 
     def _other(self, asked: str) -> Problem:
-        """Of what is asked, and was not: E407; E401 where there is no more, as of a line that was lost."""
+        """The error for a question that was not asked then: E407, or E401 where the transcript ends, as that of a
+        lost line does."""
         after = f"after tick {self._tick} of the bed" if self._tick >= 0 else "at the beginning"
         if self._at == len(self._records):
             helps = "it was broken off there, or another deck or case made it"

@@ -29,28 +29,29 @@ from hw.transcript import TranscribedLine, TranscriptWriter
 from met.diagnostic import Diagnostic, Problem, error
 
 LONGEST_SHARE = 0.8
-"""Of a period that the bytes of an exchange may take; and what those are: docs/protocol.md, Timing."""
+"""Largest share of a period that the bytes of an exchange may take on the line (docs/protocol.md, Timing)."""
 _LEAST_BYTES, _SENSOR_BYTES, _BITS = 16 + 17, 4, 10
 
 _WRITE_TIMEOUT = 1.0
-"""s that 16 bytes may wait to be sent; then the line hangs. pyserial counts what a busy machine does as well."""
+"""s that 16 bytes may wait to be sent before the line counts as hanging. pyserial counts a busy machine's delays
+too."""
 
 _UNIX = "unix://"
 _NETWORK = ("socket", "rfc2217")
 
 _SLICE = 0.001
-"""s between two looks at a line that cannot be waited for."""
+"""s between two looks at a line that the system cannot wait for."""
 
 ADAPTERS = Path("/sys/bus/usb-serial/devices")
 _SLOW_ADAPTER = 2
-"""ms, the longest that a USB adapter may keep bytes back without a warning."""
+"""Longest time in ms for which a USB adapter may keep bytes back without a warning."""
 
 
 class SerialBed(WireBed):
-    """url: of pyserial's `serial_for_url`;  period: s, from one exchange to the next.
+    """A bed on a serial line.
 
-    transcript  takes the bytes of each record of a transcript (hw/transcript.py)
-    warnings    what may make exchanges late, known once it is connected
+    url         a device, or another URL of pyserial's `serial_for_url`;  period: s from one exchange to the next
+    transcript  takes the bytes of each record of a transcript (hw/transcript.py); None: none is kept
     """
 
     def __init__(
@@ -97,17 +98,17 @@ PORT = PortKind(
 
 
 def exchanged(capabilities: Capability) -> int:
-    """Bytes of an exchange, both ways together."""
+    """The number of bytes of an exchange, both ways together."""
     return _LEAST_BYTES + _SENSOR_BYTES * sum(each in capabilities for each in messages.SENSORS)
 
 
 def needed(capabilities: Capability, baud: int) -> float:
-    """s that an exchange takes on a serial line."""
+    """The time that the bytes of an exchange take on a serial line, s."""
     return _BITS * exchanged(capabilities) / baud
 
 
 class SerialLine:
-    """Open from its making on. Raises Problem E400 then, E401 after it."""
+    """A serial line, open as soon as it is made. Making it raises Problem E400, its methods raise E401."""
 
     def __init__(self, url: str, baud: int) -> None:
         self._url = url
@@ -180,7 +181,7 @@ def _opened(url: str, baud: int) -> Any:
 
 
 def _check_address(url: str) -> None:
-    """That what is to be reached over a network has a host and a port. Raises Problem E400."""
+    """Raise Problem E400 where the URL of a network line names no host or no port."""
     scheme = url.partition("://")[0]
     if scheme not in _NETWORK:
         return
@@ -195,7 +196,7 @@ def _check_address(url: str) -> None:
 
 
 class _UnixSocket:
-    """What pyserial has no port for, with as much of one as is asked of it."""
+    """A UNIX socket with those methods of a pyserial port that `SerialLine` uses: pyserial has none for it."""
 
     def __init__(self, path: str) -> None:
         self._line = socket.socket(socket.AF_UNIX)
@@ -215,7 +216,7 @@ class _UnixSocket:
         self._line.sendall(data)
 
     def read(self, size: int) -> bytes:
-        """Without waiting."""
+        """Read what is there, without waiting."""
         try:
             data = self._line.recv(size)
         except BlockingIOError:
@@ -252,7 +253,7 @@ def _not_opened(url: str, reason: Exception) -> Problem:
 
 
 def _is_ours(path: str) -> bool:
-    """Whether this process has the same device open, other than as its terminal."""
+    """True where this process has the same device open, other than as its terminal."""
     with contextlib.suppress(OSError):
         wanted = os.stat(path).st_rdev
         for name in os.listdir("/proc/self/fd"):
@@ -270,7 +271,7 @@ def _ports() -> str:
 
 
 def latency(url: str) -> tuple[Diagnostic, ...]:
-    """A warning where a USB adapter keeps bytes back; it forgets its setting when it is plugged in again."""
+    """A warning where a USB adapter keeps bytes back. Its setting is lost when the adapter is plugged in again."""
     file = ADAPTERS / Path(url).resolve().name / "latency_timer"
     try:
         ms = int(file.read_text(encoding="ascii"))
@@ -284,7 +285,7 @@ def latency(url: str) -> tuple[Diagnostic, ...]:
 
 
 def _why(reason: Exception) -> str:
-    """In the system's words where it has some, else those of what went wrong first."""
+    """The reason of an error in words: the system's where there is an error number, else those of its first cause."""
     number = _number(reason)
     if number and number > 0:
         return os.strerror(number).lower()
@@ -297,7 +298,7 @@ def _why(reason: Exception) -> str:
 
 
 def _number(reason: BaseException | None) -> int | None:
-    """The system's, of an error that pyserial raised, or of what it raised it from."""
+    """The system's error number, of an error that pyserial raised or of its cause; None where there is none."""
     for each in _chain(reason):
         number = each.args[0] if isinstance(each, termios.error) else getattr(each, "errno", None)
         if number:
@@ -306,7 +307,7 @@ def _number(reason: BaseException | None) -> int | None:
 
 
 def _chain(reason: BaseException | None) -> Iterator[BaseException]:
-    """An error, and those from which it came."""
+    """An error, and the errors from which it came."""
     while reason is not None:
         yield reason
         reason = reason.__context__

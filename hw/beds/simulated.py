@@ -29,13 +29,17 @@ from met.program.control.plant import plant_c
 from met.substitution.bed import SIMULATION_PARAMETERS
 
 WITHIN = 20.0
-"""s in which its process must be there."""
+"""Longest time for the firmware's process to start, s."""
 
 
 class SimulatedBed(WireBed):
-    """kind: "firmware" or "qemu";  config, plant: as hw.build.build takes them;  period: s, from exchange to exchange.
+    """A bed whose firmware runs on this machine over a simulated plant.
 
-    The process begins when the bed is connected, and ends when it is closed. transcript: as of a `SerialBed`.
+    kind          "firmware": a program of this machine; "qemu": in an emulator of a Cortex-M3
+    config, plant  as hw.build.build takes them;  period: s from one exchange to the next
+    transcript    as of `SerialBed`
+
+    The process begins when the bed is connected, and ends when it is closed.
     """
 
     def __init__(
@@ -101,7 +105,7 @@ class SimulatedBed(WireBed):
 
 
 class SocketLine:
-    """A line that is a connected socket."""
+    """A line over a socket that is connected already."""
 
     def __init__(self, connection: socket.socket) -> None:
         connection.setblocking(False)

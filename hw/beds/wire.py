@@ -23,30 +23,31 @@ _GREETED, _REFUSED = 1 << 2, 1 << 13
 _FAULTS = sum(Fault)
 
 _WAITS = (0.05, 0.15, 0.5)
-"""s for an answer, each time that it is asked for: first three times the latency of a slow USB adapter, then longer for
-a machine that is busy."""
+"""s to wait for an answer, each time that a question is asked: first three times the latency of a slow USB adapter,
+then longer for a busy machine."""
 
 _BOOT = (0.05,) * 10 + (0.2,) * 5 + (0.5,) * 3
-"""The same of HELLO, for some boards boot when their line is opened: 3 s."""
+"""s to wait for each answer to HELLO, 3 s together, for some boards boot when their line is opened."""
 
 _STOP = (0.02,) * 10 + (0.05, 0.1, 0.2, 0.4)
-"""The same of STOP: 1 s. A bed's deadman has acted long before."""
+"""s to wait for each answer to STOP, 1 s together. A bed's deadman has acted long before."""
 
 _SIMULATED = 0.01
-"""s that a tick of a simulated plant may take: in an emulator of a small controller a millisecond is usual."""
+"""Longest time for a tick of a simulated plant, s: an emulator of a small controller takes about a millisecond."""
 
 _NONSENSE = 1024
-"""Bytes of a wait without the answer, after which it counts as missing: a line that babbles holds nobody up."""
+"""Bytes of other things after which the answer counts as missing, so that a line that babbles holds nobody up."""
 
 
 T = TypeVar("T", HelloAnswer, LimitsAnswer, SampleAnswer)
 
 
 class WireBed(BedDriver):
-    """period: s, from one exchange to the next, infinite where none are made;  first: the sequence number before the
-    first one.
+    """A bed that speaks the protocol, over the line that `open` gives.
 
-    confirmed  whether the bed has confirmed that it is not armed, since it was last told to arm
+    period     s from one exchange to the next; infinite where none are made
+    first      the sequence number before the first one
+    confirmed  True where the bed has confirmed that it is not armed, since it was last told to arm
     """
 
     def __init__(self, name: str, period: float, first: int) -> None:
@@ -60,11 +61,11 @@ class WireBed(BedDriver):
         self._step = 0
         """Ticks that a bed in lock-step advances by at an exchange; 0 for one with a time of its own."""
         self._angle: tuple[int, int] | None = None
-        """As it came, and as it is: without the jumps where it wraps around."""
+        """The encoder's last count as it came, and without the jumps where it wraps around."""
 
     @abstractmethod
     def open(self) -> BedLine:
-        """A new line. Raises Problem E400, E405."""
+        """Open a new line. Raises Problem E400, E405."""
 
     def connect(self) -> About:
         self.close()
@@ -220,7 +221,7 @@ class WireBed(BedDriver):
         return None
 
     def _answer(self, message: HostMessage, kind: type[T], wait: float) -> T | None:
-        """The answer to a message, if it comes in time; what else comes is dropped."""
+        """The answer to a message, or None where it does not come within `wait` s. Other frames are dropped."""
         line = self._line
         assert line is not None
         self._number = number = (self._number + 1) % messages.NUMBERS

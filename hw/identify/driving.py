@@ -24,18 +24,22 @@ from met.frozen import frozen
 from met.plan import file as plan_file
 
 SHARE = 0.8
-"""Of a bed's own limit of current and rate, that the moves go to at most."""
+"""Share of a bed's own limits of current and rate that the moves go to at most."""
 
 TURNS = 4.0
-"""Times the dry friction of the data sheet, that the moves' voltage must come to in torque."""
+"""Torque that the moves' voltage must give at least, in units of the data sheet's dry friction."""
 
 
 @frozen
 class MovesRequest:
-    """plan: of one experiment, as text (met.plan.file);  row: of its case table;  joint: whose motor is on the bed
-    port, baud, lock_step, transcript: as of hw.ports.Port;  records: the file that they go to
-    sheet: what is believed of the bed, by the names of hw.identify.model.MOTOR, and `v_max`, V
-    voltage, current, rate: the most that the moves may ask for, V, A, rad/s; None: what bed and sheet allow
+    """The moves that the process is to lead a bed through.
+
+    plan      plan of one experiment, as text (met.plan.file);  row: of its case table;  joint: whose motor is on the
+              bed
+    port, baud, lock_step, transcript  as of hw.ports.Port
+    records   the file that the records go to
+    sheet     parameters that are believed before, SI, by the names of hw.identify.model.MOTOR, and `v_max`, V
+    voltage, current, rate  the most that the moves may ask for, V, A, rad/s; None: what bed and sheet allow
     """
 
     plan: str
@@ -54,8 +58,11 @@ class MovesRequest:
 
 @frozen
 class MovesResult:
-    """began: of each move, the exchange at which the bed was at rest;  lock_step: whether the bed has no time of its
-    own;  seconds: that it took"""
+    """The course of the moves.
+
+    began      for each move, the exchange at which the bed was at rest
+    lock_step  True where the bed has no time of its own;  seconds: that the moves took
+    """
 
     began: tuple[int, ...]
     lock_step: bool
@@ -63,8 +70,8 @@ class MovesResult:
 
 
 def peaks(limits: Limits, sheet: Mapping[str, float], asked: MovesRequest) -> tuple[Peaks, float]:
-    """What the moves may ask for, and the rate, rad/s, up to which those go that are to reach the drive's largest
-    torque. Raises Problem E421."""
+    """The largest commands of the moves, and the rate (rad/s) up to which the moves go that are to reach the drive's
+    largest torque. Raises Problem E421."""
     for name, value, most, unit in (
         ("voltage", asked.voltage, limits.voltage, "V"),
         ("current", asked.current, limits.current, "A"),

@@ -20,7 +20,8 @@ from hw.identify.series import Series
 from met.frozen import frozen
 
 STEP = 1e-3
-"""Of a logarithm, to take a derivative with: over the moves the times at which the shaft stops average out."""
+"""Step of a parameter's logarithm by which derivatives are taken. It is large, for over the moves the times at which
+the shaft stops average out."""
 
 FLOOR = 1e-3
 """Half an interval is at least this share of its value, and added to in squares: what the model leaves out, such as a
@@ -33,10 +34,11 @@ VAGUE = 1.0
 """Half an interval of the logarithm, from which on a parameter counts as not found."""
 
 AWAY = 0.01
-"""Of a logarithm: from so far away each group is fitted, so that no two are caught in the same small valley."""
+"""Distance, in the parameters' logarithms, from which each group's fit begins, so that no two end in the same local
+minimum."""
 
 FIRST = 2
-"""Groups that are fitted together first, from what is believed."""
+"""Number of groups that are fitted together first, from the data sheet's parameters."""
 
 _TURNS = 30
 _DAMPINGS = 10.0 ** np.arange(-6.0, 4.0)
@@ -44,7 +46,8 @@ _DAMPINGS = 10.0 ** np.arange(-6.0, 4.0)
 
 @frozen
 class Estimate:
-    """value: SI;  low, high: ends of the 95 % interval, or the value itself where it is given"""
+    """A parameter that was found or given. value: SI;  low, high: ends of its 95 % interval, or the value itself
+    where it was given"""
 
     value: float
     low: float
@@ -117,7 +120,8 @@ def fitted(series: Series, groups: Sequence[int], start: Mapping[str, float]) ->
 
 
 class _Search:
-    """At a place among the parameters: logarithms of `MOTOR`, and `RIPPLE` as shares of the friction to begin with."""
+    """A search for least squares, at one place among the parameters: the logarithms of `MOTOR`, then `RIPPLE` in
+    units of the dry friction that the search began with."""
 
     def __init__(self, series: Series, start: Mapping[str, float]) -> None:
         self._series = series
@@ -134,8 +138,8 @@ class _Search:
             self.place[PARAMETERS.index(name)] = math.log(values[name])
 
     def settle(self, names: Sequence[str]) -> bool:
-        """To the nearest least sum of squares over these parameters, by Levenberg's and Marquardt's method; whether it
-        is one."""
+        """Go to the nearest minimum over these parameters, by Levenberg's and Marquardt's method. Returns True where
+        it was reached."""
         self._free = [PARAMETERS.index(name) for name in names]
         self._weigh()
         for _ in range(_TURNS):
@@ -157,7 +161,7 @@ class _Search:
         return False
 
     def over(self, series: Series, away: np.ndarray, names: Sequence[str]) -> _Search:
-        """Over other steps, from a place that is so far away in these parameters."""
+        """The same search over another series, from a place that is `away` from this one in these parameters."""
         found = copy.copy(self)
         free = [PARAMETERS.index(name) for name in names]
         found._series, found.place = series, self.place.copy()
@@ -165,12 +169,12 @@ class _Search:
         return found
 
     def residual(self) -> np.ndarray:
-        """Of the rate at each step, rad/s."""
+        """Simulated less measured rate at each step, rad/s."""
         read = simulated(self._series, self._sets(self.place[None, :]))
         return _off(read[0, :, :1], self._series.rate)[:, 0]
 
     def limited(self) -> float:
-        """Share of the time at which the drive is at its largest torque."""
+        """Share of the time for which the drive is at its largest torque."""
         read = simulated(self._series, self._sets(self.place[None, :]))
         values = self.values()
         drive = np.abs(read[1, :, 0]) * values["kt"]
@@ -181,7 +185,7 @@ class _Search:
         return np.column_stack([np.exp(places[:, :count]), places[:, count:] * self._unit])
 
     def _weigh(self) -> None:
-        """So that rate and current count as what is left of them is large."""
+        """Weigh rate and drive current by the inverse of what is left of each."""
         if self._series.drive_current is None:
             return
         read = simulated(self._series, self._sets(self.place[None, :]))[:, :, 0]
@@ -190,7 +194,7 @@ class _Search:
         self._weights = [1.0 / max(spread, 1e-9) for spread in spreads]
 
     def _residuals(self, places: np.ndarray) -> np.ndarray:
-        """[channel and step, place]."""
+        """Weighted residuals [channel and step, place]."""
         read = simulated(self._series, self._sets(places))
         found = [self._weights[0] * _off(read[0], self._series.rate)]
         if self._series.drive_current is not None:
@@ -198,7 +202,7 @@ class _Search:
         return np.concatenate(found)
 
     def _linear(self) -> tuple[np.ndarray, np.ndarray]:
-        """The residual here, and its slopes by each free parameter."""
+        """The residuals at this place, and their slopes by each free parameter."""
         count = len(self._free)
         assert 2 * count < LANES
         places = np.repeat(self.place[None, :], 2 * count + 1, axis=0)
@@ -210,5 +214,5 @@ class _Search:
 
 
 def _off(read: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """What is simulated less what was read, [step, set]; 0 where nothing was."""
+    """Simulated less measured values [step, set]; 0 where nothing was measured."""
     return np.nan_to_num(read - measured[:, None], nan=0.0)

@@ -35,7 +35,7 @@ _GIVEN = ("voltage", "current", "time", "angle")
 
 @lru_cache(maxsize=4)
 def _kernel(count: int) -> Kernel:
-    """Whose steps are of so many substeps."""
+    """The kernel of a bed whose steps have `count` substeps each."""
 
     def begin(tape: Tape) -> None:
         for name in ("rate", "filtered", "slope"):
@@ -81,9 +81,9 @@ def _kernel(count: int) -> Kernel:
 
 
 def simulated(found: Series, sets: np.ndarray) -> np.ndarray:
-    """What would be read, [channel, step, set]: the rate, rad/s, and the drive motor's current, A.
+    """The rate (rad/s) and the drive motor's current (A) that the model reads, [channel, step, set].
 
-    sets: of parameters, [set, parameter] in the order of `PARAMETERS`, at most `LANES`.
+    sets  parameters [set, parameter] in the order of `PARAMETERS`, at most `LANES` sets
     """
     count = max(1, math.ceil(float(np.median(found.time)) / SUBSTEP - 1e-9))
     given = np.zeros((LANES, len(_GIVEN) + len(PARAMETERS)))

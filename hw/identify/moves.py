@@ -19,14 +19,14 @@ SLOW = 2.0
 """rad/s: a shaft that has been slower for `STILL` s without voltage and current is at rest."""
 STILL = 0.08
 PATIENCE = 3.0
-"""s to wait for that."""
+"""Longest time to wait for a shaft to come to rest, s."""
 REST = -1
-"""The number of no move: what was told after the last."""
+"""The number that stands for no move: for what was told after the last one."""
 
 
 @frozen
 class Peaks:
-    """What the moves may ask for. voltage V, current A;  rate: rad/s, above which a move is over"""
+    """The largest voltage (V) and current (A) of the moves, and the rate (rad/s) above which a move is over."""
 
     voltage: float
     current: float
@@ -34,12 +34,12 @@ class Peaks:
 
 
 Profile = Callable[[float, float], tuple[float, float]]
-"""(time from the move's beginning s, rate rad/s) -> voltage and current, as shares of the peaks."""
+"""A move's commands: (time from its beginning s, rate rad/s) -> voltage and current, as shares of the peaks."""
 
 
 @frozen
 class Move:
-    """name: its kind;  time: s, before it comes to rest"""
+    """One move. name: its kind;  time: s, before it comes to rest"""
 
     name: str
     time: float
@@ -47,7 +47,7 @@ class Move:
 
 
 def guided(top: float) -> tuple[Move, ...]:
-    """All of them. top: rad/s, up to which the `limited` ones go."""
+    """All moves, in their order. top: rate up to which the `limited` ones go, rad/s."""
     return (*_steps(), *_loaded(), *_slow(), *_limited(top), *_mixed())
 
 
@@ -55,7 +55,8 @@ GROUPS = 8
 
 
 def groups(moves: Sequence[Move]) -> list[int]:
-    """The group of each: each of the `GROUPS` has moves of every kind, and tells all by itself."""
+    """The group of each move. Each of the `GROUPS` has moves of every kind, so that all parameters follow from one
+    group."""
     seen: dict[str, int] = {}
     found = []
     for move in moves:
@@ -166,7 +167,7 @@ class MoveGuide:
 
     @property
     def exchanges(self) -> int:
-        """At most."""
+        """The largest number of exchanges that the moves may take."""
         return sum(math.ceil((move.time + PATIENCE) / self._period) + 1 for move in self._moves) + 1
 
     def __call__(self, e: int, rates: Sequence[float], told: list[list[float]]) -> None:
@@ -185,7 +186,7 @@ class MoveGuide:
             told[0][n] += min(max(value - told[0][n], -most), most)
 
     def _rest(self, e: int, rate: float, told: Sequence[float]) -> None:
-        """Begins the next move where the bed has been at rest for long enough."""
+        """Begin the next move where the bed has been at rest for long enough."""
         still = abs(rate) <= SLOW and told[0] == 0.0 and told[1] == 0.0
         self._since = self._since + 1 if still else 0
         self._waited += 1

@@ -14,12 +14,13 @@ from met.frozen import frozen
 
 @frozen
 class Series:
-    """Steps of time; each array has an entry for each.
+    """A bed's commands and readings as steps of time. Each array has an entry for each step.
 
-    time     s, that it took;  voltage V, current A: held meanwhile;  angle: of the shaft as it began, rad
-    rate     read at its end, rad/s, not-a-number where no answer came;  drive_current: the same, A; None where it is
-             not measured
-    move     its number, from 0
+    time           length of the step, s
+    voltage        held meanwhile, V;  current: A;  angle: of the shaft at its beginning, rad
+    rate           read at its end, rad/s; not-a-number where no answer came
+    drive_current  read at its end, A; None where the bed does not measure it
+    move           number of the move, from 0
     """
 
     time: np.ndarray
@@ -35,7 +36,7 @@ class Series:
         return int(self.move[-1]) + 1 if len(self.move) else 0
 
     def of(self, moves: Sequence[int]) -> Series:
-        """These moves alone, in this order, numbered anew."""
+        """The steps of these moves alone, in this order, the moves numbered anew."""
         at = [np.flatnonzero(self.move == move) for move in moves]
         take = np.concatenate(at)
         numbers = np.repeat(np.arange(len(at)), [len(each) for each in at])
@@ -46,8 +47,9 @@ class Series:
 
 
 def series(rows: np.ndarray, about: About, began: Sequence[int], *, lock_step: bool) -> Series:
-    """Of one bed's records (hw.records.LAYOUT), from its first exchange on. began: of each move, the exchange at
-    which the bed was at rest.
+    """The steps of one bed's records (hw.records.LAYOUT), from its first exchange on.
+
+    began  for each move, the exchange at which the bed was at rest
 
     A bed in lock-step holds what it is told until it answers; one with a time of its own answers with what it read as
     the command came, and holds that until the next. What was told and not answered is taken for heard, at even times.

@@ -6,7 +6,7 @@ from binascii import crc_hqx
 
 LONGEST_PAYLOAD = 200
 LONGEST = 208
-"""Bytes of a frame, its zero counted."""
+"""Largest number of bytes of a frame, with its final zero."""
 
 _CODES = [bytes((n,)) for n in range(256)]
 

@@ -14,13 +14,13 @@ from met.frozen import frozen
 
 VERSION = 1
 NUMBERS = 1 << 16
-"""Sequence numbers: a frame's is the last one's plus one, modulo this."""
+"""The number of sequence numbers: each frame's is the one before plus one, modulo this."""
 
 MOST = (1 << 31) - 1
-"""Counts that a value can have on the wire."""
+"""Largest count that a value can have on the wire, either way."""
 
 STATE = 3
-"""The bits of a status that are the state; all of them set are none."""
+"""The bits of a status that hold the state. All of them set is no state."""
 
 _HEAD = struct.Struct("<BH")
 
