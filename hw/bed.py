@@ -148,8 +148,8 @@ class BedDriver(ABC):
         """Greet the bed, and return its description. It is disarmed afterwards, and its limits are its own."""
 
     @abstractmethod
-    def limit(self, asked: Mapping[str, float]) -> None:
-        """Make limits tighter for this session. asked: those of `LIMIT_NAMES` that are to change, by name."""
+    def limit(self, limits: Mapping[str, float]) -> None:
+        """Make limits tighter for this session. limits: those of `LIMIT_NAMES` that are to change, by name."""
 
     @abstractmethod
     def arm(self) -> BedSample:

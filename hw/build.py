@@ -256,7 +256,7 @@ def counted(config: Config) -> tuple[dict[str, int], Limits, float]:
     if not 0.010 - 1e-9 <= deadman <= 0.020 + 1e-9:
         raise Uncountable(f"a deadman of {deadman:g} s, in whole ticks, is not 0.010 to 0.020 s", "another rate")
     deadman = min(max(deadman, 0.010), 0.020)  # but for what rounding has left beyond them
-    told = Limits(
+    announced = Limits(
         voltage=counts["voltage"] * s.voltage,
         current=counts["current"] * s.current,
         rate=counts["rate"] * s.rate,
@@ -265,7 +265,7 @@ def counted(config: Config) -> tuple[dict[str, int], Limits, float]:
         current_slew=counts["current_slew"] * s.current * hz,
         heat=limits.heat,
     )
-    return counts, told, deadman
+    return counts, announced, deadman
 
 
 _STEPS = {
@@ -541,8 +541,8 @@ def _is_sound(found: Path, name: str) -> bool:
     """True where a product is there as it was made; a damaged one is removed."""
     if not found.parent.exists():
         return False
-    data, told = cache.read(found), cache.read(found.with_name(_SUM))
-    if data is not None and told == cache.digest_of(name, data) and cache.within("firmware", name[:32]):
+    data, checksum = cache.read(found), cache.read(found.with_name(_SUM))
+    if data is not None and checksum == cache.digest_of(name, data) and cache.within("firmware", name[:32]):
         return True
     # away under a name of its own, for another process may be at it too
     leaving = Path(tempfile.mkdtemp(dir=found.parents[1], prefix=".old-"))

@@ -57,38 +57,38 @@ def pace_of(experiment: Experiment) -> Pace:
     return pace(experiment.structure.schedule.base_hz / divisor(experiment))
 
 
-def run(asked: CaseRequest) -> loop.LoopEnd:
+def run(request: CaseRequest) -> loop.LoopEnd:
     """Drive the case. Raises Problem."""
-    experiment = plan_file.loads(asked.plan).experiments[0]
+    experiment = plan_file.loads(request.plan).experiments[0]
     of = pace_of(experiment)
-    asked_to_stop = process.listening()
+    stop_requested = process.listening()
     joints = substituted(prepare(experiment, wire=True))
-    _check_start(experiment, joints, asked.row)
+    _check_start(experiment, joints, request.row)
     beds: list[BedDriver] = []
     abouts: list[About] = []
     try:
         for joint in joints:
-            port = Port(asked.ports[joint], asked.baud, asked.lock_step, asked.transcripts.get(joint))
-            beds.append(opened(port, experiment, joint, asked.row, of.period))
-            abouts.append(_greeted(beds[-1], joint, experiment, asked))
-        lock_step = asked.lock_step
+            port = Port(request.ports[joint], request.baud, request.lock_step, request.transcripts.get(joint))
+            beds.append(opened(port, experiment, joint, request.row, of.period))
+            abouts.append(_greeted(beds[-1], joint, experiment, request))
+        lock_step = request.lock_step
         _check_time(abouts, lock_step)
         _check_ticks(abouts, of, lock_step)
         prepared = prepare(experiment, wire=True, late=of.late(lock_step), lanes=LANES)
-        driven = CaseKernel(prepared, asked.row, of.repeats)
+        driven = CaseKernel(prepared, request.row, of.repeats)
         _check_delay(driven, of, lock_step)
         if not lock_step:
             process.precedence()
         driven(0, [0.0] * len(beds), [[0.0, 0.0] for _ in beds])  # code and memory are there when time begins to count
         if not lock_step:  # a motor that is simulated in lock-step does not get hot
-            _rest(beds, asked.rest, asked_to_stop)
+            _rest(beds, request.rest, stop_requested)
         for bed in beds:
             bed.patience = of.patience(lock_step)
-        if asked_to_stop():  # nothing was begun
+        if stop_requested():  # nothing was begun
             return loop.LoopEnd(0, "the host was asked to stop")
         head = {
-            **asked.head,
-            "row": asked.row,
+            **request.head,
+            "row": request.row,
             "servo_hz": of.servo_hz,
             "repeats": of.repeats,
             "lock_step": lock_step,
@@ -96,10 +96,10 @@ def run(asked: CaseRequest) -> loop.LoopEnd:
             "tick_hz": abouts[0].tick_hz,
             "beds": [{"name": each.name, "firmware": each.firmware} for each in abouts],
         }
-        with recording(Path(asked.records), head, (driven.exchanges + 1) * len(beds)) as put:
+        with recording(Path(request.records), head, (driven.exchanges + 1) * len(beds)) as put:
             process.say(began=True)
             ended = loop.drive(
-                beds, driven, of, driven.exchanges, put, lock_step=lock_step, asked_to_stop=asked_to_stop
+                beds, driven, of, driven.exchanges, put, lock_step=lock_step, stop_requested=stop_requested
             )
         refusals.check_stopped(beds, abouts, ended.why)
         return ended
@@ -108,21 +108,21 @@ def run(asked: CaseRequest) -> loop.LoopEnd:
             bed.close()
 
 
-def _rest(beds: Sequence[BedDriver], time: float, asked_to_stop: Callable[[], bool]) -> None:
+def _rest(beds: Sequence[BedDriver], time: float, stop_requested: Callable[[], bool]) -> None:
     """Let all beds rest for `time` s at once, or until the host is asked to stop."""
     for _ in range(math.ceil(time / process.PAUSE - 1e-6)):
-        if asked_to_stop():
+        if stop_requested():
             return
         beds[0].rest(process.PAUSE)
 
 
-def _greeted(bed: BedDriver, joint: str, experiment: Experiment, asked: CaseRequest) -> About:
+def _greeted(bed: BedDriver, joint: str, experiment: Experiment, request: CaseRequest) -> About:
     """Greet a bed, and return its description. A simulated one begins anew, with the case's noise."""
-    about, row = bed.connect(), asked.row
+    about, row = bed.connect(), request.row
     process.say(bed=joint, about=process.about_as_json(about))
     process.warnings(bed)
-    if not asked.clear:
-        latch.check(bed, about, asked.ports[joint])
+    if not request.clear:
+        latch.check(bed, about, request.ports[joint])
     elif faults := latch.cleared(bed, about):
         process.say(said=f"{joint}: cleared: {refusals.words(faults)}")
     if Capability.SIMULATED in about.capabilities:
@@ -170,8 +170,8 @@ def _check_start(experiment: Experiment, joints: Sequence[str], row: int) -> Non
             raise Problem(error("E416", message, help=f"`initial {{ {joint}.qd = 0 rad/s; }}` in the run"))
 
 
-def _driven(asked: CaseRequest) -> dict[str, Any]:
-    ended = run(asked)
+def _driven(request: CaseRequest) -> dict[str, Any]:
+    ended = run(request)
     return {"ended": {**asdict(ended), "faults": int(ended.faults)}}
 
 

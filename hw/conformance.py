@@ -1,4 +1,4 @@
-"""What every bed does, as tests. Whoever writes a bed derives a class from one of these, and pytest runs it:
+"""Tests that every bed must pass. Whoever writes a driver derives a class from one of these, and pytest runs it:
 
     class TestMine(FreeRunning):
         @pytest.fixture

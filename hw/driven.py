@@ -41,7 +41,7 @@ class CaseKernel:
         """The servos' last tick."""
         self._rates = [self.block.inputs[program.inputs.index(f"wire:{joint}.rate")] for joint in self.joints]
         names = ("voltage", "current")
-        self._told = [
+        self._outputs = [
             [self.block.outputs[program.outputs.index(f"wire:{joint}.{name}")] for name in names]
             for joint in self.joints
         ]
@@ -51,7 +51,7 @@ class CaseKernel:
         """The number of exchanges after the first sample, until the servos' last tick."""
         return self.last * self.repeats
 
-    def __call__(self, e: int, rates: Sequence[float], told: list[list[float]]) -> None:
+    def __call__(self, e: int, rates: Sequence[float], commands: list[list[float]]) -> None:
         """Step to the instant of exchange e where the servos tick then, and write the commands (`hw.loop.Compute`)."""
         tick, between = divmod(e, self.repeats)
         if between:
@@ -60,8 +60,8 @@ class CaseKernel:
             lane[:] = rate
         at = tick * self.divisor
         self.block.step(max(0, at - self.divisor + 1), at)
-        for b, (voltage, current) in enumerate(self._told):
-            told[b][0], told[b][1] = float(voltage[0]), float(current[0])
+        for b, (voltage, current) in enumerate(self._outputs):
+            commands[b][0], commands[b][1] = float(voltage[0]), float(current[0])
 
     def delay(self, joint: str) -> float:
         """The bed's delay as the law takes it to be, in the servo's ticks."""

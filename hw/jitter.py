@@ -1,5 +1,5 @@
-"""How well this computer and a line keep time, measured with a bed that is not armed, in a process of its own:
-`python -m hw.jitter`, told what to do in a line of JSON (`JitterRequest`).
+"""The timing of this computer and a line, measured with a bed that is not armed, in a process of its own:
+`python -m hw.jitter`, which reads a line of JSON, a `JitterRequest`.
 
 It runs the loop of `hw.loop` as a run has it, but that the bed is read and told nothing. On its standard output is a
 line of JSON each: {"said": words}, {"about": ...}, at the end {"kept": ...} (`JitterResult`) or {"wrong": diagnostics}.
@@ -54,13 +54,13 @@ class JitterResult:
     stops: int
 
 
-def measure(asked: JitterRequest) -> JitterResult:
+def measure(request: JitterRequest) -> JitterResult:
     """Measure the timing of exchanges with a bed that is not armed. Raises Problem."""
-    asked_to_stop = process.listening()
-    experiment = plan_file.loads(asked.plan).experiments[0] if asked.plan else None
-    period = 1.0 / (asked.hz * asked.joints) if experiment is None else pace_of(experiment).period
+    stop_requested = process.listening()
+    experiment = plan_file.loads(request.plan).experiments[0] if request.plan else None
+    period = 1.0 / (request.hz * request.joints) if experiment is None else pace_of(experiment).period
     rows: list[bytes] = []
-    with opened(Port(asked.port, asked.baud), experiment, asked.joint, 0, period) as bed:
+    with opened(Port(request.port, request.baud), experiment, request.joint, 0, period) as bed:
         about = bed.connect()
         process.say(about={"name": about.name, "firmware": about.firmware})
         process.warnings(bed)
@@ -68,23 +68,23 @@ def measure(asked: JitterRequest) -> JitterResult:
             message = f"bed `{about.name}` has no time of its own, so that nothing can be late"
             raise Problem(error("E426", message, help="a line, or `--port firmware`, has one; `met bed run` drives it"))
         process.precedence()
-        of = Pace(asked.hz, 1)
+        of = Pace(request.hz, 1)
         bed.patience = of.patience(False)
         begun = time.perf_counter()
         ended = loop.drive(
-            [bed] * asked.joints,
+            [bed] * request.joints,
             _nothing,
             of,
-            math.ceil(asked.seconds * asked.hz),
+            math.ceil(request.seconds * request.hz),
             rows.append,
             lock_step=False,
             armed=False,
-            asked_to_stop=lambda: asked_to_stop() or time.perf_counter() - begun > asked.seconds,
+            stop_requested=lambda: stop_requested() or time.perf_counter() - begun > request.seconds,
         )
         if ended.bed >= 0:
             message = f"bed `{about.name}` was reset while it was measured"
             raise Problem(error("E427", message, help="look at its supply, and whether its watchdog resets it"))
-    return jitter_result(np.frombuffer(b"".join(rows), LAYOUT), about.tick_hz, asked.hz)
+    return jitter_result(np.frombuffer(b"".join(rows), LAYOUT), about.tick_hz, request.hz)
 
 
 def jitter_result(rows: np.ndarray, tick_hz: float, hz: float) -> JitterResult:
@@ -92,18 +92,18 @@ def jitter_result(rows: np.ndarray, tick_hz: float, hz: float) -> JitterResult:
     first = rows[rows["bed"] == 0]
     own = rows[rows["exchange"] > 0]
     answered = (own["flags"] & ANSWERED) != 0
-    found = replace(
+    figures = replace(
         timing(first, tick_hz),
         exchanges=len(own),
         trip=time_spread((own["ended"] - own["began"])[answered]),
         unanswered=int((~answered).sum()),
     )
-    return JitterResult(float(rows["ended"][-1]) * 1e-9, found, stops(first, 1.0 / hz))
+    return JitterResult(float(rows["ended"][-1]) * 1e-9, figures, stops(first, 1.0 / hz))
 
 
-def _nothing(e: int, rates: Sequence[float], told: list[list[float]]) -> None:
+def _nothing(e: int, rates: Sequence[float], commands: list[list[float]]) -> None:
     """Compute no commands: the bed is only read."""
 
 
 if __name__ == "__main__":
-    process.answer(JitterRequest, lambda asked: {"kept": asdict(measure(asked))})
+    process.answer(JitterRequest, lambda request: {"kept": asdict(measure(request))})

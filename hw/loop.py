@@ -30,10 +30,10 @@ late. Not longer, for the system throttles a process that only watches clocks.""
 
 
 class Compute(Protocol):
-    """Computes the commands after exchange e. rates: rad/s, one a bed; told: [voltage V, current A] of each bed,
+    """Computes the commands after exchange e. rates: rad/s, one a bed; commands: [voltage V, current A] of each bed,
     changed in place."""
 
-    def __call__(self, e: int, rates: Sequence[float], told: list[list[float]]) -> None: ...
+    def __call__(self, e: int, rates: Sequence[float], commands: list[list[float]]) -> None: ...
 
 
 @frozen
@@ -64,7 +64,7 @@ def drive(
     put: Put,
     *,
     lock_step: bool,
-    asked_to_stop: Callable[[], bool] = lambda: False,
+    stop_requested: Callable[[], bool] = lambda: False,
     armed: bool = True,
 ) -> LoopEnd:
     """Arm the beds, drive them through so many exchanges after the first sample, and stop them.
@@ -72,11 +72,11 @@ def drive(
     lock_step      whether they have no time of their own
     armed          False: they are only read. Where the host is as far behind as would end a run, or a bed as silent,
                    it leaves out the periods that are gone, and goes on
-    asked_to_stop  looked at before each exchange
+    stop_requested  looked at before each exchange
     """
     silent = -1
     try:
-        ended = _driven(beds, compute, pace, exchanges, put, lock_step, asked_to_stop, armed)
+        ended = _driven(beds, compute, pace, exchanges, put, lock_step, stop_requested, armed)
         silent = ended.bed
         return ended
     finally:
@@ -91,14 +91,14 @@ def _driven(
     exchanges: int,
     put: Put,
     lock_step: bool,
-    asked_to_stop: Callable[[], bool],
+    stop_requested: Callable[[], bool],
     armed: bool,
 ) -> LoopEnd:
     clock, packed = time.perf_counter_ns, records.packed
     period = round(pace.period * 1e9)
-    if armed and asked_to_stop():
+    if armed and stop_requested():
         return LoopEnd(0, "the host was asked to stop")
-    told = [[0.0, 0.0] for _ in beds]
+    commands = [[0.0, 0.0] for _ in beds]
     rates = [0.0] * len(beds)
     missed = [0] * len(beds)
     for b, bed in enumerate(beds):
@@ -108,10 +108,10 @@ def _driven(
         # it may have been armed by the first of two asks
         if ending := _ending(0, b, replace(sample, refused=False), armed):
             return ending
-    compute(0, rates, told)
+    compute(0, rates, commands)
     origin, computed, ended, gone = clock(), 0, 0, 0
     for e in range(1, exchanges + 1):
-        if asked_to_stop():
+        if stop_requested():
             return LoopEnd(e, "the host was asked to stop")
         due, flags = e * period + gone, 0
         if lock_step:
@@ -128,7 +128,7 @@ def _driven(
                         return LoopEnd(e, f"the host is {late * 1e-6:.3g} ms behind: {_LATE[flags]}")
                     gone += late
         for b, bed in enumerate(beds):
-            voltage, current = told[b]
+            voltage, current = commands[b]
             began = clock() - origin
             answer = bed.exchange(voltage, current) if armed else bed.look()
             ended = clock() - origin
@@ -142,7 +142,7 @@ def _driven(
             rates[b] = answer.rate
             if ending := _ending(e, b, answer, armed):
                 return ending
-        compute(e, rates, told)
+        compute(e, rates, commands)
         computed = clock() - origin
     return LoopEnd(exchanges + 1)
 

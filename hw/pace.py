@@ -1,4 +1,4 @@
-"""How often a bed is spoken to: at the servo's rate, or the smallest multiple of it that is at least 500 Hz.
+"""The rate of exchanges with a bed: the servo's rate, or the smallest multiple of it that is at least 500 Hz.
 
 A bed stops itself when it hears nothing for 10 to 20 ms, so that a slow servo's command is repeated on the wire.
 """

@@ -80,9 +80,9 @@ class Opening:
         return None if self.port.transcript is None else TranscriptFile(self.port.transcript)
 
 
-def as_asked(name: str, asked: bool) -> bool:
+def as_requested(name: str, requested: bool) -> bool:
     """The `lock_step` of a port whose bed may be either: what the user says with `--lock-step`."""
-    return asked
+    return requested
 
 
 @frozen(kw_only=True)
@@ -95,8 +95,8 @@ class PortKind:
     open        (Opening) -> the driver, which is not connected yet. Raises Problem
     simulated   True where the deck's bed is simulated, so that a deck must be given, and each joint has its own bed
     needs       parameters that the deck's bed model must declare, besides `met.substitution.bed.PARAMETERS`
-    lock_step   (port, asked) -> True where the bed has no time of its own and waits for each exchange; asked: whether
-                the user says `--lock-step`
+    lock_step   (port, requested) -> True where the bed has no time of its own and waits for each exchange; requested:
+                whether the user says `--lock-step`
     replays     True where the bed answers from a transcript, so that only what made it can be asked again
     recognizes  (port) -> True where a port is of this kind that begins with no scheme
     """
@@ -107,7 +107,7 @@ class PortKind:
     address: str = ""
     simulated: bool = False
     needs: tuple[Parameter, ...] = ()
-    lock_step: Callable[[str, bool], bool] = as_asked
+    lock_step: Callable[[str, bool], bool] = as_requested
     replays: bool = False
     recognizes: Callable[[str], bool] = lambda name: False
 
@@ -156,9 +156,9 @@ def check_model(name: str, experiment: Experiment, joint: str) -> None:
             raise Problem(error("E429", message, use.place, help=helps))
 
 
-def in_lock_step(name: str, asked: bool) -> bool:
-    """True where the bed at a port has no time of its own. asked: whether the user says `--lock-step`."""
-    return kind_of(name).lock_step(name, asked)
+def in_lock_step(name: str, requested: bool) -> bool:
+    """True where the bed at a port has no time of its own. requested: whether the user says `--lock-step`."""
+    return kind_of(name).lock_step(name, requested)
 
 
 def same_bed(one: str, other: str) -> bool:

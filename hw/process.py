@@ -1,4 +1,4 @@
-"""A process of its own that speaks to beds, and who started it: what is told it, and what it says.
+"""A process of its own that speaks to beds, and the process that starts it: how they talk with one another.
 
 It is asked one thing, a frozen dataclass, in a line of JSON on its standard input, and answers in lines of JSON:
 {"said": words, "help": [...]} for people, {"wrong": diagnostics} where it cannot go on, and what else it has to say.

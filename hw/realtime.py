@@ -1,4 +1,4 @@
-"""What the host can do so that it wakes in time, where it is allowed: a process that is scheduled first, memory that is
+"""Measures by which the host wakes in time, where they are allowed: a process that is scheduled first, memory that is
 not swapped, and no collection of garbage. It is not hard real time: what was late is counted.
 """
 

@@ -1,4 +1,4 @@
-"""What was said and answered at every exchange with a bed, one record each: what a run is made from again.
+"""Records: the command and the answer of every exchange with a bed, one record each. A run is made again from them.
 
     line       MET bed records 1
     8 bytes    length of the head, little-endian

@@ -1,4 +1,4 @@
-"""What is said where a bed cannot be reached, or says no: E400 to E409, each with its remedy."""
+"""The errors of a bed that cannot be reached or says no: E400 to E409, each with its remedy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How well a loop kept its time, from its records: lateness, round trips, misses and why, and how clocks drift."""
+"""The timing of a loop, from its records: lateness, round trips, misses and their causes, and the drift of clocks."""
 
 from __future__ import annotations
 

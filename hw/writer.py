@@ -87,10 +87,10 @@ class RecordsWriter:
         os.close(self._alive)
         assert self._process.stderr is not None
         with self._process.stderr as stderr:
-            told = stderr.read().decode("utf-8", "replace").strip()
+            complaint = stderr.read().decode("utf-8", "replace").strip()
         status = self._process.wait()
         self._ring.close()
-        return told or (f"cannot write {self._path}: its process ended with {status}" if status else "")
+        return complaint or (f"cannot write {self._path}: its process ended with {status}" if status else "")
 
 
 @contextlib.contextmanager

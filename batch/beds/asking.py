@@ -1,4 +1,4 @@
-"""Which bed a user means who asks of one alone: a port, and the deck's joint where the bed is simulated."""
+"""The bed that a user means by `--port`: a port, and the deck's joint where the bed is simulated."""
 
 from __future__ import annotations
 

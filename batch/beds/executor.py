@@ -81,7 +81,7 @@ class OnBeds:
     def __init__(self, ports: Ports, say: Callable[[str], None] = lambda _: None) -> None:
         self._ports, self._say = ports, say
         self._waiting: deque[Task] = deque()
-        self._told: dict[str, str] = {}
+        self._greeted_beds: dict[str, str] = {}
         self.about = ", ".join(dict.fromkeys(ports.by_joint.values()))
         self.known = CampaignRecords(ports.by_joint)
         self.driving: Driving | None = None
@@ -152,11 +152,11 @@ class OnBeds:
     def _case(self, section: Section, row: int) -> tuple[CaseResult, str]:
         """Drive a case, or take up its records. Returns the result, and why it ended early, "" where it did not."""
         path = self._folder.beds / f"{section.experiment}-{row}.records"
-        told = path.with_suffix(".ended")
+        ended_file = path.with_suffix(".ended")
         try:
             if not _recorded(path):
                 path.unlink(missing_ok=True)
-                self._drive(section, row, path, told)
+                self._drive(section, row, path, ended_file)
             found = case_result(path, section.prepared, row)
         except records.UnsoundRecords as reason:
             message = f"the file of records of case #{row} {reason}"
@@ -167,7 +167,7 @@ class OnBeds:
         self.known.add(section.experiment, row, found.head, found.exchanges)
         why = "" if found.whole else "the host was gone"
         with contextlib.suppress(OSError, ValueError, LookupError, TypeError):
-            why = str(read_json(told)["why"]) or why
+            why = str(read_json(ended_file)["why"]) or why
         if not why:
             return found, ""
         ticks = section.prepared.experiment.structure.schedule
@@ -175,7 +175,7 @@ class OnBeds:
         self._say(f"case #{section.prepared.experiment.cases.table[row]}, t = {at:g} s: {why}")
         return found, f"t = {at:g} s: {why}"
 
-    def _drive(self, section: Section, row: int, path: Path, told: Path) -> None:
+    def _drive(self, section: Section, row: int, path: Path, ended_file: Path) -> None:
         """Drive a case in a process of its own. Raises Problem, OSError, and KeyboardInterrupt once that process has
         stopped the beds."""
         ports = self._ports
@@ -224,13 +224,13 @@ class OnBeds:
             self.driving = None
             if ended is not None:
                 # what the case's process says of a full disk is what counts
-                with contextlib.suppress(OSError), new_file(told) as file:
+                with contextlib.suppress(OSError), new_file(ended_file) as file:
                     file.write(json.dumps(ended).encode())
 
     def _greeted(self, joint: str, bed: str) -> None:
         """Say which bed a joint is on, where it is another than in the case before."""
-        if self._told.get(joint) != bed:
-            self._told[joint] = bed
+        if self._greeted_beds.get(joint) != bed:
+            self._greeted_beds[joint] = bed
             self._say(f"{joint}: {bed}")
 
 

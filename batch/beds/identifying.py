@@ -113,7 +113,7 @@ def identify_and_tell(
         message = f"joint `{which.joint}`: the load motor's constant, by which torques are measured, is nowhere said"
         helps = "`--kt-load '0.072 N*m/A'`, from its data sheet; or `bed = emulated(kt_load = ..., ...)` in the deck"
         raise Problem(error("E424", message, help=helps))
-    asked = MovesRequest(
+    request = MovesRequest(
         plan=plan_file.dumps(Plan("", (which.experiment,))),
         row=0,
         joint=which.joint,
@@ -127,7 +127,7 @@ def identify_and_tell(
         rate=rate,
     )
     records.unlink(missing_ok=True)  # of an attempt that found nothing: there is no deck
-    about, ended = _driven(asked, say)
+    about, ended = _driven(request, say)
     found = _fitted(records, about, ended, sheet)
     check(found, about)
     estimates = widened(found.parameters, kt_load_error / 100.0)
@@ -137,7 +137,7 @@ def identify_and_tell(
     if form == "json":
         visible.say(json.dumps(as_data(found, estimates, sheet, deck, records), indent=2))
         return
-    for line in told(found, estimates, sheet):
+    for line in table_lines(found, estimates, sheet):
         say(line)
     say(f"{deck} is a deck to include; what was told and read is in {records}")
 
@@ -203,7 +203,7 @@ def widened(found: Mapping[str, Estimate], kt_load_error: float) -> dict[str, Es
     return out
 
 
-def told(found: FitResult, estimates: Mapping[str, Estimate], sheet: DataSheet) -> list[str]:
+def table_lines(found: FitResult, estimates: Mapping[str, Estimate], sheet: DataSheet) -> list[str]:
     """For people."""
     rows = [["", "found", "95 % interval", "", "data sheet", "off by"]]
     for name, unit in UNITS.items():
@@ -369,12 +369,12 @@ def as_data(
     }
 
 
-def _driven(asked: MovesRequest, say: Callable[[str], None]) -> tuple[About, dict[str, Any]]:
+def _driven(request: MovesRequest, say: Callable[[str], None]) -> tuple[About, dict[str, Any]]:
     """Lead the bed through the moves. Returns its description and the course of the moves. Raises Problem, and
     KeyboardInterrupt once the bed is stopped."""
     about: About | None = None
     found = dict[str, Any]()
-    for line in talk("hw.identify.driving", asked, lambda words: say(f"  {words}"), until="ended"):
+    for line in talk("hw.identify.driving", request, lambda words: say(f"  {words}"), until="ended"):
         if "about" in line:
             about, most = _about(line["about"]), line["peaks"]
             say(

@@ -30,18 +30,18 @@ _FIGURES = (("median", "median"), ("high", "p99"), ("highest", "p99.9"), ("large
 
 
 def measured(
-    asked: ChosenBed, baud: int, hz: float | None, seconds: float, joints: int
+    bed: ChosenBed, baud: int, hz: float | None, seconds: float, joints: int
 ) -> tuple[dict[str, Any], list[str]]:
     """Measure the timing at a port. Returns the figures for programs, and the process's lines about the measurement.
     Raises Problem."""
-    kind = kind_of(asked.port)
-    if kind.simulated and kind.lock_step(asked.port, False):
+    kind = kind_of(bed.port)
+    if kind.simulated and kind.lock_step(bed.port, False):
         message = "an emulated bed has no time of its own, so that nothing can be late"
         raise Problem(error("E426", message, help="`--port firmware` has one, over a pseudo-terminal"))
-    rate = hz or (HZ if asked.experiment is None else pace_of(asked.experiment).hz)
-    simulated = asked.simulated
+    rate = hz or (HZ if bed.experiment is None else pace_of(bed.experiment).hz)
+    simulated = bed.simulated
     plan = "" if simulated is None else plan_file.dumps(Plan("", (simulated,)))
-    question = JitterRequest(asked.port, rate, seconds, joints, baud, plan, asked.joint)
+    question = JitterRequest(bed.port, rate, seconds, joints, baud, plan, bed.joint)
     said = list[str]()
     about, kept = dict[str, Any](), dict[str, Any]()
     for line in talk("hw.jitter", question, said.append, until="kept", goes_on=True):
@@ -49,7 +49,7 @@ def measured(
         kept = line.get("kept", kept)
     timing = kept["timing"]
     return {
-        "port": asked.port,
+        "port": bed.port,
         **about,
         "rate_hz": rate,
         "joints": joints,
@@ -77,8 +77,8 @@ def jitter_and_tell(
     **options: Any,
 ) -> bool:
     """Run `met bed jitter`. Returns True where no run would have been stopped. Raises Problem."""
-    asked = chosen_bed(word, source, names, quiet=quiet, **options)
-    data, said = measured(asked, baud, rate, duration, joints)
+    bed = chosen_bed(word, source, names, quiet=quiet, **options)
+    data, said = measured(bed, baud, rate, duration, joints)
     if form == "json":
         say(json.dumps({**data, "warnings": said}, indent=2))
     elif not quiet:
@@ -96,7 +96,7 @@ def lines(data: Mapping[str, Any]) -> list[str]:
     ]
     for name, words in _SPREADS:
         spread = data[name]
-        figures = ", ".join(f"{told} {duration(spread[figure])}" for figure, told in _FIGURES)
+        figures = ", ".join(f"{label} {duration(spread[figure])}" for figure, label in _FIGURES)
         out += ["", f"{words}: {figures}", *histogram(spread["histogram"])]
     late = sum(misses[name] for name in ("woken", "computed", "waited"))
     out += [

@@ -1,4 +1,4 @@
-"""What the records of a campaign's cases say of its beds: which they were, and every exchange with them."""
+"""The records of a campaign's cases: which beds they were driven on, and every exchange with them."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ class CampaignRecords:
             if (int(experiment), int(row)) in self.cases:
                 continue
             with contextlib.suppress(records.UnsoundRecords, OSError):
-                found = records.read(path)
-                if found.head:
-                    check_head(found)
-                    rows = [found.rows[found.rows["bed"] == bed] for bed in range(len(found.head["joints"]))]
-                    self.add(int(experiment), int(row), found.head, rows)
+                recorded = records.read(path)
+                if recorded.head:
+                    check_head(recorded)
+                    rows = [recorded.rows[recorded.rows["bed"] == bed] for bed in range(len(recorded.head["joints"]))]
+                    self.add(int(experiment), int(row), recorded.head, rows)
 
     def of(self, joint: str) -> list[tuple[float, np.ndarray]]:
         """The rate of ticks (Hz) and the records of each case on a joint's bed."""

@@ -1,4 +1,4 @@
-"""A case's records made into what a shard holds of it: the run is computed again from the rates that were read.
+"""The result of a case from its records: the run is computed again from the rates that were read.
 
 So nothing but the exchanges has to outlive a crash, and an archive follows from what was on the wire.
 """
@@ -41,10 +41,10 @@ class CaseResult:
     head: Mapping[str, Any]
 
 
-def read_rates(found: records.Records, beds: int) -> np.ndarray:
+def read_rates(recorded: records.Records, beds: int) -> np.ndarray:
     """The rates as the kernel had them, [servo tick, bed]. Where no answer came it had the one before."""
-    repeats = int(found.head["repeats"])
-    rows = found.rows[: len(found.rows) // beds * beds].reshape(-1, beds)
+    repeats = int(recorded.head["repeats"])
+    rows = recorded.rows[: len(recorded.rows) // beds * beds].reshape(-1, beds)
     rates = rows["rate"].copy()
     answered = (rows["flags"] & ANSWERED) != 0
     for bed in range(beds):
@@ -53,9 +53,9 @@ def read_rates(found: records.Records, beds: int) -> np.ndarray:
     return rates[::repeats]
 
 
-def check_head(found: records.Records) -> None:
+def check_head(recorded: records.Records) -> None:
     """Raise records.UnsoundRecords where the head of a case's records is damaged, or does not fit the records."""
-    head = found.head
+    head = recorded.head
     if HEAD - set(head):
         raise records.UnsoundRecords("was written by another version of MET")
     joints, beds, hz = head["joints"], head["beds"], head["tick_hz"]
@@ -69,7 +69,7 @@ def check_head(found: records.Records) -> None:
         and hz > 0
         and is_count(head["repeats"])
         and head["repeats"] > 0
-        and bool((found.rows["bed"] < len(joints)).all())
+        and bool((recorded.rows["bed"] < len(joints)).all())
     )
     if not good:
         raise records.UnsoundRecords("has a head that is damaged")
@@ -78,22 +78,22 @@ def check_head(found: records.Records) -> None:
 def case_result(path: Path, prepared: Prepared, row: int) -> CaseResult:
     """Make a case's result from its file of records. prepared: the run with its wires open. Raises
     records.UnsoundRecords, OSError."""
-    found = records.read(path)
-    check_head(found)
+    recorded = records.read(path)
+    check_head(recorded)
     driven = CaseKernel(prepared, row)
     beds = len(driven.joints)
-    if found.head["joints"] != list(driven.joints):
+    if recorded.head["joints"] != list(driven.joints):
         raise records.UnsoundRecords("is of other joints")
-    rows, outputs, done = driven.again(read_rates(found, beds))
+    rows, outputs, done = driven.again(read_rates(recorded, beds))
     whole = done == driven.ticks
     if not whole and outputs[FAILURE] == 0.0:
         outputs[FAILURE], outputs[TICK] = STOPPED, float(done + 1)
-    last = found.rows["ended"][-1] if len(found.rows) else 0
+    last = recorded.rows["ended"][-1] if len(recorded.rows) else 0
     return CaseResult(
         rows,
         outputs,
         whole,
         float(last) * 1e-9,
-        tuple(found.rows[found.rows["bed"] == bed] for bed in range(beds)),
-        found.head,
+        tuple(recorded.rows[recorded.rows["bed"] == bed] for bed in range(beds)),
+        recorded.head,
     )

@@ -55,15 +55,15 @@ class ProbeResult:
         return math.inf if stepped or longest == 0.0 else LONGEST_SHARE / longest
 
 
-def probe(asked: ChosenBed, baud: int) -> ProbeResult:
+def probe(chosen: ChosenBed, baud: int) -> ProbeResult:
     """Greet the bed, and read its sensors. Raises Problem."""
-    simulated = asked.simulated
+    simulated = chosen.simulated
     period = math.inf if simulated is None else pace_of(simulated).period
-    with opened(Port(asked.port, baud), simulated, asked.joint, 0, period) as bed:
+    with opened(Port(chosen.port, baud), simulated, chosen.joint, 0, period) as bed:
         about = bed.connect()
         sample = bed.read()
         trips = _trips(bed) if bed.has_line else ()
-        return ProbeResult(asked.port, about, sample, bed.warnings, baud, bed.line_time(about), trips)
+        return ProbeResult(chosen.port, about, sample, bed.warnings, baud, bed.line_time(about), trips)
 
 
 def probe_and_tell(
@@ -78,17 +78,17 @@ def probe_and_tell(
     **options: Any,
 ) -> None:
     """Run `met bed probe`. Raises Problem."""
-    found = probe(chosen_bed(word, source, names, quiet=quiet, **options), baud)
+    result = probe(chosen_bed(word, source, names, quiet=quiet, **options), baud)
     if form == "json":
-        say(json.dumps(data(found), indent=2))
+        say(json.dumps(data(result), indent=2))
     elif not quiet:
-        say("\n".join(lines(found)))
+        say("\n".join(lines(result)))
 
 
-def lines(found: ProbeResult) -> list[str]:
+def lines(result: ProbeResult) -> list[str]:
     """The result for people, line by line."""
-    about, sample, limits = found.about, found.sample, found.about.limits
-    out = [f"bed `{about.name}` at {found.port}"]
+    about, sample, limits = result.about, result.sample, result.about.limits
+    out = [f"bed `{about.name}` at {result.port}"]
     sensors = (f"{name.replace('_', ' ')} {quantity(value, unit)}" for name, value, unit in _read(sample))
     rows = [
         ["firmware", f"{about.firmware}, version {about.version} of the protocol, session {about.session}"],
@@ -103,24 +103,24 @@ def lines(found: ProbeResult) -> list[str]:
         ["a count", ", ".join(quantity(value, unit) for value, unit in _scales(about))],
         ["sensors", ", ".join(sensors)],
         ["state", sample.state.name.lower()],
-        *_line(found),
+        *_line(result),
     ]
     out += columns(rows)
     for fault in Fault:
         if fault in sample.faults:
             out.append(f"  fault: {refusals.words(fault)}")
             out += [f"    = help: {each}" for each in refusals.remedies(fault)]
-    for warning in found.warnings:
+    for warning in result.warnings:
         out.append(f"  warning: {warning.message}")
         out += [f"    = help: {each}" for each in warning.help]
     return out
 
 
-def data(found: ProbeResult) -> dict[str, Any]:
+def data(result: ProbeResult) -> dict[str, Any]:
     """The result for programs, SI."""
-    about, sample = found.about, found.sample
+    about, sample = result.about, result.sample
     return {
-        "port": found.port,
+        "port": result.port,
         **{name: value for name, value in asdict(about).items() if name not in ("capabilities", "scales")},
         "capabilities": [str(each.name).lower() for each in Capability if each in about.capabilities],
         "scales": {name: value if math.isfinite(value) else None for name, value in asdict(about.scales).items()},
@@ -131,13 +131,13 @@ def data(found: ProbeResult) -> dict[str, Any]:
             for fault in Fault
             if fault in sample.faults
         ],
-        "warnings": [{"code": each.code, "message": each.message, "help": list(each.help)} for each in found.warnings],
+        "warnings": [{"code": each.code, "message": each.message, "help": list(each.help)} for each in result.warnings],
         "line": {
             "bytes": exchanged(about.capabilities),
-            "bytes_take": found.needed or None,
-            "answered_in": statistics.median(found.trips) if found.trips else None,
-            "answered_in_at_most": max(found.trips, default=None),
-            "fastest_hz": found.fastest if math.isfinite(found.fastest) else None,
+            "bytes_take": result.needed or None,
+            "answered_in": statistics.median(result.trips) if result.trips else None,
+            "answered_in_at_most": max(result.trips, default=None),
+            "fastest_hz": result.fastest if math.isfinite(result.fastest) else None,
         },
     }
 
@@ -166,36 +166,38 @@ def _trips(bed: BedDriver) -> tuple[float, ...]:
 
 def _scales(about: About) -> list[tuple[float, str]]:
     s, has = about.scales, about.capabilities
-    found = [(s.voltage, "V"), (s.current, "A"), (s.rate, "rad/s")]
+    result = [(s.voltage, "V"), (s.current, "A"), (s.rate, "rad/s")]
     others = (
         (Capability.ENCODER, s.angle, "rad"),
         (Capability.DRIVE_CURRENT, s.drive_current, "A of the drive"),
         (Capability.ACCELEROMETER, s.acceleration, "rad/s^2"),
     )
-    return found + [(value, unit) for each, value, unit in others if each in has]
+    return result + [(value, unit) for each, value, unit in others if each in has]
 
 
 def _read(sample: BedSample) -> list[tuple[str, float, str]]:
     return [(name, getattr(sample, name), unit) for name, unit in _SENSORS if getattr(sample, name) is not None]
 
 
-def _line(found: ProbeResult) -> list[Sequence[str]]:
+def _line(result: ProbeResult) -> list[Sequence[str]]:
     """Rows about the line, and about the rates for which it is fast enough."""
-    if not found.trips and not found.needed:
+    if not result.trips and not result.needed:
         return [["line", "none: the bed is in this process"]]
     said = []
-    if found.needed:
-        bytes_ = exchanged(found.about.capabilities)
-        said.append(f"{found.baud} baud: {bytes_} bytes an exchange take {1e3 * found.needed:.3g} ms")
-    if found.trips:
-        lost = ASKED - len(found.trips)
-        median, longest = statistics.median(found.trips), max(found.trips)
+    if result.needed:
+        bytes_ = exchanged(result.about.capabilities)
+        said.append(f"{result.baud} baud: {bytes_} bytes an exchange take {1e3 * result.needed:.3g} ms")
+    if result.trips:
+        lost = ASKED - len(result.trips)
+        median, longest = statistics.median(result.trips), max(result.trips)
         said.append(
             f"answered in {1e3 * median:.3g} ms, at most {1e3 * longest:.3g} ms, {ASKED} times asked"
             + (f", {lost} times without an answer" if lost else "")
         )
-    if not math.isfinite(found.fastest):
+    if not math.isfinite(result.fastest):
         return [["line", "; ".join(said)], ["rates", "all: the bed waits for the computer"]]
-    words = [f"{hz:g} Hz {'yes' if hz <= found.fastest else 'no'}" for hz in RATES]
-    rates = f"{', '.join(words)}; up to {found.fastest:.3g} Hz, where an exchange takes {LONGEST_SHARE:.0%} of a period"
+    words = [f"{hz:g} Hz {'yes' if hz <= result.fastest else 'no'}" for hz in RATES]
+    rates = (
+        f"{', '.join(words)}; up to {result.fastest:.3g} Hz, where an exchange takes {LONGEST_SHARE:.0%} of a period"
+    )
     return [["line", "; ".join(said)], ["rates", rates]]

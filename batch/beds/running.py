@@ -64,9 +64,9 @@ def campaign_of(
     cases: Sequence[str] | None = None,
 ) -> tuple[Campaign, dict[str, str], bool]:
     """The campaign, its ports by joint, and True where the beds have no time of their own. Raises Problem."""
-    asked = on_beds(plan, names)
-    by_joint = ports_of(ports, asked)
-    for each in asked:
+    experiments = on_beds(plan, names)
+    by_joint = ports_of(ports, experiments)
+    for each in experiments:
         for use in each.structure.substitutions:
             check_model(by_joint[use.joint], each, use.joint)
     steps = {in_lock_step(port, lock_step) for port in by_joint.values()}
@@ -74,7 +74,7 @@ def campaign_of(
         one = "give all beds ports of one kind"
         raise Problem(error("E414", "some of the beds have a time of their own, and some have none", help=one))
     [stepped] = steps
-    late = max(pace_of(each).late(stepped) for each in asked)
+    late = max(pace_of(each).late(stepped) for each in experiments)
     found = prepare(plan, output=output, experiments=names, cases=cases, histories="all", wires=Wires(late))
     return found, by_joint, stepped
 

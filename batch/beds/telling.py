@@ -1,4 +1,4 @@
-"""What is told of cases on beds: how far they are while they are driven, then how well the loop kept its time."""
+"""Lines about cases on beds: their progress while they are driven, then how well the loop kept its time."""
 
 from __future__ import annotations
 

@@ -106,9 +106,9 @@ class EmulatedBed(BedDriver):
         self._about, self._in_force = about, greeting.in_force(about)
         return about
 
-    def limit(self, asked: Mapping[str, float]) -> None:
+    def limit(self, requested: Mapping[str, float]) -> None:
         about = self._there()
-        tighter = greeting.tighter(about, asked)
+        tighter = greeting.tighter(about, requested)
         if self._state != BedState.DISARMED:
             raise refusals.refused(about, "take tighter limits", self._sample(refused=True))
         own = greeting.in_force(about)
@@ -240,5 +240,5 @@ PORT = PortKind(
     open=_opened_port,
     simulated=True,
     needs=tuple(each for each in SIMULATION_PARAMETERS if each.name == "i_max"),
-    lock_step=lambda name, asked: True,
+    lock_step=lambda name, requested: True,
 )

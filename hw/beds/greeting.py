@@ -1,4 +1,4 @@
-"""What a bed says of itself when it is greeted, and whether that can be."""
+"""The description of a bed, made from its answer to HELLO and checked; its limits and commands in counts."""
 
 from __future__ import annotations
 
@@ -65,16 +65,16 @@ def in_force(about: About) -> messages.LimitsAnswer:
     return messages.LimitsAnswer(voltage, current, rate, *slews)
 
 
-def tighter(about: About, asked: Mapping[str, float]) -> dict[str, int]:
+def tighter(about: About, limits: Mapping[str, float]) -> dict[str, int]:
     """Limits that are asked for in SI as whole counts, slews in counts a tick; both by their names in `LIMIT_NAMES`.
     Raises Problem E408 for a number that is no limit, KeyError for another name."""
     s, hz = about.scales, about.tick_hz
     of = dict(zip(LIMIT_NAMES, (s.voltage, s.current, s.rate, s.voltage * hz, s.current * hz), strict=True))
-    for name, value in asked.items():
+    for name, value in limits.items():
         if not 0.0 <= value < math.inf:
             message = f"a limit of {_words(name)} of {value:g} {_UNITS[name]} for bed `{about.name}`"
             raise Problem(error("E408", message, help="a limit is a number from 0 on"))
-    return {name: counts(value, of[name]) for name, value in asked.items()}
+    return {name: counts(value, of[name]) for name, value in limits.items()}
 
 
 def commanded(value: float, scale: float, most: int) -> int | None:

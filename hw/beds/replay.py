@@ -101,17 +101,17 @@ class _ReplayedLine:
             if found is not None and isinstance(found[1], messages.HelloAnswer):
                 self._scales = found[1].scales
 
-    def _other(self, asked: str) -> Problem:
+    def _other(self, question: str) -> Problem:
         """The error for a question that was not asked then: E407, or E401 where the transcript ends, as that of a
         lost line does."""
         after = f"after tick {self._tick} of the bed" if self._tick >= 0 else "at the beginning"
         if self._at == len(self._records):
             helps = "it was broken off there, or another deck or case made it"
-            return Problem(error("E401", f"{self._name} ends {after}, where {asked}", help=helps))
+            return Problem(error("E401", f"{self._name} ends {after}, where {question}", help=helps))
         record = self._records[self._at]
         then = self._words(record.data) if record.kind == SENT else _KINDS.get(record.kind, "something else")
         helps = "a transcript is replayed by what made it: the same deck, case and version of MET"
-        return Problem(error("E407", f"{self._name}: {after} {asked}; then it was {then}", help=helps))
+        return Problem(error("E407", f"{self._name}: {after} {question}; then it was {then}", help=helps))
 
     def _words(self, frame: bytes) -> str:
         payload = unframed(frame[:-1])
@@ -138,7 +138,7 @@ def is_transcript(name: str) -> bool:
         return file.read(len(MAGIC)) == MAGIC
 
 
-def _was_in_lock_step(name: str, asked: bool) -> bool:
+def _was_in_lock_step(name: str, requested: bool) -> bool:
     """True where a transcript has a STEP: its bed had no time of its own, whatever is asked now."""
     sent = (unframed(each.data[:-1]) for each in read(name).records if each.kind == SENT)
     return any(payload is not None and payload[0] == messages.StepMessage.kind for payload in sent)

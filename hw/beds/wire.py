@@ -82,7 +82,7 @@ class WireBed(BedDriver):
         assert line is not None
         self._line = heard = TappedLine(line)
         try:
-            found = self._asked_again(messages.HelloMessage(), HelloAnswer, _BOOT)
+            found = self._ask_again(messages.HelloMessage(), HelloAnswer, _BOOT)
         finally:
             self._line = line
         if found is None:
@@ -99,10 +99,10 @@ class WireBed(BedDriver):
         self._step = greeting.ticks(about, self.period) if steps else 0
         return about
 
-    def limit(self, asked: Mapping[str, float]) -> None:
+    def limit(self, limits: Mapping[str, float]) -> None:
         about = self._there()
-        for name, most in greeting.tighter(about, asked).items():
-            found = self._asked(messages.LimitMessage(LIMIT_NAMES.index(name), most), LimitsAnswer)
+        for name, most in greeting.tighter(about, limits).items():
+            found = self._ask(messages.LimitMessage(LIMIT_NAMES.index(name), most), LimitsAnswer)
             if getattr(found, name) > most:
                 message = f"bed `{about.name}` does not take a tighter limit of {name.replace('_', ' ')}"
                 raise Problem(error("E406", message, help="limits are set before it is armed"))
@@ -115,7 +115,7 @@ class WireBed(BedDriver):
         self.confirmed = False
         message = messages.ArmMessage(about.session)
         first = self._answer(message, SampleAnswer, waits[0])
-        sample = self._sample(first or self._asked(message, SampleAnswer, waits[1:]))
+        sample = self._sample(first or self._ask(message, SampleAnswer, waits[1:]))
         if sample.state != BedState.ARMED or (sample.refused and first is not None):
             self.confirmed = sample.state != BedState.ARMED
             raise refusals.refused(about, "arm", sample)
@@ -140,7 +140,7 @@ class WireBed(BedDriver):
 
     def read(self) -> BedSample:
         self._there()
-        return self._sample(self._asked(messages.ReadMessage(), SampleAnswer))
+        return self._sample(self._ask(messages.ReadMessage(), SampleAnswer))
 
     def look(self) -> BedSample | None:
         self._there()
@@ -149,7 +149,7 @@ class WireBed(BedDriver):
 
     def clear(self) -> BedSample:
         about = self._there()
-        sample = self._sample(self._asked(messages.ClearMessage(), SampleAnswer))
+        sample = self._sample(self._ask(messages.ClearMessage(), SampleAnswer))
         if sample.state != BedState.DISARMED:
             raise refusals.refused(about, "clear", sample)
         return sample
@@ -177,7 +177,7 @@ class WireBed(BedDriver):
         if Capability.SIMULATED not in about.capabilities:
             raise real_plant()
         for which, value in ((1, float(seed)), (2, float(repeat)), (0, rate)):
-            sample = self._sample(self._asked(messages.PresetMessage(which, value), SampleAnswer))
+            sample = self._sample(self._ask(messages.PresetMessage(which, value), SampleAnswer))
             if sample.refused:
                 raise refusals.refused(about, "start its plant anew", sample)
         return sample
@@ -187,7 +187,7 @@ class WireBed(BedDriver):
             return self.confirmed
         for _ in range(2):  # a transcript that cannot be written is in the way once
             try:
-                found = self._asked_again(messages.StopMessage(), SampleAnswer, _STOP)
+                found = self._ask_again(messages.StopMessage(), SampleAnswer, _STOP)
                 self.confirmed = found is not None and found.status & messages.STATE != BedState.ARMED
                 break
             except Problem:
@@ -207,13 +207,13 @@ class WireBed(BedDriver):
             raise refusals.not_connected(self._name)
         return self._about
 
-    def _asked(self, message: HostMessage, kind: type[T], waits: Sequence[float] = _WAITS) -> T:
-        found = self._asked_again(message, kind, waits)
+    def _ask(self, message: HostMessage, kind: type[T], waits: Sequence[float] = _WAITS) -> T:
+        found = self._ask_again(message, kind, waits)
         if found is None:
             raise refusals.silent(self._there().name, message.word)
         return found
 
-    def _asked_again(self, message: HostMessage, kind: type[T], waits: Sequence[float]) -> T | None:
+    def _ask_again(self, message: HostMessage, kind: type[T], waits: Sequence[float]) -> T | None:
         for wait in waits:
             found = self._answer(message, kind, wait)
             if found is not None:

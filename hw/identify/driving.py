@@ -1,5 +1,5 @@
-"""A bed led through the moves, in a process of its own: `python -m hw.identify.driving`, told what to do in a line of
-JSON (`MovesRequest`).
+"""A bed led through the moves, in a process of its own: `python -m hw.identify.driving`, which reads a line of JSON, a
+`MovesRequest`.
 
 It says how it goes on its standard output, a line of JSON each: {"said": words}, {"about": ..., "peaks": ...}, at the
 end {"ended": ...} (`LoopEnd`) or {"wrong": diagnostics}. What came of each exchange is in the records. It stops the bed
@@ -69,22 +69,22 @@ class MovesResult:
     seconds: float
 
 
-def peaks(limits: Limits, sheet: Mapping[str, float], asked: MovesRequest) -> tuple[Peaks, float]:
+def peaks(limits: Limits, sheet: Mapping[str, float], request: MovesRequest) -> tuple[Peaks, float]:
     """The largest commands of the moves, and the rate (rad/s) up to which the moves go that are to reach the drive's
     largest torque. Raises Problem E421."""
     for name, value, most, unit in (
-        ("voltage", asked.voltage, limits.voltage, "V"),
-        ("current", asked.current, limits.current, "A"),
-        ("rate", asked.rate, limits.rate, "rad/s"),
+        ("voltage", request.voltage, limits.voltage, "V"),
+        ("current", request.current, limits.current, "A"),
+        ("rate", request.rate, limits.rate, "rad/s"),
     ):
         if value is not None and value > most:
             message = f"a {name} of {value:.6g} {unit} is beyond the bed's limit, {most:.6g} {unit}"
             raise Problem(error("E421", message, help=f"give `--{name}` less, or leave it out"))
-    voltage = min(limits.voltage, sheet.get("v_max", limits.voltage)) if asked.voltage is None else asked.voltage
-    current = asked.current
+    voltage = min(limits.voltage, sheet.get("v_max", limits.voltage)) if request.voltage is None else request.voltage
+    current = request.current
     if current is None:
         current = min(SHARE * limits.current, sheet["tau_max"] / sheet["kt_load"])
-    rate = SHARE * limits.rate if asked.rate is None else asked.rate
+    rate = SHARE * limits.rate if request.rate is None else request.rate
     kt, resistance = sheet["kt"], sheet["resistance"]
     if kt / resistance * voltage < TURNS * sheet["f_c"]:
         least = TURNS * sheet["f_c"] * resistance / kt
@@ -95,20 +95,20 @@ def peaks(limits: Limits, sheet: Mapping[str, float], asked: MovesRequest) -> tu
     return Peaks(voltage, current, rate), min(top, SHARE * rate)
 
 
-def run(asked: MovesRequest) -> MovesResult:
+def run(request: MovesRequest) -> MovesResult:
     """Lead the bed through the moves. Raises Problem."""
-    experiment = plan_file.loads(asked.plan).experiments[0]
+    experiment = plan_file.loads(request.plan).experiments[0]
     of = pace_of(experiment)
-    asked_to_stop = process.listening()
-    port = Port(asked.port, asked.baud, asked.lock_step, asked.transcript)
-    with opened(port, experiment, asked.joint, asked.row, of.period) as bed:
+    stop_requested = process.listening()
+    port = Port(request.port, request.baud, request.lock_step, request.transcript)
+    with opened(port, experiment, request.joint, request.row, of.period) as bed:
         about = bed.connect()
         process.warnings(bed)
-        latch.check(bed, about, asked.port)
+        latch.check(bed, about, request.port)
         if Capability.SIMULATED in about.capabilities:
             bed.preset(seed=experiment.cases.seed)
         lock_step = Capability.LOCK_STEP in about.capabilities
-        most, top = peaks(about.limits, asked.sheet, asked)
+        most, top = peaks(about.limits, request.sheet, request)
         scales = about.scales
         # a command is a whole count, the nearest
         bed.limit({"voltage": most.voltage + scales.voltage, "current": most.current + scales.current})
@@ -120,14 +120,14 @@ def run(asked: MovesRequest) -> MovesResult:
             process.precedence()
         bed.patience = of.patience(lock_step)
         head = {
-            "joint": asked.joint,
+            "joint": request.joint,
             "hz": of.hz,
             "lock_step": lock_step,
             "tick_hz": about.tick_hz,
             "bed": about.name,
             "firmware": about.firmware,
         }
-        with recording(Path(asked.records), head, guide.exchanges + 1) as put:
+        with recording(Path(request.records), head, guide.exchanges + 1) as put:
             ended = loop.drive(
                 [bed],
                 guide,
@@ -135,7 +135,7 @@ def run(asked: MovesRequest) -> MovesResult:
                 guide.exchanges,
                 put,
                 lock_step=lock_step,
-                asked_to_stop=lambda: asked_to_stop() or guide.done or guide.stuck,
+                stop_requested=lambda: stop_requested() or guide.done or guide.stuck,
             )
         refusals.check_stopped([bed], [about], "" if guide.done else ended.why)
         seconds = ended.exchanges * of.period
@@ -155,4 +155,4 @@ def run(asked: MovesRequest) -> MovesResult:
 
 
 if __name__ == "__main__":
-    process.answer(MovesRequest, lambda asked: {"ended": asdict(run(asked))})
+    process.answer(MovesRequest, lambda request: {"ended": asdict(run(request))})

@@ -77,40 +77,40 @@ def fitted(series: Series, groups: Sequence[int], start: Mapping[str, float]) ->
     drive was never at its largest torque.
     """
     measured = series.drive_current is not None
-    told = [name for name in MOTOR if name != "kt_load" or measured]
+    sought = [name for name in MOTOR if name != "kt_load" or measured]
     parts = [series.of([move for move, its in enumerate(groups) if its == group]) for group in range(max(groups) + 1)]
     some = series.of([move for move, its in enumerate(groups) if its < FIRST])
     search = _Search(some, start)
-    search.settle(told)
-    search.settle([*told, *RIPPLE])
+    search.settle(sought)
+    search.settle([*sought, *RIPPLE])
     limited = search.limited()
     unseen: list[str] = []
     if limited < LIMITED:
         unseen = ["tau_max"] if measured else ["tau_max", "f_v"]
     while True:
         if unseen:
-            told = [name for name in told if name not in unseen]
+            sought = [name for name in sought if name not in unseen]
             search.put(unseen, start)
-            search.settle([*told, *RIPPLE])
+            search.settle([*sought, *RIPPLE])
         settled, chance = True, np.random.default_rng(0)
         places = []
         for part in parts:
-            one = search.over(part, chance.uniform(-AWAY, AWAY, len(PARAMETERS)), [*told, *RIPPLE])
-            settled = one.settle([*told, *RIPPLE]) and settled
+            one = search.over(part, chance.uniform(-AWAY, AWAY, len(PARAMETERS)), [*sought, *RIPPLE])
+            settled = one.settle([*sought, *RIPPLE]) and settled
             places.append(one.place)
         factor = stdtrit(len(parts) - 1, 0.975) / math.sqrt(len(parts))
         half = dict(zip(PARAMETERS, (factor * np.std(places, axis=0, ddof=1)).tolist(), strict=True))
-        unseen = [name for name in told if not half[name] < VAGUE]
+        unseen = [name for name in sought if not half[name] < VAGUE]
         if not unseen:
             break
-    search = search.over(series, np.mean(places, axis=0) - search.place, [*told, *RIPPLE])
+    search = search.over(series, np.mean(places, axis=0) - search.place, [*sought, *RIPPLE])
     values = search.values()
     estimates = {}
     for name in MOTOR:
         value, wide = start[name], 1.0
-        if name in told:
+        if name in sought:
             value, wide = values[name], math.exp(math.hypot(half[name], FLOOR))
-        estimates[name] = Estimate(value, value / wide, value * wide, name in told)
+        estimates[name] = Estimate(value, value / wide, value * wide, name in sought)
     ripple = [math.hypot(values[f"sin_{n}"], values[f"cos_{n}"]) / math.sqrt(2.0) for n in (1, 2)]
     residual = search.residual()
     counts = np.bincount(series.move, ~np.isnan(series.rate), minlength=series.moves)

@@ -80,22 +80,24 @@ def _kernel(count: int) -> Kernel:
     return backends.load(record(program), LANES)
 
 
-def simulated(found: Series, sets: np.ndarray) -> np.ndarray:
+def simulated(series: Series, sets: np.ndarray) -> np.ndarray:
     """The rate (rad/s) and the drive motor's current (A) that the model reads, [channel, step, set].
 
     sets  parameters [set, parameter] in the order of `PARAMETERS`, at most `LANES` sets
     """
-    count = max(1, math.ceil(float(np.median(found.time)) / SUBSTEP - 1e-9))
+    count = max(1, math.ceil(float(np.median(series.time)) / SUBSTEP - 1e-9))
     given = np.zeros((LANES, len(_GIVEN) + len(PARAMETERS)))
     given[:, len(_GIVEN) :] = sets[0]
     given[: len(sets), len(_GIVEN) :] = sets
     block = _kernel(count).block(given)
-    told = np.ascontiguousarray(np.column_stack([found.voltage, found.current, found.time, found.angle]))[:, :, None]
+    steps = np.ascontiguousarray(np.column_stack([series.voltage, series.current, series.time, series.angle]))[
+        :, :, None
+    ]
     inputs, outputs, step = block.inputs[: len(_GIVEN)], block.outputs, block.step
-    read = np.empty((len(told), 2, LANES))
-    starts = set(np.flatnonzero(np.diff(found.move, prepend=-1)).tolist())
-    for n in range(len(told)):
-        inputs[:] = told[n]
+    read = np.empty((len(steps), 2, LANES))
+    starts = set(np.flatnonzero(np.diff(series.move, prepend=-1)).tolist())
+    for n in range(len(steps)):
+        inputs[:] = steps[n]
         if n in starts:
             step(0, 0)
         step(1, 1)

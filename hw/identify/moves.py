@@ -170,10 +170,10 @@ class MoveGuide:
         """The largest number of exchanges that the moves may take."""
         return sum(math.ceil((move.time + PATIENCE) / self._period) + 1 for move in self._moves) + 1
 
-    def __call__(self, e: int, rates: Sequence[float], told: list[list[float]]) -> None:
+    def __call__(self, e: int, rates: Sequence[float], commands: list[list[float]]) -> None:
         rate, wanted = rates[0], (0.0, 0.0)
         if self._profile is None:
-            self._rest(e, rate, told[0])
+            self._rest(e, rate, commands[0])
         if self._profile is not None:
             time = self._since * self._period
             if time >= self._moves[len(self.began) - 1].time - 1e-9 or abs(rate) > self._peaks.rate:
@@ -183,11 +183,11 @@ class MoveGuide:
                 wanted = volts * self._peaks.voltage, amperes * self._peaks.current
                 self._since += 1
         for n, (value, most) in enumerate(zip(wanted, self._most, strict=True)):
-            told[0][n] += min(max(value - told[0][n], -most), most)
+            commands[0][n] += min(max(value - commands[0][n], -most), most)
 
-    def _rest(self, e: int, rate: float, told: Sequence[float]) -> None:
+    def _rest(self, e: int, rate: float, commands: Sequence[float]) -> None:
         """Begin the next move where the bed has been at rest for long enough."""
-        still = abs(rate) <= SLOW and told[0] == 0.0 and told[1] == 0.0
+        still = abs(rate) <= SLOW and commands[0] == 0.0 and commands[1] == 0.0
         self._since = self._since + 1 if still else 0
         self._waited += 1
         if self._since * self._period >= STILL:

@@ -1,4 +1,4 @@
-"""What a bed was told and what it read, as steps of time: records made into what a model can be held against."""
+"""Records of a bed made into steps of time: its commands and readings, to compare a model with."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the payloads say: a class a message, its fields in the order of the wire, in counts.
+"""The messages of the wire: a class for each, its fields in the order of the wire, in counts.
 
 Fields that the wire has no room for raise `struct.error`: whoever sends checks first.
 """

@@ -133,7 +133,7 @@ def moved(
         guide.exchanges,
         out.append,
         lock_step=True,
-        asked_to_stop=lambda: guide.done or guide.stuck,
+        stop_requested=lambda: guide.done or guide.stuck,
     )
     assert guide.done
     rows = np.frombuffer(b"".join(out), records.LAYOUT)

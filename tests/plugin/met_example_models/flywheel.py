@@ -58,5 +58,5 @@ PORT = PortKind(
     address="INERTIA",
     doc="A flywheel on both motors, in this process, in lock-step.",
     open=opened,
-    lock_step=lambda name, asked: True,
+    lock_step=lambda name, requested: True,
 )
