@@ -1,13 +1,15 @@
-"""Motor beds at work: `met bed run`, whose cases are driven one after another in real time, and what is asked of a bed
-before.
+"""The commands of `met bed`: `run`, whose cases are driven one after another, and those that come before it.
 
-    running    `met bed run`
-    executor   carries out a campaign's tasks, each case in a process of its own (hw/case.py)
-    made       what was said and answered, made into shards: at the end of a case, or after a crash
-    telling    how far a case is, and how well the loop kept its time
-    asking     which bed a user means, of `probe` and `jitter`
-    probe      `met bed probe`: who is there
-    jitter     `met bed jitter`: how well exchanges keep their time (hw/jitter.py)
+    running           `met bed run`
+    executor          carries out a campaign's tasks, each case in a process of its own (hw/case.py)
+    case_result       a case's result from its records, at its end or after a crash
+    campaign_records  the records of all cases: which beds they were driven on, and how time was kept
+    bed_progress      lines about a case under way, and about how well the loop kept its time
+    chosen_bed        the bed that a user means, for the commands below
+    probe             `met bed probe`: who is there
+    clearing          `met bed clear`: forget latched faults
+    jitter            `met bed jitter`: the timing of exchanges (hw/jitter.py)
+    identifying       `met bed identify`: a bed's parameters from guided moves (hw/identify)
 """
 
 from __future__ import annotations

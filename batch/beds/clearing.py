@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 
-from batch.beds.asking import chosen_bed
+from batch.beds.chosen_bed import chosen_bed
 from hw import refusals
 from hw.bed import About, Fault
 from hw.beds import latch

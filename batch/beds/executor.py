@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from batch.beds.known import CampaignRecords
-from batch.beds.made import CaseResult, case_result
+from batch.beds.campaign_records import CampaignRecords
+from batch.beds.case_result import CaseResult, case_result
 from batch.campaigns import shard
 from batch.campaigns.folder import Folder
 from batch.campaigns.tasks import Done, Section, Task

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from batch.beds.asking import chosen_bed
+from batch.beds.chosen_bed import chosen_bed
 from hw.bed import About, Capability, Limits, Scales
 from hw.identify.driving import MovesRequest
 from hw.process import talk

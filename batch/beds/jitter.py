@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from batch.beds.asking import ChosenBed, chosen_bed
+from batch.beds.chosen_bed import ChosenBed, chosen_bed
 from hw.case import pace_of
 from hw.jitter import JitterRequest
 from hw.ports import kind_of

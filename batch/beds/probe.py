@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from batch.beds.asking import ChosenBed, chosen_bed
+from batch.beds.chosen_bed import ChosenBed, chosen_bed
 from hw import refusals
 from hw.bed import About, BedDriver, BedSample, Capability, Fault
 from hw.beds.serial_line import LONGEST_SHARE, exchanged

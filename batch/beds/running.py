@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from batch.archive.read import ArchiveFile
-from batch.beds.asking import on_beds, on_none, split
+from batch.beds.bed_progress import BedProgress, sidecar_entries, timing_lines
+from batch.beds.chosen_bed import on_beds, on_none, split
 from batch.beds.executor import OnBeds, Ports
-from batch.beds.telling import BedProgress, sidecar_entries, timing_lines
 from batch.campaigns.campaign import Campaign, Wires, prepare
 from batch.campaigns.output import sidecar_path
 from batch.campaigns.performing import perform

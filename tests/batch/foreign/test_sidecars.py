@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import batch
+from batch.beds.case_result import check_head
 from batch.beds.executor import OnBeds, Ports
-from batch.beds.made import check_head
 from batch.campaigns import shard
 from batch.campaigns.folder import Folder
 from batch.executors import job

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.beds.made import check_head
+from batch.beds.case_result import check_head
 from hw import records
 from met.frozen import frozen
 

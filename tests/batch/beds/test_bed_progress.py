@@ -11,10 +11,10 @@ import pytest
 
 import batch
 import ic
+from batch.beds.bed_progress import BedProgress, timing_lines, timings
+from batch.beds.bed_progress import sidecar_entries as written_beside
+from batch.beds.campaign_records import CaseRecords
 from batch.beds.executor import Driving, OnBeds, Ports
-from batch.beds.known import CaseRecords
-from batch.beds.telling import BedProgress, timing_lines, timings
-from batch.beds.telling import sidecar_entries as written_beside
 from batch.campaigns.folder import Folder
 from batch.terminal.progress import Bar
 from hw import records
