@@ -1,4 +1,5 @@
-"""The commands of `met bed`: `run`, whose cases are driven one after another, and those that come before it.
+"""The commands of `met bed`. `run` drives the cases of a run or sweep, one after another; the others come before it or
+after a fault.
 
     running           `met bed run`
     executor          carries out a campaign's tasks, each case in a process of its own (hw/case.py)
