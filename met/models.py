@@ -151,6 +151,8 @@ def available(kind: Kind) -> dict[str, Any]:
         _check_units(model, found_at)
         if kind == "bed":
             _check_bed(model, found_at)
+        if kind == "law":
+            _check_law(model, found_at)
         if model.name in found and found[model.name] is not model:
             message = f"{found_at} offers {kind} `{model.name}`, which exists already"
             raise Problem(error("E215", message, help="give the model another name"))
@@ -214,6 +216,19 @@ def _check_bed(model: Any, found_at: str) -> None:
     if wrong is not None:
         message, help = wrong
         raise Problem(error("E215", f"{found_at} {message}", help=help))
+
+
+def _check_law(model: Any, found_at: str) -> None:
+    """A law declares the parameters that its observer, and a balance with friction, read by name."""
+    from met.substitution.law import BAND, OBSERVER
+
+    needed = [(each, "with an observer") for each in OBSERVER if model.observer]
+    needed += [(BAND, "of full balance")] if model.balance == "full" else []
+    for parameter, kind in needed:
+        if all(each.name != parameter.name for each in model.parameters):
+            message = f"{found_at} declares no parameter `{parameter.name}`, which every law {kind} has"
+            help = f"`{parameter.name}`, {parameter.unit}: {parameter.doc}"
+            raise Problem(error("E215", message, help=help))
 
 
 def find(kind: Kind, name: str, place: Place | None = None) -> Any:

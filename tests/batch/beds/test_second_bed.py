@@ -22,7 +22,7 @@ from hw.ports import Opening, Port
 from met import cli, models
 from met.diagnostic import Problem
 from met.parameter import Memory, Parameter
-from met.substitution import BEDS
+from met.substitution import BEDS, LAWS
 from met.substitution.bed import PARAMETERS, SIMULATION_PARAMETERS, check
 
 PACKAGE = Path(__file__).parents[2] / "plugin"
@@ -205,6 +205,19 @@ def test_a_bed_model_that_lacks_a_parameter_is_refused_by_its_name(
     )
 
 
+@pytest.mark.parametrize(
+    ("lacking", "whose"),
+    [("torque_noise", "with an observer"), ("drift", "with an observer"), ("band", "of full balance")],
+)
+def test_a_law_that_lacks_a_parameter_is_refused_by_its_name(
+    lacking: str, whose: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    law = next(law for law in LAWS if law.name == "torque_balance_observer")
+    left = tuple(each for each in law.parameters if each.name != lacking)
+    message, _ = refused(replace(law, name="mine", parameters=left), monkeypatch, kind="law")
+    assert message == f"declares no parameter `{lacking}`, which every law {whose} has"
+
+
 def changed(name: str, **fields: Any) -> Any:
     parameters = tuple(replace(each, **fields) if each.name == name else each for each in BEDS[0].parameters)
     return replace(BEDS[0], name="mine", parameters=parameters)
@@ -230,13 +243,13 @@ def test_a_bed_model_whose_declaration_is_unsound_is_refused(
     assert refused(model, monkeypatch)[0] == message
 
 
-def refused(model: Any, monkeypatch: pytest.MonkeyPatch) -> tuple[str, tuple[str, ...]]:
-    """Message, after the entry point, and help of the refusal of a bed model that another package offers."""
-    offered(monkeypatch, models, "met.beds", model)
+def refused(model: Any, monkeypatch: pytest.MonkeyPatch, kind: models.Kind = "bed") -> tuple[str, tuple[str, ...]]:
+    """Message, after the entry point, and help of the refusal of a model that another package offers."""
+    offered(monkeypatch, models, f"met.{kind}s", model)
     with pytest.raises(Problem) as caught:
-        models.available.__wrapped__("bed")
+        models.available.__wrapped__(kind)
     [diagnostic] = caught.value.diagnostics
-    head = "entry point `mine = my_bed:THIS` of my-bed-0 in group `met.beds` "
+    head = f"entry point `mine = my_bed:THIS` of my-bed-0 in group `met.{kind}s` "
     assert diagnostic.code == "E215" and diagnostic.message.startswith(head)
     return diagnostic.message.removeprefix(head), tuple(diagnostic.help)
 
