@@ -82,18 +82,18 @@ def run(
     from batch.campaigns.campaign import prepare
     from batch.campaigns.performing import perform
     from batch.executors.choose import choose
-    from batch.export import straight
+    from batch.export import from_run
 
-    archive, target = straight.parted(output)
+    archive, target = from_run.parted(output)
     chosen = executor or choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
     campaign = prepare(
         _plan(plan), output=archive, experiments=experiments, cases=cases, histories=histories, float32=float32
     )
     if target is not None:
-        straight.check(campaign, target, histories=histories != "default")
+        from_run.check(campaign, target, histories=histories != "default")
     performed = perform(campaign, executor=chosen, fresh=fresh, max_failures=max_failures, progress=progress)
     if target is not None:
-        straight.written(campaign, target, histories=histories != "default")
+        from_run.written(campaign, target, histories=histories != "default")
     return look(campaign.output, (*campaign.notes, *performed.notes))
 
 

@@ -103,6 +103,11 @@ class Campaign:
         return sum(len(part.rows) for part in self.parts)
 
     @property
+    def asked(self) -> list[str]:
+        """The runs and sweeps, by the names by which they were asked for, each once."""
+        return list(dict.fromkeys(part.experiment.name_in_deck for part in self.parts))
+
+    @property
     def bytes(self) -> int:
         """About the size of the archive."""
         return sum(part.bytes for part in self.parts)

@@ -16,7 +16,7 @@ import numpy as np
 
 from batch.archive.sink import Busy, Sink, temporary_of
 from batch.campaigns.folder import Folder, beside
-from batch.export import FORMATS
+from batch.export.formats import format_of
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem, error
 from met.host.files import new_file
@@ -81,7 +81,7 @@ def _check_output(output: Path, plan: Plan) -> None:
             archive = quoted(folder.with_name(folder.name.removesuffix(".campaign")))
             remedy = f"what it fills is called {archive}: `-o {archive}`"
             raise Problem(error("E305", f"cannot write {output}: {folder} is a campaign's folder", help=remedy))
-    if output.suffix.lower().removeprefix(".") in FORMATS:
+    if format_of(output):
         remedy = f"`-o {quoted(output.with_suffix('.h5'))}`; `met run DECK -o {quoted(output)}` writes both"
         raise Problem(error("E305", f"cannot write {output}: it is to be an archive, which ends in .h5", help=remedy))
     for target in (output, sidecar_path(output)) if output.name else (output,):  # the name of . and / is empty

@@ -11,16 +11,24 @@ from met.messages.visible import line, say
 @click.command(short_help="Say what changed between two archives, case by case.")
 @click.argument("a", metavar="A.h5")
 @click.argument("b", metavar="B.h5")
-@click.option("--tol", "tolerances", multiple=True, metavar="LIST", help="How much may differ: qd=1e-6rad/s,rel=1e-9,"
-              "time=1ms; may be repeated. Nothing may, unless it is given.")  # fmt: skip
-@click.option("--require", type=click.Choice(["identical", "equivalent"]), default="equivalent", show_default=True,
-              help="What is asked for.")  # fmt: skip
+@click.option(
+    "--tol",
+    "tolerances",
+    multiple=True,
+    metavar="LIST",
+    help="How much may differ: qd=1e-6rad/s,rel=1e-9,time=1ms; may be repeated. Nothing may, unless it is given.",
+)
+@click.option(
+    "--require",
+    type=click.Choice(["identical", "equivalent"]),
+    default="equivalent",
+    show_default=True,
+    help="What is asked for.",
+)
 @click.option("--distributions", is_flag=True, help="Compare metrics as distributions too, as where seeds differ.")
 @click.option("--all", "every", is_flag=True, help="Show all that is found, not the first of each kind alone.")
 @format_option
-def diff(
-    a: str, b: str, tolerances: tuple[str, ...], require: str, distributions: bool, every: bool, form: str
-) -> int:  # fmt: skip
+def diff(a: str, b: str, tolerances: tuple[str, ...], require: str, distributions: bool, every: bool, form: str) -> int:
     """Compare two campaigns: one case or a million, of two versions of a deck, of its models, or of MET.
 
     Cases are matched by what is varied in them. First what made the two: the decks' lines, what they change and what

@@ -6,34 +6,60 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from batch.export.formats import FORMATS
 from met.cli import YES, format_option, loudness_options
 from met.messages.visible import say
 
 if TYPE_CHECKING:
-    from batch.export import Rows
+    from batch.export.formats import Rows
 
 
 @click.command(short_help="Write an archive for Foxglove (MCAP), or as a table (CSV, Parquet).")
 @click.argument("archive", metavar="ARCHIVE")
 @click.option("-o", "--output", metavar="FILE", help="The file; its ending says the format [ARCHIVE.mcap].")
-@click.option("--to", "kind", type=click.Choice(["mcap", "csv", "parquet"]), help="The format, for any name.")
+@click.option("--to", "kind", type=click.Choice(list(FORMATS)), help="The format, for any name.")
 @click.option("--run", "runs", multiple=True, metavar="NAME", help="This run or sweep [the first]; may be repeated.")
-@click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'; "
-              "may be repeated, and the first is then drawn solid.")  # fmt: skip
+@click.option(
+    "--case",
+    "cases",
+    multiple=True,
+    metavar="ID",
+    help="Only this case: the beginning of its id, or '#0'; may be repeated, and the first is then drawn solid.",
+)
 @click.option("--signals", multiple=True, metavar="LIST", help="Only these: qd,elbow.q; may be repeated [all].")
-@click.option("--histories/--metrics", "histories", default=None, help="Of a table, a row an instant or a row a case "
-              "[a case of a sweep; an instant where --case or --signals is given].")  # fmt: skip
-@click.option("--units", type=click.Choice(["si", "deck"]), default="si", show_default=True, help="Of a table: metrics "
-              "and what is varied in SI, or as the deck writes them; signals are in SI.")  # fmt: skip
+@click.option(
+    "--histories/--metrics",
+    "histories",
+    default=None,
+    help="Of a table, a row an instant or a row a case "
+    "[a case of a sweep; an instant where --case or --signals is given].",
+)
+@click.option(
+    "--units",
+    type=click.Choice(["si", "deck"]),
+    default="si",
+    show_default=True,
+    help="Of a table: metrics and what is varied in SI, or as the deck writes them; signals are in SI.",
+)
 @click.option("--layout", is_flag=True, help="Also write how Foxglove shows it, in FILE.layout.json.")
 @click.option("--force", is_flag=True, help="Write over a file that is there, whatever it is.")
 @format_option
 @loudness_options
 def export(
-    archive: str, output: str | None, kind: str | None, runs: tuple[str, ...], cases: tuple[str, ...],
-    signals: tuple[str, ...], histories: bool | None, units: Literal["si", "deck"], layout: bool, force: bool,
-    form: str, quiet: bool, verbose: bool,
-) -> int:  # fmt: skip
+    archive: str,
+    output: str | None,
+    kind: str | None,
+    runs: tuple[str, ...],
+    cases: tuple[str, ...],
+    signals: tuple[str, ...],
+    histories: bool | None,
+    units: Literal["si", "deck"],
+    layout: bool,
+    force: bool,
+    form: str,
+    quiet: bool,
+    verbose: bool,
+) -> int:
     """Write an archive for other tools.
 
     MCAP opens in Foxglove and Lichtblick: the arm moves in 3D, without a URDF, beside its signals and what was said of
@@ -42,18 +68,28 @@ def export(
     """
     import json
 
-    from batch.export import export, what
+    from batch.export import export, summary
     from ic.printing.columns import size
 
     names = [name.strip() for each in signals for name in each.split(",") if name.strip()]
     table: Rows | None = None if histories is None else "histories" if histories else "metrics"
-    done = export(archive, output, form=kind, runs=runs, cases=cases, signals=names, table=table, units=units,
-                  layout=layout, force=force)  # fmt: skip
+    done = export(
+        archive,
+        output,
+        form=kind,
+        runs=runs,
+        cases=cases,
+        signals=names,
+        table=table,
+        units=units,
+        layout=layout,
+        force=force,
+    )
     written = [path for path in (done.path, done.layout) if path is not None]
     if form == "json":
         told = {"written": [str(path) for path in written], "cases": done.cases, "rows": done.rows, "table": done.table}
         click.echo(json.dumps(told, indent=1))
     elif not quiet:
         for path in written:
-            say(f"{path}  ({size(path.stat().st_size)}){what(done) if path == done.path else ''}")
+            say(f"{path}  ({size(path.stat().st_size)}){summary(done) if path == done.path else ''}")
     return YES

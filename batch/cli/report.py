@@ -13,14 +13,25 @@ from met.messages.visible import say
 @click.option("-o", "--output", metavar="FILE", help="The page [ARCHIVE.html].")
 @click.option("--run", "experiments", multiple=True, metavar="NAME", help="Only this run or sweep of the archive.")
 @click.option("--against", metavar="BEFORE.h5", help="An earlier archive: the page says what changed since.")
-@click.option("--tol", "tolerances", multiple=True, metavar="LIST", help="How much may differ from it, as `met diff` "
-              "has it: qd=1e-6rad/s,rel=1e-9,time=1ms; may be repeated.")  # fmt: skip
+@click.option(
+    "--tol",
+    "tolerances",
+    multiple=True,
+    metavar="LIST",
+    help="How much may differ from it, as `met diff` has it: qd=1e-6rad/s,rel=1e-9,time=1ms; may be repeated.",
+)
 @click.option("--title", default="", metavar="TEXT", help="What stands above it [names of deck, runs and sweeps].")
 @loudness_options
 def report(
-    archive: str, output: str | None, experiments: tuple[str, ...], against: str | None, tolerances: tuple[str, ...],
-    title: str, quiet: bool, verbose: bool,
-) -> int:  # fmt: skip
+    archive: str,
+    output: str | None,
+    experiments: tuple[str, ...],
+    against: str | None,
+    tolerances: tuple[str, ...],
+    title: str,
+    quiet: bool,
+    verbose: bool,
+) -> int:
     """Write what an archive holds as one page: verdict, cases, worst cases, signals, parameters and where they come
     from.
 

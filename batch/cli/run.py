@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from batch.export.formats import endings
 from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
 from met.messages.visible import line, say
 
@@ -50,22 +51,38 @@ def measured(value: Any, si: str) -> float:
 @click.command(short_help="Run the cases of a deck or a plan into an archive.")
 @click.argument("source", metavar="DECK|PLAN.json|ARCHIVE.h5")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
-@click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck; all cases of "
-              "an archive.")  # fmt: skip
-@click.option("-o", "--output", metavar="FILE", help="The archive [DECK.h5, or DECK.NAME.h5, in this folder]; "
-              "FILE.mcap, .csv or .parquet: FILE.h5, and an export of it.")  # fmt: skip
+@click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck; all cases of an archive.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    help="The archive [DECK.h5, or DECK.NAME.h5, in this folder]; "
+    f"FILE{endings(' or ')}: FILE.h5, and an export of it.",
+)
 @click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'.")
 @click.option("--failed", is_flag=True, help="Of an archive: run the cases again that did not reach their end.")
-@click.option("--histories", multiple=True, metavar="WHICH",
-              help="Whose signals to keep besides metrics: all, none, every:N, failed, worst:N:METRIC, or a case; "
-              "several together. [all, while the archive stays below 1 GiB]")  # fmt: skip
+@click.option(
+    "--histories",
+    multiple=True,
+    metavar="WHICH",
+    help="Whose signals to keep besides metrics: all, none, every:N, failed, worst:N:METRIC, or a case; "
+    "several together. [all, while the archive stays below 1 GiB]",
+)
 @click.option("--float32", is_flag=True, help="Keep signals as numbers of four bytes.")
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads, of each process [one a core].")
-@click.option("--processes", type=click.IntRange(min=1), metavar="N", help="Run in N processes: a case that kills its "
-              "process is found out, and the others are done.")  # fmt: skip
+@click.option(
+    "--processes",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Run in N processes: a case that kills its process is found out, and the others are done.",
+)
 @click.option("--dask", metavar="ADDRESS", help="Run on the workers of this Dask scheduler, or of a `local` one.")
-@click.option("--timeout", type=SECONDS, metavar="TIME", help="Give up a case that makes no progress for so long "
-              "(`90 s`, `5 min`); in processes.")  # fmt: skip
+@click.option(
+    "--timeout",
+    type=SECONDS,
+    metavar="TIME",
+    help="Give up a case that makes no progress for so long (`90 s`, `5 min`); in processes.",
+)
 @click.option("--max-failures", type=click.IntRange(min=0), metavar="N", help="Stop when more cases have failed.")
 @click.option("--fresh", is_flag=True, help="Start over, rather than run what is missing.")
 @click.option("--no-picture", is_flag=True, help="Draw no picture beside the archive.")
@@ -98,8 +115,13 @@ def run(source: str, names: tuple[str, ...], form: str, **options: Any) -> int:
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @click.option("--slurm", is_flag=True, required=True, help="To SLURM, by sbatch: a job array, and a job that merges.")
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Jobs of the array [16].")
-@click.option("--sbatch", "options", multiple=True, metavar="WORD", help="A further word for sbatch, such as "
-              "--partition=long; may be repeated.")  # fmt: skip
+@click.option(
+    "--sbatch",
+    "options",
+    multiple=True,
+    metavar="WORD",
+    help="A further word for sbatch, such as --partition=long; may be repeated.",
+)
 @click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck.")
 @click.option("-o", "--output", metavar="FILE", help="The archive [as `met run` calls it].")
 @click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'.")

@@ -20,15 +20,27 @@ if TYPE_CHECKING:
 @click.option("--run", "experiments", multiple=True, metavar="NAME", help="Only this run or sweep of the archive.")
 @click.option("--case", metavar="ID", help="All about this case alone: the beginning of its id, or '#0'.")
 @click.option("--all-cases", is_flag=True, help="All rows of the table of cases, not the first 20 alone.")
-@click.option("--sort", multiple=True, metavar="NAME", help="Cases by this metric or varied parameter, smallest first; "
-              "NAME:largest: largest first. Repeated: equal ones by the next.")  # fmt: skip
+@click.option(
+    "--sort",
+    multiple=True,
+    metavar="NAME",
+    help="Cases by this metric or varied parameter, smallest first; "
+    "NAME:largest: largest first. Repeated: equal ones by the next.",
+)
 @click.option("--reverse", is_flag=True, help="Of --sort: largest first, by each NAME that does not say it itself.")
 @click.option("--no-plots", is_flag=True, help="Numbers only.")
 @format_option
 def show(
-    archive: str, signals: tuple[str, ...], experiments: tuple[str, ...], case: str | None, all_cases: bool,
-    sort: tuple[str, ...], reverse: bool, no_plots: bool, form: str,
-) -> int:  # fmt: skip
+    archive: str,
+    signals: tuple[str, ...],
+    experiments: tuple[str, ...],
+    case: str | None,
+    all_cases: bool,
+    sort: tuple[str, ...],
+    reverse: bool,
+    no_plots: bool,
+    form: str,
+) -> int:
     """Show what an archive holds: what was run, how it went, metrics, requirements, and SIGNALs (`qd`, `elbow.q`).
 
     Of a sweep, also which cases failed or missed a requirement, worst first, or by what --sort names.
@@ -53,9 +65,16 @@ def show(
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
         colour = wants_colour(sys.stdout)
         text = show(
-            file, signals, experiments=experiments, case=case, all_cases=all_cases, by=by, width=width, colour=colour,
+            file,
+            signals,
+            experiments=experiments,
+            case=case,
+            all_cases=all_cases,
+            by=by,
+            width=width,
+            colour=colour,
             plots=not no_plots,
-        )  # fmt: skip
+        )
         click.echo(text, nl=False, color=colour)  # made visible where it was made, but for our own colours
     return YES
 
@@ -66,9 +85,13 @@ def show(
 @deck_options
 @format_option
 def profile(
-    source: str, names: tuple[str, ...], defines: tuple[str, ...], include_dirs: tuple[str, ...],
-    settings: tuple[str, ...], form: str,
-) -> int:  # fmt: skip
+    source: str,
+    names: tuple[str, ...],
+    defines: tuple[str, ...],
+    include_dirs: tuple[str, ...],
+    settings: tuple[str, ...],
+    form: str,
+) -> int:
     """Measure the kernel of a deck's only run or sweep, of the one marked `default`, or of these NAMEs, on one core.
 
     Operations, flops and time of each part of a step, the share of what the core can do, what is folded into the code
@@ -89,9 +112,13 @@ def profile(
 @deck_options
 @format_option
 def margin(
-    source: str, names: tuple[str, ...], defines: tuple[str, ...], include_dirs: tuple[str, ...],
-    settings: tuple[str, ...], form: str,
-) -> int:  # fmt: skip
+    source: str,
+    names: tuple[str, ...],
+    defines: tuple[str, ...],
+    include_dirs: tuple[str, ...],
+    settings: tuple[str, ...],
+    form: str,
+) -> int:
     """Predict, for each joint whose motor is on a bed, how heavy the arm may be for its law, rate and delay.
 
     The loop of bed, servo and law is taken round once by the functions that run it, and its eigenvalues are looked at.
@@ -112,9 +139,13 @@ def margin(
 
 
 def _asked_for(
-    source: str, names: tuple[str, ...], defines: tuple[str, ...], include_dirs: tuple[str, ...],
-    settings: tuple[str, ...], form: str,
-) -> Sequence[Experiment]:  # fmt: skip
+    source: str,
+    names: tuple[str, ...],
+    defines: tuple[str, ...],
+    include_dirs: tuple[str, ...],
+    settings: tuple[str, ...],
+    form: str,
+) -> Sequence[Experiment]:
     """The runs and sweeps of a deck or plan that a command is asked about; what the compiler says goes to people."""
     from batch.campaigns.choosing import experiments_named
     from batch.terminal.running import read_plan

@@ -20,9 +20,10 @@ from pathlib import Path
 import numpy as np
 
 from batch.archive.read import ArchiveFile
-from batch.export.cases import Field, Table, of_varied, value_of, varied
+from batch.export.case_table import CaseTable, TableColumn, of_varied, value_of, varied
+from batch.export.formats import ExportFormat, Request, Written
 from batch.export.output import whole
-from batch.export.picking import Case, Column
+from batch.export.picking import ExportedCase, SignalColumn
 from met.messages.visible import line
 from met.version import VERSION
 
@@ -32,11 +33,6 @@ BEGINS = "=+-@\t\r\uff1d\uff0b\uff0d\uff20"
 
 NUMBER = re.compile("[0-9]+(e[0-9]+)?")
 """A case_id, of sixteen digits from 0 to f, that a reader takes for a number: one in a thousand is."""
-
-
-def own(path: Path) -> bool:
-    """Whether a file may be written over unasked: a table may have been worked on, so never."""
-    return False
 
 
 def word(text: str) -> str:
@@ -59,13 +55,14 @@ def _cell(text: str) -> str:
     return out.getvalue()
 
 
-def united(cases: Sequence[Case]) -> list[Column]:
+def united(cases: Sequence[ExportedCase]) -> list[SignalColumn]:
     """The columns of all the cases: those of one structure may lack some of another's."""
     return list({column.path: column for case in cases for column in case.columns}.values())
 
 
-def write(file: ArchiveFile, cases: Sequence[Case], output: Path, *, deck: bool = False) -> int:
-    """Write the cases' histories; the number of rows. deck: what is varied in the deck's units. Raises Problem E305."""
+def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, deck: bool = False) -> int:
+    """Write the cases' histories and return the number of rows. deck: varied parameters in the deck's units. Raises
+    Problem E305."""
     columns, groups = united(cases), list({case.group.name: case.group for case in cases}.values())
     runs = dict.fromkeys(case.asked for case in cases)
     fields = [of_varied(variable, deck=deck) for variable in varied(groups)]
@@ -87,8 +84,8 @@ def write(file: ArchiveFile, cases: Sequence[Case], output: Path, *, deck: bool 
     return sum(len(case.time) for case in cases)
 
 
-def write_cases(file: ArchiveFile, table: Table, output: Path) -> int:
-    """Write a table of cases; the number of rows. Raises Problem E305."""
+def write_cases(file: ArchiveFile, table: CaseTable, output: Path) -> int:
+    """Write a table of cases and return the number of its rows. Raises Problem E305."""
     with whole(output) as sink:
         sink.write(memoryview(_head(file, table.runs, [(field.name, field.unit) for field in table.fields])))
         for columns in table.blocks():
@@ -110,7 +107,7 @@ def _head(file: ArchiveFile, runs: Iterable[str], heads: Sequence[tuple[str, str
     return head.getvalue().encode("utf-8", "replace")
 
 
-def _column(field: Field, values: Sequence[object]) -> list[str]:
+def _column(field: TableColumn, values: Sequence[object]) -> list[str]:
     """The cells of a column; a case_id that reads as a number, such as 93556390810e0238, gets an apostrophe before
     it."""
     if field.variable == "case_id":
@@ -123,7 +120,7 @@ def _line(cells: Sequence[object]) -> list[str]:
     return [_cell(cell) if isinstance(cell, str) else "" if cell is None else repr(cell) for cell in cells]
 
 
-def _cells(case: Case, columns: Sequence[Column]) -> list[list[str]]:
+def _cells(case: ExportedCase, columns: Sequence[SignalColumn]) -> list[list[str]]:
     """The numbers of each column as texts; empty ones where the case has no such column."""
     mine = {column.path: column for column in case.columns}
     signals = {name: case.signal(name) for name in dict.fromkeys(column.variable for column in case.columns)}
@@ -140,3 +137,20 @@ def texts(values: np.ndarray) -> list[str]:
     if values.dtype == np.float32:
         return [str(value) for value in values]
     return list(map(repr, values.tolist()))
+
+
+class Csv(ExportFormat):
+    """Tables as text. None is overwritten unasked: somebody may have worked on it."""
+
+    title = "a CSV file"
+
+    def write_metrics(self, file: ArchiveFile, table: CaseTable, target: Path) -> Written:
+        return Written(write_cases(file, table, target))
+
+    def write_histories(
+        self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: Request
+    ) -> Written:
+        return Written(write(file, cases, target, deck=request.units == "deck"))
+
+
+FORMAT = Csv()

@@ -12,7 +12,7 @@ from typing import Any
 
 from batch.export import mcap, scene
 from batch.export.output import whole
-from batch.export.poses import Arm
+from batch.export.poses import PosedArm
 from batch.plotting.sheet import COLOURS
 from batch.queries.signals import pretty_unit
 
@@ -39,7 +39,7 @@ def write(output: Path, text: str) -> None:
         sink.write(memoryview(text.encode()))
 
 
-def text(arms: Sequence[Arm]) -> str:
+def text(arms: Sequence[PosedArm]) -> str:
     """The layout of an export of these arms."""
     known = mcap.signals(arms[0].case)
     signals = [name for name in PLOTTED if name in known] or list(known)[: len(PLOTTED)]
@@ -57,14 +57,21 @@ def text(arms: Sequence[Arm]) -> str:
     return json.dumps(layout, indent=1) + "\n"
 
 
-def _view(arms: Sequence[Arm]) -> dict[str, Any]:
+def _view(arms: Sequence[PosedArm]) -> dict[str, Any]:
     """The 3D panel: the whole arm from obliquely above, on a grid."""
     base, size = mcap.root(arms), scene.size(arms)
     return {
         "cameraState": {
-            "distance": DISTANCE * size, "perspective": True, "phi": 60, "thetaOffset": 45, "fovy": 45,
-            "target": [0, 0, 0], "targetOffset": [0, 0, 0], "targetOrientation": [0, 0, 0, 1],
-            "near": size / 100, "far": 100 * size,
+            "distance": DISTANCE * size,
+            "perspective": True,
+            "phi": 60,
+            "thetaOffset": 45,
+            "fovy": 45,
+            "target": [0, 0, 0],
+            "targetOffset": [0, 0, 0],
+            "targetOrientation": [0, 0, 0, 1],
+            "near": size / 100,
+            "far": 100 * size,
         },
         "followMode": "follow-pose",
         "followTf": base,
@@ -73,16 +80,26 @@ def _view(arms: Sequence[Arm]) -> dict[str, Any]:
         "topics": {mcap.topic(arm, "scene"): {"visible": True} for arm in arms},
         "layers": {
             "grid": {
-                "layerId": "foxglove.Grid", "instanceId": "grid", "label": "Grid", "visible": True, "frameId": base,
-                "frameLocked": True, "size": GRID * size, "divisions": 20, "lineWidth": 1, "color": "#8a939c55",
-                "position": [0, 0, 0], "rotation": [0, 0, 0], "order": 1,
+                "layerId": "foxglove.Grid",
+                "instanceId": "grid",
+                "label": "Grid",
+                "visible": True,
+                "frameId": base,
+                "frameLocked": True,
+                "size": GRID * size,
+                "divisions": 20,
+                "lineWidth": 1,
+                "color": "#8a939c55",
+                "position": [0, 0, 0],
+                "rotation": [0, 0, 0],
+                "order": 1,
             }
         },
         **_titled("arm"),
-    }  # fmt: skip
+    }
 
 
-def _plot(arms: Sequence[Arm], signal: str) -> dict[str, Any]:
+def _plot(arms: Sequence[PosedArm], signal: str) -> dict[str, Any]:
     """A signal over time: a line a joint or component, of each case."""
     paths, units = [], []
     for number, arm in enumerate(arms):
@@ -91,14 +108,22 @@ def _plot(arms: Sequence[Arm], signal: str) -> dict[str, Any]:
             field = ".".join(column.parts or ("value",))
             label = f"{arm.prefix.replace('/', ' ')}{'.'.join(column.parts)}".strip() or signal
             value = f"{mcap.topic(arm, signal)}.{field}"
-            paths.append({"value": value, "label": label, "color": colour, "enabled": True,
-                          "timestampMethod": "receiveTime"})  # fmt: skip
+            paths.append(
+                {"value": value, "label": label, "color": colour, "enabled": True, "timestampMethod": "receiveTime"}
+            )
             units.append("" if column.unit == "1" else pretty_unit(column.unit))
     told = f"{signal} ({', '.join(dict.fromkeys(units))})" if any(units) else signal
     return {
-        "paths": paths, "xAxisVal": "timestamp", "isSynced": True, "showXAxisLabels": True, "showYAxisLabels": True,
-        "showLegend": True, "legendDisplay": "floating", "showPlotValuesInLegend": False, **_titled(told),
-    }  # fmt: skip
+        "paths": paths,
+        "xAxisVal": "timestamp",
+        "isSynced": True,
+        "showXAxisLabels": True,
+        "showYAxisLabels": True,
+        "showLegend": True,
+        "legendDisplay": "floating",
+        "showPlotValuesInLegend": False,
+        **_titled(told),
+    }
 
 
 def _titled(title: str) -> dict[str, str]:

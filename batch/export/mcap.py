@@ -23,12 +23,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from batch.archive.read import ArchiveFile
+from batch.campaigns.campaign import Campaign
 from batch.campaigns.output import quoted
 from batch.export import scene, wire
-from batch.export.output import whole
-from batch.export.picking import Case, Column
-from batch.export.poses import Arm, arm_of
-from batch.export.said import Line, lines, result, varied
+from batch.export.case_log import LogLine, log_lines, result, varied
+from batch.export.formats import ExportFormat, Request, Written
+from batch.export.output import check, whole
+from batch.export.picking import ExportedCase, SignalColumn
+from batch.export.poses import PosedArm, arm_of
 from batch.export.wire import plain
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
@@ -58,14 +60,7 @@ Message = tuple[int, int, int, bytes]
 """Time, ns; the case and channel, by which messages of one time are ordered; content."""
 
 
-def own(path: Path) -> bool:
-    """Whether a file is an export of MET's, whole or in part."""
-    with open_regular(path) as file:
-        head = file.read(HEAD_BYTES)
-    return head.startswith(MAGIC) and ABOUT.encode() in head
-
-
-def arms(file: ArchiveFile, cases: Sequence[Case], *, named: bool) -> list[Arm]:
+def arms(file: ArchiveFile, cases: Sequence[ExportedCase], *, named: bool) -> list[PosedArm]:
     """The arms of the cases. named: whether the cases were asked for one by one. Raises Problem E370, E372,
     E376."""
     for case in cases:
@@ -74,8 +69,10 @@ def arms(file: ArchiveFile, cases: Sequence[Case], *, named: bool) -> list[Arm]:
             message = f"`{case.asked}` ends at {end:g} s: times of an MCAP file are below {LONGEST / SECOND:.3g} s"
             raise Problem(error("E376", message, help="`-o FILE.csv` has times of any length"))
     if len(cases) > OVERLAID and not named:
-        helps = (f"`--case '#{cases[0].number}' --case '#{cases[1].number}'` shows these over one another",
-                 f"`met show {quoted(file.path)}` lists the cases, the worst first")  # fmt: skip
+        helps = (
+            f"`--case '#{cases[0].number}' --case '#{cases[1].number}'` shows these over one another",
+            f"`met show {quoted(file.path)}` lists the cases, the worst first",
+        )
         raise Problem(too_many(len(cases), cases[0].asked, helps))
     plan = file.plan(as_written=True)
     one_run = len({case.asked for case in cases}) == 1
@@ -88,32 +85,32 @@ def too_many(cases: int, asked: str, helps: Sequence[str]) -> Diagnostic:
     return error("E372", f"{cases:,} cases of `{asked}` are too many to show over one another", help=helps)
 
 
-def root(arms: Sequence[Arm]) -> str:
+def root(arms: Sequence[PosedArm]) -> str:
     """The frame that nothing moves: the first of these names that is no link's."""
     taken = {arm.prefix + name for arm in arms for name in arm.poses}
     names = itertools.chain(("world", "base", "ground"), (f"world_{number}" for number in itertools.count(2)))
     return next(name for name in names if name not in taken)
 
 
-def topic(arm: Arm, name: str) -> str:
+def topic(arm: PosedArm, name: str) -> str:
     """The topic of a signal, in which dots would be taken for fields: `/case7/elbow/servo/voltage`."""
     return f"/{arm.prefix}{name.replace('.', '/')}"
 
 
-def fields(columns: Sequence[Column]) -> tuple[wire.Field, ...]:
+def fields(columns: Sequence[SignalColumn]) -> tuple[wire.MessageField, ...]:
     """The fields of a signal's messages: joints, components, or `value`."""
     return wire.tree([column.parts or ("value",) for column in columns])
 
 
-def signals(case: Case) -> dict[str, list[Column]]:
+def signals(case: ExportedCase) -> dict[str, list[SignalColumn]]:
     """The columns of a case, by signal."""
-    out: dict[str, list[Column]] = {}
+    out: dict[str, list[SignalColumn]] = {}
     for column in case.columns:
         out.setdefault(column.variable, []).append(column)
     return out
 
 
-def write(file: ArchiveFile, arms: Sequence[Arm], output: Path) -> int:
+def write(file: ArchiveFile, arms: Sequence[PosedArm], output: Path) -> int:
     """Write the cases of these arms; the number of their rows. Raises Problem E305."""
     from mcap.writer import Writer
 
@@ -130,7 +127,7 @@ def write(file: ArchiveFile, arms: Sequence[Arm], output: Path) -> int:
     return sum(len(arm.case.time) for arm in arms)
 
 
-def _about(writer: Writer, file: ArchiveFile, arms: Sequence[Arm]) -> None:
+def _about(writer: Writer, file: ArchiveFile, arms: Sequence[PosedArm]) -> None:
     """What made the file, before all else: by it a later export knows that it may write over it."""
     told = {
         "archive": file.path.name,
@@ -143,10 +140,16 @@ def _about(writer: Writer, file: ArchiveFile, arms: Sequence[Arm]) -> None:
     writer.add_metadata(ABOUT, {plain(name): plain(value) for name, value in told.items()})
     for arm in arms:
         case, group = arm.case, arm.case.group
-        keys = {name: str(group.at(name, [case.position])[0]) for name in ("case_id", "case_key")
-                if name in group.variables}  # fmt: skip
-        data = {"prefix": arm.prefix, "run": case.asked, "case": str(case.number), **keys,
-                **{f"varied.{path}": value for path, value in varied(case).items()}}  # fmt: skip
+        keys = {
+            name: str(group.at(name, [case.position])[0]) for name in ("case_id", "case_key") if name in group.variables
+        }
+        data = {
+            "prefix": arm.prefix,
+            "run": case.asked,
+            "case": str(case.number),
+            **keys,
+            **{f"varied.{path}": value for path, value in varied(case).items()},
+        }
         writer.add_metadata("met.case", {plain(name): plain(value) for name, value in data.items()})
     for name, text in file.sources().items():
         writer.add_attachment(0, 0, plain(name), "text/plain", plain(text).encode())
@@ -158,7 +161,7 @@ class Channels:
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
         self._schemas: dict[tuple[str, bytes], int] = {}
-        self._described: dict[tuple[str, tuple[wire.Field, ...]], tuple[str, bytes]] = {}
+        self._described: dict[tuple[str, tuple[wire.MessageField, ...]], tuple[str, bytes]] = {}
         self._topics: dict[str, int] = {}
 
     def foxglove(self, topic: str, kind: Any) -> int:
@@ -168,7 +171,7 @@ class Channels:
         data = build_file_descriptor_set(kind).SerializeToString(deterministic=True)
         return self._channel(topic, kind.DESCRIPTOR.full_name, data, {})
 
-    def own(self, topic: str, name: str, fields: tuple[wire.Field, ...], told: dict[str, str]) -> int:
+    def own(self, topic: str, name: str, fields: tuple[wire.MessageField, ...], told: dict[str, str]) -> int:
         """The channel of messages of our own. told: of the channel, such as units."""
         if (name, fields) not in self._described:
             used = {known.removeprefix(f"{wire.PACKAGE}.") for known, _ in self._described.values()}
@@ -192,11 +195,11 @@ class Stream:
     """A signal's messages to be made. values: its numbers, (row, column)."""
 
     channel: int
-    fields: tuple[wire.Field, ...]
+    fields: tuple[wire.MessageField, ...]
     values: np.ndarray
 
 
-def _messages(channels: Channels, arms: Sequence[Arm], number: int) -> Iterator[Message]:
+def _messages(channels: Channels, arms: Sequence[PosedArm], number: int) -> Iterator[Message]:
     """The messages of a case, in the order of their times."""
     from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
     from foxglove_schemas_protobuf.Log_pb2 import Log
@@ -208,7 +211,7 @@ def _messages(channels: Channels, arms: Sequence[Arm], number: int) -> Iterator[
     drawn = channels.foxglove(topic(arm, "scene"), SceneUpdate)
     log = channels.foxglove("/log", Log)
     streams = [_stream(channels, arm, name, columns) for name, columns in signals(case).items()]
-    said = lines(case)
+    said = log_lines(case)
     update = scene.scene(arm, base, number > 0, scene.size(arms))
     yield 0, number, drawn, update.SerializeToString(deterministic=True)
     yield from ((0, number, log, _log(case, arm, line)) for line in said if line.time == 0.0)
@@ -228,7 +231,7 @@ def _messages(channels: Channels, arms: Sequence[Arm], number: int) -> Iterator[
     yield _ns(said[-1].time), number, channel, wire.message(parts, data)
 
 
-def _stream(channels: Channels, arm: Arm, name: str, columns: Sequence[Column]) -> Stream:
+def _stream(channels: Channels, arm: PosedArm, name: str, columns: Sequence[SignalColumn]) -> Stream:
     values = arm.case.signal(name)[:, [column.place for column in columns]]
     parts = fields(columns)
     units = {".".join(column.parts or ("value",)): column.unit for column in columns}
@@ -238,7 +241,7 @@ def _stream(channels: Channels, arm: Arm, name: str, columns: Sequence[Column]) 
     return Stream(channel, parts, values)
 
 
-def _transforms(arm: Arm, base: str, times: Sequence[int], here: slice) -> list[bytes]:
+def _transforms(arm: PosedArm, base: str, times: Sequence[int], here: slice) -> list[bytes]:
     """The frames of all links at some rows."""
     from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
     from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -266,7 +269,7 @@ def _transforms(arm: Arm, base: str, times: Sequence[int], here: slice) -> list[
     return out
 
 
-def _log(case: Case, arm: Arm, line: Line) -> bytes:
+def _log(case: ExportedCase, arm: PosedArm, line: LogLine) -> bytes:
     from foxglove_schemas_protobuf.Log_pb2 import Log
 
     name = arm.prefix.rstrip("/") or case.asked
@@ -290,3 +293,64 @@ def _stamp(time: int) -> Any:
     from google.protobuf.timestamp_pb2 import Timestamp
 
     return Timestamp(seconds=time // SECOND, nanos=time % SECOND)
+
+
+def _check_positions(campaign: Campaign, target: Path) -> None:
+    """Refuse a campaign that does not record q of every joint, without which no arm can be shown. Raises Problem
+    E370."""
+    for part in campaign.parts:
+        structure = part.experiment.structure
+        recorded = {channel for each in structure.record for channel in each.channels}
+        lacking = [f"{joint.name}.q" for joint in structure.moving if f"{joint.name}.q" not in recorded]
+        if part.recorded and lacking:
+            which = "q" if len(lacking) == len(structure.moving) else ", ".join(lacking)
+            message = f"the arm of `{part.experiment.name_in_deck}` could not be shown in {target}: {which} is not recorded"
+            helps = (
+                "`record = [q, ...]` in the run keeps where its joints are",
+                f"`-o {quoted(target.with_suffix('.csv'))}` needs no positions",
+            )
+            raise Problem(error("E370", message, help=helps))
+
+
+class Mcap(ExportFormat):
+    """Histories for Foxglove and Lichtblick, and a layout beside them."""
+
+    title = "an MCAP file"
+    tables = ("histories",)
+    options = ("layout",)
+    metrics_in = "in an MCAP file they are in `/result`"
+
+    def is_own(self, path: Path) -> bool:
+        """Return True where a file is an export of MET's, whole or in part."""
+        with open_regular(path) as file:
+            head = file.read(HEAD_BYTES)
+        return head.startswith(MAGIC) and ABOUT.encode() in head
+
+    def check_campaign(self, campaign: Campaign, target: Path) -> None:
+        """Refuse what cannot be shown: positions that are not recorded, too many cases. Raises Problem E370, E372."""
+        _check_positions(campaign, target)
+        kept = sum(len(part.kept) for part in campaign.parts)
+        if kept > OVERLAID:
+            archive = quoted(target.with_suffix(".h5"))
+            helps = (
+                "`--case '#0'` runs one alone, and `--histories '#0'` keeps the signals of one",
+                f"or run all, and choose then: `-o {archive}`, `met export {archive} --case '#0'`",
+            )
+            raise Problem(too_many(kept, ", ".join(campaign.asked), helps))
+
+    def write_histories(
+        self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: Request
+    ) -> Written:
+        from batch.export import layout
+
+        shown = arms(file, cases, named=request.named)
+        if not request.layout:
+            return Written(write(file, shown, target))
+        text, beside = layout.text(shown), layout.beside(target)
+        check(beside, file.path, lambda path: path.read_text("utf-8", "replace") == text, force=request.force)
+        rows = write(file, shown, target)
+        layout.write(beside, text)
+        return Written(rows, beside)
+
+
+FORMAT = Mcap()

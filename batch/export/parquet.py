@@ -17,10 +17,12 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile
 from batch.archive.sink import temporary_of
-from batch.export.cases import Field, Table, of_varied, value_of, varied
+from batch.campaigns.campaign import Campaign
+from batch.export.case_table import CaseTable, TableColumn, of_varied, value_of, varied
 from batch.export.csv import united
+from batch.export.formats import ExportFormat, Request, Written
 from batch.export.output import whole
-from batch.export.picking import Case, Column
+from batch.export.picking import ExportedCase, SignalColumn
 from met.diagnostic import Problem, error
 from met.host.files import open_regular
 from met.version import VERSION
@@ -32,21 +34,9 @@ GROUP_ROWS = 100_000
 """Rows of a row group, about: those of whole cases."""
 
 
-def own(path: Path) -> bool:
-    """Whether a file is an export of MET's: its last bytes describe it."""
-    with open_regular(path) as file:
-        size = file.seek(0, 2)
-        file.seek(max(0, size - 8))
-        end = file.read()
-        if end[4:] != MAGIC:
-            return False
-        file.seek(max(0, size - 8 - int.from_bytes(end[:4], "little")))
-        return ABOUT.encode() in file.read()
-
-
-def write(file: ArchiveFile, cases: Sequence[Case], output: Path, *, deck: bool = False) -> int:
-    """Write the cases' histories; the number of rows. deck: what is varied in the deck's units. Raises Problem E305,
-    and E373 where there is no pyarrow."""
+def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, deck: bool = False) -> int:
+    """Write the cases' histories and return the number of rows. deck: varied parameters in the deck's units. Raises
+    Problem E305, and E373 where there is no pyarrow."""
     arrow, parquet = pyarrow_here()
     columns, runs = united(cases), dict.fromkeys(case.asked for case in cases)
     fields = [of_varied(variable, deck=deck) for variable in varied([case.group for case in _one_each(cases)])]
@@ -65,8 +55,8 @@ def write(file: ArchiveFile, cases: Sequence[Case], output: Path, *, deck: bool 
     return sum(len(case.time) for case in cases)
 
 
-def write_cases(file: ArchiveFile, table: Table, output: Path) -> int:
-    """Write a table of cases; the number of rows. Raises Problem E305, E373."""
+def write_cases(file: ArchiveFile, table: CaseTable, output: Path) -> int:
+    """Write a table of cases and return the number of its rows. Raises Problem E305, E373."""
     arrow, parquet = pyarrow_here()
     kinds = {"float": arrow.float64(), "int": arrow.int64(), "str": arrow.string()}
     fields = [arrow.field(each.name, kinds[each.kind], metadata=_told(each.unit, each.about)) for each in table.fields]
@@ -81,8 +71,13 @@ def write_cases(file: ArchiveFile, table: Table, output: Path) -> int:
 
 
 def _about(file: ArchiveFile, runs: Iterable[str]) -> dict[str, str]:
-    told = {"archive": file.path.name, "deck": file.deck, "runs": list(runs), "met": VERSION,
-            "provenance": file.provenance}  # fmt: skip
+    told = {
+        "archive": file.path.name,
+        "deck": file.deck,
+        "runs": list(runs),
+        "met": VERSION,
+        "provenance": file.provenance,
+    }
     return {ABOUT: json.dumps(told)}
 
 
@@ -98,10 +93,16 @@ def pyarrow_here() -> tuple[Any, Any]:
     return pyarrow, parquet
 
 
-def _schema(arrow: Any, cases: Sequence[Case], alike: Sequence[Field], columns: Sequence[Column]) -> Any:
+def _schema(
+    arrow: Any, cases: Sequence[ExportedCase], alike: Sequence[TableColumn], columns: Sequence[SignalColumn]
+) -> Any:
     """Names, types and units: what case it is, what is varied, the time, the signals."""
-    double = {column.path for case in _one_each(cases) for column in case.columns
-              if case.signal(column.variable).dtype != np.float32}  # fmt: skip
+    double = {
+        column.path
+        for case in _one_each(cases)
+        for column in case.columns
+        if case.signal(column.variable).dtype != np.float32
+    }
     fields = [arrow.field("run", arrow.string()), arrow.field("case", arrow.int64())]
     for each in alike:
         kind = arrow.string() if each.kind == "str" else arrow.float64()
@@ -117,12 +118,12 @@ def _told(unit: str, about: str) -> dict[str, str]:
     return {"unit": unit, "about": about}
 
 
-def _one_each(cases: Sequence[Case]) -> list[Case]:
+def _one_each(cases: Sequence[ExportedCase]) -> list[ExportedCase]:
     """A case of each structure."""
     return list({case.group.name: case for case in cases}.values())
 
 
-def _table(arrow: Any, schema: Any, case: Case, fields: Sequence[Field]) -> Any:
+def _table(arrow: Any, schema: Any, case: ExportedCase, fields: Sequence[TableColumn]) -> Any:
     """A case as a table; nulls in columns that it does not have."""
     rows = len(case.time)
     alike: dict[str, Any] = {"run": case.asked, "case": case.number}
@@ -137,3 +138,34 @@ def _table(arrow: Any, schema: Any, case: Case, fields: Sequence[Field]) -> Any:
         else:
             made.append(arrow.repeat(arrow.scalar(alike.get(field.name), field.type), rows))
     return arrow.Table.from_arrays(made, schema=schema)
+
+
+class Parquet(ExportFormat):
+    """Tables for other programs; needs pyarrow."""
+
+    title = "a Parquet file"
+
+    def is_own(self, path: Path) -> bool:
+        """Return True where the last bytes of the file, which describe it, are of an export of MET's."""
+        with open_regular(path) as file:
+            size = file.seek(0, 2)
+            file.seek(max(0, size - 8))
+            end = file.read()
+            if end[4:] != MAGIC:
+                return False
+            file.seek(max(0, size - 8 - int.from_bytes(end[:4], "little")))
+            return ABOUT.encode() in file.read()
+
+    def check_campaign(self, campaign: Campaign, target: Path) -> None:
+        pyarrow_here()
+
+    def write_metrics(self, file: ArchiveFile, table: CaseTable, target: Path) -> Written:
+        return Written(write_cases(file, table, target))
+
+    def write_histories(
+        self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: Request
+    ) -> Written:
+        return Written(write(file, cases, target, deck=request.units == "deck"))
+
+
+FORMAT = Parquet()

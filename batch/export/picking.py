@@ -16,7 +16,7 @@ from met.plan.channel import channel_paths
 
 
 @frozen
-class Column:
+class SignalColumn:
     """One number that changes in time.
 
     path       of its channel, `elbow.qd`, `links.tip.position.x`
@@ -33,7 +33,7 @@ class Column:
 
 
 @frozen
-class Case:
+class ExportedCase:
     """A case that is exported.
 
     position  in its group;  number  in the case table, as `--case '#7'` names it
@@ -45,7 +45,7 @@ class Case:
     position: int
     number: int
     time: np.ndarray
-    columns: tuple[Column, ...]
+    columns: tuple[SignalColumn, ...]
 
     @property
     def asked(self) -> str:
@@ -58,7 +58,7 @@ class Case:
         return values.reshape(len(values), math.prod(values.shape[1:]))
 
 
-def pick(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: Sequence[str]) -> list[Case]:
+def pick(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: Sequence[str]) -> list[ExportedCase]:
     """The cases of these runs and sweeps (none: of the first), in the order they are asked for (none: all that have
     histories, by their positions), with these signals. Raises Problem E321-E325, E328."""
     names = tuple(runs) or (file.groups[0].sweep or file.groups[0].name,)
@@ -77,7 +77,7 @@ def pick(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: 
             places = [place for other, place in wanted if other is group] if cases else group.recorded_positions
             for place in map(int, places):
                 rows = time[: valid[place]]
-                found.append(Case(group, place, int(numbers[place]), rows, columns[group.name]))
+                found.append(ExportedCase(group, place, int(numbers[place]), rows, columns[group.name]))
     if cases:
         order = {key: at for at, key in enumerate(wanted)}
         return sorted(found, key=lambda case: order[case.group, case.position])
@@ -90,11 +90,11 @@ def rank(names: Sequence[str], group: Group) -> int:
     return min(at for at, name in enumerate(names) if name in (group.name, group.sweep))
 
 
-def _columns(groups: Sequence[Group], signals: Sequence[str]) -> dict[str, tuple[Column, ...]]:
+def _columns(groups: Sequence[Group], signals: Sequence[str]) -> dict[str, tuple[SignalColumn, ...]]:
     """The columns by group. A signal that only some structures of a sweep have is theirs; one that none has is a
     Problem, and so are groups without histories."""
-    out: dict[str, list[Column]] = {}
-    known: dict[tuple[str, str], list[Column]] = {}
+    out: dict[str, list[SignalColumn]] = {}
+    known: dict[tuple[str, str], list[SignalColumn]] = {}
     for name in signals or ("",):
         problems = []
         for group in groups:
@@ -112,22 +112,24 @@ def _columns(groups: Sequence[Group], signals: Sequence[str]) -> dict[str, tuple
     return {name: _ordered(columns) for name, columns in out.items()}
 
 
-def _columns_of(group: Group, variable: Stored) -> list[Column]:
+def _columns_of(group: Group, variable: Stored) -> list[SignalColumn]:
     """All numbers of a signal."""
     joints, components = group.joints(variable), group.components(variable)
     owners: list[tuple[str, ...]] = [(joint,) for joint in joints] or [()]
     inner: list[tuple[str, ...]] = [(component,) for component in components] or [()]
     parts = [(*owner, *each) for owner in owners for each in inner]
-    units = [variable.units_by_joint[place // len(inner)] if variable.units_by_joint else variable.unit
-             for place in range(len(parts))]  # fmt: skip
+    units = [
+        variable.units_by_joint[place // len(inner)] if variable.units_by_joint else variable.unit
+        for place in range(len(parts))
+    ]
     paths = channel_paths(variable.name, joints, components)
     return [
-        Column(path, unit, variable.long_name, variable.name, place, part)
+        SignalColumn(path, unit, variable.long_name, variable.name, place, part)
         for place, (path, unit, part) in enumerate(zip(paths, units, parts, strict=True))
     ]
 
 
-def _ordered(columns: Sequence[Column]) -> tuple[Column, ...]:
+def _ordered(columns: Sequence[SignalColumn]) -> tuple[SignalColumn, ...]:
     """Each once: signals as they were asked for, and the numbers of each as they lie in it."""
     signals = list(dict.fromkeys(column.variable for column in columns))
     once = {column.path: column for column in columns}

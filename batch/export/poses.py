@@ -12,7 +12,7 @@ import numpy as np
 
 from batch.archive.read import Stored, reading
 from batch.campaigns.output import quoted
-from batch.export.picking import Case
+from batch.export.picking import ExportedCase
 from met.diagnostic import Problem, error
 from met.dynamics.spatial import HERE, IDENTITY, Pose, compose, inverse, rotation_quaternion, sub
 from met.frozen import frozen
@@ -31,7 +31,7 @@ INSTANT = 1e-6
 
 
 @frozen
-class Arm:
+class PosedArm:
     """The arm of a case.
 
     prefix    before the names of its frames and topics; "" where it is alone
@@ -45,7 +45,7 @@ class Arm:
     travel    of each joint that slides: the stretch of q, 0 in it, that this case uses, m
     """
 
-    case: Case
+    case: ExportedCase
     experiment: Experiment
     prefix: str
     values: Mapping[str, float]
@@ -64,7 +64,7 @@ class Moved:
     orientation: np.ndarray
 
 
-def arm_of(plan: Plan, case: Case, prefix: str) -> Arm:
+def arm_of(plan: Plan, case: ExportedCase, prefix: str) -> PosedArm:
     """The arm of a case. Raises Problem E370 where q of a joint was not recorded, E302 where the archive's plan does
     not tell the arm."""
     group = case.group
@@ -97,9 +97,12 @@ def arm_of(plan: Plan, case: Case, prefix: str) -> Arm:
         links = [link.name for link in experiment.structure.links]
         place = {name: moved(Pose(IDENTITY, sub(world[name].p, base.p)), len(case.time)).position for name in links}
     start = {name: rows[0] if len(rows) else np.zeros(3) for name, rows in place.items()}
-    travel = {joint.name: (float(rows.min(initial=0.0)), float(rows.max(initial=0.0)))
-              for joint, rows in zip(joints, q, strict=True) if joint.kind == "prismatic"}  # fmt: skip
-    return Arm(case, experiment, prefix, values, first, parents, poses, start, travel)
+    travel = {
+        joint.name: (float(rows.min(initial=0.0)), float(rows.max(initial=0.0)))
+        for joint, rows in zip(joints, q, strict=True)
+        if joint.kind == "prismatic"
+    }
+    return PosedArm(case, experiment, prefix, values, first, parents, poses, start, travel)
 
 
 def parameters(experiment: Experiment, varied: Mapping[str, Any]) -> dict[str, Any]:
@@ -118,7 +121,7 @@ def _plain(value: Any) -> Any:
     return float(value) if np.ndim(value) == 0 else value
 
 
-def positions(case: Case, joints: Sequence[str], *, free: bool = False) -> list[np.ndarray]:
+def positions(case: ExportedCase, joints: Sequence[str], *, free: bool = False) -> list[np.ndarray]:
     """q of each of these joints by row, as one signal of all or a signal of each. Raises Problem E370: free, where what
     tells of a free base is missing too."""
     signals = {variable.name: variable for variable in case.group.role("signal")}
@@ -129,13 +132,15 @@ def positions(case: Case, joints: Sequence[str], *, free: bool = False) -> list[
         every = missing and len(missing) == len(joints)
         which = ", ".join([*(["q"] if every else [f"{joint}.q" for joint in missing]), *of_base])
         message = f"the arm of case #{case.number} of `{case.asked}` cannot be shown: {which} was not recorded"
-        helps = (lacking_help(free=bool(of_base)),
-                 f"`met export {quoted(case.group.path)} -o FILE.csv` needs no positions")  # fmt: skip
+        helps = (
+            lacking_help(free=bool(of_base)),
+            f"`met export {quoted(case.group.path)} -o FILE.csv` needs no positions",
+        )
         raise Problem(error("E370", message, help=helps))
     return [q for q in found.values() if q is not None]
 
 
-def _position(case: Case, joint: str, signals: Mapping[str, Stored]) -> np.ndarray | None:
+def _position(case: ExportedCase, joint: str, signals: Mapping[str, Stored]) -> np.ndarray | None:
     alone = f"{joint}.{POSITION}"
     if alone in signals:
         return case.signal(alone)[:, 0].astype(np.float64)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.export.poses import Arm
+from batch.export.poses import PosedArm
 from batch.export.wire import plain
 from batch.plotting.sheet import COLOURS
 from met.dynamics.spatial import IDENTITY, Pose, compose, rotation_rpy
@@ -34,15 +34,18 @@ ROD, JOINT_RADIUS, JOINT_LENGTH, MASS = 0.02, 0.02, 0.05, 0.015
 """Radii and lengths of what has none: of a rod, in its own lengths; of others, in the arm's size."""
 
 SIZES = {
-    "rod": ("length",), "cylinder": ("radius", "length"), "sphere": ("radius",), "box": ("size_x", "size_y", "size_z")
-}  # fmt: skip
+    "rod": ("length",),
+    "cylinder": ("radius", "length"),
+    "sphere": ("radius",),
+    "box": ("size_x", "size_y", "size_z"),
+}
 """Of the shapes that are drawn; a link of another one, which a later MET may know, is drawn as one without."""
 
 LINE_PIXELS = 4.0
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
-def size(arms: Sequence[Arm]) -> float:
+def size(arms: Sequence[PosedArm]) -> float:
     """How far, about, the arms reach from the base, m."""
     far = 0.0
     for arm in arms:
@@ -53,7 +56,7 @@ def size(arms: Sequence[Arm]) -> float:
     return far if 0.0 < far < math.inf else 1.0
 
 
-def scene(arm: Arm, root: str, ghost: bool, size: float) -> Any:
+def scene(arm: PosedArm, root: str, ghost: bool, size: float) -> Any:
     """The SceneUpdate that puts an arm in place; its links' frames move it from then on. root: frame of the base."""
     from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
@@ -100,7 +103,7 @@ def drawn(link: Link | Payload) -> bool:
     return link.shape is not None and set(SIZES.get(link.shape[0], ("none",))) <= set(dict(link.shape[1]))
 
 
-def shape_of(arm: Arm, link: Link | Payload) -> tuple[str, dict[str, float]]:
+def shape_of(arm: PosedArm, link: Link | Payload) -> tuple[str, dict[str, float]]:
     """A link's shape in this case: kind and sizes, in m; `along` as 0, 1 or 2.
 
     The plan has the sizes of its first case. Where a sweep varies a size by its path, this case has its own; and where
@@ -134,7 +137,7 @@ def _entity(scene: Any, frame: str, name: str) -> Any:
     return entity
 
 
-def _middle(arm: Arm, link: Link | Payload, kind: str, numbers: Mapping[str, float]) -> Vector:
+def _middle(arm: PosedArm, link: Link | Payload, kind: str, numbers: Mapping[str, float]) -> Vector:
     """Where the middle of a link's shape is in the link's frame."""
     inertia = arm.experiment.parameters.get(f"{head(link)}.inertia.xx")
     if inertia is not None and inertia.origin.kind != "deck":
@@ -161,7 +164,7 @@ def _solid(entity: Any, kind: str, numbers: Mapping[str, float], middle: Vector,
         _cylinder(entity, middle, _axis(numbers), numbers.get("radius", ROD * length), length, colour)
 
 
-def _bare(entity: Any, arm: Arm, link: Link | Payload, carried: Sequence[Joint], colour: Any, size: float) -> None:
+def _bare(entity: Any, arm: PosedArm, link: Link | Payload, carried: Sequence[Joint], colour: Any, size: float) -> None:
     """A link that has no shape: lines to its joints, or to its centre of mass."""
     com = _numbers(arm, f"{head(link)}.com", "xyz")
     ends = [_at(arm, joint) for joint in carried] or [com]
@@ -170,7 +173,7 @@ def _bare(entity: Any, arm: Arm, link: Link | Payload, carried: Sequence[Joint],
         entity.spheres.add(pose=_pose(com), size=_vector((2 * MASS * size,) * 3), color=colour)
 
 
-def _joint(entity: Any, arm: Arm, joint: Joint, colour: Any, size: float) -> None:
+def _joint(entity: Any, arm: PosedArm, joint: Joint, colour: Any, size: float) -> None:
     """The joint that carries a link, in the link's frame."""
     radius, length = JOINT_RADIUS * size, JOINT_LENGTH * size
     if joint.kind == "revolute":
@@ -185,7 +188,7 @@ def _cylinder(entity: Any, middle: Vector, axis: Vector, radius: float, length: 
     entity.cylinders.add(pose=pose, size=extent, bottom_scale=1.0, top_scale=1.0, color=colour)
 
 
-def _rails(arm: Arm, carried: Sequence[Joint]) -> list[tuple[Vector, Vector]]:
+def _rails(arm: PosedArm, carried: Sequence[Joint]) -> list[tuple[Vector, Vector]]:
     """Of the joints that slide on a link, from end to end, in the link's frame."""
     out = []
     for joint in carried:
@@ -210,9 +213,13 @@ def _draw(entity: Any, lines: Sequence[tuple[Vector, Vector]], colour: Any) -> N
     points = [Point3(x=x, y=y, z=z) for ends in lines if math.dist(*ends) > 0.0 for x, y, z in ends]
     if points:
         entity.lines.add(
-            type=LinePrimitive.LINE_LIST, pose=_pose(ORIGIN), thickness=LINE_PIXELS, scale_invariant=True,
-            points=points, color=colour,
-        )  # fmt: skip
+            type=LinePrimitive.LINE_LIST,
+            pose=_pose(ORIGIN),
+            thickness=LINE_PIXELS,
+            scale_invariant=True,
+            points=points,
+            color=colour,
+        )
 
 
 def turned_to(axis: Vector) -> tuple[float, float, float, float]:
@@ -250,12 +257,12 @@ def _colour(hexadecimal: str, opacity: float) -> Any:
 # Numbers of the case
 
 
-def _at(arm: Arm, joint: Joint) -> Vector:
+def _at(arm: PosedArm, joint: Joint) -> Vector:
     """Where a joint's frame is in its parent link's."""
     return _numbers(arm, f"{joint.name}.at", "xyz")
 
 
-def _numbers(arm: Arm, path: str, parts: str) -> Vector:
+def _numbers(arm: PosedArm, path: str, parts: str) -> Vector:
     x, y, z = (arm.values.get(f"{path}.{part}", 0.0) for part in parts)
     return (x, y, z)
 

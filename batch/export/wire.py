@@ -23,24 +23,24 @@ Kind = Literal["double", "int64", "string"]
 
 
 @frozen
-class Field:
+class MessageField:
     """A field. within: of a message, its fields;  many: whether there may be several."""
 
     name: str
     kind: Kind = "double"
-    within: tuple[Field, ...] = ()
+    within: tuple[MessageField, ...] = ()
     many: bool = False
 
 
-def tree(paths: Sequence[tuple[str, ...]]) -> tuple[Field, ...]:
+def tree(paths: Sequence[tuple[str, ...]]) -> tuple[MessageField, ...]:
     """Fields of numbers by their paths: `("elbow", "x")` is `elbow.x`."""
     inner: dict[str, list[tuple[str, ...]]] = {}
     for name, *rest in paths:
         inner.setdefault(name, []).extend([tuple(rest)] if rest else [])
-    return tuple(Field(name, within=tree(rests)) for name, rests in inner.items())
+    return tuple(MessageField(name, within=tree(rests)) for name, rests in inner.items())
 
 
-def schema(name: str, fields: Sequence[Field]) -> bytes:
+def schema(name: str, fields: Sequence[MessageField]) -> bytes:
     """What tells any reader of such messages what is in them: a FileDescriptorSet with the message `met.<name>`."""
     from google.protobuf.descriptor_pb2 import FileDescriptorSet
 
@@ -50,12 +50,12 @@ def schema(name: str, fields: Sequence[Field]) -> bytes:
     return out.SerializeToString(deterministic=True)
 
 
-def _describe(message: Any, fields: Sequence[Field], path: str) -> None:
+def _describe(message: Any, fields: Sequence[MessageField], path: str) -> None:
     """Put fields into the description of a message; messages within it that are alike are described once."""
     from google.protobuf.descriptor_pb2 import FieldDescriptorProto as Of
 
     kinds = {"double": Of.TYPE_DOUBLE, "int64": Of.TYPE_INT64, "string": Of.TYPE_STRING}
-    types: dict[tuple[Field, ...], str] = {}
+    types: dict[tuple[MessageField, ...], str] = {}
     for number, field in enumerate(fields, 1):
         label = Of.LABEL_REPEATED if field.many else Of.LABEL_OPTIONAL
         # a name in JSON that is the name itself: those made of it may be alike, as of `a_b` and `aB`
@@ -72,7 +72,7 @@ def _describe(message: Any, fields: Sequence[Field], path: str) -> None:
         told.type, told.type_name = Of.TYPE_MESSAGE, f"{path}.{types[field.within]}"
 
 
-def rows(fields: Sequence[Field], values: np.ndarray) -> list[bytes]:
+def rows(fields: Sequence[MessageField], values: np.ndarray) -> list[bytes]:
     """The message of each row of numbers (row, number), the numbers in the order of the fields: all are equally long
     and differ in their doubles alone."""
     template = bytearray()
@@ -89,7 +89,7 @@ def rows(fields: Sequence[Field], values: np.ndarray) -> list[bytes]:
     return [data[at : at + size] for at in range(0, count * size, size)] if size else [b""] * count
 
 
-def _parts(fields: Sequence[Field]) -> Iterator[bytes | None]:
+def _parts(fields: Sequence[MessageField]) -> Iterator[bytes | None]:
     """A message of numbers in pieces: what is the same in all, and None for a double."""
     for number, field in enumerate(fields, 1):
         if field.within:
@@ -101,7 +101,7 @@ def _parts(fields: Sequence[Field]) -> Iterator[bytes | None]:
             yield None
 
 
-def message(fields: Sequence[Field], data: Mapping[str, Any]) -> bytes:
+def message(fields: Sequence[MessageField], data: Mapping[str, Any]) -> bytes:
     """One message: a value for each field by its name, a mapping for a message, a sequence where there may be many."""
     out = bytearray()
     for number, field in enumerate(fields, 1):

@@ -17,7 +17,7 @@ from batch.campaigns.rehearsal import rehearse
 from batch.campaigns.replaying import Replay, differences, replay
 from batch.executors.choose import choose
 from batch.executors.threads import Threads
-from batch.export.straight import check, later, parted, written
+from batch.export.from_run import check, later, parted, written
 from batch.queries.structures import structures
 from batch.queries.summary import summarise
 from batch.terminal.progress import Bar

@@ -21,7 +21,7 @@ from met.servos.motor import damping, torque
 from met.substitution import butterworth, shaft
 from met.substitution.emulated import SUBSTEP
 from met.trace import cos, sin
-from met.trace.program import Phase, Program, Tape, Unless0
+from met.trace.program import CallPhase, Phase, Program, Tape, Unless0
 from met.trace.recorder import record
 
 MOTOR = ("kt", "resistance", "tau_max", "f_c", "f_v", "inertia", "kt_load", "f_cut")

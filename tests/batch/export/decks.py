@@ -122,8 +122,10 @@ class Mcap:
         with path.open("rb") as file:
             reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
             self.library = reader.get_header().library
-            self.messages = [Read(channel.topic, schema.name, message.log_time, data)
-                             for schema, channel, message, data in reader.iter_decoded_messages()]  # fmt: skip
+            self.messages = [
+                Read(channel.topic, schema.name, message.log_time, data)
+                for schema, channel, message, data in reader.iter_decoded_messages()
+            ]
             self.metadata = [(each.name, dict(each.metadata)) for each in reader.iter_metadata()]
             self.attachments = {each.name: each.data.decode() for each in reader.iter_attachments()}
             summary = reader.get_summary()

@@ -41,9 +41,7 @@ def test_programs_are_told_in_json(archive: Path, capsys: pytest.CaptureFixture[
 def test_signals_are_given_as_lists(archive: Path) -> None:
     words = ["--signals", "qd, elbow.q", "--signals", "shoulder.servo.voltage"]
     assert cli.main(["export", "a.h5", *words]) == cli.YES
-    assert Mcap(Path("a.mcap")).topics() == {
-        "/tf", "/scene", "/log", "/result", "/qd", "/q", "/shoulder/servo/voltage"
-    }  # fmt: skip
+    assert Mcap(Path("a.mcap")).topics() == {"/tf", "/scene", "/log", "/result", "/qd", "/q", "/shoulder/servo/voltage"}
 
 
 def test_other_commands_do_not_load_what_it_needs() -> None:

@@ -15,7 +15,6 @@ from batch.export import export
 from met import run as engine
 from met.diagnostic import Problem
 from met.dynamics.kinematics import link_motions
-from met.program.system import System
 from met.vectors import quaternion
 from tests.batch import plans
 from tests.batch.export.decks import CHAIN, DECK, LINKS, Mcap, made, matrix, said
@@ -59,8 +58,10 @@ def test_the_frames_are_where_the_kinematics_have_them(reaches: tuple[ArchiveFil
     [experiment] = file.plan().experiments
     for case, reach in enumerate((0.8, 1.1, 0.5)):
         outputs = experiment.formulas.replay({"reach": reach})
-        values = {path: outputs[q.value.output] if hasattr(q.value, "output") else q.value
-                  for path, q in experiment.parameters.items()}  # fmt: skip
+        values = {
+            path: outputs[q.value.output] if hasattr(q.value, "output") else q.value
+            for path, q in experiment.parameters.items()
+        }
         tree = System(experiment).tree(lambda name, values=values: float(values[name.removeprefix("parameter:")]))
         history = file.groups[0].signal("q", case)
         for q, world in zip(history, read.worlds(f"/case{case}/tf"), strict=True):
@@ -75,10 +76,12 @@ def test_the_frames_are_where_the_kinematics_have_them(reaches: tuple[ArchiveFil
 @pytest.mark.slow
 def test_no_frame_jumps_between_the_two_quaternions_of_its_turn(pick: tuple[ArchiveFile, Mcap]) -> None:
     _, read = pick
-    turns = np.array([
-        [[turn.rotation.w, turn.rotation.x, turn.rotation.y, turn.rotation.z] for turn in message.data.transforms]
-        for message in read.of("/tf")
-    ])  # fmt: skip
+    turns = np.array(
+        [
+            [[turn.rotation.w, turn.rotation.x, turn.rotation.y, turn.rotation.z] for turn in message.data.transforms]
+            for message in read.of("/tf")
+        ]
+    )
     assert (turns[0, :, 0] >= 0.0).all() and (turns[..., 0] < 0.0).any()  # the lamp passes half a turn
     assert (np.sum(turns[1:] * turns[:-1], axis=-1) > 0.0).all()
 
@@ -99,8 +102,10 @@ def test_a_signal_is_a_topic_with_a_field_for_each_joint_and_component(pick: tup
     joints = ("lift", "swing", "roll", "point", "pan")
     rates = [[getattr(message.data, joint) for joint in joints] for message in read.of("/qd")]
     np.testing.assert_array_equal(rates, group.signal("qd", 0))
-    forces = [[[getattr(getattr(message.data, joint), axis) for axis in "xyz"] for joint in joints]
-              for message in read.of("/reaction/force")]  # fmt: skip
+    forces = [
+        [[getattr(getattr(message.data, joint), axis) for axis in "xyz"] for joint in joints]
+        for message in read.of("/reaction/force")
+    ]
     np.testing.assert_array_equal(forces, group.signal("reaction.force", 0))
     tips = [[getattr(message.data, axis) for axis in "xyz"] for message in read.of("/links/tool/position")]
     np.testing.assert_array_equal(tips, group.signal("links.tool.position", 0))
@@ -111,12 +116,17 @@ def test_a_signal_is_a_topic_with_a_field_for_each_joint_and_component(pick: tup
 def test_a_channel_says_its_unit_or_that_of_each_joint(pick: tuple[ArchiveFile, Mcap]) -> None:
     _, read = pick
     assert read.channels["/swing/servo/command"].metadata == {
-        "unit": "rad/s^2", "about": "acceleration asked of the servo"
-    }  # fmt: skip
+        "unit": "rad/s^2",
+        "about": "acceleration asked of the servo",
+    }
     assert read.channels["/tau"].metadata == {
-        "unit.lift": "N", "unit.swing": "N*m", "unit.roll": "N*m", "unit.point": "N*m", "unit.pan": "N*m",
+        "unit.lift": "N",
+        "unit.swing": "N*m",
+        "unit.roll": "N*m",
+        "unit.point": "N*m",
+        "unit.pan": "N*m",
         "about": "torque of the servo on the joint",
-    }  # fmt: skip
+    }
 
 
 def test_only_the_signals_that_are_asked_for_are_there(pick: tuple[ArchiveFile, Mcap], tmp_path: Path) -> None:
@@ -149,11 +159,16 @@ def test_a_link_looks_as_the_deck_says_and_moves_with_its_frame(pick: tuple[Arch
     [lamp] = drawn["lamp"].spheres
     assert (lamp.size.x, lamp.size.y, lamp.size.z) == (0.12, 0.12, 0.12)
     assert {each.key: each.value for each in drawn["lamp"].metadata} == {
-        "link": "lamp", "mass": "1.5 kg", "shape": "sphere"
-    }  # fmt: skip
+        "link": "lamp",
+        "mass": "1.5 kg",
+        "shape": "sphere",
+    }
     assert len(drawn["carriage"].cubes) == 2  # itself, and its prismatic joint
-    colours = [(entity.cubes or entity.cylinders or entity.spheres)[0].color for entity in drawn.values()
-               if entity.id in ("stand", "carriage", "boom", "pointer")]  # fmt: skip
+    colours = [
+        (entity.cubes or entity.cylinders or entity.spheres)[0].color
+        for entity in drawn.values()
+        if entity.id in ("stand", "carriage", "boom", "pointer")
+    ]
     assert len({(colour.r, colour.g, colour.b) for colour in colours}) == 4
     assert {colour.a for colour in colours} == {1.0}
 
@@ -234,9 +249,13 @@ def test_the_file_says_what_made_it(reaches: tuple[ArchiveFile, Mcap]) -> None:
     assert about["deck"] == file.deck
     assert {"met", "version_met", "version_numpy", "git_commit", "git_dirty"} < set(about)
     assert case == {
-        "prefix": "case2/", "run": "reaches", "case": "2", "case_id": str(file.groups[0].values("case_id")[2]),
-        "case_key": str(file.groups[0].values("case_key")[2]), "varied.reach": "0.5 m",
-    }  # fmt: skip
+        "prefix": "case2/",
+        "run": "reaches",
+        "case": "2",
+        "case_id": str(file.groups[0].values("case_id")[2]),
+        "case_key": str(file.groups[0].values("case_key")[2]),
+        "varied.reach": "0.5 m",
+    }
     assert read.attachments == file.sources() != {}
 
 
@@ -244,8 +263,10 @@ def test_how_a_case_went_is_logged_and_its_result_is_there_once(pick: tuple[Arch
     file, read = pick
     group = file.groups[0]
     fast = float(group.values("fast")[0])
-    log = [(message.time, message.data.Level.Name(message.data.level), message.data.name, message.data.message)
-           for message in read.of("/log")]  # fmt: skip
+    log = [
+        (message.time, message.data.Level.Name(message.data.level), message.data.name, message.data.message)
+        for message in read.of("/log")
+    ]
     second, case_id = 1_000_000_000, group.values("case_id")[0]
     assert log == [
         (0, "INFO", "pick", f"case #0 {case_id[:8]}"),
@@ -259,8 +280,9 @@ def test_how_a_case_went_is_logged_and_its_result_is_there_once(pick: tuple[Arch
     assert (found.case, found.case_id, found.status, found.cause, found.valid_rows) == (0, case_id, "done", "", 51)
     assert found.metrics.up == group.values("up")[0] and found.metrics.fast == fast
     assert [(each.text, each.outcome) for each in found.requirements] == [
-        ("up < 1 m", "met"), ("fast < 0.1 rad/s", "missed")
-    ]  # fmt: skip
+        ("up < 1 m", "met"),
+        ("fast < 0.1 rad/s", "missed"),
+    ]
     assert read.channels["/result"].metadata == {"unit.up": "m", "unit.fast": "rad/s"}
 
 
@@ -277,8 +299,9 @@ def test_a_case_that_failed_ends_where_it_failed_and_says_why(here: Path, monkey
     assert (result.data.status, result.data.valid_rows) == ("failed", 5)
     assert np.isnan(result.data.metrics.settle)
     assert [(v.name, v.value, v.unit) for v in result.data.varied] == [
-        ("gearbox.kp", 0.025, "V*s/rad"), ("links.lower.mass", 20.1, "kg")
-    ]  # fmt: skip
+        ("gearbox.kp", 0.025, "V*s/rad"),
+        ("links.lower.mass", 20.1, "kg"),
+    ]
     assert {each.outcome for each in result.data.requirements} == {"unknown"}
 
 
@@ -301,8 +324,11 @@ def test_a_case_that_failed_before_its_first_row_has_no_frames(here: Path, monke
 def test_structures_of_one_sweep_have_fields_of_their_own(tmp_path: Path) -> None:
     read = Mcap(export(made(tmp_path, "links", CHAIN)).path)
     assert {"/case0/qd", "/case1/qd", "/case2/qd", "/case3/qd"} < read.topics()
-    fields = {topic: [field.name for field in read.of(topic)[0].data.DESCRIPTOR.fields]
-              for topic in read.topics() if topic.endswith("/qd")}  # fmt: skip
+    fields = {
+        topic: [field.name for field in read.of(topic)[0].data.DESCRIPTOR.fields]
+        for topic in read.topics()
+        if topic.endswith("/qd")
+    }
     assert sorted(fields.values()) == [["one"], ["one"], ["one", "two"], ["one", "two"]]
     assert len({schema.name for schema in read.schemas.values()}) == len(read.schemas)  # none is two things
 

@@ -72,39 +72,57 @@ def test_it_may_be_run_again(here: Path) -> None:
     assert (here / "z.mcap").exists() and (here / "z.h5").exists()
 
 
-@pytest.mark.parametrize(("words", "message"), [
-    (("many", "-o", "x.mcap"), """\
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ("many", "-o", "x.mcap"),
+            """\
 error[E372]: 9 cases of `many` are too many to show over one another
  = help: `--case '#0'` runs one alone, and `--histories '#0'` keeps the signals of one
  = help: or run all, and choose then: `-o x.h5`, `met export x.h5 --case '#0'`
 
 1 error
-"""),
-    (("few", "-o", "x.mcap", "--histories", "none"), """\
+""",
+        ),
+        (
+            ("few", "-o", "x.mcap", "--histories", "none"),
+            """\
 error[E323]: x.mcap would be empty: no histories are kept
  = help: `--histories all` keeps them, and `--histories '#0'` those of a case
 
 1 error
-"""),
-    (("blind", "-o", "x.csv"), """\
+""",
+        ),
+        (
+            ("blind", "-o", "x.csv"),
+            """\
 error[E323]: x.csv would be empty: no histories are kept
  = help: `record = [q, qd, tau];` in the run records signals
 
 1 error
-"""),
-    (("brief", "-o", "work.csv"), """\
+""",
+        ),
+        (
+            ("brief", "-o", "work.csv"),
+            """\
 error[E374]: work.csv exists, and may hold work that is not in the archive: it is not written over
  = help: give another name with `-o`, or remove the file
 
 1 error
-"""),
-    (("brief", "-o", "none/x.mcap"), """\
+""",
+        ),
+        (
+            ("brief", "-o", "none/x.mcap"),
+            """\
 error[E305]: cannot write none/x.h5: none does not exist
  = help: make it first: `mkdir -p none`
 
 1 error
-"""),
-])  # fmt: skip
+""",
+        ),
+    ],
+)
 def test_what_cannot_be_exported_does_not_run(
     here: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], message: str
 ) -> None:

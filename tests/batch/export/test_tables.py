@@ -14,9 +14,9 @@ import pytest
 
 import batch
 from batch.archive.read import ArchiveFile
-from batch.export import Exported, export, what
+from batch.export import Exported, export, summary
 from batch.export import parquet as module
-from batch.export.cases import Field
+from batch.export.case_table import TableColumn
 from batch.export.csv import _column
 from met import run as engine
 from met.diagnostic import Problem
@@ -39,8 +39,16 @@ def test_a_case_is_a_row_an_instant_and_a_column_a_number(here: Path) -> None:
     comments, heads, rows = table(done.path)
     assert (done.cases, done.rows, done.layout) == (1, 51, None)
     assert comments == ["# MET 0.1.0: nominal of two_link.ic", "# units: s,rad,rad,rad/s,rad/s,N*m,N*m,V"]
-    assert heads == ["time", "shoulder.q", "elbow.q", "shoulder.qd", "elbow.qd", "shoulder.tau", "elbow.tau",
-                     "shoulder.servo.voltage"]  # fmt: skip
+    assert heads == [
+        "time",
+        "shoulder.q",
+        "elbow.q",
+        "shoulder.qd",
+        "elbow.qd",
+        "shoulder.tau",
+        "elbow.tau",
+        "shoulder.servo.voltage",
+    ]
     with ArchiveFile("a.h5") as file:
         group = file.groups[0]
         kept = [group.values("time")[:, None], *(group.signal(name, 0) for name in ("q", "qd", "tau"))]
@@ -92,12 +100,16 @@ def test_a_structure_leaves_empty_what_only_another_has(tmp_path: Path) -> None:
     _, heads, rows = table(export(archive, tmp_path / "a.csv", table="histories").path)
     assert heads == ["case", "macro LINKS", "links.first.mass", "time", "one.q", "one.qd", "two.q", "two.qd"]
     assert {row[0]: (row[6] == "", row[7] == "") for row in rows} == {
-        "0": (True, True), "1": (True, True), "2": (False, False), "3": (False, False)
-    }  # fmt: skip
+        "0": (True, True),
+        "1": (True, True),
+        "2": (False, False),
+        "3": (False, False),
+    }
     _, heads, rows = table(export(archive, tmp_path / "b.csv", signals=["two.q"]).path)
     assert (heads, sorted({row[0] for row in rows})) == (
-        ["case", "macro LINKS", "links.first.mass", "time", "two.q"], ["2", "3"]
-    )  # fmt: skip
+        ["case", "macro LINKS", "links.first.mass", "time", "two.q"],
+        ["2", "3"],
+    )
     with pytest.raises(Problem, match="E324"):
         export(archive, tmp_path / "c.csv", signals=["two.q"], cases=["#0"])
 
@@ -140,8 +152,12 @@ def test_a_parquet_file_holds_the_same_with_units_and_what_is_varied(here: Path)
         "links.lower.mass": {b"unit": b"kg", b"about": b"varied: links.lower.mass"},
     }
     assert json.loads(found.schema.metadata[b"met.export"]) == {
-        "archive": "a.h5", "deck": "two_link.ic", "runs": ["gains"], "met": "0.1.0", "provenance": provenance
-    }  # fmt: skip
+        "archive": "a.h5",
+        "deck": "two_link.ic",
+        "runs": ["gains"],
+        "met": "0.1.0",
+        "provenance": provenance,
+    }
 
 
 @pytest.mark.oracle
@@ -149,12 +165,24 @@ def test_a_parquet_file_of_several_structures_has_nulls_and_their_choices(tmp_pa
     from pyarrow import parquet
 
     found = parquet.read_table(export(made(tmp_path, "links", CHAIN), tmp_path / "a.parquet", table="histories").path)
-    assert found.column_names == ["run", "case", "macro LINKS", "links.first.mass", "time", "one.q", "one.qd",
-                                  "two.q", "two.qd"]  # fmt: skip
+    assert found.column_names == [
+        "run",
+        "case",
+        "macro LINKS",
+        "links.first.mass",
+        "time",
+        "one.q",
+        "one.qd",
+        "two.q",
+        "two.qd",
+    ]
     assert found["two.q"].null_count == 12 == found["case"].to_pylist().count(0) * 2
     assert set(zip(found["case"].to_pylist(), found["macro LINKS"].to_pylist(), strict=True)) == {
-        (0, "1"), (1, "1"), (2, "2"), (3, "2")
-    }  # fmt: skip
+        (0, "1"),
+        (1, "1"),
+        (2, "2"),
+        (3, "2"),
+    }
 
 
 @pytest.mark.oracle
@@ -187,18 +215,18 @@ def test_without_pyarrow_it_is_said_where_it_comes_from(here: Path, monkeypatch:
 
 
 def test_says_how_many_rows_of_one_case() -> None:
-    assert what(Exported(Path("a.csv"), None, 1, 501, "histories")) == ": histories of 1 case, 501 rows"
-    assert what(Exported(Path("a.csv"), None, 3, 1503, "histories")) == ": histories of 3 cases, 1,503 rows"
+    assert summary(Exported(Path("a.csv"), None, 1, 501, "histories")) == ": histories of 1 case, 501 rows"
+    assert summary(Exported(Path("a.csv"), None, 3, 1503, "histories")) == ": histories of 3 cases, 1,503 rows"
 
 
 # A row a case
 
 
 def test_a_case_id_that_reads_as_a_number_stays_a_word() -> None:
-    field = Field("case_id", "", "", "str", "case_id")
+    field = TableColumn("case_id", "", "", "str", "case_id")
     ids = ["0751325775669632", "93556390810e0238", "948a9b4a612000ce", "12e45e6789012345"]
     assert _column(field, ids) == ["'0751325775669632", "'93556390810e0238", *ids[2:]]
-    assert _column(Field("macro LINKS", "", "", "str", "LINKS"), ["3"]) == ["3"]
+    assert _column(TableColumn("macro LINKS", "", "", "str", "LINKS"), ["3"]) == ["3"]
 
 
 @pytest.mark.usefixtures("engine")
@@ -208,8 +236,17 @@ def test_of_a_sweep_a_row_is_a_case_with_what_is_varied_and_its_metrics(here: Pa
     comments, heads, rows = table(done.path)
     assert (done.cases, done.rows, done.table) == (5, 5, "metrics")
     assert comments == ["# MET 0.1.0: gains of two_link.ic", "# units: 1,,V*s/rad,kg,,s,V,,"]
-    assert heads == ["case", "case_id", "gearbox.kp", "links.lower.mass", "status", "settle", "volts",
-                     "require settle < 10 s", "require volts < 5 V"]  # fmt: skip
+    assert heads == [
+        "case",
+        "case_id",
+        "gearbox.kp",
+        "links.lower.mass",
+        "status",
+        "settle",
+        "volts",
+        "require settle < 10 s",
+        "require volts < 5 V",
+    ]
     with ArchiveFile("a.h5") as file:
         group = file.groups[0]
         for column, name in ((2, "gearbox.kp"), (3, "links.lower.mass"), (5, "settle"), (6, "volts")):
@@ -270,14 +307,26 @@ def test_metrics_and_what_is_varied_may_be_in_the_deck_s_units(here: Path) -> No
 
 
 @pytest.mark.usefixtures("engine")
-@pytest.mark.parametrize(("options", "message", "helps"), [
-    ({"output": "a.mcap", "table": "metrics"}, "a.mcap would hold histories: an MCAP file is no table of metrics",
-     "`-o FILE.csv` writes one; in an MCAP file they are in `/result`"),
-    ({"output": "a.mcap", "units": "deck"}, "a.mcap would be in SI: an MCAP file has no other units",
-     "`-o FILE.csv` can be in the deck's"),
-    ({"output": "a.csv", "table": "metrics", "signals": ["q"]},
-     "signals are histories: a table of metrics has no `q`", "leave out `--metrics`, or `--signals`"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("options", "message", "helps"),
+    [
+        (
+            {"output": "a.mcap", "table": "metrics"},
+            "a.mcap would hold histories: an MCAP file is no table of metrics",
+            "`-o FILE.csv` writes one; in an MCAP file they are in `/result`",
+        ),
+        (
+            {"output": "a.mcap", "units": "deck"},
+            "a.mcap would be in SI: an MCAP file has no other units",
+            "`-o FILE.csv` can be in the deck's",
+        ),
+        (
+            {"output": "a.csv", "table": "metrics", "signals": ["q"]},
+            "signals are histories: a table of metrics has no `q`",
+            "leave out `--metrics`, or `--signals`",
+        ),
+    ],
+)
 def test_what_a_table_cannot_be_is_told(here: Path, options: dict[str, Any], message: str, helps: str) -> None:
     batch.run(plans.plan(plans.gains(2)), output="a.h5")
     with pytest.raises(Problem) as caught:

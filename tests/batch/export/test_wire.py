@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
-from batch.export.wire import Field, message, plain, rows, schema, tree, varint
+from batch.export.wire import MessageField, message, plain, rows, schema, tree, varint
 
 NAMES = ("self", "None", "DESCRIPTOR", "Part1", "Part1_", "a_b", "aB", "a__b", "class", "data", "constructor", "x")
 
 
-def read(name: str, fields: tuple[Field, ...], data: bytes) -> Any:
+def read(name: str, fields: tuple[MessageField, ...], data: bytes) -> Any:
     """A message by the official decoder."""
     given = Schema(id=1, name=f"met.{name}", encoding="protobuf", data=schema(name, fields))
     decode = DecoderFactory().decoder_for("protobuf", given)
@@ -27,9 +27,7 @@ def read(name: str, fields: tuple[Field, ...], data: bytes) -> Any:
 
 def as_data(found: Any) -> dict[str, Any]:
     """A message's fields by name, messages within it too."""
-    return {
-        field.name: as_data(value) if field.message_type else value for field, value in found.ListFields()
-    }  # fmt: skip
+    return {field.name: as_data(value) if field.message_type else value for field, value in found.ListFields()}
 
 
 @pytest.mark.parametrize("components", [(), ("x", "y", "z")], ids=["numbers", "vectors"])
@@ -68,16 +66,22 @@ def test_no_rows_are_no_messages() -> None:
 
 
 ALL = (
-    Field("count", "int64"), Field("text", "string"), Field("number"),
-    Field("one", within=(Field("a"), Field("b", "string"))),
-    Field("many", within=(Field("a"), Field("b", "string")), many=True), Field("words", "string", many=True),
-)  # fmt: skip
+    MessageField("count", "int64"),
+    MessageField("text", "string"),
+    MessageField("number"),
+    MessageField("one", within=(MessageField("a"), MessageField("b", "string"))),
+    MessageField("many", within=(MessageField("a"), MessageField("b", "string")), many=True),
+    MessageField("words", "string", many=True),
+)
 
 
 @given(
-    st.integers(-(2**63), 2**63 - 1), st.text(), st.floats(allow_nan=False), st.lists(st.text()),
+    st.integers(-(2**63), 2**63 - 1),
+    st.text(),
+    st.floats(allow_nan=False),
+    st.lists(st.text()),
     st.lists(st.fixed_dictionaries({"a": st.floats(allow_nan=False), "b": st.text()})),
-)  # fmt: skip
+)
 def test_a_message_of_any_kind_comes_back(
     count: int, text: str, number: float, words: list[str], many: list[dict[str, Any]]
 ) -> None:

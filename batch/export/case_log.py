@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 
 from batch.archive.read import Group, Stored
-from batch.export.picking import Case
-from batch.export.wire import Field
+from batch.export.picking import ExportedCase
+from batch.export.wire import MessageField
 from batch.queries.failures import STATUS
 from batch.queries.signals import case_text, value_text
 from met.frozen import frozen
@@ -25,7 +25,7 @@ OUTCOMES = {1: "met", 0: "missed", -1: "unknown"}
 
 
 @frozen
-class Line:
+class LogLine:
     """A line of a log. time: s, simulated."""
 
     time: float
@@ -33,28 +33,28 @@ class Line:
     text: str
 
 
-def lines(case: Case) -> list[Line]:
+def log_lines(case: ExportedCase) -> list[LogLine]:
     """What case it is, how it ended and when, and what it met; in the order of their times."""
     group, position = case.group, case.position
     status, cause = int(_at(group, "status", position)), str(_at(group, "cause", position))
     end = ends(case)
-    out = [Line(0.0, "INFO", case_text(group, position))]
+    out = [LogLine(0.0, "INFO", case_text(group, position))]
     if status == DONE:
-        out.append(Line(end, "INFO", "reached its end"))
+        out.append(LogLine(end, "INFO", "reached its end"))
     else:
         word = STATUS.get(status, "failed")
-        out.append(Line(end, "ERROR", f"{word}: {cause.removeprefix(f'{word}: ')}"))
+        out.append(LogLine(end, "ERROR", f"{word}: {cause.removeprefix(f'{word}: ')}"))
     if "bed_limited" in group.variables and (ticks := int(_at(group, "bed_limited", position))):
         text = f"the load motor of a bed was at its limit for {ticks:,} ticks: the run is not what the joint would do"
-        out.append(Line(end, "WARNING", text))
+        out.append(LogLine(end, "WARNING", text))
     metrics = {variable.name: variable for variable in group.role("metric")}
     for text, outcome, name in _requirements(group, position):
         has = f" ({name} = {_value(group, metrics[name], position)})" if name in metrics else ""
-        out.append(Line(end, "INFO" if outcome == "met" else "WARNING", f"require {text}: {outcome}{has}"))
+        out.append(LogLine(end, "INFO" if outcome == "met" else "WARNING", f"require {text}: {outcome}{has}"))
     return out
 
 
-def ends(case: Case) -> float:
+def ends(case: ExportedCase) -> float:
     """When a case ended, s: after its last row, at the instant when it failed if it says so."""
     last = float(case.time[-1]) if len(case.time) else 0.0
     group, position = case.group, case.position
@@ -67,16 +67,22 @@ def ends(case: Case) -> float:
     return last
 
 
-def result(case: Case) -> tuple[tuple[Field, ...], dict[str, Any]]:
+def result(case: ExportedCase) -> tuple[tuple[MessageField, ...], dict[str, Any]]:
     """The result of a case as a message: its fields and what is in them, in SI."""
     group, position = case.group, case.position
     metrics = group.role("metric")
-    numbers = (Field("name", "string"), Field("value"), Field("unit", "string"))
+    numbers = (MessageField("name", "string"), MessageField("value"), MessageField("unit", "string"))
     fields = [
-        Field("case", "int64"), Field("case_id", "string"), Field("status", "string"), Field("cause", "string"),
-        Field("valid_rows", "int64"), Field("varied", within=numbers, many=True),
-        Field("requirements", within=(Field("text", "string"), Field("outcome", "string")), many=True),
-    ]  # fmt: skip
+        MessageField("case", "int64"),
+        MessageField("case_id", "string"),
+        MessageField("status", "string"),
+        MessageField("cause", "string"),
+        MessageField("valid_rows", "int64"),
+        MessageField("varied", within=numbers, many=True),
+        MessageField(
+            "requirements", within=(MessageField("text", "string"), MessageField("outcome", "string")), many=True
+        ),
+    ]
     data: dict[str, Any] = {
         "case": case.number,
         "case_id": str(_at(group, "case_id", position)),
@@ -91,12 +97,12 @@ def result(case: Case) -> tuple[tuple[Field, ...], dict[str, Any]]:
     }
     if metrics:
         names = {variable.name: variable.name.rpartition(".")[2] for variable in metrics}  # `metrics.q` is `q` here
-        fields.append(Field("metrics", within=tuple(Field(name) for name in names.values())))
+        fields.append(MessageField("metrics", within=tuple(MessageField(name) for name in names.values())))
         data["metrics"] = {field: float(_at(group, name, position)) for name, field in names.items()}
     return tuple(fields), data
 
 
-def varied(case: Case) -> dict[str, str]:
+def varied(case: ExportedCase) -> dict[str, str]:
     """What is varied in a case, in the deck's units, by path; choices of structure in words."""
     group, position = case.group, case.position
     numbers = {v.path: _value(group, v, position) for v in group.role("coordinate")}
@@ -112,8 +118,10 @@ def _requirements(group: Group, position: int) -> list[tuple[str, str, str]]:
     metrics: Sequence[str] = told if isinstance(told, list) else [str(told)]
     metrics = metrics if len(metrics) == len(texts) else [""] * len(texts)
     outcomes = np.atleast_1d(group.at("met", [position])[0]).tolist()
-    return [(text, OUTCOMES.get(outcome, "unknown"), metric)
-            for text, outcome, metric in zip(texts, outcomes, metrics, strict=True)]  # fmt: skip
+    return [
+        (text, OUTCOMES.get(outcome, "unknown"), metric)
+        for text, outcome, metric in zip(texts, outcomes, metrics, strict=True)
+    ]
 
 
 def _value(group: Group, variable: Stored, position: int) -> str:

@@ -21,7 +21,7 @@ OUTCOME = {1: "met", 0: "missed"}
 
 
 @frozen
-class Field:
+class TableColumn:
     """A column of the table. kind: "float", "int" or "str"; variable: the archive's, which some structures may lack;
     scale: what SI values are divided by."""
 
@@ -34,13 +34,13 @@ class Field:
 
 
 @frozen
-class Table:
+class CaseTable:
     """The cases of runs and sweeps. places: the group and the position in it of each row."""
 
     runs: tuple[str, ...]
     groups: tuple[Group, ...]
     places: tuple[np.ndarray, np.ndarray]
-    fields: tuple[Field, ...]
+    fields: tuple[TableColumn, ...]
 
     @property
     def count(self) -> int:
@@ -52,7 +52,7 @@ class Table:
             group_of, positions = (each[first : first + BLOCK] for each in self.places)
             yield [self._column(field, group_of, positions) for field in self.fields]
 
-    def _column(self, field: Field, group_of: np.ndarray, positions: np.ndarray) -> list[object]:
+    def _column(self, field: TableColumn, group_of: np.ndarray, positions: np.ndarray) -> list[object]:
         out: list[object] = [None] * len(positions)
         for number in np.unique(group_of).tolist():
             here = np.flatnonzero(group_of == number)
@@ -62,14 +62,15 @@ class Table:
         return out
 
 
-def table(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], *, deck: bool = False) -> Table:
+def table(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], *, deck: bool = False) -> CaseTable:
     """The cases of these runs and sweeps (none: of the first), in the order they are asked for (none: all, by their
     positions). deck: numbers in the deck's units. Raises Problem E325, E328."""
     names = tuple(runs) or (file.groups[0].sweep or file.groups[0].name,)
     groups = chosen(file, names)
     if cases:
-        wanted = dict.fromkeys((groups.index(group), int(position or 0))
-                               for case in cases for group, position in picked(file, names, case))  # fmt: skip
+        wanted = dict.fromkeys(
+            (groups.index(group), int(position or 0)) for case in cases for group, position in picked(file, names, case)
+        )
         group_of, positions = np.array(list(wanted), np.int64).T
     else:
         group_of = np.repeat(np.arange(len(groups)), [group.count for group in groups])
@@ -79,27 +80,27 @@ def table(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], *, deck:
         order = np.lexsort((numbers, ranks))
         group_of, positions = group_of[order], positions[order]
     asked = tuple(dict.fromkeys(group.sweep or group.name for group in groups))
-    return Table(asked, groups, (group_of, positions), tuple(_fields(groups, deck=deck)))
+    return CaseTable(asked, groups, (group_of, positions), tuple(_fields(groups, deck=deck)))
 
 
-def _fields(groups: Sequence[Group], *, deck: bool) -> Iterator[Field]:
+def _fields(groups: Sequence[Group], *, deck: bool) -> Iterator[TableColumn]:
     """Which case it is, what is varied, how it ended, metrics, requirements."""
     if len({group.sweep or group.name for group in groups}) > 1:
-        yield Field("run", "", "run or sweep", "str")
-    yield Field("case", "1", "position in the case table", "int", "case")
-    yield Field("case_id", "", "name of the case", "str", "case_id")
+        yield TableColumn("run", "", "run or sweep", "str")
+    yield TableColumn("case", "1", "position in the case table", "int", "case")
+    yield TableColumn("case_id", "", "name of the case", "str", "case_id")
     for variable in varied(groups):
         yield of_varied(variable, deck=deck)
     if any("repeat" in group.variables and group.values("repeat").any() for group in groups):
-        yield Field("repeat", "1", "repeat of noise", "int", "repeat")
-    yield Field("status", "", "how it ended", "str", "status")
+        yield TableColumn("repeat", "1", "repeat of noise", "int", "repeat")
+    yield TableColumn("status", "", "how it ended", "str", "status")
     for variable in {v.name: v for group in groups for v in group.role("metric")}.values():
         unit, scale = in_unit(variable, deck=deck)
-        yield Field(variable.name, unit, variable.long_name, "float", variable.name, scale)
+        yield TableColumn(variable.name, unit, variable.long_name, "float", variable.name, scale)
     for text in dict.fromkeys(text for group in groups for text in requirements.texts(group)):
-        yield Field(f"require {text}", "", "met, missed, or empty where that is not known", "str")
+        yield TableColumn(f"require {text}", "", "met, missed, or empty where that is not known", "str")
     if any((group.values("status") != 0).any() for group in groups):
-        yield Field("cause", "", "why it failed", "str", "cause")
+        yield TableColumn("cause", "", "why it failed", "str", "cause")
 
 
 def varied(groups: Sequence[Group]) -> list[Stored]:
@@ -107,13 +108,13 @@ def varied(groups: Sequence[Group]) -> list[Stored]:
     return list({v.name: v for role in ("choice", "coordinate") for group in groups for v in group.role(role)}.values())
 
 
-def of_varied(variable: Stored, *, deck: bool) -> Field:
+def of_varied(variable: Stored, *, deck: bool) -> TableColumn:
     """The column of what is varied: a deck may vary a `let run`."""
     name = f"coordinates.{variable.name}" if variable.name == "run" else variable.name
     if variable.role == "choice":
-        return Field(name, "", variable.long_name, "str", variable.name)
+        return TableColumn(name, "", variable.long_name, "str", variable.name)
     unit, scale = in_unit(variable, deck=deck)
-    return Field(name, unit, variable.long_name, "float", variable.name, scale)
+    return TableColumn(name, unit, variable.long_name, "float", variable.name, scale)
 
 
 def in_unit(variable: Stored, *, deck: bool) -> tuple[str, float]:
@@ -123,13 +124,13 @@ def in_unit(variable: Stored, *, deck: bool) -> tuple[str, float]:
     return str(variable.attributes["deck_unit"]), float(variable.attributes.get("deck_scale", 1.0))
 
 
-def value_of(field: Field, group: Group, position: int) -> object:
+def value_of(field: TableColumn, group: Group, position: int) -> object:
     """What is varied, in one case; None where its structure does not have it."""
     [value] = _values(group, field, np.array([position]))
     return value
 
 
-def _values(group: Group, field: Field, positions: np.ndarray) -> list[object]:
+def _values(group: Group, field: TableColumn, positions: np.ndarray) -> list[object]:
     if field.name == "run" and not field.variable:
         return [group.sweep or group.name] * len(positions)
     if not field.variable:

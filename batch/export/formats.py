@@ -1,0 +1,128 @@
+"""The file formats of `met export`: one file in this folder each, and one line in `FORMATS`.
+
+Its module has a `FORMAT`, an object of a class derived from `ExportFormat`. Everything that asks about formats asks
+here: `met export`, `met run -o FILE.ending`, what an archive must not be called, and what their help lists.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+
+if TYPE_CHECKING:
+    from batch.archive.read import ArchiveFile
+    from batch.campaigns.campaign import Campaign
+    from batch.export.case_table import CaseTable
+    from batch.export.picking import ExportedCase
+
+FORMATS = {
+    "mcap": "batch.export.mcap",
+    "csv": "batch.export.csv",
+    "parquet": "batch.export.parquet",
+}
+"""The module of each format, by its name, which is also the ending of its files. The first is the default."""
+
+Rows = Literal["metrics", "histories"]
+"""What an export's rows are: a case with its metrics, or an instant of a case."""
+
+Option = Literal["units", "layout"]
+"""An option of `met export` that only some formats take."""
+
+
+@frozen
+class Request:
+    """What was asked of an export besides its file.
+
+    table     what its rows are to be; None: not said
+    signals   signals that were named; none: all
+    units     units of metrics and varied parameters: SI, or the deck's
+    layout    True where a layout file was asked for
+    force     True to overwrite any file that exists; None where the user has no way to say so
+    named     True where cases were asked for one by one
+    """
+
+    table: Rows | None = None
+    signals: tuple[str, ...] = ()
+    units: Literal["si", "deck"] = "si"
+    layout: bool = False
+    force: bool | None = False
+    named: bool = False
+
+
+@frozen
+class Written:
+    """How many rows an export has, and the layout file written beside it, if any."""
+
+    rows: int
+    layout: Path | None = None
+
+
+class ExportFormat:
+    """One file format.
+
+    title       a file of it, as messages call it: "an MCAP file"
+    tables      what its rows may be
+    options     those of the options in `Option` that it takes
+    metrics_in  for help, where a file without a table of metrics has them
+    """
+
+    title: str
+    tables: tuple[Rows, ...] = ("metrics", "histories")
+    options: tuple[Option, ...] = ("units",)
+    metrics_in: str = ""
+
+    def is_own(self, path: Path) -> bool:
+        """Return True where an existing file is an export of MET's in this format, which may be overwritten unasked."""
+        return False
+
+    def check_campaign(self, campaign: Campaign, target: Path) -> None:
+        """Refuse, before anything runs, a campaign whose archive could not be exported. Raises Problem."""
+
+    def write_metrics(self, file: ArchiveFile, table: CaseTable, target: Path) -> Written:
+        """Write a row a case: what is varied, metrics, requirements. Raises Problem."""
+        raise NotImplementedError
+
+    def write_histories(
+        self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: Request
+    ) -> Written:
+        """Write the signals of these cases. Raises Problem."""
+        raise NotImplementedError
+
+    def check_request(self, request: Request, target: Path) -> None:
+        """Refuse options that this format has no use for. Raises Problem E375, E376."""
+        if request.layout and "layout" not in self.options:
+            helps = "`-o FILE.mcap` writes one, and its layout"
+            raise Problem(error("E375", f"a layout shows an MCAP file, and {target} is none", help=helps))
+        if request.table == "metrics" and "metrics" not in self.tables:
+            helps = "; ".join(filter(None, ("`-o FILE.csv` writes one", self.metrics_in)))
+            message = f"{target} would hold histories: {self.title} is no table of metrics"
+            raise Problem(error("E376", message, help=helps))
+        if request.units != "si" and "units" not in self.options:
+            message = f"{target} would be in SI: {self.title} has no other units"
+            raise Problem(error("E376", message, help="`-o FILE.csv` can be in the deck's"))
+        if request.table == "metrics" and request.signals:
+            message = f"signals are histories: a table of metrics has no `{request.signals[0]}`"
+            raise Problem(error("E376", message, help="leave out `--metrics`, or `--signals`"))
+
+
+def find(name: str) -> ExportFormat:
+    """The format of that name; its module is imported when it is first asked for. Raises KeyError."""
+    found: ExportFormat = import_module(FORMATS[name]).FORMAT
+    return found
+
+
+def format_of(path: Path) -> str | None:
+    """The name of the format that a file's ending says; None for any other ending."""
+    ending = path.suffix.lower().removeprefix(".")
+    return ending if ending in FORMATS else None
+
+
+def endings(last: str = ", ") -> str:
+    """The endings of all formats, for help and messages: `.mcap, .csv, .parquet`. last: between the last two."""
+    *others, end = (f".{name}" for name in FORMATS)
+    return ", ".join(others) + last + end

@@ -1,0 +1,48 @@
+"""An export straight from a run, `met run DECK -o FILE.mcap`: of an archive FILE.h5 that is run, and stays."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from batch.campaigns.campaign import Campaign
+from batch.campaigns.output import quoted
+from batch.export import Exported, export
+from batch.export.formats import find, format_of
+from batch.export.output import check as check_place
+from met.diagnostic import Problem, error
+
+
+def parted(output: str | os.PathLike[str] | None) -> tuple[Path | None, Path | None]:
+    """The archive and the export that an output names; None for what it does not."""
+    target = None if output is None else Path(output)
+    if target is None or format_of(target) is None:
+        return target, None
+    return target.with_suffix(".h5"), target
+
+
+def check(campaign: Campaign, target: Path, *, histories: bool) -> None:
+    """Refuse what could not be exported in the end, before anything runs. histories: whether they were asked for.
+    Raises Problem E305, E323, E370-E374."""
+    writer = find(str(format_of(target)))
+    kept = sum(len(part.kept) for part in campaign.parts)
+    if not kept and not campaign.keep.later and ("metrics" not in writer.tables or histories or campaign.cases == 1):
+        message = f"{target} would be empty: no histories are kept"
+        helps = ["`--histories all` keeps them, and `--histories '#0'` those of a case"]
+        if not any(part.experiment.structure.record for part in campaign.parts):
+            helps = ["`record = [q, qd, tau];` in the run records signals"]
+        raise Problem(error("E323", message, help=[*helps, *campaign.notes]))
+    writer.check_campaign(campaign, target)
+    check_place(target, campaign.output, writer.is_own, force=None)
+
+
+def later(campaign: Campaign, target: Path, *, histories: bool) -> str:
+    """The command that makes the export of an archive that is whole."""
+    runs = campaign.asked
+    named = "".join(f" --run {quoted(name)}" for name in runs) if len(runs) > 1 else ""
+    return f"met export {quoted(campaign.output)}{named}{' --histories' * histories} -o {quoted(target)}"
+
+
+def written(campaign: Campaign, target: Path, *, histories: bool) -> Exported:
+    """Export all that was run. Raises Problem."""
+    return export(campaign.output, target, runs=campaign.asked, table="histories" if histories else None)
