@@ -20,6 +20,7 @@ from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import new_file
 from met.messages import visible
+from met.outputs import check_place
 from met.plan import Experiment, Formula, Plan, Substitution
 from met.plan import file as plan_file
 from met.program.control.plant import bed_values
@@ -162,10 +163,9 @@ def _check_output(deck: Path, records: Path) -> None:
         wrong, helps = f"{deck} is there already: it is not written over", f"{helps}, or remove it"
     elif os.path.lexists(records) and (records.is_symlink() or not records.is_file()):
         wrong = f"cannot write {records}: it is not a regular file"
-    elif not deck.parent.is_dir():
-        wrong, helps = f"cannot write {deck}: {deck.parent} does not exist", f"make it first: `mkdir -p {deck.parent}`"
     if wrong:
         raise Problem(error("E305", wrong, help=helps))
+    check_place(deck, code="E305")
 
 
 def check(found: FitResult, about: About) -> None:

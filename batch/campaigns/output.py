@@ -6,7 +6,6 @@ import errno
 import json
 import os
 import resource
-import shlex
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,8 +17,10 @@ from batch.archive.sink import Busy, Sink, temporary_of
 from batch.campaigns.folder import Folder, beside
 from batch.export.formats import format_of
 from ic.printing.columns import size as size_text
+from met import outputs
 from met.diagnostic import Problem, error
 from met.host.files import new_file
+from met.outputs import check_overwrite, check_place, quoted
 from met.plan import Experiment, Plan
 
 
@@ -84,27 +85,15 @@ def _check_output(output: Path, plan: Plan) -> None:
     if format_of(output):
         remedy = f"`-o {quoted(output.with_suffix('.h5'))}`; `met run DECK -o {quoted(output)}` writes both"
         raise Problem(error("E305", f"cannot write {output}: it is to be an archive, which ends in .h5", help=remedy))
-    for target in (output, sidecar_path(output)) if output.name else (output,):  # the name of . and / is empty
-        if target.is_dir():
-            inside = quoted(target / default_output(plan))
-            helps = f"name a file in it: `-o {inside}`" if target == output else ()
-            raise Problem(error("E305", f"cannot write {target}: it is a folder", help=helps))
+    check_place(output, code="E305", inside=output / default_output(plan))
     if beside(output).exists() and not beside(output).is_dir():
         message = f"cannot write {output}: {beside(output)} is no folder, and a campaign's has to be there"
         raise Problem(error("E305", message, help="give another name with `-o`, or move the file"))
     if foreign := Folder(beside(output)).foreign():
         message = f"cannot write {output}: {beside(output)} is no campaign's folder, and holds {', '.join(foreign[:3])}"
         raise Problem(error("E305", message, help="give another name with `-o`, or move the folder"))
-    if not output.parent.is_dir():
-        what = "is a file, not a folder" if output.parent.exists() else "does not exist"
-        helps = () if output.parent.exists() else f"make it first: `mkdir -p {quoted(output.parent)}`"
-        raise Problem(error("E305", f"cannot write {output}: {output.parent} {what}", help=helps))
-    for target in (output, sidecar_path(output)):
-        if target.exists() and not target.is_file():
-            raise Problem(error("E305", f"cannot write {target}: it is not a regular file"))
-    if output.exists() and output.stat().st_size > 0 and not is_archive(output):
-        helps = "give another name with `-o`, or remove the file"
-        raise Problem(error("E305", f"{output} exists and is no archive of MET: it is not written over", help=helps))
+    check_place(sidecar_path(output), code="E305")
+    check_overwrite(output, is_archive, code="E305", because=" and is no archive of MET")
     temporary_of(sidecar_path(output)).exists()  # the longest of the names that there will be beside it
     probe = Sink(temporary_of(output))
     probe.remove()
@@ -126,7 +115,7 @@ def check_room(output: Path, needed: int) -> None:
 
 def cannot_write(output: Path, reason: OSError, kept: str = "") -> Any:
     """kept: what of the work is kept, and where; nothing is without it."""
-    why = (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
+    why = outputs.refusal_text(reason)
     if reason.errno in (errno.EMFILE, errno.ENFILE):  # whatever it was that could not be opened
         return error("E305", f"cannot write {output}: {why}", help=f"{kept or 'nothing was kept'}; {more_files()}")
     where = str(reason.filename) if isinstance(reason.filename, str | os.PathLike) else ""
@@ -149,9 +138,3 @@ def busy(output: Path) -> Any:
         f"`met status {quoted(output)}` says how far it is", "wait until it is done, or give another name with `-o`",
     ]  # fmt: skip
     return error("E307", f"cannot write {output}: another run is writing it now", help=helps)
-
-
-def quoted(path: Any) -> str:
-    """A path as a word of a command line: for a shell, and not to be taken for an option."""
-    text = str(path)
-    return shlex.quote(f"./{text}" if text.startswith("-") else text)

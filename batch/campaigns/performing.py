@@ -19,13 +19,14 @@ from batch.campaigns import merge, resuming
 from batch.campaigns.campaign import Campaign, histories_section, values_sections
 from batch.campaigns.drive import Driver, Progress, Stopped, TooManyFailures
 from batch.campaigns.folder import Busy, Folder, beside, gaps
-from batch.campaigns.output import busy, cannot_write, check_room, publish, quoted
+from batch.campaigns.output import busy, cannot_write, check_room, publish
 from batch.campaigns.status import Reporter, died
 from batch.campaigns.tasks import Section
 from batch.executors import Executor
 from batch.executors.threads import Threads
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
+from met.outputs import quoted
 
 WORTH_SECONDS = 1.0
 """Work that took less is not kept where a campaign ends early: it is done again as fast as it is found."""

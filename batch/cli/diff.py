@@ -38,12 +38,12 @@ def diff(a: str, b: str, tolerances: tuple[str, ...], require: str, distribution
     """
     import json
 
-    from batch.campaigns.output import quoted
     from batch.differences.campaigns import diff
     from batch.differences.compare import EQUIVALENT, VERDICTS
     from batch.differences.data import as_data
     from batch.differences.told import Cut, told
     from batch.differences.tolerance import tolerances as read
+    from met.outputs import quoted
 
     found = diff(a, b, read(tolerances), distributions=distributions)
     options = [*(f"--tol {quoted(each)}" for each in tolerances), *(["--distributions"] if distributions else [])]

@@ -159,9 +159,9 @@ def status(where: str, form: str) -> int:
     import time
     from pathlib import Path
 
-    from batch.campaigns.output import quoted
     from batch.campaigns.status import found, here, lines, report, whole
     from met.diagnostic import Problem, error
+    from met.outputs import quoted
 
     folder = found(where)
     if folder is None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from batch.campaigns.output import quoted
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE
 from batch.differences.found import Diff, Ended, Experiment, Ranked, Required, Signal
 from batch.differences.samples import LEVEL, Sample
@@ -12,6 +11,7 @@ from batch.queries.failures import STATUS, ranges
 from batch.queries.signals import number_text
 from met.frozen import frozen
 from met.messages.visible import visible
+from met.outputs import quoted
 
 SAME = "made from the same: deck, parameters, models and versions"
 

@@ -23,6 +23,7 @@ from batch.campaigns.output import more_files
 from batch.campaigns.tasks import Done, Task
 from batch.executors import Outcome
 from met.host import interpreter
+from met.outputs import refusal_text
 
 COMMAND = tuple(interpreter.command("batch.executors.worker"))
 WATCH_SECONDS = 0.2
@@ -129,7 +130,7 @@ class Child:
 
 
 def _no_start(reason: OSError) -> str:
-    why = (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
+    why = refusal_text(reason)
     if reason.errno in (errno.EMFILE, errno.ENFILE):
         return f"a worker cannot be started: {why}; {more_files()}"
     fewer = "; fewer processes may do" if reason.errno in (errno.ENOMEM, errno.EAGAIN) else ""

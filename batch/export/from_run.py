@@ -6,11 +6,11 @@ import os
 from pathlib import Path
 
 from batch.campaigns.campaign import Campaign
-from batch.campaigns.output import quoted
 from batch.export import Exported, export
 from batch.export.formats import find, format_of
 from batch.export.output import check as check_place
 from met.diagnostic import Problem, error
+from met.outputs import quoted
 
 
 def parted(output: str | os.PathLike[str] | None) -> tuple[Path | None, Path | None]:

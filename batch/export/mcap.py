@@ -24,7 +24,6 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign
-from batch.campaigns.output import quoted
 from batch.export import scene, wire
 from batch.export.case_log import LogLine, log_lines, result, varied
 from batch.export.formats import ExportFormat, Request, Written
@@ -35,6 +34,7 @@ from batch.export.wire import plain
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 from met.host.files import open_regular
+from met.outputs import quoted
 from met.version import VERSION
 
 if TYPE_CHECKING:
@@ -304,7 +304,9 @@ def _check_positions(campaign: Campaign, target: Path) -> None:
         lacking = [f"{joint.name}.q" for joint in structure.moving if f"{joint.name}.q" not in recorded]
         if part.recorded and lacking:
             which = "q" if len(lacking) == len(structure.moving) else ", ".join(lacking)
-            message = f"the arm of `{part.experiment.name_in_deck}` could not be shown in {target}: {which} is not recorded"
+            message = (
+                f"the arm of `{part.experiment.name_in_deck}` could not be shown in {target}: {which} is not recorded"
+            )
             helps = (
                 "`record = [q, ...]` in the run keeps where its joints are",
                 f"`-o {quoted(target.with_suffix('.csv'))}` needs no positions",

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from batch.archive.sink import Busy, Sink, temporary_of
-from batch.campaigns.output import quoted
 from met.diagnostic import Problem, error
+from met.outputs import cannot_write, check_overwrite, check_place
 
 
 def check(output: Path, archive: Path, own: Callable[[Path], bool], *, force: bool | None) -> None:
@@ -20,30 +20,16 @@ def check(output: Path, archive: Path, own: Callable[[Path], bool], *, force: bo
     force  whether any other may; None where the user has no way to say so
     """
     try:
-        _check(output, archive, own, force)
+        check_place(output, code="E305", inside=output / archive.with_suffix(".mcap").name)
+        if output.exists() and archive.exists() and output.samefile(archive):
+            message = f"{output} is the archive itself: it is not written over"
+            raise Problem(error("E374", message, help="give another name with `-o`"))
+        if not force:
+            because = ", and may hold work that is not in the archive"
+            remedy = "remove the file" if force is None else "say `--force`"
+            check_overwrite(output, own, code="E374", because=because, remedy=remedy)
     except OSError as reason:
         raise _cannot_write(output, reason) from reason
-
-
-def _check(output: Path, archive: Path, own: Callable[[Path], bool], force: bool | None) -> None:
-    if output.is_dir():
-        helps = f"name a file in it: `-o {quoted(output / archive.with_suffix('.mcap').name)}`"
-        raise Problem(error("E305", f"cannot write {output}: it is a folder", help=helps))
-    if not output.parent.is_dir():
-        what = "is a file, not a folder" if output.parent.exists() else "does not exist"
-        helps = "" if output.parent.exists() else f"make it first: `mkdir -p {quoted(output.parent)}`"
-        raise Problem(error("E305", f"cannot write {output}: {output.parent} {what}", help=helps or ()))
-    if not output.exists():
-        return
-    if not output.is_file():
-        raise Problem(error("E305", f"cannot write {output}: it is not a regular file"))
-    if archive.exists() and output.samefile(archive):
-        message = f"{output} is the archive itself: it is not written over"
-        raise Problem(error("E374", message, help="give another name with `-o`"))
-    if not force and output.stat().st_size > 0 and not own(output):
-        message = f"{output} exists, and may hold work that is not in the archive: it is not written over"
-        remedy = "remove the file" if force is None else "say `--force`"
-        raise Problem(error("E374", message, help=f"give another name with `-o`, or {remedy}"))
 
 
 @contextlib.contextmanager
@@ -76,5 +62,4 @@ def whole(output: Path) -> Iterator[Sink]:
 
 
 def _cannot_write(output: Path, reason: OSError) -> Problem:
-    why = (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
-    return Problem(error("E305", f"cannot write {output}: {why}", help="`-o FILE` names another place"))
+    return cannot_write(output, reason, code="E305", help="`-o FILE` names another place")

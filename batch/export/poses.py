@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from batch.archive.read import Stored, reading
-from batch.campaigns.output import quoted
 from batch.export.picking import ExportedCase
 from met.diagnostic import Problem, error
 from met.dynamics.spatial import HERE, IDENTITY, Pose, compose, inverse, rotation_quaternion, sub
 from met.frozen import frozen
+from met.outputs import quoted
 from met.plan import BASE, Experiment, Formula, Plan
 from met.program.motion.base import BaseMotion, motions, prescribed
 from met.program.system import PARAMETER, System

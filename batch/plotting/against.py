@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group
-from batch.campaigns.output import quoted
 from batch.differences import matching
 from batch.queries.signals import Panel, pretty_unit
 from met.diagnostic import Problem, error
 from met.messages.visible import line
+from met.outputs import quoted
 from met.plan.channel import channel_paths
 
 LONGEST = 40

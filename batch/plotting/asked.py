@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group, Stored
-from batch.campaigns.output import quoted
 from batch.queries.grids import is_grid, levels
 from batch.queries.pool import Column, Pool
 from batch.queries.signals import number_text, panels
 from met.diagnostic import Problem, did_you_mean, error
 from met.frozen import frozen
+from met.outputs import quoted
 
 MOST_OVER = 3
 MOST_BESIDE = 6

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from batch.archive.read import ArchiveFile, Group, Stored
-from batch.campaigns.output import quoted
 from batch.plotting import held, layout
 from batch.plotting.against import Beside, lacking
 from batch.plotting.sheet import COLOURS, FAINT, INK, Sheet, sequence
@@ -22,6 +21,7 @@ from batch.queries.limits import Mark, limits_of
 from batch.queries.signals import Panel, case_text, deck_unit, history, number_text, panels
 from met.diagnostic import Problem, error
 from met.distinct import distinct
+from met.outputs import quoted
 
 OVERLAID = 8
 LEGEND_EVERY = 4

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from batch.archive.read import ArchiveFile
-from batch.campaigns.output import quoted
 from batch.plotting import layout, maps, points
 from batch.plotting.against import Beside, file_names
 from batch.plotting.asked import coloured, free, over
@@ -16,6 +15,7 @@ from batch.plotting.measured import Measured, measured
 from batch.plotting.sheet import Sheet
 from batch.queries.pool import Column, Pool
 from met.diagnostic import Problem, error
+from met.outputs import quoted
 
 
 def draw(

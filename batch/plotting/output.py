@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
-from batch.campaigns.output import quoted
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, whole_file
 from met.messages.visible import visible
+from met.outputs import cannot_write, check_overwrite, check_place, quoted
 
 SOFTWARE = "MET"
 MOST_DOTS = 200_000_000
@@ -33,26 +32,13 @@ MARKS = {
 def check(output: Path) -> None:
     """Refuse to write over what is no picture of MET's. Raises Problem E305; E326 for another ending."""
     try:
-        _check(output)
+        if output.suffix.lower() not in METADATA and not output.is_dir():
+            helps = [f"`-o {quoted(output.with_suffix('.png'))}`"] if output.name else []
+            raise Problem(error("E326", f"cannot write {output}: pictures are PNG, SVG or PDF files", help=helps))
+        check_place(output, code="E305", inside=output / "plot.png")
+        check_overwrite(output, own, code="E305", because=" and was not drawn by MET")
     except OSError as reason:
-        raise _cannot_write(output, reason) from reason
-
-
-def _check(output: Path) -> None:
-    if output.is_dir():
-        inside = quoted(output / "plot.png")
-        raise Problem(error("E305", f"cannot write {output}: it is a folder", help=f"`-o {inside}`"))
-    if output.suffix.lower() not in METADATA:
-        helps = [f"`-o {quoted(output.with_suffix('.png'))}`"] if output.name else []
-        raise Problem(error("E326", f"cannot write {output}: pictures are PNG, SVG or PDF files", help=helps))
-    if not output.parent.is_dir():
-        helps = [f"`mkdir -p {quoted(output.parent)}`"]
-        raise Problem(error("E305", f"cannot write {output}: {output.parent} is no folder", help=helps))
-    if output.exists() and not output.is_file():
-        raise Problem(error("E305", f"cannot write {output}: it is not a regular file"))
-    if output.exists() and output.stat().st_size and not own(output):
-        message = f"{output} exists and was not drawn by MET: it is not written over"
-        raise Problem(error("E305", message, help="give another name with `-o`, or remove the file"))
+        raise cannot_write(output, reason, code="E305") from reason
 
 
 def own(output: Path) -> bool:
@@ -85,7 +71,7 @@ def save(figure: Any, output: Path) -> None:
             warnings.filterwarnings("ignore", message="Glyph .* missing from font")
             getattr(drawn, f"print_{kind[1:]}")(file, metadata=METADATA[kind])
     except OSError as reason:
-        raise _cannot_write(output, reason) from reason
+        raise cannot_write(output, reason, code="E305") from reason
     except UserWarning as reason:
         wide, high = (f"{2.54 * side:.3g}" for side in figure.get_size_inches())
         message = f"{wide} x {high} cm have no room for {len(figure.axes)} panels, with what is written on them"
@@ -99,8 +85,3 @@ def _check_dots(figure: Any, kind: str) -> None:
     if kind == ".png" and across * up > MOST_DOTS:
         message = f"{across:,} x {up:,} dots: a PNG has {MOST_DOTS:,} at most"
         raise Problem(error("E392", message, help=("a smaller `--dpi` or `--size`", "an SVG or a PDF has no dots")))
-
-
-def _cannot_write(output: Path, reason: OSError) -> Problem:
-    why = (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
-    return Problem(error("E305", f"cannot write {output}: {why}"))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from batch.campaigns.output import quoted
 from batch.queries.pool import ENDED, Column, Pool, shown
 from batch.queries.summary import median_text
 from batch.report.against import GOOD, Before
 from batch.report.content import Table, Worst
 from met.distinct import distinct
+from met.outputs import quoted
 
 MOST_CASES = 20
 """Rows of the table of worst cases."""

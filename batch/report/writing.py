@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
-from batch.campaigns.output import quoted
 from batch.report.page import GENERATOR
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, whole_file
+from met.outputs import cannot_write, check_overwrite, check_place, quoted
 
 ENDINGS = (".html", ".htm")
 HEAD_BYTES = 400
@@ -23,29 +22,15 @@ def default(archive: Path) -> Path:
 def check(output: Path) -> None:
     """Refuse a place before anything is computed. Raises Problem E380, or E381 where the name is not that of a page."""
     try:
-        _check(output)
+        if output.suffix.lower() not in ENDINGS and not output.is_dir():
+            helps = [f"`-o {quoted(output.with_suffix('.html'))}`"] if output.name else []
+            if output.suffix.lower() == ".pdf":
+                helps.append("a browser prints the page to PDF: everything is open then, and light")
+            raise Problem(error("E381", f"cannot write {output}: reports are HTML files", help=helps))
+        check_place(output, code="E380", inside=output / "report.html")
+        check_overwrite(output, is_report, code="E380", because=" and is no report of MET")
     except OSError as reason:
-        raise cannot_write(output, reason) from reason
-
-
-def _check(output: Path) -> None:
-    if output.is_dir():
-        inside = quoted(output / "report.html")
-        raise Problem(error("E380", f"cannot write {output}: it is a folder", help=f"name a file in it: `-o {inside}`"))
-    if output.suffix.lower() not in ENDINGS:
-        helps = [f"`-o {quoted(output.with_suffix('.html'))}`"] if output.name else []
-        if output.suffix.lower() == ".pdf":
-            helps.append("a browser prints the page to PDF: everything is open then, and light")
-        raise Problem(error("E381", f"cannot write {output}: reports are HTML files", help=helps))
-    if not output.parent.is_dir():
-        what = "is a file, not a folder" if output.parent.exists() else "does not exist"
-        helps = [] if output.parent.exists() else [f"make it first: `mkdir -p {quoted(output.parent)}`"]
-        raise Problem(error("E380", f"cannot write {output}: {output.parent} {what}", help=helps))
-    if output.exists() and not output.is_file():
-        raise Problem(error("E380", f"cannot write {output}: it is not a regular file"))
-    if output.exists() and output.stat().st_size > 0 and not is_report(output):
-        message = f"{output} exists and is no report of MET: it is not written over"
-        raise Problem(error("E380", message, help="give another name with `-o`, or remove the file"))
+        raise _cannot_write(output, reason) from reason
 
 
 def is_report(path: Path) -> bool:
@@ -60,9 +45,8 @@ def write(output: Path, text: str) -> None:
         with whole_file(output) as file:
             file.write(text.encode("utf-8"))
     except OSError as reason:
-        raise cannot_write(output, reason) from reason
+        raise _cannot_write(output, reason) from reason
 
 
-def cannot_write(output: Path, reason: OSError) -> Problem:
-    why = (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
-    return Problem(error("E380", f"cannot write {output}: {why}", help="`-o FILE` names another place"))
+def _cannot_write(output: Path, reason: OSError) -> Problem:
+    return cannot_write(output, reason, code="E380", help="`-o FILE` names another place")

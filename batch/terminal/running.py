@@ -11,7 +11,6 @@ from typing import Any
 
 from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, prepare
-from batch.campaigns.output import quoted
 from batch.campaigns.performing import TooMany, perform
 from batch.campaigns.rehearsal import rehearse
 from batch.campaigns.replaying import Replay, differences, replay
@@ -25,6 +24,7 @@ from batch.terminal.verdict import announcement, told, verdict_json, worst_cases
 from met.diagnostic import Problem, error
 from met.host.sources import names_archive, names_plan
 from met.messages import visible
+from met.outputs import quoted
 from met.plan import Plan
 
 

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from batch.archive.read import ArchiveFile, Group
-from batch.campaigns.output import quoted
 from batch.queries import cases, ordering
 from batch.queries.deck_units import DeckUnits
 from batch.queries.failures import failure_lines
@@ -23,6 +22,7 @@ from ic.printing.columns import size as size_text
 from met.diagnostic import Problem, error
 from met.distinct import distinct
 from met.messages.visible import line
+from met.outputs import quoted
 
 MOST_GROUPS = 4
 """So many structures of a sweep are shown in full unless they are named; of more, their table alone."""

@@ -28,6 +28,7 @@ import numpy as np
 
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, read_regular, whole_file
+from met.outputs import check_regular, not_overwritten
 from met.plan import Experiment, Formula, Plan
 from met.plan.codec import Damaged, decode, encode
 
@@ -213,8 +214,7 @@ def _check_targets(path: Path, files: dict[Path, bytes]) -> None:
     """Nothing is written over but a plan of MET's, and the tables that it names."""
     before = _plan_there(path)
     for target, data in files.items():
-        if target.exists() and not target.is_file():
-            raise Problem(error("E300", f"cannot write {target}: it is not a regular file"))
+        check_regular(target, code="E300")
         if target == path or not target.exists() or f'"{target.name}"' in before or read_regular(target) == data:
             continue
         message = f"cannot write {target}: it exists, and is no case table of {path}; it is not written over"
@@ -225,8 +225,8 @@ def _plan_there(path: Path) -> str:
     """The text of the plan that is there now; empty where nothing is. Raises Problem E300 for anything else."""
     text = ""
     try:
-        if not path.is_file() and path.exists() and not path.is_dir():
-            raise Problem(error("E300", f"cannot write {path}: it is not a regular file"))
+        if not path.is_dir():
+            check_regular(path, code="E300")
         with open_regular(path) as file:
             begins = file.read(1)
             text = (begins + file.read()).decode("utf-8") if begins == b"{" else ""
@@ -238,8 +238,7 @@ def _plan_there(path: Path) -> str:
     except (ValueError, RecursionError):
         document = None
     if not isinstance(document, dict) or document.get("schema") != SCHEMA:
-        message = f"{path} exists and is no plan of MET: it is not written over"
-        raise Problem(error("E300", message, help="give another name with `-o`, or remove the file"))
+        raise Problem(not_overwritten(path, code="E300", because=" and is no plan of MET"))
     return text
 
 

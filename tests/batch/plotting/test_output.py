@@ -44,8 +44,12 @@ def test_letters_of_an_svg_are_drawn_and_those_of_a_pdf_are_letters(here: Path) 
     ("output", "said"),
     [
         ("a.jpg", "error[E326]: cannot write a.jpg: pictures are PNG, SVG or PDF files\n = help: `-o a.png`\n"),
-        ("folder.png", "error[E305]: cannot write folder.png: it is a folder\n = help: `-o folder.png/plot.png`\n"),
-        ("no/a.png", "error[E305]: cannot write no/a.png: no is no folder\n = help: `mkdir -p no`\n"),
+        (
+            "folder.png",
+            "error[E305]: cannot write folder.png: it is a folder\n"
+            " = help: name a file in it: `-o folder.png/plot.png`\n",
+        ),
+        ("no/a.png", "error[E305]: cannot write no/a.png: no does not exist\n = help: make it first: `mkdir -p no`\n"),
         *(
             (f"photo{ending}", f"error[E305]: photo{ending} exists and was not drawn by MET: it is not written over\n"
              " = help: give another name with `-o`, or remove the file\n")

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 import batch.report
-from batch.report import writing
 from met import cli
 from met.diagnostic import Problem
 from met.messages.render import render
@@ -125,7 +124,7 @@ def test_a_full_disk_leaves_what_was_there(sweep: Path, monkeypatch: pytest.Monk
     def full(_: int) -> None:
         raise OSError(errno.ENOSPC, "no space")
 
-    monkeypatch.setattr(writing.os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(Problem) as caught:
         batch.report.report(sweep, title="another")
     assert render(caught.value.diagnostics) == (

@@ -1,0 +1,75 @@
+"""Places for a command's output: what is refused as one before any work is done, always in the same words.
+
+met.host.files.whole_file then writes the file, whole or not at all.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from met.diagnostic import Problem, error
+
+
+def check_place(output: Path, *, code: str, inside: Path | None = None) -> None:
+    """Refuse a path at which no file can be written: a folder, a pipe, a path in a folder that is not there.
+
+    code    of the error
+    inside  a file to propose where `output` is a folder; None: none
+
+    Raises Problem; OSError where the system does not let it look.
+    """
+    if output.is_dir():
+        helps = () if inside is None else (f"name a file in it: `-o {quoted(inside)}`",)
+        raise Problem(error(code, f"cannot write {output}: it is a folder", help=helps))
+    if not output.parent.is_dir():
+        what = "is a file, not a folder" if output.parent.exists() else "does not exist"
+        helps = () if output.parent.exists() else (f"make it first: `mkdir -p {quoted(output.parent)}`",)
+        raise Problem(error(code, f"cannot write {output}: {output.parent} {what}", help=helps))
+    check_regular(output, code=code)
+
+
+def check_regular(output: Path, *, code: str) -> None:
+    """Refuse to replace a pipe, a device or a folder. Raises Problem, OSError."""
+    if output.exists() and not output.is_file():
+        raise Problem(error(code, f"cannot write {output}: it is not a regular file"))
+
+
+def check_overwrite(
+    output: Path, is_own: Callable[[Path], bool], *, code: str, because: str, remedy: str = "remove the file"
+) -> None:
+    """Refuse to overwrite a file that holds anything, unless it is one that MET may replace unasked.
+
+    is_own   True for such a file
+    because  the rest of "`output` exists ...", as "and is no report of MET"
+    remedy   what to do besides giving another name
+
+    Raises Problem, OSError.
+    """
+    if output.exists() and output.stat().st_size > 0 and not is_own(output):
+        raise Problem(not_overwritten(output, code=code, because=because, remedy=remedy))
+
+
+def not_overwritten(output: Path, *, code: str, because: str, remedy: str = "remove the file") -> Any:
+    """The error that `output` exists and is left as it is, as `check_overwrite` has it."""
+    helps = f"give another name with `-o`, or {remedy}"
+    return error(code, f"{output} exists{because}: it is not written over", help=helps)
+
+
+def cannot_write(output: Path, reason: OSError, *, code: str, help: str | Sequence[str] = ()) -> Problem:
+    """The problem that the system refuses to write a file, in the system's words."""
+    return Problem(error(code, f"cannot write {output}: {refusal_text(reason)}", help=help))
+
+
+def refusal_text(reason: OSError) -> str:
+    """A refusal in the system's words, as the end of a message: `no space left on device`."""
+    return (os.strerror(reason.errno) if reason.errno else str(reason)).lower()
+
+
+def quoted(path: Any) -> str:
+    """A path as a word of a command line: for a shell, and not to be taken for an option."""
+    text = str(path)
+    return shlex.quote(f"./{text}" if text.startswith("-") else text)
