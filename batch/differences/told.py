@@ -76,24 +76,26 @@ def _ended(experiment: Experiment, cut: Cut) -> Iterator[str]:
 def _signals(signals: Sequence[Signal]) -> list[str]:
     if not signals:
         return []
-    rows = [["", "", "cases", "largest", "", "of range", "where", "first", "tolerance"]]
-    rows += [_row(words.compared(signal)) for signal in signals]
-    used = [column for column in range(len(rows[0])) if column < 3 or any(row[column] for row in rows[1:])]
-    right = [used.index(column) for column in (3, 5) if column in used]
-    return columns([[row[column] for column in used] for row in rows], right=right)
-
-
-def _row(each: words.Compared) -> list[str]:
-    return [each.name, each.verdict, each.cases, each.largest, each.unit, each.share, each.where, each.first,
-            each.tolerance]  # fmt: skip
+    found = [words.signal_row(signal) for signal in signals]
+    heads: list[str] = []
+    fields: list[str] = []
+    right: list[int] = []
+    for column in words.signal_columns(found):
+        right += [len(fields)] if column.kind == "number" else []
+        heads.append(column.head)
+        fields.append(column.field)
+        if column.unit and any(getattr(row, column.unit) for row in found):  # in a column of its own
+            heads.append("")
+            fields.append(column.unit)
+    return columns([heads, *([getattr(row, field) for field in fields] for row in found)], right=right)
 
 
 def _samples(experiment: Experiment) -> list[str]:
     if not experiment.samples:
         return []
-    rows = [["  as distributions", "cases", "", "median", "", "distance", "by chance"]]
-    for each in map(words.distribution, experiment.samples):
-        rows.append([f"  {each.name}", *each.cases, *each.medians, each.distance, each.chance])
+    rows = [[head for head, _ in words.DISTRIBUTION_HEADS]]
+    rows += [list(words.distribution(each).cells) for each in experiment.samples]
+    rows = [[f"  {first}", *others] for first, *others in rows]
     note = words.starred(experiment)
     return ["", *columns(rows, right=range(1, 7)), *([f"  {note}"] if note else [])]
 
@@ -102,9 +104,9 @@ def _worst(found: Diff, experiment: Experiment, cut: Cut) -> list[str]:
     if not experiment.worst:
         return []
     out = []
-    for each in experiment.worst:
-        what, before, now = words.most(each)
-        out.append(f"    #{each.case_b} {each.case_id[:8]}  {what}: {before}, now {now}\n"
-                   f"      {'; '.join(words.again(found, experiment, each))}")  # fmt: skip
+    for each in words.worst_cases(found, experiment):
+        now = f"{each.now} {each.unit}".rstrip()
+        first = f"    #{each.case} {each.id}  {each.what}: {each.before}, now {now}"
+        out.append(f"{first}\n      {'; '.join(each.commands)}")
     few = cut.few(out, SHOWN_WORST, "    ")
     return ["", f"  {words.WORST}:", *(line for each in few for line in each.split("\n"))]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE
 from batch.differences.found import Diff, Ended, Experiment, Ranked, Required, Signal
@@ -130,11 +132,15 @@ def cause(each: Ended) -> str:
 
 
 @frozen
-class Compared:
-    """A signal or a metric as a row of a table; texts, "" for what there is not.
+class SignalRow:
+    """A signal or a metric as a row of the table of `met diff` and of the report; texts, "" for what there is not.
 
-    cases      how many, of how many;  largest, unit: the largest difference;  share: of what the values of a span
-    where      of the largest, and its `case`;  first: s, the earliest difference;  tolerance: what was given and used
+    cases      how many, of how many
+    largest    the largest difference, in `unit`
+    share      of it, in what the values of a span
+    where      it is, and in which `case`
+    first      the earliest difference, with its unit
+    tolerance  what was given, and how much of it was used
     """
 
     name: str
@@ -149,11 +155,48 @@ class Compared:
     case: int | None = None
 
 
-def compared(signal: Signal) -> Compared:
+@frozen
+class SignalColumn:
+    """A column of the table of signals, for the terminal and for the page alike.
+
+    field       of `SignalRow`
+    head        above it in the terminal;  page_head  in the report
+    unit        the field that has the unit of its numbers; "" for none
+    kind        how it is set: "number" flush right, "words" with room to wrap
+    always      True where it is shown even if every cell is empty
+    """
+
+    field: str
+    head: str
+    page_head: str
+    unit: str = ""
+    kind: Literal["", "number", "words"] = ""
+    always: bool = False
+
+
+SIGNAL_COLUMNS = (
+    SignalColumn("name", "", "signal or metric", always=True),
+    SignalColumn("verdict", "", "verdict", always=True),
+    SignalColumn("cases", "cases", "cases", always=True),
+    SignalColumn("largest", "largest", "largest difference", unit="unit", kind="number"),
+    SignalColumn("share", "of range", "of range", kind="number"),
+    SignalColumn("where", "where", "where", kind="words"),
+    SignalColumn("first", "first", "first"),
+    SignalColumn("tolerance", "tolerance", "tolerance", kind="words"),
+)
+
+
+def signal_columns(rows: Sequence[SignalRow]) -> list[SignalColumn]:
+    """The columns that these rows have something in."""
+    return [column for column in SIGNAL_COLUMNS if column.always or any(getattr(row, column.field) for row in rows)]
+
+
+def signal_row(signal: Signal) -> SignalRow:
+    """The row of a signal or metric, in the unit that people read it in."""
     if signal.verdict == INCOMPARABLE:
-        return Compared(signal.name, INCOMPARABLE, signal.why)
+        return SignalRow(signal.name, INCOMPARABLE, signal.why)
     if signal.verdict == IDENTICAL:
-        return Compared(signal.name, IDENTICAL, f"{signal.compared:,}")
+        return SignalRow(signal.name, IDENTICAL, f"{signal.compared:,}")
     unit = signal.deck_unit if signal.largest < float("inf") else ""
     count = {DIFFERENT: signal.different, EQUIVALENT: signal.equivalent}.get(signal.verdict, signal.compared)
     place = signal.place
@@ -170,10 +213,18 @@ def compared(signal: Signal) -> Compared:
     share = f"{number_text(float(f'{100 * signal.share:.2g}'))} %" if 0.0 < signal.share < float("inf") else ""
     if signal.nan:
         where = f"{signal.nan:,} not-a-number on one side" + (f", {where}" if where else "")
-    return Compared(
-        signal.name, signal.verdict, f"{count:,} of {signal.compared:,}", largest, unit if largest else "", share,
-        where, first, _tolerance(signal), None if place is None else place.case,
-    )  # fmt: skip
+    return SignalRow(
+        name=signal.name,
+        verdict=signal.verdict,
+        cases=f"{count:,} of {signal.compared:,}",
+        largest=largest,
+        unit=unit if largest else "",
+        share=share,
+        where=where,
+        first=first,
+        tolerance=_tolerance(signal),
+        case=None if place is None else place.case,
+    )
 
 
 def _tolerance(signal: Signal) -> str:
@@ -207,6 +258,23 @@ class Distribution:
     distance: str
     chance: str
 
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Its row, under `DISTRIBUTION_HEADS`; all but the first are numbers."""
+        return self.name, *self.cases, *self.medians, self.distance, self.chance
+
+
+DISTRIBUTION_HEADS = (
+    ("as distributions", "as distributions"),
+    ("cases", "cases before"),
+    ("", "now"),
+    ("median", "median before"),
+    ("", "now"),
+    ("distance", "distance"),
+    ("by chance", "by chance"),
+)
+"""The heads of the table of distributions: in the terminal, and in the report."""
+
 
 def distribution(each: Sample) -> Distribution:
     chance = f"{each.probability:.2g}" + (" *" if each.unlike else "")
@@ -224,15 +292,38 @@ def starred(experiment: Experiment) -> str:
 WORST = "worst cases, each with what runs it again"
 
 
-def most(each: Ranked) -> tuple[str, str, str]:
-    """What differs most in a case, and where; its value before and now."""
-    where = f" of {each.place.label}" if each.place.label else ""
-    when = f" at {each.place.time:g} s" if each.place.time == each.place.time else ""
-    before, now = apart(each.place.before / each.deck_scale, each.place.after / each.deck_scale)
-    return f"{each.signal}{where}{when}", before, f"{now} {each.deck_unit}".rstrip()
+@frozen
+class WorstCase:
+    """A case that differs much, as `met diff` and the report list it.
+
+    case      its position in the case table of b;  id  its first letters
+    what      differs most in it, where and when
+    before    the value in a, and `now` that in b, in `unit`
+    commands  that run it again, in a and in b
+    """
+
+    case: int
+    id: str
+    what: str
+    before: str
+    now: str
+    unit: str
+    commands: tuple[str, str]
 
 
-def again(found: Diff, experiment: Experiment, each: Ranked) -> tuple[str, str]:
+def worst_cases(found: Diff, experiment: Experiment) -> list[WorstCase]:
+    """The cases that differ most, the first ones first."""
+    out = []
+    for each in experiment.worst:
+        where = f" of {each.place.label}" if each.place.label else ""
+        when = f" at {each.place.time:g} s" if each.place.time == each.place.time else ""
+        before, now = apart(each.place.before / each.deck_scale, each.place.after / each.deck_scale)
+        what, commands = f"{each.signal}{where}{when}", _replays(found, experiment, each)
+        out.append(WorstCase(each.case_b, each.case_id[:8], what, before, now, each.deck_unit, commands))
+    return out
+
+
+def _replays(found: Diff, experiment: Experiment, each: Ranked) -> tuple[str, str]:
     """The commands that run a case of both archives again."""
     several = len(found.experiments) + len(found.only_a) + len(found.only_b) > 1
     return (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -28,8 +29,24 @@ class Spread:
 
 
 @frozen
-class MetricSummary:
-    """A metric over cases (SI), as `Spread` has it.
+class SpreadColumn:
+    """A column of the table of metrics: a number of `Spread`, and its head in `met show` and in a report."""
+
+    field: str
+    head: str
+    page_head: str
+
+
+SPREAD_COLUMNS = (
+    SpreadColumn("minimum", "min", "smallest"),
+    SpreadColumn("median", "median", "median"),
+    SpreadColumn("maximum", "max", "largest"),
+)
+
+
+@frozen
+class MetricSummary(Spread):
+    """A metric over cases: its spread in SI.
 
     deck_unit   the unit its requirement is written in, else that of its values; shown = value / deck_scale
     """
@@ -37,11 +54,6 @@ class MetricSummary:
     name: str
     unit: str
     about: str
-    minimum: float
-    median: float
-    maximum: float
-    infinite: int
-    unknown: int
     deck_unit: str = ""
     deck_scale: float = 1.0
 
@@ -128,9 +140,13 @@ def summary_of(group: Group, position: int | None = None) -> Summary:
 def _metric(variable: Stored, values: np.ndarray) -> MetricSummary:
     found, told = spread(values), variable.attributes
     return MetricSummary(
-        variable.name, variable.unit, variable.long_name, found.minimum, found.median, found.maximum, found.infinite,
-        found.unknown, str(told.get("deck_unit", variable.unit)), float(told.get("deck_scale", 1.0)),
-    )  # fmt: skip
+        **asdict(found),
+        name=variable.name,
+        unit=variable.unit,
+        about=variable.long_name,
+        deck_unit=str(told.get("deck_unit", variable.unit)),
+        deck_scale=float(told.get("deck_scale", 1.0)),
+    )
 
 
 def spread(values: np.ndarray) -> Spread:
@@ -154,10 +170,13 @@ def median_text(values: np.ndarray, *, infinite: str = "inf", none: str = "-") -
 
 def as_json(summary: Summary) -> dict[str, Any]:
     """Plain data for `--format json`; a number that is not finite is null."""
-    from dataclasses import asdict
-
-    data: dict[str, Any] = finite(asdict(summary))
+    data: dict[str, Any] = finite({**asdict(summary), "metrics": [_named_first(asdict(m)) for m in summary.metrics]})
     return {**data, "ok": summary.ok}
+
+
+def _named_first(metric: dict[str, Any]) -> dict[str, Any]:
+    """A metric's numbers after what it is."""
+    return {**{key: metric[key] for key in ("name", "unit", "about")}, **metric}
 
 
 def finite(value: Any) -> Any:

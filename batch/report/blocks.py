@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from batch.queries.pool import shown
+from batch.queries.summary import SPREAD_COLUMNS
 from batch.report.content import Demand, Fact, Failing, Flow, MetricRow, Section, Spot, Varied, Verdict
 from batch.report.markup import Child, Html, breaking, el, join, lines
 
@@ -232,16 +234,16 @@ def metrics(section: Section) -> Html | None:
     if not section.metrics:
         return None
     compared = any(each.before for each in section.metrics)
-    values = ["smallest", "median", "largest", *(["median before"] if compared else [])]
+    values = [*(each.page_head for each in SPREAD_COLUMNS), *(["median before"] if compared else [])]
     if section.single:
         values = ["before", "now"] if compared else ["value"]
     heads = ["metric", *values, "unit"]
     heads += [] if section.single else ["how often"]
-    shown = any(each.remark for each in section.metrics)
-    rows = [el("tr", _metric(each, section.single, shown, compared)) for each in section.metrics]
+    remarks = any(each.remark for each in section.metrics)
+    rows = [el("tr", _metric(each, section.single, remarks, compared)) for each in section.metrics]
     numbers = range(1, len(values) + 1)
     head = el("tr", [el("th", name, scope="col", cls="right" if n in numbers else None)
-                     for n, name in enumerate([*heads, *([""] if shown else [])])])  # fmt: skip
+                     for n, name in enumerate([*heads, *([""] if remarks else [])])])  # fmt: skip
     made = el("table", el("thead", head), el("tbody", lines(rows)), cls="few" if section.single else None)
     outline = any(each.bars_before for each in section.metrics)
     said = el("p", "Bars: how often now. Outline: before.", cls="said") if outline else None
@@ -250,7 +252,8 @@ def metrics(section: Section) -> Html | None:
 
 def _metric(each: MetricRow, single: bool, remarks: bool, compared: bool) -> list[Html]:
     before = [each.before] if compared else []
-    values = [*before, each.median] if single else [each.minimum, each.median, each.maximum, *before]
+    spread = [shown(getattr(each.spread, column.field)) for column in SPREAD_COLUMNS]
+    values = [*before, shown(each.spread.median)] if single else [*spread, *before]
     cells = [el("th", el("code", breaking(each.name)), el("span", each.about, cls="under"), scope="row")]
     cells += [el("td", value, cls="right") for value in values]
     cells.append(el("td", each.unit))
@@ -278,7 +281,8 @@ def histogram(each: MetricRow) -> Html | None:
         y = f"{26 - 24 * count / top:.2f}"
         before += f"{'L' if n else 'M'}{n * wide:.2f} {y}H{(n + 1) * wide - 0.6 * (n + 1 == len(each.bars)):.2f}"
     outline = el("path", d=before, cls="before") if before else None
-    words = f"{each.name} from {each.minimum} to {each.maximum} {each.unit}, median {each.median}"
+    low, high, middle = (shown(value) for value in (each.spread.minimum, each.spread.maximum, each.spread.median))
+    words = f"{each.name} from {low} to {high} {each.unit}, median {middle}"
     floor = el("line", x1=0, x2=160, y1=26.5, y2=26.5, cls="floor")
     return el("svg", bars, floor, outline, limits, cls="histogram", viewBox="-1 0 162 28", role="img", aria_label=words)
 

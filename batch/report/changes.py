@@ -1,14 +1,18 @@
-"""What a report holds of a comparison with another archive, which is before, and this one now, as plain data."""
+"""What a report holds of a comparison with another archive, which is before, and this one now, as plain data. Its rows
+are those of `met diff`, batch/differences/words.py."""
 
 from __future__ import annotations
 
-from batch.report.content import Table
+from batch.differences.words import Distribution, Ending, SignalRow, WorstCase
 from met.frozen import frozen
 
 
 @frozen
-class Made:
-    """What made the two and differs: what kind of thing, and what is said of it; lines that are left out."""
+class OtherOrigin:
+    """Something that the two archives were made from and that differs, such as a parameter.
+
+    about  what kind of thing;  lines  what is said of it;  left  how many more lines there are
+    """
 
     about: str
     lines: tuple[str, ...]
@@ -16,78 +20,37 @@ class Made:
 
 
 @frozen
-class EndedCase:
-    case: int
-    id: str
-    cause: str
-
-
-@frozen
-class EndedAlike:
-    """Cases that end otherwise than before, alike: how, which, and the first of them with their causes."""
-
-    text: str
-    cases: str
-    each: tuple[EndedCase, ...]
-    left: int
-
-
-@frozen
-class SignalRow:
-    """A signal or metric in both, as `batch.differences.words.Compared`."""
-
-    name: str
-    word: str
-    cases: str
-    largest: str
-    share: str
-    where: str
-    first: str
-    tolerance: str
-    case: int | None
-
-
-@frozen
-class ChangedCase:
-    """A case that changed much: what changed most in it, and where; the value before and now; the commands that run it
-    again in both."""
-
-    case: int
-    id: str
-    what: str
-    before: str
-    now: str
-    unit: str
-    commands: tuple[str, str]
-
-
-@frozen
-class Compared:
+class RunChanges:
     """A run, or the cases of one structure of a sweep, in both archives.
 
     heading  name, cases in both, verdict;  word: the verdict alone
     alone    cases that one archive has alone, and what else is to be said;  allowed: the tolerances, by who gives them
+    worst    the cases that changed most;  left: how many more differ
     """
 
     heading: str
     word: str
     alone: tuple[str, ...]
-    ended: tuple[EndedAlike, ...]
+    endings: tuple[Ending, ...]
     notes: tuple[str, ...]
     allowed: tuple[str, ...]
     signals: tuple[SignalRow, ...]
-    samples: Table | None
+    samples: tuple[Distribution, ...]
     starred: str
-    worst: tuple[ChangedCase, ...]
+    worst: tuple[WorstCase, ...]
     left: int
 
 
 @frozen
-class Comparison:
-    """What changed against another archive: `before` and `now` are what the two are called, `made` what made them,
-    `alone` runs and sweeps that one has alone."""
+class ArchiveChanges:
+    """What changed against another archive.
+
+    before   what the other is called, and `now` this one
+    origins  what they were made from and that differs
+    alone    runs and sweeps that one of them has alone
+    """
 
     before: str
     now: str
-    made: tuple[Made, ...]
+    origins: tuple[OtherOrigin, ...]
     alone: tuple[str, ...]

@@ -2,22 +2,38 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from batch.differences.compare import IDENTICAL
-from batch.differences.words import SAME, WORST
+from batch.differences.words import (
+    DISTRIBUTION_HEADS,
+    SAME,
+    WORST,
+    Ending,
+    SignalColumn,
+    SignalRow,
+    WorstCase,
+    cause,
+    signal_columns,
+)
+from batch.queries.pool import shown
 from batch.report.blocks import case_link, likeness, scrolling
-from batch.report.changes import ChangedCase, Compared, Comparison, EndedAlike, Made, SignalRow
+from batch.report.changes import ArchiveChanges, OtherOrigin, RunChanges
+from batch.report.content import Table
 from batch.report.markup import Child, Html, breaking, el, join, lines
 from batch.report.tabular import command, table
 
 SHOWN_LINES, SHOWN_WORST = 12, 5
-"""Of one kind of change, and of the cases that changed most; the others are folded away."""
+"""Lines of one kind of change, and cases of those that changed most, that are open; the others are folded away."""
+
+MOST_ENDED = 20
+"""Cases that are listed of those that end otherwise alike."""
 
 
-def made(found: Comparison) -> Html:
-    """What made the two and differs, and what one of them has alone."""
-    rows = [el("div", el("dt", each.about), el("dd", _lines(each))) for each in found.made]
+def origins(found: ArchiveChanges) -> Html:
+    """What the two archives were made from and that differs, and what one of them has alone."""
+    rows = [el("div", el("dt", each.about), el("dd", _lines(each))) for each in found.origins]
     same = el("p", SAME[0].upper() + SAME[1:], ".", cls="said") if not rows else None
     return join([el("dl", rows, cls="facts made") if rows else None, same, _noted(found.alone)])
 
@@ -26,7 +42,7 @@ def _noted(said: Sequence[str]) -> Html | None:
     return el("div", [el("p", line) for line in said], cls="note") if said else None
 
 
-def _lines(found: Made) -> list[Html]:
+def _lines(found: OtherOrigin) -> list[Html]:
     shown = [_line(line) for line in found.lines[:SHOWN_LINES]]
     folded = found.lines[SHOWN_LINES:]
     if folded:
@@ -42,7 +58,7 @@ def _line(said: str) -> Html:
     return el("p", said[2:], cls="text") if said.startswith("  ") else el("p", said)
 
 
-def compared(found: Compared) -> Html:
+def run_changes(found: RunChanges) -> Html:
     """A run or a structure: its cases, then signals and metrics, distributions, and the cases that changed most."""
     head = el("h3", el("span", likeness(found.word), cls="likeness"), found.heading)
     signals = _signals(found.signals)
@@ -51,22 +67,24 @@ def compared(found: Compared) -> Html:
     return join([
         head,
         _noted(found.alone),
-        [_ended(each) for each in found.ended],
+        [_ended(each) for each in found.endings],
         [el("p", f"Note: {note}", cls="said") for note in found.notes],
         [el("p", line, ".", cls="said") for line in found.allowed],
         signals,
-        table(found.samples, "Metrics as distributions") if found.samples is not None else None,
+        _samples(found),
         el("p", found.starred, cls="said") if found.starred else None,
         _worst(found),
     ])  # fmt: skip
 
 
-def _ended(found: EndedAlike) -> Html:
+def _ended(found: Ending) -> Html:
     """Cases that end otherwise, and why."""
     rows = [
-        el("li", case_link(each.case), " ", el("code", each.id), "  ", el("span", each.cause)) for each in found.each
+        el("li", case_link(each.case), " ", el("code", each.case_id[:8]), "  ", el("span", cause(each)))
+        for each in found.each[:MOST_ENDED]
     ]
-    left = el("li", f"and {found.left:,} more") if found.left else None
+    more = len(found.each) - MOST_ENDED
+    left = el("li", f"and {more:,} more") if more > 0 else None
     head = el("p", el("strong", found.text, ":"), " ", el("span", found.cases, cls="cases"), cls="ends")
     return el("div", head, el("ul", rows, left), cls="failing ended")
 
@@ -74,20 +92,39 @@ def _ended(found: EndedAlike) -> Html:
 def _signals(found: Sequence[SignalRow]) -> Html | None:
     if not found:
         return None
-    texts = [("largest difference", "largest", "right"), ("of range", "share", "right"), ("where", "where", "words"),
-             ("first", "first", None), ("tolerance", "tolerance", "words")]  # fmt: skip
-    used = [(head, name, cls) for head, name, cls in texts if any(getattr(each, name) for each in found)]
-    heads = [el("th", head, scope="col") for head in ("signal or metric", "verdict", "cases")]
-    heads += [el("th", head, scope="col", cls=cls if cls == "right" else None) for head, _, cls in used]
-    rows = [
-        el("tr", el("th", el("code", breaking(each.name)), scope="row"),
-           el("td", likeness(each.word), each.word, cls=f"is {'same' if each.word == IDENTICAL else 'other'}"),
-           el("td", each.cases),
-           [el("td", _where(each) if name == "where" else getattr(each, name), cls=cls) for _, name, cls in used])
-        for each in found
-    ]  # fmt: skip
+    used = signal_columns(found)
+    heads = [el("th", each.page_head, scope="col", cls="right" if each.kind == "number" else None) for each in used]
+    rows = [el("tr", [_cell(row, column) for column in used]) for row in found]
     made = el("table", el("thead", el("tr", heads)), el("tbody", lines(rows)))
     return scrolling(made, "Signals and metrics, before and now")
+
+
+def _cell(row: SignalRow, column: SignalColumn) -> Html:
+    """A cell of the table of signals; a case in it can be chosen."""
+    text = getattr(row, column.field)
+    if column.field == "name":
+        return el("th", el("code", breaking(text)), scope="row")
+    if column.field == "verdict":
+        return el("td", likeness(text), text, cls=f"is {'same' if text == IDENTICAL else 'other'}")
+    if column.field == "where":
+        return el("td", _where(row), cls="words")
+    if column.unit:
+        text = f"{text} {getattr(row, column.unit)}".rstrip()
+    return el("td", text, cls={"number": "right", "words": "words"}.get(column.kind))
+
+
+def _samples(found: RunChanges) -> Html | None:
+    """Metrics as distributions."""
+    if not found.samples:
+        return None
+    heads = tuple(head for _, head in DISTRIBUTION_HEADS)
+    rows = tuple(each.cells for each in found.samples)
+    return table(Table(heads, ("",) * len(heads), rows, frozenset(range(1, len(heads)))), "Metrics as distributions")
+
+
+def _number(text: str) -> str:
+    """A number as other tables of the page have it where there is none."""
+    return shown(math.nan) if text == "nan" else text
 
 
 def _where(each: SignalRow) -> Child:
@@ -97,7 +134,7 @@ def _where(each: SignalRow) -> Child:
     return [before, case_link(each.case), after] if found and each.case is not None else each.where
 
 
-def _worst(found: Compared) -> Html | None:
+def _worst(found: RunChanges) -> Html | None:
     """The cases that changed most, with the commands that run them again."""
     if not found.worst:
         return None
@@ -110,14 +147,14 @@ def _worst(found: Compared) -> Html | None:
     return join([head, _cases(first), more, left, again])
 
 
-def _cases(found: Sequence[ChangedCase]) -> Html:
+def _cases(found: Sequence[WorstCase]) -> Html:
     heads = ("case", "id", "what changed most", "before", "now", "unit", "run it again, before and now")
     right = {0, 3, 4}
     head = el("tr", [el("th", name, scope="col", cls="right" if n in right else "command" if n == 6 else None)
                      for n, name in enumerate(heads)])  # fmt: skip
     rows = [
         el("tr", el("th", case_link(each.case), scope="row", cls="right"), el("td", el("code", each.id), cls="id"),
-           el("td", each.what), el("td", each.before, cls="right"), el("td", each.now, cls="right"),
+           el("td", each.what), el("td", _number(each.before), cls="right"), el("td", _number(each.now), cls="right"),
            el("td", each.unit), el("td", [el("p", command(words)) for words in each.commands], cls="command"),
            data_case=each.case)
         for each in found

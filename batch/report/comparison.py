@@ -10,13 +10,13 @@ from batch.differences import words
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, VERDICTS
 from batch.differences.found import Diff, Experiment
 from batch.queries.failures import ranges
-from batch.queries.pool import Pool, shown
+from batch.queries.pool import Pool
 from batch.report.against import GOOD, Against, Before
-from batch.report.changes import ChangedCase, Compared, Comparison, EndedAlike, EndedCase, Made, SignalRow
-from batch.report.content import Flow, Part, Table, Verdict
+from batch.report.changes import ArchiveChanges, OtherOrigin, RunChanges
+from batch.report.content import Flow, Part, Verdict
 
-MOST_LINES, MOST_ENDED = 200, 20
-"""Of one kind of change, and of cases that end otherwise alike."""
+MOST_LINES = 200
+"""Lines of one kind of change that are in a page."""
 
 KINDS = {
     "versions": "Versions", "code": "Code", "structure": "Structure", "deck": "Deck",
@@ -24,67 +24,43 @@ KINDS = {
 }  # fmt: skip
 
 
-def comparison(found: Diff) -> Comparison:
-    made = tuple(
-        Made(KINDS[kind], lines[:MOST_LINES], max(0, len(lines) - MOST_LINES)) for kind, lines in words.made(found)
+def archive_changes(found: Diff) -> ArchiveChanges:
+    """What the two archives were made from, and what one of them has alone."""
+    origins = tuple(
+        OtherOrigin(KINDS[kind], lines[:MOST_LINES], max(0, len(lines) - MOST_LINES))
+        for kind, lines in words.made(found)
     )
-    return Comparison(str(found.a), str(found.b), made, tuple(words.alone(found)))
+    return ArchiveChanges(str(found.a), str(found.b), origins, tuple(words.alone(found)))
 
 
-def compared(found: Diff, before: Before | None) -> tuple[Compared, ...]:
-    """Of a section's structures, each that both archives have."""
+def run_changes(found: Diff, before: Before | None) -> tuple[RunChanges, ...]:
+    """The changes of each of a section's structures that both archives have."""
     if before is None:
         return ()
     several = len(before.pairs) > 1
-    return tuple(_compared(found, experiment, several) for _, _, experiment in before.pairs)
+    return tuple(_run_changes(found, experiment, several) for _, _, experiment in before.pairs)
 
 
-def _compared(found: Diff, experiment: Experiment, several: bool) -> Compared:
-    """several: whether requirements are to be told of here, since the verdict has those of all structures together."""
+def _run_changes(found: Diff, experiment: Experiment, several: bool) -> RunChanges:
+    """The changes of one structure. several: True where there are others, so that its requirements are listed here: the
+    verdict has those of all structures together."""
     alone = words.missing(found, experiment)
     if several:
         alone += words.requirements(experiment)
     allowed = (line.replace("the deck of b ", f"the deck of {found.b} ") for line in words.allowed(found, experiment))
-    ended = tuple(
-        EndedAlike(
-            each.text, each.cases,
-            tuple(EndedCase(one.case, one.case_id[:8], words.cause(one)) for one in each.each[:MOST_ENDED]),
-            max(0, len(each.each) - MOST_ENDED),
-        )
-        for each in words.endings(experiment)
-    )  # fmt: skip
-    return Compared(
-        words.heading(experiment), experiment.verdict, tuple(alone), ended, tuple(experiment.notes), tuple(allowed),
-        tuple(map(_row, map(words.compared, experiment.signals))), _samples(experiment), words.starred(experiment),
-        _worst(found, experiment), max(0, experiment.cases_different - len(experiment.worst)),
-    )  # fmt: skip
-
-
-def _row(each: words.Compared) -> SignalRow:
-    largest = f"{each.largest} {each.unit}".rstrip()
-    return SignalRow(
-        each.name, each.verdict, each.cases, largest, each.share, each.where, each.first, each.tolerance, each.case
+    return RunChanges(
+        heading=words.heading(experiment),
+        word=experiment.verdict,
+        alone=tuple(alone),
+        endings=tuple(words.endings(experiment)),
+        notes=tuple(experiment.notes),
+        allowed=tuple(allowed),
+        signals=tuple(map(words.signal_row, experiment.signals)),
+        samples=tuple(map(words.distribution, experiment.samples)),
+        starred=words.starred(experiment),
+        worst=tuple(words.worst_cases(found, experiment)),
+        left=max(0, experiment.cases_different - len(experiment.worst)),
     )
-
-
-def _samples(experiment: Experiment) -> Table | None:
-    if not experiment.samples:
-        return None
-    rows = [(each.name, *each.cases, *each.medians, each.distance, each.chance)
-            for each in map(words.distribution, experiment.samples)]  # fmt: skip
-    heads = ("as distributions", "cases before", "now", "median before", "now", "distance", "by chance")
-    return Table(heads, ("",) * 7, tuple(rows), frozenset(range(1, 7)))
-
-
-def _worst(found: Diff, experiment: Experiment) -> tuple[ChangedCase, ...]:
-    out = []
-    for each in experiment.worst:
-        what, was, now = words.most(each)
-        now = now.removesuffix(f" {each.deck_unit}")  # it has a column of its own
-        was, now = (shown(np.nan) if text == "nan" else text for text in (was, now))
-        commands = words.again(found, experiment, each)
-        out.append(ChangedCase(each.case_b, each.case_id[:8], what, was, now, each.deck_unit, commands))
-    return tuple(out)
 
 
 # The verdict

@@ -6,16 +6,13 @@ are numbered through, and what decides the structure is a column of words.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from batch.queries.colours import Reach
 from batch.queries.pool import Column
+from batch.queries.summary import Spread
+from batch.report.changes import ArchiveChanges, RunChanges
 from met.frozen import frozen
-
-if TYPE_CHECKING:
-    from batch.report.changes import Compared, Comparison
 
 
 @frozen
@@ -133,6 +130,8 @@ class Varied:
 class MetricRow:
     """A metric over the cases: spread, histogram of the finite values, limits in the histogram's range.
 
+    spread  in `unit`, as a deck writes it
+    remark  how many values are infinite or missing
     bars    counts of equal stretches from `low` to `high`; none where there are too few values to show a shape
     limits  of requirements, in the metric's unit
     before  the median of the other archive's cases, where one is compared with, and `bars_before` their counts
@@ -141,9 +140,7 @@ class MetricRow:
     name: str
     about: str
     unit: str
-    minimum: str
-    median: str
-    maximum: str
+    spread: Spread
     remark: str
     bars: tuple[int, ...] = ()
     low: float = 0.0
@@ -366,7 +363,7 @@ class Section:
     """A run or sweep.
 
     name        as it is asked for;  lede  what it is, in a sentence
-    compared    with another archive, a structure each;  what it lacks is in `Comparison.alone`
+    changes     against another archive, a structure each;  what one of them lacks is in `ArchiveChanges.alone`
     trouble     why parameters and stability are missing; "" where they are not
     """
 
@@ -385,7 +382,7 @@ class Section:
     trouble: str = ""
     notes: tuple[str, ...] = ()
     single: bool = False
-    compared: tuple[Compared, ...] = ()
+    changes: tuple[RunChanges, ...] = ()
 
 
 @frozen
@@ -400,4 +397,4 @@ class Report:
     sections: tuple[Section, ...]
     sources: tuple[SourceText, ...]
     provenance: tuple[Fact, ...]
-    comparison: Comparison | None = None
+    changes: ArchiveChanges | None = None

@@ -12,7 +12,6 @@ from batch.archive.read import ArchiveFile, Group
 from batch.queries.pool import Pool, pools
 from batch.report import comparison
 from batch.report.against import Against, Before, narrowed
-from batch.report.comparison import compared
 from batch.report.content import Fact, Report, Section, SourceText, Stability
 from batch.report.histories import MOST_VALUES, no_signals, signals
 from batch.report.overview import overview
@@ -56,7 +55,7 @@ def gather(
     befores = [None if against is None else against.of(pool) for pool in found]
     sections = tuple(
         replace(_section(name, pool, pool.name if several else "", experiments, trouble, share, progress, before),
-                compared=() if against is None else compared(against.found, before))
+                changes=() if against is None else comparison.run_changes(against.found, before))
         for pool, before in zip(found, befores, strict=True)
     )  # fmt: skip
     verdicts = [verdict(pool, named=len(found) > 1) for pool in found]
@@ -71,7 +70,7 @@ def gather(
         sections=sections,
         sources=_sources(archive),
         provenance=_provenance(archive, groups) + (() if against is None else _compared_with(against)),
-        comparison=None if against is None else comparison.comparison(against.found),
+        changes=None if against is None else comparison.archive_changes(against.found),
     )
 
 

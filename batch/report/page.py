@@ -33,7 +33,7 @@ def page(report: Report) -> str:
         Html(f"<style>{style}</style>"),
     ])  # fmt: skip
     data = [
-        el("script", script_json(section_data(section, _replay(report, section), report.comparison)),
+        el("script", script_json(section_data(section, _replay(report, section), report.changes)),
            type="application/json", id=f"d{n}")
         for n, section in enumerate(report.sections)
     ]  # fmt: skip
@@ -58,7 +58,7 @@ def _replay(report: Report, section: Section) -> str:
 
 def _header(report: Report) -> Html:
     lede = report.sections[0].lede if len(report.sections) == 1 else f"{len(report.sections)} runs and sweeps."
-    links = [("verdict", "Verdict"), *([("changed", "What changed")] if report.comparison is not None else [])]
+    links = [("verdict", "Verdict"), *([("changed", "What changed")] if report.changes is not None else [])]
     links += [link for n, section in enumerate(report.sections) for link in _links(n, section, report)]
     links += [("parameters", "Parameters"), ("provenance", "Provenance")]
     items = [el("li", el("a", name, href=f"#{where}")) for where, name in links]
@@ -72,9 +72,9 @@ def _header(report: Report) -> Html:
 
 
 def _about(report: Report) -> str:
-    if report.comparison is None:
+    if report.changes is None:
         return report.deck
-    return f"{report.deck} · {report.comparison.now} against {report.comparison.before}"
+    return f"{report.deck} · {report.changes.now} against {report.changes.before}"
 
 
 def _links(number: int, section: Section, report: Report) -> list[tuple[str, str]]:
@@ -91,8 +91,8 @@ def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
     several = len(report.sections) > 1
     answers = [blocks.verdict(each) for each in report.verdicts]
     out: list[Child] = [el("section", el("h2", "Verdict", cls="quiet"), answers, id="verdict")]
-    if report.comparison is not None:
-        out.append(el("section", el("h2", "What changed"), compared.made(report.comparison), id="changed"))
+    if report.changes is not None:
+        out.append(el("section", el("h2", "What changed"), compared.origins(report.changes), id="changed"))
     for number, section in enumerate(report.sections):
         parts = lines(_section(number, section, anchors, "h3" if several else "h2"))
         if several:
@@ -114,8 +114,8 @@ def _section(number: int, section: Section, anchors: blocks.Anchors, head: str) 
         return el("section", el(head, name), told, *children, id=f"s{number}-{key}", cls=key)
 
     out: list[Child] = []
-    if section.compared:
-        out.append(el("section", [compared.compared(each) for each in section.compared], id=f"s{number}-compared",
+    if section.changes:
+        out.append(el("section", [compared.run_changes(each) for each in section.changes], id=f"s{number}-compared",
                       cls="compared"))  # fmt: skip
     out.append(part(
         "run", "What was run", blocks.facts(section.facts), blocks.varied(section.varied, anchors),
@@ -187,7 +187,7 @@ def _parameters(report: Report, anchors: blocks.Anchors) -> Html:
 
 
 def _footer(report: Report) -> Html:
-    against = None if report.comparison is None else [" against ", el("code", report.comparison.before)]
+    against = None if report.changes is None else [" against ", el("code", report.changes.before)]
     words = join(["Made by ", el("code", "met report"), " from ", el("code", report.archive), against,
                   ". The page is whole in this file and asks nothing of any network."])  # fmt: skip
     scripts = el("noscript", el("p", "The plots need JavaScript; all tables are here without.", cls="note"))

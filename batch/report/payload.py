@@ -11,7 +11,7 @@ import numpy as np
 from batch.queries.colours import Reach, reach
 from batch.queries.pool import ENDED, Column
 from batch.queries.signals import pretty_unit
-from batch.report.changes import Comparison
+from batch.report.changes import ArchiveChanges
 from batch.report.content import History, Map, Overview, Ruler, Section, Signals, Stability
 from batch.report.markup import Html
 from met.messages.visible import visible
@@ -28,11 +28,11 @@ def script_json(data: Any) -> Html:
     return Html(json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).translate(LEGIBLE))
 
 
-def section_data(section: Section, replay: str, comparison: Comparison | None = None) -> dict[str, Any]:
+def section_data(section: Section, replay: str, changes: ArchiveChanges | None = None) -> dict[str, Any]:
     """All that the plots of a section need. replay: the command that runs a case again, with `#CASE` for which."""
     return {
         "name": visible(section.name),
-        "against": None if comparison is None else [visible(comparison.before), visible(comparison.now)],
+        "against": None if changes is None else [visible(changes.before), visible(changes.now)],
         "replay": visible(replay),
         "ended": list(ENDED),
         "overview": None if section.overview is None else _overview(section.overview),

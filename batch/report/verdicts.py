@@ -100,8 +100,7 @@ def _metric(column: Column, before: np.ndarray | None) -> MetricRow:
     said = [f"infinite in {counted(found.infinite, 'case')}"] if found.infinite else []
     said += [f"no value in {counted(found.unknown, 'case')}"] if found.unknown else []
     if not len(finite):
-        none = shown(np.nan)
-        return MetricRow(column.label, column.about, column.unit, none, none, none, ", ".join(said), before=was_text)
+        return MetricRow(column.label, column.about, column.unit, found, ", ".join(said), before=was_text)
     low, middle, high = found.minimum, found.median, found.maximum
     bars: tuple[int, ...] = ()
     bars_before: tuple[int, ...] = ()
@@ -112,11 +111,19 @@ def _metric(column: Column, before: np.ndarray | None) -> MetricRow:
         bars = _counts(finite, from_, to)
         bars_before = _counts(was, from_, to) if len(was) else ()
     limits = tuple(limit.value for limit in column.limits if from_ <= limit.value <= to)
-    low_text, middle_text, high_text = (shown(value) for value in (low, middle, high))
     return MetricRow(
-        column.label, column.about, column.unit, low_text, middle_text, high_text, ", ".join(said), bars, from_, to,
-        limits if bars else (), was_text, bars_before,
-    )  # fmt: skip
+        name=column.label,
+        about=column.about,
+        unit=column.unit,
+        spread=found,
+        remark=", ".join(said),
+        bars=bars,
+        low=from_,
+        high=to,
+        limits=limits if bars else (),
+        before=was_text,
+        bars_before=bars_before,
+    )
 
 
 def _counts(values: np.ndarray, low: float, high: float) -> tuple[int, ...]:

@@ -16,7 +16,7 @@ from batch.queries.ordering import By
 from batch.queries.pool import pools
 from batch.queries.signals import case_text, history, number_text, panels, pretty_unit
 from batch.queries.structures import structures
-from batch.queries.summary import MetricSummary, Summary, summary_of
+from batch.queries.summary import SPREAD_COLUMNS, MetricSummary, Summary, summary_of
 from batch.terminal import braille
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem, error
@@ -237,8 +237,8 @@ def _counts(summary: Summary) -> str:
 
 def _metric_table(summary: Summary) -> list[str]:
     single = summary.cases == 1
-    head = ("", "", "") if single else ("min", "median", "max")
-    rows = [("", *(head[:1] if single else head), "", "")]
+    head = ("",) if single else tuple(column.head for column in SPREAD_COLUMNS)
+    rows = [("", *head, "", "")]
     for metric in summary.metrics:
         unit = "" if metric.deck_unit == "1" else pretty_unit(metric.deck_unit)
         rows.append((metric.name, *_metric_numbers(metric, single), unit, _metric_words(metric, single)))
@@ -254,7 +254,7 @@ def _metric_numbers(metric: MetricSummary, single: bool) -> tuple[str, ...]:
     """Of the finite values; `_metric_words` says how many others there are."""
     if single:
         return ("inf" if metric.infinite else _text(metric.median, metric),)
-    return tuple(_text(value, metric) for value in (metric.minimum, metric.median, metric.maximum))
+    return tuple(_text(getattr(metric, column.field), metric) for column in SPREAD_COLUMNS)
 
 
 def _text(value: float, metric: MetricSummary) -> str:

@@ -110,8 +110,8 @@ class TestTheVerdict:
         verdict = found.verdicts[-1]
         assert (verdict.word, verdict.headline) == ("incomparable", "The two have no case in common")
         assert [(part.word, part.count) for part in verdict.parts] == [("only before", 4), ("only now", 5)]
-        assert found.comparison is not None
-        assert found.comparison.alone == (
+        assert found.changes is not None
+        assert found.changes.alone == (
             "`nominal` is only in a.h5", "`gains` is only in a.h5",
             "`swing` is only in b.h5", "`loads` is only in b.h5",
         )  # fmt: skip
@@ -148,7 +148,7 @@ class TestThePage:
     def test_says_what_the_deck_allows(self, here: Path) -> None:
         deck = archives.DECK.replace("duration = 4 s;", "duration = 4 s; tolerances { qd = 1e-6 rad/s; rel = 1e-9; }")
         batch.run(archives.compiled(here, "brief", deck=deck), output="a.h5")
-        [only] = gathered(Path("a.h5"), Path("a.h5"), "qd=1e-3rad/s").sections[0].compared
+        [only] = gathered(Path("a.h5"), Path("a.h5"), "qd=1e-3rad/s").sections[0].changes
         deck_says, command_says = only.allowed
         assert deck_says.startswith("the deck of a.h5 allows rel ") and command_says.startswith("--tol allows qd ")
 
@@ -158,7 +158,7 @@ class TestThePage:
         archives.made(here / "a.h5", one)
         archives.made(here / "b.h5", replace(one, cases=replace(one.cases, seed=8)))
         self.all_told(Path("a.h5"), Path("b.h5"))
-        assert gathered(Path("a.h5"), Path("b.h5")).sections[0].compared[0].samples is not None
+        assert gathered(Path("a.h5"), Path("b.h5")).sections[0].changes[0].samples
 
     def test_of_many_changes_folds_away_the_later_ones(self, here: Path, engine: None) -> None:
         one = plans.nominal()
@@ -167,8 +167,8 @@ class TestThePage:
                    if isinstance(q.value, float)}  # fmt: skip
         archives.made(here / "b.h5", replace(one, parameters=heavier))
         found = gathered(Path("a.h5"), Path("b.h5"))
-        assert found.comparison is not None
-        [made] = [each for each in found.comparison.made if each.about == "Parameters and models"]
+        assert found.changes is not None
+        [made] = [each for each in found.changes.origins if each.about == "Parameters and models"]
         assert len(made.lines) > 20
         assert f"and {len(made.lines) - 12} more" in words(page(found))
 
@@ -194,7 +194,7 @@ class TestThePage:
         archives.made(here / "b.h5", plans.nominal(), plans.gains(4))
         found = gathered(Path("a.h5"), Path("b.h5"), names=("nominal",))
         assert found.verdicts[-1].word == "identical" and len(found.sections) == 1
-        [only] = found.sections[0].compared
+        [only] = found.sections[0].changes
         assert only.heading == "nominal: 1 case in both, identical"
 
     @pytest.mark.slow
@@ -202,7 +202,7 @@ class TestThePage:
         batch.run(archives.compiled(here, "ways", "brief"), output="a.h5")
         deck = archives.DECK.replace("duration = 4 s", "duration = 5 s")
         batch.run(archives.compiled(here, "ways", "brief", deck=deck), output="b.h5")
-        worst = gathered(Path("a.h5"), Path("b.h5")).sections[0].compared[1].worst[0]
+        worst = gathered(Path("a.h5"), Path("b.h5")).sections[0].changes[1].worst[0]
         for number, command in zip("ab", worst.commands, strict=True):
             assert command == f"met run {number}.h5 ways.rk4 --case '#{worst.case}'"
             assert cli.main([*shlex.split(command)[1:], "-q", "--no-picture"]) == cli.YES
