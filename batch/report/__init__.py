@@ -3,7 +3,7 @@
     batch.report.report("two_link.gains.h5")                    # -> two_link.gains.html
     batch.report.report("after.h5", against="before.h5")        # and what changed
 
-`data.gather` makes plain data of an archive (`content.Report`), `page.page` makes HTML of that; here it is written.
+`contents` makes plain data of an archive (`contents.parts.Report`), `html` makes a page of that; here it is written.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ def report(
     from contextlib import ExitStack
 
     from batch.archive.read import ArchiveFile
-    from batch.report.against import Against, called, named
-    from batch.report.data import gather
-    from batch.report.page import page
+    from batch.report.contents.against import Against, called, named
+    from batch.report.contents.gathering import gather
+    from batch.report.html.page import page
     from batch.report.writing import check, default, write
     from batch.terminal.show import chosen
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from batch.report.page import GENERATOR
+from batch.report.html.page import GENERATOR
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, whole_file
 from met.outputs import cannot_write, check_overwrite, check_place, quoted

@@ -15,6 +15,7 @@ from batch.export import export
 from met import run as engine
 from met.diagnostic import Problem
 from met.dynamics.kinematics import link_motions
+from met.program.system import System
 from met.vectors import quaternion
 from tests.batch import plans
 from tests.batch.export.decks import CHAIN, DECK, LINKS, Mcap, made, matrix, said

@@ -15,11 +15,11 @@ import batch
 from batch.archive.read import ArchiveFile
 from batch.differences.told import told
 from batch.queries.pool import Column
-from batch.report import against as sides
 from batch.report import report
-from batch.report.content import Report
-from batch.report.data import gather
-from batch.report.page import page
+from batch.report.contents import against as sides
+from batch.report.contents.gathering import gather
+from batch.report.contents.parts import Report
+from batch.report.html.page import page
 from met import cli
 from met.plan import Experiment
 from met.run import Run
@@ -281,7 +281,7 @@ class TestThePoints:
     def test_of_many_keep_those_that_changed_most(
         self, planted: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        from batch.report import overview
+        from batch.report.contents import overview
 
         monkeypatch.setattr(overview, "MOST_POINTS", 30)
         monkeypatch.setattr(overview, "KEPT", 3)

@@ -13,12 +13,12 @@ from batch.archive.read import ArchiveFile
 from batch.queries import ordering
 from batch.queries.grids import levelled
 from batch.queries.pool import ENDED, Column, Pool, pools
-from batch.report import histories, overview, stability
-from batch.report.content import Part, Report
-from batch.report.data import gather
-from batch.report.maps import ruler
-from batch.report.payload import _column
-from batch.report.thinning import thin, thin_clock
+from batch.report.contents import histories, overview, stability
+from batch.report.contents.gathering import gather
+from batch.report.contents.maps import ruler
+from batch.report.contents.parts import Part, Report
+from batch.report.contents.thinning import thin, thin_clock
+from batch.report.html.payload import _column
 from met.analysis.margin import margins
 from tests.batch import plans
 from tests.batch.report import archives

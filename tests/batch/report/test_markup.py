@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from batch.report.markup import breaking, el, prose
+from batch.report.html.markup import breaking, el, prose
 from tests.batch.report.archives import HOSTILE
 
 

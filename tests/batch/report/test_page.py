@@ -16,13 +16,14 @@ import numpy as np
 import pytest
 
 from batch.archive.read import ArchiveFile
-from batch.report import inlined, report
-from batch.report.blocks import share
-from batch.report.content import Report
-from batch.report.data import gather
-from batch.report.markup import VOID, el, text, visible
-from batch.report.page import page
-from batch.report.payload import packed, script_json
+from batch.report import report
+from batch.report.contents.gathering import gather
+from batch.report.contents.parts import Report
+from batch.report.html import inlined
+from batch.report.html.blocks import share
+from batch.report.html.markup import VOID, el, text, visible
+from batch.report.html.page import page
+from batch.report.html.payload import packed, script_json
 from tests.batch import plans
 from tests.batch.report import archives
 from tests.batch.report.archives import HOSTILE
@@ -180,8 +181,8 @@ class TestWhatIsVendored:
         assert {path.name for path in inlined.FOLDER.iterdir()} == named
 
     def test_is_installed_with_the_package(self) -> None:
-        text = (Path(inlined.__file__).parents[2] / "setup.cfg").read_text(encoding="utf-8")
-        assert "\nbatch = py.typed, report/assets/*\n" in text
+        text = (Path(inlined.__file__).parents[3] / "setup.cfg").read_text(encoding="utf-8")
+        assert "\nbatch = py.typed, report/html/assets/*\n" in text
 
 
 class TestNumbers:

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from batch.queries import grids
-from batch.report import histories, overview, stability
-from batch.report.data import MOST_LINES
+from batch.report.contents import histories, overview, stability
+from batch.report.contents.gathering import MOST_LINES
 from tests.batch.report import figures
 from tests.batch.report.browser import PACKAGE, program
 

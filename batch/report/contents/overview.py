@@ -8,9 +8,9 @@ import numpy as np
 
 from batch.differences.compare import VERDICTS
 from batch.queries.pool import ENDED, Column, Pool
-from batch.report.against import GOOD, Before, change
-from batch.report.content import Overview
-from batch.report.maps import maps
+from batch.report.contents.against import GOOD, Before, change
+from batch.report.contents.maps import maps
+from batch.report.contents.parts import Overview
 from met.distinct import distinct
 
 MOST_POINTS = 12_000

@@ -10,7 +10,7 @@ import numpy as np
 from batch.queries.grids import levels
 from batch.queries.pool import Pool, shown
 from batch.queries.signals import pretty_unit
-from batch.report.content import ParameterRow, Spot, Varied
+from batch.report.contents.parts import ParameterRow, Spot, Varied
 from ic.printing.columns import number
 from ic.printing.settings import settings
 from met.diagnostic import Place

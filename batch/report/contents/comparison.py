@@ -11,9 +11,9 @@ from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, VERDICTS
 from batch.differences.found import Diff, Experiment
 from batch.queries.failures import ranges
 from batch.queries.pool import Pool
-from batch.report.against import GOOD, Against, Before
-from batch.report.changes import ArchiveChanges, OtherOrigin, RunChanges
-from batch.report.content import Flow, Part, Verdict
+from batch.report.contents.against import GOOD, Against, Before
+from batch.report.contents.changes import ArchiveChanges, OtherOrigin, RunChanges
+from batch.report.contents.parts import Flow, Part, Verdict
 
 MOST_LINES = 200
 """Lines of one kind of change that are in a page."""

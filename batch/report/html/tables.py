@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from batch.report.blocks import Anchors, case_link, scrolling, spot_link
-from batch.report.content import ParameterRow, SourceText, Stability, Table, Worst
-from batch.report.markup import Child, Html, breaking, el, join, lines
+from batch.report.contents.parts import ParameterRow, SourceText, Stability, Table, Worst
+from batch.report.html.blocks import Anchors, case_link, scrolling, spot_link
+from batch.report.html.markup import Child, Html, breaking, el, join, lines
 from batch.terminal.margin import stable_head
 
 

@@ -10,15 +10,15 @@ from typing import Any
 
 from batch.archive.read import ArchiveFile, Group
 from batch.queries.pool import Pool, pools
-from batch.report import comparison
-from batch.report.against import Against, Before, narrowed
-from batch.report.content import Fact, Report, Section, SourceText, Stability
-from batch.report.histories import MOST_VALUES, no_signals, signals
-from batch.report.overview import overview
-from batch.report.parameters import parameters, varied
-from batch.report.stability import stability
-from batch.report.tables import replay, structures, worst
-from batch.report.verdicts import metric_rows, verdict
+from batch.report.contents import comparison
+from batch.report.contents.against import Against, Before, narrowed
+from batch.report.contents.histories import MOST_VALUES, no_signals, signals
+from batch.report.contents.overview import overview
+from batch.report.contents.parameters import parameters, varied
+from batch.report.contents.parts import Fact, Report, Section, SourceText, Stability
+from batch.report.contents.stability import stability
+from batch.report.contents.tables import replay, structures, worst
+from batch.report.contents.verdicts import metric_rows, verdict
 from batch.terminal.show import chosen
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem

@@ -9,9 +9,9 @@ import numpy as np
 from batch.archive.read import Group
 from batch.differences.matching import instants
 from batch.queries.signals import Panel, history, panels
-from batch.report.against import Before
-from batch.report.content import History, SignalPanel
-from batch.report.thinning import thin, thin_clock
+from batch.report.contents.against import Before
+from batch.report.contents.parts import History, SignalPanel
+from batch.report.contents.thinning import thin, thin_clock
 
 
 class Earlier:

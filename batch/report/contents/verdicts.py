@@ -7,8 +7,8 @@ import numpy as np
 from batch.queries.failures import failures, ranges
 from batch.queries.pool import ENDED, Column, Pool, shown
 from batch.queries.summary import spread
-from batch.report.against import Before
-from batch.report.content import Demand, Failing, MetricRow, Part, Verdict
+from batch.report.contents.against import Before
+from batch.report.contents.parts import Demand, Failing, MetricRow, Part, Verdict
 from ic.printing.columns import count as counted
 from met.run import DONE
 

@@ -11,7 +11,7 @@ import numpy as np
 from batch.queries.colours import Reach
 from batch.queries.pool import Column
 from batch.queries.summary import Spread
-from batch.report.changes import ArchiveChanges, RunChanges
+from batch.report.contents.changes import ArchiveChanges, RunChanges
 from met.frozen import frozen
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from batch.queries.colours import Reach, reach
 from batch.queries.pool import ENDED, Column
 from batch.queries.signals import pretty_unit
-from batch.report.changes import ArchiveChanges
-from batch.report.content import History, Map, Overview, Ruler, Section, Signals, Stability
-from batch.report.markup import Html
+from batch.report.contents.changes import ArchiveChanges
+from batch.report.contents.parts import History, Map, Overview, Ruler, Section, Signals, Stability
+from batch.report.html.markup import Html
 from met.messages.visible import visible
 
 PRECISE = 1e-6

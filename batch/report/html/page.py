@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from batch.report import blocks, compared, inlined, tabular
-from batch.report.content import Report, Section
-from batch.report.markup import Child, Html, el, join, lines
-from batch.report.payload import script_json, section_data
+from batch.report.contents.parts import Report, Section
+from batch.report.html import blocks, changes, inlined, tables
+from batch.report.html.markup import Child, Html, el, join, lines
+from batch.report.html.payload import script_json, section_data
 
 GENERATOR = "MET report"
 """By which a page is known as one of ours, which may be written over."""
@@ -92,7 +92,7 @@ def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
     answers = [blocks.verdict(each) for each in report.verdicts]
     out: list[Child] = [el("section", el("h2", "Verdict", cls="quiet"), answers, id="verdict")]
     if report.changes is not None:
-        out.append(el("section", el("h2", "What changed"), compared.origins(report.changes), id="changed"))
+        out.append(el("section", el("h2", "What changed"), changes.origins(report.changes), id="changed"))
     for number, section in enumerate(report.sections):
         parts = lines(_section(number, section, anchors, "h3" if several else "h2"))
         if several:
@@ -103,7 +103,7 @@ def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
     out.append(_parameters(report, anchors))
     out.append(el(
         "section", el("h2", "Provenance"), blocks.facts(report.provenance),
-        [tabular.source(n, file) for n, file in enumerate(report.sources)], id="provenance",
+        [tables.source(n, file) for n, file in enumerate(report.sources)], id="provenance",
     ))  # fmt: skip
     return out
 
@@ -115,7 +115,7 @@ def _section(number: int, section: Section, anchors: blocks.Anchors, head: str) 
 
     out: list[Child] = []
     if section.changes:
-        out.append(el("section", [compared.run_changes(each) for each in section.changes], id=f"s{number}-compared",
+        out.append(el("section", [changes.run_changes(each) for each in section.changes], id=f"s{number}-compared",
                       cls="compared"))  # fmt: skip
     out.append(part(
         "run", "What was run", blocks.facts(section.facts), blocks.varied(section.varied, anchors),
@@ -132,9 +132,9 @@ def _section(number: int, section: Section, anchors: blocks.Anchors, head: str) 
     elif table is not None:
         out.append(part("overview", "Metrics", table))
     if section.structures is not None:
-        out.append(part("structures", "Structures side by side", tabular.table(section.structures, "Structures")))
+        out.append(part("structures", "Structures side by side", tables.table(section.structures, "Structures")))
     if section.worst is not None:
-        out.append(part("worst", section.worst.title, tabular.worst(section.worst)))
+        out.append(part("worst", section.worst.title, tables.worst(section.worst)))
     if section.signals is not None:
         said = [el("p", each, cls="said") for each in section.signals.said]
         out.append(part("signals", "Signals", el("div", cls="signals plot", data_plot="signals"), said))
@@ -143,7 +143,7 @@ def _section(number: int, section: Section, anchors: blocks.Anchors, head: str) 
     if section.stability is not None:
         found = section.stability
         out.append(part(
-            "stability", "Stability of the beds", el("p", ABOUT_STABILITY, cls="said"), tabular.beds(found),
+            "stability", "Stability of the beds", el("p", ABOUT_STABILITY, cls="said"), tables.beds(found),
             [el("p", each, cls="note") for each in found.unstable],
             el("div", cls="stability plot", data_plot="stability"),
             el("p", found.said, cls="said") if found.said else None,
@@ -178,7 +178,7 @@ def _parameters(report: Report, anchors: blocks.Anchors) -> Html:
                                            spellcheck="false", autocomplete="off"), cls="controls")  # fmt: skip
         out.append(el(
             "details", el("summary", f"{count}{of}, each with the line of the deck that wrote it"), search,
-            tabular.parameters(section.parameters, anchors), el("p", role="status", cls="said found"), cls="all",
+            tables.parameters(section.parameters, anchors), el("p", role="status", cls="said found"), cls="all",
             id=f"p{number}",
         ))  # fmt: skip
     if len(out) == 1:

@@ -10,10 +10,10 @@ from batch.archive.read import Group
 from batch.queries.arrange import joints_of, overlaid
 from batch.queries.pool import Pool
 from batch.queries.signals import Panel, history, panels
-from batch.report.against import Before
-from batch.report.content import History, Line, SignalPanel, Signals
-from batch.report.earlier import Earlier
-from batch.report.thinning import stretch, thin, thin_clock
+from batch.report.contents.against import Before
+from batch.report.contents.earlier import Earlier
+from batch.report.contents.parts import History, Line, SignalPanel, Signals
+from batch.report.contents.thinning import stretch, thin, thin_clock
 
 MOST_POINTS = 4000
 """Points of a line: of more rows each stretch gives its smallest and its largest value."""

@@ -6,8 +6,8 @@ import numpy as np
 
 from batch.queries.pool import ENDED, Column, Pool, shown
 from batch.queries.summary import median_text
-from batch.report.against import GOOD, Before
-from batch.report.content import Table, Worst
+from batch.report.contents.against import GOOD, Before
+from batch.report.contents.parts import Table, Worst
 from met.distinct import distinct
 from met.outputs import quoted
 

@@ -18,11 +18,11 @@ from batch.differences.words import (
     signal_columns,
 )
 from batch.queries.pool import shown
-from batch.report.blocks import case_link, likeness, scrolling
-from batch.report.changes import ArchiveChanges, OtherOrigin, RunChanges
-from batch.report.content import Table
-from batch.report.markup import Child, Html, breaking, el, join, lines
-from batch.report.tabular import command, table
+from batch.report.contents.changes import ArchiveChanges, OtherOrigin, RunChanges
+from batch.report.contents.parts import Table
+from batch.report.html.blocks import case_link, likeness, scrolling
+from batch.report.html.markup import Child, Html, breaking, el, join, lines
+from batch.report.html.tables import command, table
 
 SHOWN_LINES, SHOWN_WORST = 12, 5
 """Lines of one kind of change, and cases of those that changed most, that are open; the others are folded away."""

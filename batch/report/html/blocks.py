@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from batch.queries.pool import shown
 from batch.queries.summary import SPREAD_COLUMNS
-from batch.report.content import Demand, Fact, Failing, Flow, MetricRow, Section, Spot, Varied, Verdict
-from batch.report.markup import Child, Html, breaking, el, join, lines
+from batch.report.contents.parts import Demand, Fact, Failing, Flow, MetricRow, Section, Spot, Varied, Verdict
+from batch.report.html.markup import Child, Html, breaking, el, join, lines
 
 Anchors = Mapping[str, tuple[int, int]]
 """Of each file whose text is in the page: its number, and how many of its lines are there."""

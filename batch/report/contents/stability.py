@@ -9,7 +9,7 @@ import numpy as np
 
 from batch.queries.failures import ranges
 from batch.queries.pool import Column, Pool
-from batch.report.content import Bed, Stability
+from batch.report.contents.parts import Bed, Stability
 from batch.terminal.margin import stable_at, verdict
 from met.analysis.margin import Margin, margins
 from met.distinct import distinct

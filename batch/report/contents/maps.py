@@ -11,7 +11,7 @@ from batch.queries.colours import reach
 from batch.queries.grids import ROUND, Levels, cells_of, edges_of, is_grid, levelled, round_numbers, standing
 from batch.queries.pool import Column, Pool
 from batch.queries.signals import number_text
-from batch.report.content import Map, Ruler
+from batch.report.contents.parts import Map, Ruler
 from met.run import DONE
 
 MOST_MAPS = 6

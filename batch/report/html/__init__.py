@@ -1,0 +1,1 @@
+"""A report as one HTML page: `page.page` makes it of a `batch.report.contents.parts.Report`."""
