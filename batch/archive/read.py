@@ -58,7 +58,7 @@ FEW = 100
 """So many values at most are read one by one."""
 
 
-class Group:
+class ArchiveGroup:
     """One experiment of an archive. Raises Problem E302 where the file does not hold what it should."""
 
     def __init__(self, node: Any, path: Path) -> None:
@@ -235,7 +235,7 @@ class ArchiveFile:
                 attributes = {name: _plain(value) for name, value in self._file.attrs.items()}
                 self._check(attributes)
                 self.deck: str = attributes["deck"]
-                self.groups: tuple[Group, ...] = self._groups()
+                self.groups: tuple[ArchiveGroup, ...] = self._groups()
         except BaseException:
             self._file.close()
             raise
@@ -263,14 +263,14 @@ class ArchiveFile:
         self._arithmetic.__exit__(None, None, None)
         self._file.close()
 
-    def _groups(self) -> tuple[Group, ...]:
+    def _groups(self) -> tuple[ArchiveGroup, ...]:
         """The experiments, in the plan's order."""
         if "experiment" in self._file.attrs:
-            return (Group(self._file, self.path),)
+            return (ArchiveGroup(self._file, self.path),)
         nodes = [node for node in self._file.values() if node.name != "/provenance"]
         if not nodes:
             raise Unlike("it holds no run and no sweep")
-        groups = tuple(Group(node, self.path) for node in nodes)
+        groups = tuple(ArchiveGroup(node, self.path) for node in nodes)
         if len({group.name for group in groups}) < len(groups):
             raise Unlike("it holds two runs of one name")
         return groups

@@ -16,7 +16,7 @@ import os
 from pathlib import Path
 
 
-class Busy(Exception):
+class FileBusy(Exception):
     """Another run has the file, in this process or in another."""
 
 
@@ -119,7 +119,7 @@ def _locked(path: Path) -> int:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             os.close(file)
-            raise Busy from None
+            raise FileBusy from None
         except OSError as reason:
             if reason.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a disk without locks: do without
                 os.close(file)

@@ -15,7 +15,7 @@ from met.messages.visible import line
 from met.run import DONE, LOST
 
 if TYPE_CHECKING:
-    from batch.archive.read import Group, Stored
+    from batch.archive.read import ArchiveGroup, Stored
 
 
 class Unlike(ValueError):
@@ -59,7 +59,7 @@ MOST_CASE = 1 << 53
 """Numbers of cases are exact as doubles, too."""
 
 
-def check(group: Group) -> None:
+def check(group: ArchiveGroup) -> None:
     """Raises Unlike; what HDF5 says of bytes that are damaged passes through."""
     _attributes(group.attributes)
     variables = group.variables
@@ -88,7 +88,7 @@ def of_joints(variable: Stored) -> bool:
     return any(dim == "joint" or dim.startswith("joint_of_") for dim in variable.dims[2:3])
 
 
-def _names(group: Group) -> None:
+def _names(group: ArchiveGroup) -> None:
     """That what a deck calls things are names: of letters, numbers and marks that can be seen, in one line."""
     attributes = group.attributes
     names = [attributes["experiment"], attributes.get("sweep", ""), *group.variables]
@@ -138,7 +138,7 @@ def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
         raise Unlike(f"variable `{name}` has no scale")
 
 
-def _requirements(group: Group) -> None:
+def _requirements(group: ArchiveGroup) -> None:
     """That what is required is said of each requirement, where it is said; and whether each case met it."""
     if "requirement" not in group.variables:
         return
@@ -153,7 +153,7 @@ def _requirements(group: Group) -> None:
             raise Unlike(f"attribute `{name}` of `requirement` is not of each")
 
 
-def _values(group: Group) -> None:
+def _values(group: ArchiveGroup) -> None:
     """That cases, how they ended, times and names are such as there can be."""
     cases, valid = group.values("case"), group.values("n_valid")
     if not _rises(cases) or (len(cases) and not (cases[0] >= 0 and cases[-1] <= MOST_CASE)):
@@ -191,7 +191,7 @@ def _rises(values: np.ndarray) -> bool:
     return bool((values[1:] > values[:-1]).all())
 
 
-def _within(group: Group, name: str, low: int, high: int) -> None:
+def _within(group: ArchiveGroup, name: str, low: int, high: int) -> None:
     values = group.values(name)
     if values.size and not (values.min() >= low and values.max() <= high):
         raise Unlike(f"variable `{name}` has a value that it cannot have")

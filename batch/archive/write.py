@@ -32,7 +32,7 @@ KINDS = {"float64": np.float64, "float32": np.float32, "int64": np.int64, "int8"
 
 
 @frozen
-class Part:
+class ArchivePart:
     """One experiment of an archive. rows: of its case table, rising; kept: places among them of the cases whose
     histories are here; single: as numbers of four bytes.
 
@@ -49,20 +49,20 @@ class Part:
 
 
 @frozen
-class Group:
+class OpenGroup:
     """A part on its way into the file, and the variables along recorded_case, which are gathered from the cases."""
 
-    part: Part
+    part: ArchivePart
     layout: Layout
     node: Any
     gathered: dict[str, np.ndarray]
 
 
-class Writer:
+class ArchiveWriter:
     """An archive being written: `put_cases` in order, `put_signals` in any, then `finish`; or `abandon`, which leaves
     nothing."""
 
-    def __init__(self, temporary: Path, plan: Plan, parts: Sequence[Part]) -> None:
+    def __init__(self, temporary: Path, plan: Plan, parts: Sequence[ArchivePart]) -> None:
         self.plan = plan
         self._sink = Sink(temporary)
         self._revision = Revision()
@@ -130,7 +130,7 @@ class Writer:
         paths = archive_layout.group_names(self.plan)
         return [root if path == "/" else root.create_group(path, track_order=True) for path in paths]
 
-    def _group(self, node: Any, part: Part) -> Group:
+    def _group(self, node: Any, part: ArchivePart) -> OpenGroup:
         """Lay a group out: every variable in its order, the signals with all their chunks."""
         layout = archive_layout.layout(part.experiment, len(part.rows), len(part.kept), part.single)
         for name, value in {**layout.attributes, "code_key": part.code}.items():
@@ -149,7 +149,7 @@ class Writer:
                     made[variable.name].dims[axis].attach_scale(made[dim])
         gathered = {variable.source: np.empty(len(part.kept), KINDS[variable.kind])
                     for variable in layout.role("recorded")}  # fmt: skip
-        return Group(part, layout, node, gathered)
+        return OpenGroup(part, layout, node, gathered)
 
     def _write_provenance(self) -> None:
         """The deck, the plan and the versions that made the numbers."""
@@ -187,7 +187,7 @@ class Writer:
             group.create_dataset(name, data=table, track_order=True)
 
 
-def _values(group: Group, run: Run) -> dict[str, Any]:
+def _values(group: OpenGroup, run: Run) -> dict[str, Any]:
     """Everything that is one value a case, of some cases, by the variable's name."""
     experiment, rows = group.part.experiment, run.case
     names = keys.case_keys(experiment, rows)
@@ -214,7 +214,7 @@ def _values(group: Group, run: Run) -> dict[str, Any]:
     return values
 
 
-def _write_rest(group: Group) -> None:
+def _write_rest(group: OpenGroup) -> None:
     """What is neither a case's nor a signal: dimensions, and what says which case is which along recorded_case."""
     part, layout = group.part, group.layout
     schedule = part.experiment.structure.schedule

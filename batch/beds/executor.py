@@ -20,7 +20,7 @@ from batch.beds.campaign_records import CampaignRecords
 from batch.beds.case_result import CaseResult, case_result
 from batch.campaigns import shard
 from batch.campaigns.folder import Folder
-from batch.campaigns.tasks import Done, Section, Task
+from batch.campaigns.tasks import CampaignSection, Done, Task
 from batch.executors import Outcome
 from hw import records
 from hw.case import CaseRequest, pace_of
@@ -93,7 +93,7 @@ class OnBeds:
     def under_way(self) -> int:
         return self._done
 
-    def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
+    def open(self, folder: Folder, sections: Mapping[int, CampaignSection], tell: Callable[[], None]) -> None:
         self._folder, self._sections, self._tell = folder, sections, tell
         folder.beds.mkdir(exist_ok=True)
         for path in folder.beds.glob("*.records"):
@@ -149,7 +149,7 @@ class OnBeds:
                 helps = "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it"
                 raise Problem(error("E353", message, help=helps))
 
-    def _case(self, section: Section, row: int) -> tuple[CaseResult, str]:
+    def _case(self, section: CampaignSection, row: int) -> tuple[CaseResult, str]:
         """Drive a case, or take up its records. Returns the result, and why it ended early, "" where it did not."""
         path = self._folder.beds / f"{section.experiment}-{row}.records"
         ended_file = path.with_suffix(".ended")
@@ -175,7 +175,7 @@ class OnBeds:
         self._say(f"case #{section.prepared.experiment.cases.table[row]}, t = {at:g} s: {why}")
         return found, f"t = {at:g} s: {why}"
 
-    def _drive(self, section: Section, row: int, path: Path, ended_file: Path) -> None:
+    def _drive(self, section: CampaignSection, row: int, path: Path, ended_file: Path) -> None:
         """Drive a case in a process of its own. Raises Problem, OSError, and KeyboardInterrupt once that process has
         stopped the beds."""
         ports = self._ports

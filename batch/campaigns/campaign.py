@@ -16,9 +16,9 @@ import numpy as np
 from batch.archive import layout as archive_layout
 from batch.campaigns import choosing
 from batch.campaigns.folder import Folder, beside
-from batch.campaigns.keep import Keep, Known, chosen, keep, known, listed
+from batch.campaigns.keep import CaseOutcomes, Keep, chosen, keep, known, listed
 from batch.campaigns.output import check_output, check_room, default_output
-from batch.campaigns.tasks import Section
+from batch.campaigns.tasks import CampaignSection
 from ic.printing.columns import size as size_text
 from met import run as engine
 from met.diagnostic import Problem, error
@@ -41,7 +41,7 @@ class Wires:
 
 
 @frozen
-class Part:
+class CampaignPart:
     """The cases of one experiment that are run.
 
     rows    of its case table, rising
@@ -92,7 +92,7 @@ class Campaign:
     """What will be run, all of it checked. words: that say what is kept, as `prepare` takes them."""
 
     plan: Plan
-    parts: tuple[Part, ...]
+    parts: tuple[CampaignPart, ...]
     keep: Keep
     words: tuple[str | int, ...]
     output: Path
@@ -112,7 +112,7 @@ class Campaign:
         """About the size of the archive."""
         return sum(part.bytes for part in self.parts)
 
-    def bytes_of(self, histories: Sequence[tuple[Part, int]]) -> int:
+    def bytes_of(self, histories: Sequence[tuple[CampaignPart, int]]) -> int:
         """About the room for the histories of so many cases of each part, in shards and in the archive."""
         whole = sum(part.experiment.structure.history_bytes // (2 if part.single else 1) * n for part, n in histories)
         return self.bytes + 2 * whole
@@ -181,7 +181,7 @@ def prepare(
     return campaign
 
 
-def _parts(selected: Sequence[tuple[Experiment, np.ndarray]], wanted: Keep, single: bool) -> tuple[Part, ...]:
+def _parts(selected: Sequence[tuple[Experiment, np.ndarray]], wanted: Keep, single: bool) -> tuple[CampaignPart, ...]:
     """The experiments with what is kept of them. Raises Problem E311, E312 for cases that are none."""
     chosen = choosing.selected([experiment for experiment, _ in selected], wanted.cases) if wanted.cases else []
     named = {experiment.name: rows for experiment, rows in chosen}
@@ -198,21 +198,23 @@ def _parts(selected: Sequence[tuple[Experiment, np.ndarray]], wanted: Keep, sing
     for experiment, rows in selected:
         if experiment.structure.history_bytes:
             kept = known(wanted, experiment, rows, named.get(experiment.name, np.empty(0, np.int64)))
-            parts.append(Part(experiment, rows, kept, wanted.at_most(len(rows)), single))
+            parts.append(CampaignPart(experiment, rows, kept, wanted.at_most(len(rows)), single))
         else:
-            parts.append(Part(experiment, rows, np.empty(0, np.int64)))
+            parts.append(CampaignPart(experiment, rows, np.empty(0, np.int64)))
     return tuple(parts)
 
 
-def values_sections(campaign: Campaign) -> list[Section]:
+def values_sections(campaign: Campaign) -> list[CampaignSection]:
     """The first pass: all cases, with their histories where those of all are kept."""
     return [
-        Section(number, number, part.prepared(), part.rows, part.all_recorded, part.single)
+        CampaignSection(number, number, part.prepared(), part.rows, part.all_recorded, part.single)
         for number, part in enumerate(campaign.parts)
     ]
 
 
-def histories_section(campaign: Campaign, values: Section, results: Callable[[], Known]) -> Section | None:
+def histories_section(
+    campaign: Campaign, values: CampaignSection, results: Callable[[], CaseOutcomes]
+) -> CampaignSection | None:
     """The second pass over an experiment: the cases whose histories are kept, where that is not all of them.
 
     results  what became of its cases
@@ -226,4 +228,4 @@ def histories_section(campaign: Campaign, values: Section, results: Callable[[],
     if not len(kept):
         return None
     number = len(campaign.parts) + values.number
-    return Section(number, values.number, values.prepared, part.rows[kept], True, part.single, values.begun)
+    return CampaignSection(number, values.number, values.prepared, part.rows[kept], True, part.single, values.begun)

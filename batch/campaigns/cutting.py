@@ -3,7 +3,7 @@ little; smaller towards the end, so that nobody waits for the last one. It decid
 
 from __future__ import annotations
 
-from batch.campaigns.tasks import GRANULE, Section
+from batch.campaigns.tasks import GRANULE, CampaignSection
 
 WORK_SECONDS = 1.5
 """Of a task, on what runs it."""
@@ -18,7 +18,7 @@ GUESS_NS = 40.0
 class Cutter:
     """Learns from the tasks that are done how long a case takes."""
 
-    def __init__(self, section: Section) -> None:
+    def __init__(self, section: CampaignSection) -> None:
         structure = section.prepared.experiment.structure
         steps = structure.schedule.ticks // min([structure.schedule.dynamics, *(s.divisor for s in structure.servos)])
         self._most = section.most

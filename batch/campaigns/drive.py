@@ -14,7 +14,7 @@ from typing import Protocol
 from batch.campaigns import shard, tasks
 from batch.campaigns.cutting import Cutter
 from batch.campaigns.folder import Folder, gaps
-from batch.campaigns.tasks import Section, Task
+from batch.campaigns.tasks import CampaignSection, Task
 from batch.executors import Executor, Outcome
 from met.run import LOST, TIMED_OUT
 
@@ -71,7 +71,7 @@ class Driver:
     told: list[str] = field(default_factory=list)
     _at: int | None = None
 
-    def find(self, section: Section) -> list[tuple[int, int]]:
+    def find(self, section: CampaignSection) -> list[tuple[int, int]]:
         """Count what is there of a section; the stretches that are missing."""
         kept, told = self.folder.sound(section)
         self.told += told
@@ -82,13 +82,13 @@ class Driver:
             count.seconds += done.seconds
         return missing
 
-    def run(self, section: Section, missing: Sequence[tuple[int, int]], cases: int | None = None) -> None:
+    def run(self, section: CampaignSection, missing: Sequence[tuple[int, int]], cases: int | None = None) -> None:
         """Run the cases that are missing. cases: of how many it is told how far it is; None: the section's. Raises
         Stopped."""
         self.check()
         if not missing:
             return
-        work = _Work(self, section, missing)
+        work = _SectionWork(self, section, missing)
         if self.progress is not None:
             count = self.counts[section.number]
             self.progress.begin(section.name, cases or len(section.rows), count.done, count.failed, self.executor.about)
@@ -113,10 +113,10 @@ class Driver:
             raise TooManyFailures(f"{cases}, more than the {self.max_failures:,} allowed")
 
 
-class _Work:
+class _SectionWork:
     """One section on its way."""
 
-    def __init__(self, driver: Driver, section: Section, missing: Sequence[tuple[int, int]]) -> None:
+    def __init__(self, driver: Driver, section: CampaignSection, missing: Sequence[tuple[int, int]]) -> None:
         self._driver, self._section = driver, section
         self._gaps = deque(missing)
         self._again: deque[Task] = deque()

@@ -32,7 +32,7 @@ import numpy as np
 
 from batch.archive.sink import is_at
 from batch.campaigns import shard
-from batch.campaigns.tasks import Done, Section, Task
+from batch.campaigns.tasks import CampaignSection, Done, Task
 from met import run as engine
 from met.diagnostic import Problem, error
 from met.host.files import is_count, new_file, read_json, read_regular, whole_file
@@ -52,7 +52,7 @@ NPY_HEAD_BYTES = 4096
 """Before the numbers of a `.npy` file; numpy writes 128."""
 
 
-class Busy(Exception):
+class FolderBusy(Exception):
     """Somebody else works in the folder."""
 
 
@@ -96,7 +96,7 @@ class Folder:
                 fcntl.flock(self._lock, (fcntl.LOCK_SH if together else fcntl.LOCK_EX) | fcntl.LOCK_NB)
             except BlockingIOError:
                 self.close()
-                raise Busy from None
+                raise FolderBusy from None
             except OSError as reason:
                 if reason.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a disk without locks: do without
                     self.close()
@@ -145,7 +145,7 @@ class Folder:
 
     # What is computed
 
-    def describe(self, plan: Plan, sections: Iterable[Section], **about: Any) -> None:
+    def describe(self, plan: Plan, sections: Iterable[CampaignSection], **about: Any) -> None:
         """Write down what is computed, for workers and for who comes back later.
 
         about   `key` of the campaign, name of its `archive`, words for the `histories` that are kept
@@ -182,7 +182,7 @@ class Folder:
         """The plan that is run here. Raises Problem."""
         return plan_file.read(self.path / "plan.json")
 
-    def sections(self) -> dict[int, Section]:
+    def sections(self) -> dict[int, CampaignSection]:
         """The sections by their numbers, for a worker. Raises Problem E353 where the code here is not that of the
         campaign, as after an update of MET or of models while jobs waited: what it gave would count for nothing."""
         experiments = [engine.prepare(experiment) for experiment in self.plan().experiments]
@@ -195,7 +195,9 @@ class Folder:
             if not experiments[of].is_work(told["code"]):
                 raise Problem(_other_code(experiments[of].experiment.name, self.path, described))
             rows = self._rows(told, experiments[of].experiment.cases.count)
-            out[number] = Section(number, of, experiments[of], rows, told["recorded"], told["single"], told["code"])
+            out[number] = CampaignSection(
+                number, of, experiments[of], rows, told["recorded"], told["single"], told["code"]
+            )
         return out
 
     def _rows(self, told: dict[str, Any], count: int) -> np.ndarray:
@@ -231,18 +233,18 @@ class Folder:
                 found.append(task)
         return sorted(found, key=lambda task: (task.first, -task.last))
 
-    def read(self, section: Section, task: Task) -> shard.Shard:
-        """A task's shard. Raises shard.Unsound where it is none of this section's, OSError."""
+    def read(self, section: CampaignSection, task: Task) -> shard.Shard:
+        """A task's shard. Raises shard.UnsoundShard where it is none of this section's, OSError."""
         found = shard.read(self.shards / task.name, task.cases * _bytes_of_case(section))
         if not 0 <= task.first < task.last <= len(section.rows) or len(found.outputs) != task.cases:
-            raise shard.Unsound("holds other cases than its name says")
+            raise shard.UnsoundShard("holds other cases than its name says")
         if found.key != section.key(task.first, task.last):
-            raise shard.Unsound("is of another plan, or of another version of MET's code")
+            raise shard.UnsoundShard("is of another plan, or of another version of MET's code")
         if not _fits(section, found):
-            raise shard.Unsound("holds other outputs than the program has")
+            raise shard.UnsoundShard("holds other outputs than the program has")
         return found
 
-    def sound(self, section: Section) -> tuple[dict[Task, Done], list[str]]:
+    def sound(self, section: CampaignSection) -> tuple[dict[Task, Done], list[str]]:
         """The tasks of a section whose shards count, and what is told of those that do not, which are removed: their
         cases are run again."""
         kept: dict[Task, Done] = {}
@@ -251,8 +253,8 @@ class Folder:
         for task in self.named(section.number):
             try:
                 found = self.read(section, task)
-            except (shard.Unsound, OSError) as reason:
-                why = str(reason) if isinstance(reason, shard.Unsound) else f"cannot be read: {reason.strerror}"
+            except (shard.UnsoundShard, OSError) as reason:
+                why = str(reason) if isinstance(reason, shard.UnsoundShard) else f"cannot be read: {reason.strerror}"
                 told.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
                 _remove(self.shards / task.name)
             else:
@@ -272,7 +274,7 @@ class Folder:
         """Of computing that the shards which are there took; when it is enough, no more are looked at."""
         total = 0.0
         for path in self.shards.glob("*-*-*"):
-            with contextlib.suppress(shard.Unsound, OSError):
+            with contextlib.suppress(shard.UnsoundShard, OSError):
                 total += shard.read(path).seconds
             if total >= enough:
                 break
@@ -346,14 +348,14 @@ def _rise(rows: np.ndarray, count: int) -> bool:
     return len(rows) == 0 or bool(rows[0] >= 0 and rows[-1] < count and (np.diff(rows) > 0).all())
 
 
-def _bytes_of_case(section: Section) -> int:
+def _bytes_of_case(section: CampaignSection) -> int:
     """What a case of a section takes in a shard."""
     program = section.prepared.program
     rows = section.prepared.experiment.structure.schedule.rows if section.recorded else 0
     return np.dtype(float).itemsize * (len(program.outputs) + rows * program.columns)
 
 
-def _fits(section: Section, found: shard.Shard) -> bool:
+def _fits(section: CampaignSection, found: shard.Shard) -> bool:
     """Whether the arrays of a shard are of the program's size, and its failures such as there are."""
     program, structure = section.prepared.program, section.prepared.experiment.structure
     if found.outputs.shape[1] != len(program.outputs):

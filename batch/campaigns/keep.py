@@ -112,14 +112,14 @@ def known(found: Keep, experiment: Experiment, rows: np.ndarray, named: np.ndarr
 
 
 @frozen
-class Known:
+class CaseOutcomes:
     """How each case of an experiment ended, and its metrics, as `met.run.Run` has them."""
 
     status: np.ndarray
     metrics: Mapping[str, np.ndarray]
 
 
-def chosen(found: Keep, experiment: Experiment, results: Known | Run) -> np.ndarray:
+def chosen(found: Keep, experiment: Experiment, results: CaseOutcomes | Run) -> np.ndarray:
     """Places of the cases whose histories are kept for what became of them: results of all."""
     kept = np.zeros(len(results.status), dtype=bool)
     if found.failed:

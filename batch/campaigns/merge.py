@@ -10,14 +10,14 @@ import numpy as np
 
 from batch.campaigns import shard
 from batch.campaigns.folder import Folder
-from batch.campaigns.keep import Known
-from batch.campaigns.tasks import Section
+from batch.campaigns.keep import CaseOutcomes
+from batch.campaigns.tasks import CampaignSection
 from met import run as engine
 from met.diagnostic import Problem, error
 from met.run import Run
 
 if TYPE_CHECKING:
-    from batch.archive.write import Writer
+    from batch.archive.write import ArchiveWriter
 
 BLOCK = 1 << 16
 """Cases that are written at a time, however they were run: where HDF5 puts strings depends on it."""
@@ -28,7 +28,7 @@ class Missing(Exception):
 
 
 def merge(
-    writer: Writer, number: int, folder: Folder, values: Section, histories: Section | None,
+    writer: ArchiveWriter, number: int, folder: Folder, values: CampaignSection, histories: CampaignSection | None,
     progress: Callable[[int], None] = lambda _: None,
 ) -> None:  # fmt: skip
     """Write one experiment. Raises Missing.
@@ -82,26 +82,26 @@ def merge(
             first_kept += int(kept.sum())
 
 
-def without_history(folder: Folder, values: Section, histories: Section) -> dict[int, str]:
+def without_history(folder: Folder, values: CampaignSection, histories: CampaignSection) -> dict[int, str]:
     """Rows whose worker died, or that found no end, when they were run again for their histories, and why: they have
     none. Those of which that was found the first time keep theirs, which is empty."""
     first = {row for row, _ in _alone(folder, values)}
     return {row: why for row, why in _alone(folder, histories) if row not in first}
 
 
-def _alone(folder: Folder, section: Section) -> Iterator[tuple[int, str]]:
+def _alone(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, str]]:
     """Rows that could not be run, and why; each has a shard of its own. One that a shard before it holds as well counts
     as it is there, as in `pieces`: a worker that was thought dead may have come to its end."""
     at = 0
     for task in folder.named(section.number):
         if task.cases == 1 and task.first >= at:
-            with contextlib.suppress(shard.Unsound, OSError):  # `pieces` comes upon it, too
+            with contextlib.suppress(shard.UnsoundShard, OSError):  # `pieces` comes upon it, too
                 for _, why in folder.read(section, task).fates.values():
                     yield int(section.rows[task.first]), why
         at = max(at, task.last)
 
 
-def results(folder: Folder, section: Section) -> Known:
+def results(folder: Folder, section: CampaignSection) -> CaseOutcomes:
     """What became of all cases of a section, as far as it decides whose histories are kept."""
     status, metrics = np.empty(len(section.rows), np.int8), dict[str, np.ndarray]()
     for at, found in pieces(folder, section):
@@ -109,10 +109,10 @@ def results(folder: Folder, section: Section) -> Known:
         status[at : at + len(run.status)] = run.status
         for name, values in run.metrics.items():
             metrics.setdefault(name, np.empty(len(section.rows)))[at : at + len(values)] = values
-    return Known(status, metrics)
+    return CaseOutcomes(status, metrics)
 
 
-def pieces(folder: Folder, section: Section) -> Iterator[tuple[int, shard.Shard]]:
+def pieces(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, shard.Shard]]:
     """The shards of a section in order, less what was had before, each with the place of its first case."""
     at = 0
     for task in folder.named(section.number):
@@ -122,7 +122,7 @@ def pieces(folder: Folder, section: Section) -> Iterator[tuple[int, shard.Shard]
             break
         try:
             found = folder.read(section, task)
-        except (shard.Unsound, OSError) as reason:
+        except (shard.UnsoundShard, OSError) as reason:
             raise Missing(f"shard {task.name} {reason}") from reason
         yield at, _without(found, at - task.first)
         at = task.last
@@ -140,13 +140,17 @@ def _without(found: shard.Shard, first: int) -> shard.Shard:
 
 
 def _results(
-    section: Section, first: int, outputs: np.ndarray, history: np.ndarray | None, fates: dict[int, tuple[int, str]]
+    section: CampaignSection,
+    first: int,
+    outputs: np.ndarray,
+    history: np.ndarray | None,
+    fates: dict[int, tuple[int, str]],
 ) -> Run:
     rows = section.rows[first : first + len(outputs)]
     return engine.results(section.prepared, rows, history, outputs, fates)
 
 
-def _check_bits(section: Section, at: int, now: np.ndarray, before: np.ndarray, fates: Iterable[int]) -> None:
+def _check_bits(section: CampaignSection, at: int, now: np.ndarray, before: np.ndarray, fates: Iterable[int]) -> None:
     """A case that was run again for its history gave the numbers that it gave before; those of `fates` gave none."""
     alike = ((now.view(np.int64) == before.view(np.int64)) | (np.isnan(now) & np.isnan(before))).all(axis=1)
     alike[list(fates)] = True

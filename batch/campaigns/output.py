@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.sink import Busy, Sink, temporary_of
+from batch.archive.sink import FileBusy, Sink, temporary_of
 from batch.campaigns.folder import Folder, beside
 from batch.export.formats import format_of
 from ic.printing.columns import size as size_text
@@ -68,7 +68,7 @@ def check_output(output: Path, plan: Plan) -> None:
     """Refuse an output that could not be written in the end, before anything runs. Raises Problem E305, E307."""
     try:
         _check_output(output, plan)
-    except Busy:
+    except FileBusy:
         raise Problem(busy(output)) from None
     except OSError as reason:
         raise Problem(cannot_write(output, reason)) from reason

@@ -13,15 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.sink import Busy as ArchiveBusy
+from batch.archive.sink import FileBusy as ArchiveBusy
 from batch.archive.sink import temporary_of
 from batch.campaigns import merge, resuming
 from batch.campaigns.campaign import Campaign, histories_section, values_sections
 from batch.campaigns.drive import Driver, Progress, Stopped, TooManyFailures
-from batch.campaigns.folder import Busy, Folder, beside, gaps
+from batch.campaigns.folder import Folder, FolderBusy, beside, gaps
 from batch.campaigns.output import busy, cannot_write, check_room, publish
 from batch.campaigns.status import Reporter, died
-from batch.campaigns.tasks import Section
+from batch.campaigns.tasks import CampaignSection
 from batch.executors import Executor
 from batch.executors.threads import Threads
 from met.diagnostic import Diagnostic, Problem, error
@@ -89,7 +89,7 @@ def perform(
     folder = Folder(beside(campaign.output))
     try:
         folder.lock()
-    except Busy:
+    except FolderBusy:
         raise Problem(busy(campaign.output)) from None
     except OSError as reason:
         raise Problem(cannot_write(campaign.output, reason)) from reason
@@ -98,7 +98,7 @@ def perform(
         return Performed({}, whole=True)
     if there == resuming.DAMAGED and not fresh:
         say(f"{campaign.output} is not as it was written: it is made again")
-    work = _Work(campaign, folder, values, key, max_failures, progress, say, more)
+    work = _CampaignWork(campaign, folder, values, key, max_failures, progress, say, more)
     try:
         work.begin(fresh)
         if ready is not None:
@@ -125,11 +125,11 @@ def perform(
         folder.close()
 
 
-class _Work:
+class _CampaignWork:
     """A campaign on its way, in its folder."""
 
     def __init__(
-        self, campaign: Campaign, folder: Folder, values: list[Section], key: str, max_failures: int | None,
+        self, campaign: Campaign, folder: Folder, values: list[CampaignSection], key: str, max_failures: int | None,
         progress: Progress | None, say: Callable[[str], None], more: Callable[[], Mapping[str, Any]],
     ) -> None:  # fmt: skip
         self.campaign, self.folder, self.key, self.say, self.more = campaign, folder, key, say, more
@@ -198,7 +198,7 @@ class _Work:
         done = self.campaign.cases - left
         return f"{done:,} of {self.campaign.cases:,} cases are kept in {self.folder.path}; the same command goes on"
 
-    def _histories(self, driver: Driver) -> dict[int, Section]:
+    def _histories(self, driver: Driver) -> dict[int, CampaignSection]:
         """Run the second pass; its sections by experiment."""
         found = {}
         for section in self.values:
@@ -215,9 +215,9 @@ class _Work:
                 driver.run(section, stretches)
         return found
 
-    def _merge(self, histories: Mapping[int, Section]) -> None:
+    def _merge(self, histories: Mapping[int, CampaignSection]) -> None:
         from batch.archive.provenance import machine
-        from batch.archive.write import Part, Writer
+        from batch.archive.write import ArchivePart, ArchiveWriter
 
         parts = []
         for part, values in zip(self.campaign.parts, self.values, strict=True):
@@ -231,9 +231,11 @@ class _Work:
                     self._note(f"no history of case #{case} of `{values.name}` is kept: {why}; {again}")
                 kept = np.searchsorted(part.rows, rows[~np.isin(rows, list(lost))])
             program = values.prepared
-            parts.append(Part(part.experiment, part.rows, kept, part.single, program.code_key, program.result_keys))
+            parts.append(
+                ArchivePart(part.experiment, part.rows, kept, part.single, program.code_key, program.result_keys)
+            )
         temporary = temporary_of(self.campaign.output)
-        writer = Writer(temporary, self.campaign.plan, parts)
+        writer = ArchiveWriter(temporary, self.campaign.plan, parts)
         try:
             for number, section in enumerate(self.values):
                 self.reporter.begin(f"{section.name}, merging", len(section.rows), 0, 0, "")
@@ -286,7 +288,7 @@ class _Work:
         self.say(text)
 
 
-def _stopped(code: str, message: str, work: _Work, how: str = "") -> Diagnostic:
+def _stopped(code: str, message: str, work: _CampaignWork, how: str = "") -> Diagnostic:
     kept = work.folder.path.exists()
     helps = f"what is done is kept in {work.folder.path}: the same command goes on{how}" if kept else "nothing was kept"
     return error(code, message, help=helps)

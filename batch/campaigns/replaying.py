@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Group
+from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.terminal.show import chosen, picked
 from met.diagnostic import Problem, error
 from met.frozen import frozen
@@ -78,7 +78,7 @@ def replay(
     return Replay(Path(archive), plan, tuple(picked_rows), word, kept if everything else None)
 
 
-def _row(group: Group, position: int) -> int:
+def _row(group: ArchiveGroup, position: int) -> int:
     """The position in the case table of a case of an archive."""
     return int(group.at("case", [position])[0])
 
@@ -107,7 +107,7 @@ def differences(before: str | Path, after: str | Path) -> list[str]:
     return out[:MOST_TOLD] + ([f"and {len(out) - MOST_TOLD} more"] if len(out) > MOST_TOLD else [])
 
 
-def _signals(old: Group, new: Group, places: np.ndarray, ran: np.ndarray) -> list[str]:
+def _signals(old: ArchiveGroup, new: ArchiveGroup, places: np.ndarray, ran: np.ndarray) -> list[str]:
     """The same of signals, of the cases whose histories both archives have. places: of new's cases in old."""
     out = []
     for variable in new.role("signal"):

@@ -13,9 +13,9 @@ from typing import Any
 from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, prepare
 from batch.campaigns.changes import changes
-from batch.campaigns.folder import Busy, Folder, beside
+from batch.campaigns.folder import Folder, FolderBusy, beside
 from batch.campaigns.output import sidecar_path
-from batch.campaigns.tasks import Section
+from batch.campaigns.tasks import CampaignSection
 from batch.terminal.progress import duration
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, read_json
@@ -33,13 +33,13 @@ MOST_CHANGES = 8
 """Changes that a refusal names."""
 
 
-def campaign_key(values: Sequence[Section]) -> str:
+def campaign_key(values: Sequence[CampaignSection]) -> str:
     """Of all that decides the numbers of a campaign: code, and what goes into it. Which cases are run again for
     their histories may change on the way."""
     return hashlib.sha256(json.dumps([[section.name, section.key()] for section in values]).encode()).hexdigest()
 
 
-def as_begun(folder: Folder, campaign: Campaign, values: list[Section]) -> list[Section]:
+def as_begun(folder: Folder, campaign: Campaign, values: list[CampaignSection]) -> list[CampaignSection]:
     """The sections with the keys of programs that an older MET wrote, where what stands in the folder, or beside the
     archive, is this campaign under those keys; else as they are."""
     key = campaign_key(values)
@@ -122,7 +122,7 @@ def tidy(folder: Folder, key: str) -> None:
     folder.forget()
     if not folder.exists():
         return
-    with contextlib.suppress(Busy, Problem):
+    with contextlib.suppress(FolderBusy, Problem):
         folder.lock()
         try:
             if folder.described()["key"] == key:
@@ -131,7 +131,9 @@ def tidy(folder: Folder, key: str) -> None:
             folder.close()
 
 
-def take_up(folder: Folder, campaign: Campaign, values: Sequence[Section], key: str, fresh: bool) -> Iterator[str]:
+def take_up(
+    folder: Folder, campaign: Campaign, values: Sequence[CampaignSection], key: str, fresh: bool
+) -> Iterator[str]:
     """See to what is in the folder, which is locked; what is to be told. Raises Problem E350, E353."""
     if not folder.exists():
         return
@@ -148,7 +150,7 @@ def take_up(folder: Folder, campaign: Campaign, values: Sequence[Section], key: 
         raise Problem(_of_another(folder, campaign, values, told))
 
 
-def describe(folder: Folder, campaign: Campaign, sections: Iterable[Section], key: str) -> None:
+def describe(folder: Folder, campaign: Campaign, sections: Iterable[CampaignSection], key: str) -> None:
     """Write down in the folder what is computed there."""
     folder.describe(
         campaign.plan, sections, key=key, archive=campaign.output.name, histories=campaign.words,
@@ -171,7 +173,7 @@ def described(folder: Folder) -> Campaign:
     )  # fmt: skip
 
 
-def _of_another(folder: Folder, campaign: Campaign, values: Sequence[Section], told: dict[str, Any]) -> Any:
+def _of_another(folder: Folder, campaign: Campaign, values: Sequence[CampaignSection], told: dict[str, Any]) -> Any:
     done = sum(task.cases for number in range(len(told["sections"])) for task in folder.named(number))
     try:
         found = changes(folder.plan(), campaign.plan)
@@ -183,7 +185,7 @@ def _of_another(folder: Folder, campaign: Campaign, values: Sequence[Section], t
     return error("E353", message, help=_what(found))
 
 
-def _other_work(campaign: Campaign, values: Sequence[Section], told: dict[str, Any]) -> list[str]:
+def _other_work(campaign: Campaign, values: Sequence[CampaignSection], told: dict[str, Any]) -> list[str]:
     """What else may differ where the plan is the same."""
     before = told["sections"][: len(values)]
     if [len(section.rows) for section in values] != [each.get("cases") for each in before]:

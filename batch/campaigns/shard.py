@@ -37,7 +37,7 @@ HEAD_BYTES = 64 << 20
 """Of what a shard holds besides its arrays: why cases were not run takes most."""
 
 
-class Unsound(Exception):
+class UnsoundShard(Exception):
     """A file that does not count as a shard, and why, in words that go on after its name."""
 
 
@@ -45,7 +45,7 @@ class Unsound(Exception):
 class Shard:
     """What a task gave.
 
-    key       of all that decided it (`tasks.Section.key`)
+    key       of all that decided it (`tasks.CampaignSection.key`)
     outputs   [case, output]
     history   [case, row, column], float64 or float32; None where none is kept
     seconds   of computing
@@ -95,22 +95,22 @@ def read(path: Path, most: int | None = None) -> Shard:
     with open_regular(path) as file:
         size = os.fstat(file.fileno()).st_size
         if size > (memory() if most is None else most + HEAD_BYTES):
-            raise Unsound("is larger than its cases make it")
+            raise UnsoundShard("is larger than its cases make it")
         data = bytearray(size)
         got = file.readinto(data)
     if got < len(data) or len(data) < len(MAGIC) + 8 + SUM_BYTES:
-        raise Unsound("is cut short")
+        raise UnsoundShard("is cut short")
     if not data.startswith(MAGIC):
-        raise Unsound("is no shard of this version of MET")
+        raise UnsoundShard("is no shard of this version of MET")
     body = memoryview(data)[:-SUM_BYTES]
     if SUM(body).digest() != data[-SUM_BYTES:]:
-        raise Unsound("is not what was written: its checksum differs")
+        raise UnsoundShard("is not what was written: its checksum differs")
     at = len(MAGIC) + 8
     end = at + int.from_bytes(data[len(MAGIC) : at], "little")
     try:
         return _made(parse_json(bytes(body[at:end])), data, end)
     except (ValueError, LookupError, TypeError, AttributeError) as reason:
-        raise Unsound("has a head that does not go with what follows it") from reason
+        raise UnsoundShard("has a head that does not go with what follows it") from reason
 
 
 def _made(head: Any, data: bytearray, at: int) -> Shard:

@@ -29,7 +29,7 @@ MOST_BYTES = 128 << 20
 
 
 @frozen
-class Section:
+class CampaignSection:
     """Cases of one experiment that are run alike.
 
     number      in its campaign;  experiment: its number in the plan
@@ -100,7 +100,7 @@ class Done:
 
 
 def carry_out(
-    section: Section, task: Task, folder: Path, *, threads: int | None = None,
+    section: CampaignSection, task: Task, folder: Path, *, threads: int | None = None,
     progress: Callable[[int], None] | None = None, computed: Callable[[], None] = lambda: None,
 ) -> Done:  # fmt: skip
     """Run a task's cases and write its shard into the folder. computed: called in between."""
@@ -111,7 +111,7 @@ def carry_out(
 
 
 def compute(
-    section: Section, task: Task, *, threads: int | None = None, progress: Callable[[int], None] | None = None
+    section: CampaignSection, task: Task, *, threads: int | None = None, progress: Callable[[int], None] | None = None
 ) -> shard.Shard:
     """What a task's cases give."""
     section.prepared.kernel  # noqa: B018 - compiling is not computing
@@ -128,7 +128,7 @@ def compute(
     )
 
 
-def not_run(section: Section, task: Task, ended: int, why: str) -> shard.Shard:
+def not_run(section: CampaignSection, task: Task, ended: int, why: str) -> shard.Shard:
     """The shard of cases that could not be run: `met.run.TIMED_OUT` or `LOST`, and why."""
     width = len(section.prepared.program.outputs)
     history = None

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Group, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.differences import matching
 from batch.differences.changed import changed
 from batch.differences.compare import (
@@ -25,10 +25,10 @@ from batch.differences.compare import (
     unlike_bits,
 )
 from batch.differences.demands import compare_requirements
-from batch.differences.found import Diff, Ended, Experiment, Place, Ranked, Signal
-from batch.differences.matching import Cases
+from batch.differences.found import Diff, DiffPlace, EndingDiff, ExperimentDiff, Ranked, SignalDiff
+from batch.differences.matching import MatchedCases
 from batch.differences.samples import samples
-from batch.differences.tolerance import Tolerance, Tolerances, check, fits, of_deck
+from batch.differences.tolerance import SignalTolerance, Tolerances, check, fits, of_deck
 from batch.queries.signals import deck_unit
 from met.diagnostic import Problem
 from met.distinct import distinct
@@ -62,7 +62,7 @@ def diff(a: str | Path, b: str | Path, given: Tolerances | None = None, *, distr
         )  # fmt: skip
 
 
-def _check(allowed: Tolerances, groups: Sequence[Group]) -> None:
+def _check(allowed: Tolerances, groups: Sequence[ArchiveGroup]) -> None:
     """That the command line's tolerances are of something in one of the archives."""
     known: dict[str, Sequence[str]] = {}
     shown: dict[str, None] = {}
@@ -74,7 +74,7 @@ def _check(allowed: Tolerances, groups: Sequence[Group]) -> None:
     check(allowed, known, list(shown))
 
 
-def _known(group: Group) -> dict[str, Sequence[str]]:
+def _known(group: ArchiveGroup) -> dict[str, Sequence[str]]:
     """Units of signals, joints' parts of them and metrics, by name."""
     known: dict[str, Sequence[str]] = {}
     for variable in (*group.role("signal"), *group.role("metric")):
@@ -94,13 +94,15 @@ def _plan(file: ArchiveFile) -> Plan | str:
         return problem.diagnostics[0].message
 
 
-def _experiment(a: Group, b: Group, given: Tolerances, plan: Plan | str, distributions: bool) -> Experiment:
+def _experiment(
+    a: ArchiveGroup, b: ArchiveGroup, given: Tolerances, plan: Plan | str, distributions: bool
+) -> ExperimentDiff:
     """Of two groups. plan: that of b, or why it cannot be read."""
     known = {} if isinstance(plan, str) else {experiment.name: experiment for experiment in plan.experiments}
     given = given.within(_known(a)).within(_known(b))
     allowed = given.over(of_deck(known[b.name], b) if b.name in known else Tolerances())
     matched = matching.cases(a, b)
-    out = Experiment(a.name, b.name, matched, allowed)
+    out = ExperimentDiff(a.name, b.name, matched, allowed)
     if isinstance(plan, str) and not given.alone:
         out.notes.append("what its deck allows is not known, for the plan cannot be read")
     out.only_a = a.values("case")[matched.only_a].tolist()
@@ -122,7 +124,7 @@ def _experiment(a: Group, b: Group, given: Tolerances, plan: Plan | str, distrib
     return out
 
 
-def _how(scores: _Scores, matched: Cases, b: Group, found: Experiment) -> np.ndarray:
+def _how(scores: _Scores, matched: MatchedCases, b: ArchiveGroup, found: ExperimentDiff) -> np.ndarray:
     """Of each matched case its place in VERDICTS. One that ended otherwise is different."""
     out = np.where(scores.unlike, VERDICTS.index(EQUIVALENT), VERDICTS.index(IDENTICAL)).astype(np.int8)
     out[scores.beyond] = VERDICTS.index(DIFFERENT)
@@ -132,13 +134,13 @@ def _how(scores: _Scores, matched: Cases, b: Group, found: Experiment) -> np.nda
     return out
 
 
-def _other_noise(a: Group, b: Group) -> bool:
+def _other_noise(a: ArchiveGroup, b: ArchiveGroup) -> bool:
     """Whether the two have other seeds, so that single cases differ by chance."""
     mine, theirs = a.values("seed"), b.values("seed")
     return not np.array_equal(mine, theirs) and not np.array_equal(distinct(mine), distinct(theirs))
 
 
-def _ended(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
+def _ended(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: ExperimentDiff) -> None:
     """Cases that ended otherwise, or earlier."""
     status, rows = ([group.values(name) for group in (a, b)] for name in ("status", "n_valid"))
     here, there = status[0][matched.a], status[1][matched.b]
@@ -149,7 +151,7 @@ def _ended(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
     names = ("case", "case_id", "cause")
     told = {name: (a.at(name, matched.a[places]), b.at(name, matched.b[places])) for name in names}
     for i, place in enumerate(places.tolist()):
-        out.ended.append(Ended(
+        out.ended.append(EndingDiff(
             int(told["case"][1][i]), str(told["case_id"][1][i]), int(here[place]), int(there[place]),
             str(told["cause"][0][i]), str(told["cause"][1][i]), int(rows[0][matched.a[place]]),
             int(rows[1][matched.b[place]]),
@@ -163,7 +165,7 @@ COUNTS = {
 """What is counted of each case besides what it records."""
 
 
-def _counts(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
+def _counts(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: ExperimentDiff) -> None:
     """Notes counts that differ where nothing else does: then something differs that was not recorded."""
     if any(signal.equivalent or signal.different for signal in out.signals):
         return
@@ -182,15 +184,17 @@ class _Scores:
         self.score = np.zeros(count)
         self.unlike = np.zeros(count, bool)
         self.beyond = np.zeros(count, bool)
-        self.where: dict[int, tuple[str, Place, float]] = {}
+        self.where: dict[int, tuple[str, DiffPlace, float]] = {}
 
-    def take(self, place: int, score: float, signal: str, where: Place, difference: float) -> None:
+    def take(self, place: int, score: float, signal: str, where: DiffPlace, difference: float) -> None:
         """Of one case, that is among the worst of a signal."""
         if score > self.score[place] or place not in self.where:
             self.score[place] = score
             self.where[place] = (signal, where, difference)
 
-    def ranked(self, a: Group, b: Group, matched: Cases, signals: Sequence[Signal]) -> list[Ranked]:
+    def ranked(
+        self, a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, signals: Sequence[SignalDiff]
+    ) -> list[Ranked]:
         by_name = {signal.name: signal for signal in signals}
         places = sorted(self.where, key=lambda each: (-self.score[each], each))[:WORST]
         if not places:
@@ -207,10 +211,12 @@ class _Scores:
 # Metrics
 
 
-def _metric(a: Group, b: Group, matched: Cases, name: str, allowed: Tolerances, scores: _Scores) -> Signal:
+def _metric(
+    a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, name: str, allowed: Tolerances, scores: _Scores
+) -> SignalDiff:
     unit = (a if name in a.variables else b).variables[name].unit
     tolerance = replace(allowed.of(name), time=0.0)
-    out = Signal(name, unit, True, tolerance)
+    out = SignalDiff(name, unit, True, tolerance)
     out.why = _incomparable(a, b, name, "metric") or ("" if matched.count else NO_CASE)
     if out.why:
         return out
@@ -226,7 +232,7 @@ def _metric(a: Group, b: Group, matched: Cases, name: str, allowed: Tolerances, 
         out.identical = out.compared
         return out
     case = int(b.at("case", [matched.b[found.row]])[0])
-    _add(out, found, Place(case, "", float("nan"), found.before, found.after))
+    _add(out, found, DiffPlace(case, "", float("nan"), found.before, found.after))
     unlike = np.flatnonzero((values_a.view(np.int64) != values_b.view(np.int64))
                             & ~(np.isnan(values_a) & np.isnan(values_b)))  # fmt: skip
     scores.unlike[unlike] = True
@@ -239,8 +245,8 @@ def _metric(a: Group, b: Group, matched: Cases, name: str, allowed: Tolerances, 
 
 
 def _rank_metric(
-    out: Signal, a: np.ndarray, b: np.ndarray, allowed: Tolerance, unlike: np.ndarray, scores: _Scores, group: Group,
-    matched: Cases,
+    out: SignalDiff, a: np.ndarray, b: np.ndarray, allowed: SignalTolerance, unlike: np.ndarray, scores: _Scores, group: ArchiveGroup,
+    matched: MatchedCases,
 ) -> None:  # fmt: skip
     with np.errstate(invalid="ignore", over="ignore"):
         apart = np.abs(b[unlike] - a[unlike])
@@ -254,18 +260,18 @@ def _rank_metric(
     cases = group.at("case", matched.b[unlike[worst]])
     for i, place in enumerate(worst.tolist()):
         at = int(unlike[place])
-        where = Place(int(cases[i]), "", float("nan"), float(a[at]), float(b[at]))
+        where = DiffPlace(int(cases[i]), "", float("nan"), float(a[at]), float(b[at]))
         scores.take(at, float(score[place]), out.name, where, float(apart[place]))
 
 
-def _unit_of(signal: Signal) -> float:
+def _unit_of(signal: SignalDiff) -> float:
     """What a difference is measured by to rank cases: what the values of a span; finite."""
     if signal.low > signal.high:
         return 1.0
     return min(signal.high - signal.low, LARGEST) or max(abs(signal.high), 1e-300)
 
 
-def _add(out: Signal, found: Difference, where: Place) -> None:
+def _add(out: SignalDiff, found: Difference, where: DiffPlace) -> None:
     """One more difference. Those beyond a tolerance go before those within, of which none is told then."""
     beyond = bool(found.beyond)
     if out.place is None or (beyond and not out.beyond):
@@ -284,8 +290,8 @@ def _add(out: Signal, found: Difference, where: Place) -> None:
 
 
 def _signals(
-    a: Group, b: Group, matched: Cases, allowed: Tolerances, scores: _Scores, about: Experiment
-) -> Iterator[Signal]:
+    a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, allowed: Tolerances, scores: _Scores, about: ExperimentDiff
+) -> Iterator[SignalDiff]:
     names = matching.names([v.name for v in a.role("signal")], [v.name for v in b.role("signal")])
     if not names:
         return
@@ -303,13 +309,13 @@ def _signals(
     numbers = b.values("recorded_case")[ib] if len(ib) else ib
     for name in names:
         unit = (a if name in a.variables else b).variables[name].unit
-        out = Signal(name, unit, False, allowed.of(name))
+        out = SignalDiff(name, unit, False, allowed.of(name))
         out.why = _incomparable(a, b, name, "signal") or ("" if matched.count else NO_CASE)
         if not out.why and not len(places):
             out.why = "no case has its history in both"
         if not out.why and not len(rows_a):
             out.why = "the two have no instant in common"
-        worst: list[tuple[float, int, Place, float]] = []
+        worst: list[tuple[float, int, DiffPlace, float]] = []
         if not out.why:
             labels = _labels(a, a.variables[name])
             out.deck_scale, out.deck_unit = deck_unit(b.variables[name])
@@ -338,20 +344,20 @@ def _signals(
         yield out
 
 
-def _histories(group: Group, name: str, places: np.ndarray) -> np.ndarray:
+def _histories(group: ArchiveGroup, name: str, places: np.ndarray) -> np.ndarray:
     """[case, row, column], of the recorded cases at these places."""
     values = group.histories(name, places)
     return values.reshape(*values.shape[:2], -1).astype(np.float64, copy=False)
 
 
-def _by_joint(group: Group, signal: Stored, allowed: Tolerances) -> dict[str, float]:
+def _by_joint(group: ArchiveGroup, signal: Stored, allowed: Tolerances) -> dict[str, float]:
     """The joints of a signal for which something of their own is allowed, be it nothing."""
     joints = tuple(group.joints(signal))
     parts = zip(joints, joint_parts(signal.name, joints), strict=True)
     return {joint: allowed.of(part).absolute for joint, part in parts if part in allowed.absolute}
 
 
-def _absolute(group: Group, signal: Stored, found: Signal) -> np.ndarray | None:
+def _absolute(group: ArchiveGroup, signal: Stored, found: SignalDiff) -> np.ndarray | None:
     """What is allowed of each column; None where it is the same for all."""
     if not found.by_joint:
         return None
@@ -360,9 +366,9 @@ def _absolute(group: Group, signal: Stored, found: Signal) -> np.ndarray | None:
 
 
 def _cases(
-    out: Signal, passed: Passed, b: np.ndarray, rows: np.ndarray, labels: Sequence[str], absolute: np.ndarray | None,
+    out: SignalDiff, passed: Passed, b: np.ndarray, rows: np.ndarray, labels: Sequence[str], absolute: np.ndarray | None,
     scores: _Scores, places: np.ndarray, numbers: np.ndarray,
-) -> Iterator[tuple[float, int, Place, float]]:  # fmt: skip
+) -> Iterator[tuple[float, int, DiffPlace, float]]:  # fmt: skip
     """Cases of a signal whose bits are not all the same, or may not be. rows: of a, to which those of b belong; places:
     of the cases among those that are matched; numbers: in the case table of b. Those beyond: how far, and where."""
     time = passed.times[rows]
@@ -373,7 +379,7 @@ def _cases(
             out.identical += 1
             continue
         scores.unlike[place] = True
-        where = Place(number, labels[found.column], float(time[found.row]), found.before, found.after)
+        where = DiffPlace(number, labels[found.column], float(time[found.row]), found.before, found.after)
         _add(out, found, where)
         out.first = min(out.first, float(time[found.first]))
         if found.beyond:
@@ -385,7 +391,9 @@ def _cases(
             out.equivalent += 1
 
 
-def _recorded(a: Group, b: Group, matched: Cases, about: Experiment) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _recorded(
+    a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, about: ExperimentDiff
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Matched cases whose histories both have: their places in `matched`, and along recorded_case of a and b."""
     has_a, has_b = np.isin(matched.a, a.recorded_positions), np.isin(matched.b, b.recorded_positions)
     for mine, theirs, path in ((has_a, has_b, a.path), (has_b, has_a, b.path)):
@@ -399,7 +407,7 @@ def _recorded(a: Group, b: Group, matched: Cases, about: Experiment) -> tuple[np
     return both, along_a, np.searchsorted(b.recorded_positions, matched.b[both])
 
 
-def _labels(group: Group, variable: Stored) -> list[str]:
+def _labels(group: ArchiveGroup, variable: Stored) -> list[str]:
     """What each column of a signal is called: joint, component, or both."""
     joints, components = group.joints(variable), group.components(variable)
     if joints and components:
@@ -407,7 +415,7 @@ def _labels(group: Group, variable: Stored) -> list[str]:
     return list(joints or components or ("",))
 
 
-def _incomparable(a: Group, b: Group, name: str, role: str) -> str:
+def _incomparable(a: ArchiveGroup, b: ArchiveGroup, name: str, role: str) -> str:
     """Why a signal or metric cannot be compared; empty where it can."""
     for mine, other in ((a, b), (b, a)):
         if name not in other.variables or other.variables[name].role != role:

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from batch.archive.read import ArchiveFile, Group
+from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.campaigns.changes import Change, between
-from batch.differences.decks import Deck, Decks, decks
+from batch.differences.decks import DeckFileChange, Decks, decks
 from met.frozen import frozen
 from met.plan import Experiment, Plan
 from met.run import comparable
 
 
 @frozen
-class Changed:
+class ProvenanceChanges:
     """What differs, in words.
 
     versions   of MET, its libraries and its commit
@@ -28,7 +28,7 @@ class Changed:
     """
 
     versions: tuple[str, ...] = ()
-    decks: tuple[Deck, ...] = ()
+    decks: tuple[DeckFileChange, ...] = ()
     meaning: tuple[str, ...] = ()
     follows: tuple[str, ...] = ()
     defaults: tuple[str, ...] = ()
@@ -38,13 +38,13 @@ class Changed:
 
 
 def changed(
-    a: ArchiveFile, b: ArchiveFile, pairs: Sequence[tuple[Group, Group]], plans: Sequence[Plan | str]
-) -> Changed:
+    a: ArchiveFile, b: ArchiveFile, pairs: Sequence[tuple[ArchiveGroup, ArchiveGroup]], plans: Sequence[Plan | str]
+) -> ProvenanceChanges:
     """What differs between what two archives were made from. plans: of each, or why it cannot be read here."""
     texts = decks(a.sources(), b.sources())
     meaning, follows, defaults = _meaning(plans, pairs, texts)
     causes = [*_defines(a, b), *(texts.names if meaning or follows else ())]
-    return Changed(
+    return ProvenanceChanges(
         versions=tuple(_versions(a, b)),
         decks=texts.files,
         meaning=(*causes, *(meaning or (() if causes else follows))),
@@ -62,7 +62,7 @@ def _other_code(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
     return comparable(one, two) and one != two
 
 
-def _other_results(a: Group, b: Group) -> Iterator[str]:
+def _other_results(a: ArchiveGroup, b: ArchiveGroup) -> Iterator[str]:
     """The metrics and signals that two groups of one program compute otherwise."""
     if not _other_code(a.attributes, b.attributes):
         for name, variable in a.variables.items():
@@ -71,7 +71,7 @@ def _other_results(a: Group, b: Group) -> Iterator[str]:
                 yield name
 
 
-def _unlike(a: Group, b: Group, name: str) -> bool:
+def _unlike(a: ArchiveGroup, b: ArchiveGroup, name: str) -> bool:
     """Whether both say it, and say otherwise."""
     one, two = a.attributes.get(name), b.attributes.get(name)
     return one is not None and two is not None and one != two
@@ -103,7 +103,7 @@ def _dirty(dirty: str) -> str:
 
 
 def _meaning(
-    plans: Sequence[Plan | str], pairs: Sequence[tuple[Group, Group]], texts: Decks
+    plans: Sequence[Plan | str], pairs: Sequence[tuple[ArchiveGroup, ArchiveGroup]], texts: Decks
 ) -> tuple[list[str], list[str], list[str]]:
     """Changes of matched experiments: those that were written, and those that follow; parameters that are new, and have
     their defaults, apart. What is so in all of several experiments is told once."""

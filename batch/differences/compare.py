@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from batch.differences.tolerance import Tolerance
+from batch.differences.tolerance import SignalTolerance
 from met.frozen import frozen
 
 IDENTICAL, EQUIVALENT, DIFFERENT, INCOMPARABLE = "identical", "equivalent", "different", "incomparable"
@@ -52,7 +52,7 @@ class Difference:
 
 
 def compare(
-    a: np.ndarray, b: np.ndarray, allowed: Tolerance, time: np.ndarray | None = None,
+    a: np.ndarray, b: np.ndarray, allowed: SignalTolerance, time: np.ndarray | None = None,
     absolute: np.ndarray | None = None,
 ) -> Difference | None:  # fmt: skip
     """None where all bits are the same. time: s of each row, where `allowed` has a tolerance of time; absolute: of each
@@ -97,7 +97,7 @@ def _flat(values: np.ndarray) -> np.ndarray:
 
 
 def compare_cases(
-    a: np.ndarray, b: np.ndarray, allowed: Tolerance, passed: Passed | None = None,
+    a: np.ndarray, b: np.ndarray, allowed: SignalTolerance, passed: Passed | None = None,
     absolute: np.ndarray | None = None,
 ) -> list[Difference | None]:  # fmt: skip
     """As `compare`, of several cases at once, [case, row, column]: one result a case. passed: where `allowed` has a

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from batch.differences.found import Diff, Experiment, Signal
+from batch.differences.found import Diff, ExperimentDiff, SignalDiff
 from batch.queries.summary import finite
 
 SCHEMA, VERSION = "met.diff", 2
@@ -23,7 +23,7 @@ def as_data(found: Diff) -> dict[str, Any]:
     return plain
 
 
-def _experiment(found: Experiment) -> dict[str, Any]:
+def _experiment(found: ExperimentDiff) -> dict[str, Any]:
     return {
         "name_a": found.name_a, "name_b": found.name_b, "verdict": found.verdict, "cases": found.cases.count,
         "tolerances": {
@@ -45,7 +45,7 @@ def _experiment(found: Experiment) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _signal(found: Signal) -> dict[str, Any]:
+def _signal(found: SignalDiff) -> dict[str, Any]:
     kept = ("name", "unit", "metric", "compared", "identical", "equivalent", "different", "largest", "first",
             "first_beyond", "used", "nan", "why")  # fmt: skip
     return {

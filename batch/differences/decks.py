@@ -36,7 +36,7 @@ ALIKE = 0.5
 
 
 @frozen
-class Deck:
+class DeckFileChange:
     """A file of the decks that differs. said: how, in words; lines: what differs as a unified difference, without its
     heads; none where a file is new or gone, or too long to be compared."""
 
@@ -55,7 +55,7 @@ class Decks:
     known   names of all files
     """
 
-    files: tuple[Deck, ...]
+    files: tuple[DeckFileChange, ...]
     names: tuple[str, ...]
     fresh: frozenset[tuple[str, int]]
     stale: frozenset[tuple[str, int]]
@@ -72,12 +72,16 @@ def decks(a: Mapping[str, str], b: Mapping[str, str]) -> Decks:
         fresh |= {(new, number) for number, line in enumerate(now, 1) if line not in known[0]}
         stale |= {(old, number) for number, line in enumerate(before, 1) if line not in known[1]}
         if not old or not new:
-            found.append(Deck(f"{old or new} is {'new' if new else 'gone'}: {_lines(len(before) + len(now))}"))
+            found.append(
+                DeckFileChange(f"{old or new} is {'new' if new else 'gone'}: {_lines(len(before) + len(now))}")
+            )
         elif a[old] != b[new] or PurePosixPath(old).name != PurePosixPath(new).name:
             name = new if old == new else f"{old}, now {new}"
             other = PurePosixPath(old).name != PurePosixPath(new).name and _share(before, now) < ALIKE
             lines = () if other else tuple(_unified(before, now))
-            found.append(Deck(f"{name}: {'another deck, ' if other else ''}{_counted(a[old], b[new])}", lines))
+            found.append(
+                DeckFileChange(f"{name}: {'another deck, ' if other else ''}{_counted(a[old], b[new])}", lines)
+            )
     return Decks(tuple(found), tuple(_names(a, b)), frozenset(fresh), frozenset(stale), frozenset((*a, *b)))
 
 

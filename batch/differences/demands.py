@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from batch.archive.read import Group
-from batch.differences.found import Experiment, Required
-from batch.differences.matching import Cases
+from batch.archive.read import ArchiveGroup
+from batch.differences.found import ExperimentDiff, RequirementDiff
+from batch.differences.matching import MatchedCases
 from batch.differences.words import apart
 from batch.queries import requirements
 from batch.queries.signals import deck_unit
 
 
-def compare_requirements(a: Group, b: Group, matched: Cases, out: Experiment) -> None:
+def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: ExperimentDiff) -> None:
     """How many matched cases meet each requirement in a, and in b; one whose limit is another is taken for the same.
     Those of one alone are noted."""
     met_a, met_b = _met(a, matched.a), _met(b, matched.b)
@@ -28,7 +28,7 @@ def compare_requirements(a: Group, b: Group, matched: Cases, out: Experiment) ->
             there = met_b[now[text]]
             one, other = known_a.get(text), known_b.get(now[text])
             gained, lost = int((there & ~here).sum()), int((here & ~there).sum())
-            out.requirements.append(Required(
+            out.requirements.append(RequirementDiff(
                 text, now[text], int(here.sum()), int(there.sum()), gained, lost, _unlike(one, other),
                 _limits(b, one, other) if text == now[text] else ("", ""),
             ))  # fmt: skip
@@ -43,7 +43,7 @@ def compare_requirements(a: Group, b: Group, matched: Cases, out: Experiment) ->
                 out.required_in_one.append(said)
 
 
-def _met(group: Group, cases: np.ndarray) -> dict[str, np.ndarray]:
+def _met(group: ArchiveGroup, cases: np.ndarray) -> dict[str, np.ndarray]:
     """By requirement whether each of these cases meets it."""
     texts = requirements.texts(group)
     if not len(cases):
@@ -52,12 +52,14 @@ def _met(group: Group, cases: np.ndarray) -> dict[str, np.ndarray]:
     return {text: met[:, column] for column, text in enumerate(texts)} if met.shape[1] else {}
 
 
-def _unlike(one: requirements.Required | None, other: requirements.Required | None) -> bool:
+def _unlike(one: requirements.GroupRequirement | None, other: requirements.GroupRequirement | None) -> bool:
     """Whether two requirements ask for something else; those of which no limit is known differ in their texts alone."""
     return one is not None and other is not None and (one.comparison, one.limit) != (other.comparison, other.limit)
 
 
-def _limits(group: Group, one: requirements.Required | None, other: requirements.Required | None) -> tuple[str, str]:
+def _limits(
+    group: ArchiveGroup, one: requirements.GroupRequirement | None, other: requirements.GroupRequirement | None
+) -> tuple[str, str]:
     """The limits of two requirements in the deck's unit, where one text stands for both, as `settle < longest`."""
     if one is None or other is None or one.limit == other.limit:
         return "", ""

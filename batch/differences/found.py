@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from batch.differences.changed import Changed
+from batch.differences.changed import ProvenanceChanges
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE, VERDICTS
-from batch.differences.matching import Cases
-from batch.differences.samples import Sample
-from batch.differences.tolerance import Tolerance, Tolerances
+from batch.differences.matching import MatchedCases
+from batch.differences.samples import MetricSamples
+from batch.differences.tolerance import SignalTolerance, Tolerances
 from met.frozen import frozen
 
 
 @frozen
-class Place:
+class DiffPlace:
     """Where two archives differ most in one signal or metric: position of the case, label of the joint or component,
     time (s), and both values."""
 
@@ -28,7 +28,7 @@ class Place:
 
 
 @dataclass
-class Signal:
+class SignalDiff:
     """One signal, or metric, over all matched cases.
 
     verdict      of compare.VERDICTS;  why: of what is incomparable
@@ -46,7 +46,7 @@ class Signal:
     name: str
     unit: str
     metric: bool
-    tolerance: Tolerance
+    tolerance: SignalTolerance
     by_joint: dict[str, float] = field(default_factory=dict)
     said: dict[str, str] = field(default_factory=dict)
     deck_unit: str = ""
@@ -56,7 +56,7 @@ class Signal:
     equivalent: int = 0
     different: int = 0
     largest: float = 0.0
-    place: Place | None = None
+    place: DiffPlace | None = None
     first: float = float("inf")
     first_beyond: float = float("inf")
     used: float = 0.0
@@ -88,7 +88,7 @@ class Signal:
 
 
 @frozen
-class Ended:
+class EndingDiff:
     """A case that ended otherwise: position in the case table, id, status, cause and rows in a and b."""
 
     case: int
@@ -111,14 +111,14 @@ class Ranked:
     case_id: str
     signal: str
     score: float
-    place: Place
+    place: DiffPlace
     difference: float
     deck_unit: str = ""
     deck_scale: float = 1.0
 
 
 @frozen
-class Required:
+class RequirementDiff:
     """A requirement of both archives.
 
     before, now          its text in a and in b
@@ -144,22 +144,22 @@ class Required:
 
 
 @dataclass
-class Experiment:
+class ExperimentDiff:
     """Two matched experiments. tolerances: what the deck of b and the command line allow; partial: whether one has
     instants or histories that the other lacks, or something that is counted differs, so that they are not identical;
     required_in_one: requirements that one archive has alone, in words."""
 
     name_a: str
     name_b: str
-    cases: Cases
+    cases: MatchedCases
     tolerances: Tolerances = field(default_factory=Tolerances)
-    signals: list[Signal] = field(default_factory=list)
+    signals: list[SignalDiff] = field(default_factory=list)
     partial: bool = False
-    ended: list[Ended] = field(default_factory=list)
-    requirements: list[Required] = field(default_factory=list)
+    ended: list[EndingDiff] = field(default_factory=list)
+    requirements: list[RequirementDiff] = field(default_factory=list)
     required_in_one: list[str] = field(default_factory=list)
     worst: list[Ranked] = field(default_factory=list)
-    samples: list[Sample] = field(default_factory=list)
+    samples: list[MetricSamples] = field(default_factory=list)
     only_a: list[int] = field(default_factory=list)
     only_b: list[int] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -197,8 +197,8 @@ class Diff:
     a: Path
     b: Path
     tolerances: Tolerances
-    changed: Changed
-    experiments: tuple[Experiment, ...]
+    changed: ProvenanceChanges
+    experiments: tuple[ExperimentDiff, ...]
     only_a: tuple[str, ...]
     only_b: tuple[str, ...]
 

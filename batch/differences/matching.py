@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Group
+from batch.archive.read import ArchiveFile, ArchiveGroup
 from met.frozen import frozen
 
 BLOCK = 1 << 16
@@ -18,7 +18,7 @@ BLOCK = 1 << 16
 
 
 @frozen
-class Cases:
+class MatchedCases:
     """Matched cases, by their positions in the two groups; and positions of those that one of them has alone."""
 
     a: np.ndarray
@@ -31,7 +31,9 @@ class Cases:
         return len(self.a)
 
 
-def experiments(a: ArchiveFile, b: ArchiveFile) -> tuple[list[tuple[Group, Group]], list[Group], list[Group]]:
+def experiments(
+    a: ArchiveFile, b: ArchiveFile
+) -> tuple[list[tuple[ArchiveGroup, ArchiveGroup]], list[ArchiveGroup], list[ArchiveGroup]]:
     """Matched groups, and those that one archive has alone."""
     if len(a.groups) == len(b.groups) == 1:
         return [(a.groups[0], b.groups[0])], [], []
@@ -45,12 +47,12 @@ def experiments(a: ArchiveFile, b: ArchiveFile) -> tuple[list[tuple[Group, Group
     )
 
 
-def cases(a: Group, b: Group) -> Cases:
+def cases(a: ArchiveGroup, b: ArchiveGroup) -> MatchedCases:
     """Match by case_key. Cases that share one are taken in order."""
     keys_a, keys_b = _keys(a), _keys(b)
     if np.array_equal(keys_a, keys_b):
         both = np.arange(len(keys_a))
-        return Cases(both, both, both[:0], both[:0])
+        return MatchedCases(both, both, both[:0], both[:0])
     order_a, order_b = np.argsort(keys_a, kind="stable"), np.argsort(keys_b, kind="stable")
     _, in_a, in_b = np.intersect1d(_nth(keys_a[order_a]), _nth(keys_b[order_b]), return_indices=True)
     found_a, found_b = order_a[in_a], order_b[in_b]
@@ -58,10 +60,10 @@ def cases(a: Group, b: Group) -> Cases:
     found_a, found_b = found_a[by_a], found_b[by_a]
     only_a, only_b = (np.flatnonzero(~np.isin(np.arange(len(keys)), found)) for keys, found in
                       ((keys_a, found_a), (keys_b, found_b)))  # fmt: skip
-    return Cases(found_a, found_b, only_a, only_b)
+    return MatchedCases(found_a, found_b, only_a, only_b)
 
 
-def _keys(group: Group) -> np.ndarray:
+def _keys(group: ArchiveGroup) -> np.ndarray:
     """The case_keys as whole numbers, [case]."""
     out = np.empty(group.count, np.uint64)
     for first in range(0, group.count, BLOCK):

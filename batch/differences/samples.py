@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.read import Group
+from batch.archive.read import ArchiveGroup
 from batch.queries.summary import spread
 from met.frozen import frozen
 
@@ -20,7 +20,7 @@ LEVEL = 0.01
 
 
 @frozen
-class Sample:
+class MetricSamples:
     """One metric in two archives.
 
     cases        of a and b that have a finite value;  medians: of these;  failures: cases of a and b that have none
@@ -41,7 +41,7 @@ class Sample:
         return self.probability < LEVEL
 
 
-def samples(a: Group, b: Group) -> list[Sample]:
+def samples(a: ArchiveGroup, b: ArchiveGroup) -> list[MetricSamples]:
     """Every metric that both have, in the order of the first."""
     from scipy.stats import ks_2samp
 
@@ -61,7 +61,7 @@ def samples(a: Group, b: Group) -> list[Sample]:
         found.append((variable, sizes, medians, lost, distance, chance))
     corrected = holm([each[-1] for each in found])
     return [
-        Sample(variable.name, variable.unit, sizes, (medians[0], medians[1]), lost, distance, chance)
+        MetricSamples(variable.name, variable.unit, sizes, (medians[0], medians[1]), lost, distance, chance)
         for (variable, sizes, medians, lost, distance, _), chance in zip(found, corrected, strict=True)
     ]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from batch.differences import words
-from batch.differences.found import Diff, Experiment, Signal
+from batch.differences.found import Diff, ExperimentDiff, SignalDiff
 from ic.printing.columns import columns
 from met.frozen import frozen
 
@@ -53,7 +53,7 @@ def _changed(found: Diff, cut: Cut) -> Iterator[str]:
             yield f"  {'' if line.startswith(' ') else kind:<10} {line}"
 
 
-def _experiment(found: Diff, experiment: Experiment, cut: Cut) -> list[str]:
+def _experiment(found: Diff, experiment: ExperimentDiff, cut: Cut) -> list[str]:
     out = [words.heading(experiment), *(f"  {line}" for line in words.missing(found, experiment))]
     out += _ended(experiment, cut)
     out += [f"  note: {note}" for note in experiment.notes]
@@ -65,7 +65,7 @@ def _experiment(found: Diff, experiment: Experiment, cut: Cut) -> list[str]:
     return out
 
 
-def _ended(experiment: Experiment, cut: Cut) -> Iterator[str]:
+def _ended(experiment: ExperimentDiff, cut: Cut) -> Iterator[str]:
     """Cases that end otherwise, in kinds."""
     for ending in words.endings(experiment):
         yield f"  {ending.text}: {ending.cases}"
@@ -73,7 +73,7 @@ def _ended(experiment: Experiment, cut: Cut) -> Iterator[str]:
         yield from cut.few(each, SHOWN_ENDED, "    ")
 
 
-def _signals(signals: Sequence[Signal]) -> list[str]:
+def _signals(signals: Sequence[SignalDiff]) -> list[str]:
     if not signals:
         return []
     found = [words.signal_row(signal) for signal in signals]
@@ -90,7 +90,7 @@ def _signals(signals: Sequence[Signal]) -> list[str]:
     return columns([heads, *([getattr(row, field) for field in fields] for row in found)], right=right)
 
 
-def _samples(experiment: Experiment) -> list[str]:
+def _samples(experiment: ExperimentDiff) -> list[str]:
     if not experiment.samples:
         return []
     rows = [[head for head, _ in words.DISTRIBUTION_HEADS]]
@@ -100,7 +100,7 @@ def _samples(experiment: Experiment) -> list[str]:
     return ["", *columns(rows, right=range(1, 7)), *([f"  {note}"] if note else [])]
 
 
-def _worst(found: Diff, experiment: Experiment, cut: Cut) -> list[str]:
+def _worst(found: Diff, experiment: ExperimentDiff, cut: Cut) -> list[str]:
     if not experiment.worst:
         return []
     out = []

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
 
-from batch.archive.read import Group
+from batch.archive.read import ArchiveGroup
 from met import units
 from met.diagnostic import Problem, error
 from met.frozen import frozen
@@ -23,7 +23,7 @@ USAGE = "as in `--tol qd=1e-6rad/s,rel=1e-9,time=1ms`"
 
 
 @frozen
-class Tolerance:
+class SignalTolerance:
     """What one signal or metric may differ by: |b - a| <= absolute + relative * max(|a|, |b|), at an instant that may
     be `time` s earlier or later. absolute in SI."""
 
@@ -53,9 +53,9 @@ class Tolerances:
     def given(self) -> bool:
         return bool(self.relative or self.time or any(size for size, _ in self.absolute.values()))
 
-    def of(self, name: str) -> Tolerance:
+    def of(self, name: str) -> SignalTolerance:
         """Of a signal or a metric."""
-        return Tolerance(self.absolute.get(name, (0.0, ""))[0], self.relative or 0.0, self.time or 0.0)
+        return SignalTolerance(self.absolute.get(name, (0.0, ""))[0], self.relative or 0.0, self.time or 0.0)
 
     def over(self, deck: Tolerances) -> Tolerances:
         """With what a deck says besides."""
@@ -83,7 +83,7 @@ class Tolerances:
         ]
 
 
-def of_deck(experiment: Experiment, group: Group) -> Tolerances:
+def of_deck(experiment: Experiment, group: ArchiveGroup) -> Tolerances:
     """What the deck of an archive allows. group: of the archive, in which a metric may be called otherwise."""
     metrics = {variable.path: variable.name for variable in group.role("metric")}
     signals = {recorded.name for recorded in experiment.structure.record}

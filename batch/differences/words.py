@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Literal
 
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE
-from batch.differences.found import Diff, Ended, Experiment, Ranked, Required, Signal
-from batch.differences.samples import LEVEL, Sample
+from batch.differences.found import Diff, EndingDiff, ExperimentDiff, Ranked, RequirementDiff, SignalDiff
+from batch.differences.samples import LEVEL, MetricSamples
 from batch.queries.failures import STATUS, ranges
 from batch.queries.signals import number_text
 from met.frozen import frozen
@@ -47,7 +47,7 @@ def alone(found: Diff) -> list[str]:
     return [f"`{name}` is only in {where}" for names, where in both for name in names]
 
 
-def heading(experiment: Experiment) -> str:
+def heading(experiment: ExperimentDiff) -> str:
     names = dict.fromkeys([experiment.name_a, experiment.name_b])
     count = experiment.cases.count
     how = experiment.of_values
@@ -56,7 +56,7 @@ def heading(experiment: Experiment) -> str:
     return f"{' and '.join(names)}: {count:,} case{'s' if count != 1 else ''} in both, {how}"
 
 
-def missing(found: Diff, experiment: Experiment) -> list[str]:
+def missing(found: Diff, experiment: ExperimentDiff) -> list[str]:
     """Cases that one archive has alone."""
     return [
         f"{len(cases):,} case{'s' if len(cases) > 1 else ''} only in {where}: {ranges(cases)}"
@@ -64,21 +64,21 @@ def missing(found: Diff, experiment: Experiment) -> list[str]:
     ]  # fmt: skip
 
 
-def allowed(found: Diff, experiment: Experiment) -> list[str]:
+def allowed(found: Diff, experiment: ExperimentDiff) -> list[str]:
     """What may differ, and who says so."""
     mine, every = set(found.tolerances.words()), experiment.tolerances.words()
     both = (("the deck of b", [each for each in every if each not in mine]), ("--tol", sorted(mine & set(every))))
     return [f"{who} allows {', '.join(what)}" for who, what in both if what]
 
 
-def requirements(experiment: Experiment) -> list[str]:
+def requirements(experiment: ExperimentDiff) -> list[str]:
     """Those that are others, or are met by another number of cases."""
     count = experiment.cases.count
     return [f"require {required(each)}  {requirement(each.met_before, each.met_now, count)}"
             for each in experiment.requirements if each.told]  # fmt: skip
 
 
-def required(each: Required) -> str:
+def required(each: RequirementDiff) -> str:
     """A requirement, and what it was before where it is another."""
     before, now = each.limits
     text = each.now if each.before == each.now else f"{each.now} (before: {each.before})"
@@ -96,12 +96,12 @@ class Ending:
 
     text: str
     cases: str
-    each: tuple[Ended, ...]
+    each: tuple[EndingDiff, ...]
 
 
-def endings(experiment: Experiment) -> list[Ending]:
+def endings(experiment: ExperimentDiff) -> list[Ending]:
     """What fails now comes first."""
-    kinds: dict[str, list[Ended]] = {}
+    kinds: dict[str, list[EndingDiff]] = {}
     for each in experiment.ended:
         kinds.setdefault(_kind(each), []).append(each)
     order = sorted(kinds, key=lambda kind: not kind.startswith(("fail", "are timed", "are lost")))
@@ -112,7 +112,7 @@ def endings(experiment: Experiment) -> list[Ending]:
     ]  # fmt: skip
 
 
-def _kind(each: Ended) -> str:
+def _kind(each: EndingDiff) -> str:
     if each.before == each.after:
         return f"{STATUS.get(each.after, 'failed')} earlier or later"
     if each.before == 0:
@@ -126,7 +126,7 @@ def _one(kind: str, count: int) -> str:
     return kind if count > 1 else kind.replace("fail that", "fails that").replace("are ", "is ").replace("were", "was")
 
 
-def cause(each: Ended) -> str:
+def cause(each: EndingDiff) -> str:
     """Why it ended so, now or before."""
     return f"{'' if each.after else 'before: '}{each.cause_after or each.cause_before}"
 
@@ -156,7 +156,7 @@ class SignalRow:
 
 
 @frozen
-class SignalColumn:
+class DiffColumn:
     """A column of the table of signals, for the terminal and for the page alike.
 
     field       of `SignalRow`
@@ -175,23 +175,23 @@ class SignalColumn:
 
 
 SIGNAL_COLUMNS = (
-    SignalColumn("name", "", "signal or metric", always=True),
-    SignalColumn("verdict", "", "verdict", always=True),
-    SignalColumn("cases", "cases", "cases", always=True),
-    SignalColumn("largest", "largest", "largest difference", unit="unit", kind="number"),
-    SignalColumn("share", "of range", "of range", kind="number"),
-    SignalColumn("where", "where", "where", kind="words"),
-    SignalColumn("first", "first", "first"),
-    SignalColumn("tolerance", "tolerance", "tolerance", kind="words"),
+    DiffColumn("name", "", "signal or metric", always=True),
+    DiffColumn("verdict", "", "verdict", always=True),
+    DiffColumn("cases", "cases", "cases", always=True),
+    DiffColumn("largest", "largest", "largest difference", unit="unit", kind="number"),
+    DiffColumn("share", "of range", "of range", kind="number"),
+    DiffColumn("where", "where", "where", kind="words"),
+    DiffColumn("first", "first", "first"),
+    DiffColumn("tolerance", "tolerance", "tolerance", kind="words"),
 )
 
 
-def signal_columns(rows: Sequence[SignalRow]) -> list[SignalColumn]:
+def signal_columns(rows: Sequence[SignalRow]) -> list[DiffColumn]:
     """The columns that these rows have something in."""
     return [column for column in SIGNAL_COLUMNS if column.always or any(getattr(row, column.field) for row in rows)]
 
 
-def signal_row(signal: Signal) -> SignalRow:
+def signal_row(signal: SignalDiff) -> SignalRow:
     """The row of a signal or metric, in the unit that people read it in."""
     if signal.verdict == INCOMPARABLE:
         return SignalRow(signal.name, INCOMPARABLE, signal.why)
@@ -227,7 +227,7 @@ def signal_row(signal: Signal) -> SignalRow:
     )
 
 
-def _tolerance(signal: Signal) -> str:
+def _tolerance(signal: SignalDiff) -> str:
     given = signal.tolerance
     words = [f"{joint} {text}".lstrip() for joint, text in signal.said.items()]
     if len(words) > 1 or any(signal.said):
@@ -276,13 +276,13 @@ DISTRIBUTION_HEADS = (
 """The heads of the table of distributions: in the terminal, and in the report."""
 
 
-def distribution(each: Sample) -> Distribution:
+def distribution(each: MetricSamples) -> Distribution:
     chance = f"{each.probability:.2g}" + (" *" if each.unlike else "")
     cases, medians = [f"{count:,}" for count in each.cases], [number_text(median) for median in each.medians]
     return Distribution(each.name, (cases[0], cases[1]), (medians[0], medians[1]), f"{each.distance:.3g}", chance)
 
 
-def starred(experiment: Experiment) -> str:
+def starred(experiment: ExperimentDiff) -> str:
     """What a star is, where there is one."""
     if not any(each.unlike for each in experiment.samples):
         return ""
@@ -311,7 +311,7 @@ class WorstCase:
     commands: tuple[str, str]
 
 
-def worst_cases(found: Diff, experiment: Experiment) -> list[WorstCase]:
+def worst_cases(found: Diff, experiment: ExperimentDiff) -> list[WorstCase]:
     """The cases that differ most, the first ones first."""
     out = []
     for each in experiment.worst:
@@ -323,7 +323,7 @@ def worst_cases(found: Diff, experiment: Experiment) -> list[WorstCase]:
     return out
 
 
-def _replays(found: Diff, experiment: Experiment, each: Ranked) -> tuple[str, str]:
+def _replays(found: Diff, experiment: ExperimentDiff, each: Ranked) -> tuple[str, str]:
     """The commands that run a case of both archives again."""
     several = len(found.experiments) + len(found.only_a) + len(found.only_b) > 1
     return (
@@ -359,7 +359,7 @@ def verdict(found: Diff) -> str:
     return f"{DIFFERENT}; requirements differ: {said}; values: {_of_values(found)}"
 
 
-def _other_requirements(experiment: Experiment) -> list[str]:
+def _other_requirements(experiment: ExperimentDiff) -> list[str]:
     """`settle < 10 s -> settle < 1 s (30 of 36 cases no longer meet it)`"""
     out, of = [], f" of {experiment.cases.count:,}"
     for each in experiment.requirements:

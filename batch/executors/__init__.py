@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from typing import Literal, Protocol
 
 from batch.campaigns.folder import Folder
-from batch.campaigns.tasks import Done, Section, Task
+from batch.campaigns.tasks import CampaignSection, Done, Task
 from met.frozen import frozen
 
 
@@ -48,7 +48,7 @@ class Executor(Protocol):
     def under_way(self) -> int:
         """Cases that are done of tasks that are not."""
 
-    def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
+    def open(self, folder: Folder, sections: Mapping[int, CampaignSection], tell: Callable[[], None]) -> None:
         """Begin. tell: to be called now and then while `wait` waits. `sections` may grow."""
 
     def submit(self, task: Task) -> None:

@@ -18,7 +18,7 @@ from contextlib import ExitStack, suppress
 from typing import Any
 
 from batch.campaigns.folder import Folder
-from batch.campaigns.tasks import Done, Section, Task
+from batch.campaigns.tasks import CampaignSection, Done, Task
 from batch.executors import Outcome
 from batch.executors.dask_connection import check, connected
 from met.diagnostic import Problem, error
@@ -98,7 +98,7 @@ class Dask:
         text = f"Dask, {workers} worker{'s' if workers != 1 else ''}"
         return text if threads == workers else f"{text} with {threads} threads"
 
-    def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
+    def open(self, folder: Folder, sections: Mapping[int, CampaignSection], tell: Callable[[], None]) -> None:
         from batch.executors.dask_worker import dismiss
 
         self._folder, self._sections, self._tell = folder.path.resolve(), sections, tell

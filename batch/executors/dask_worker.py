@@ -52,7 +52,7 @@ def carry_out(order: Mapping[str, Any]) -> dict[str, Any]:
             f"{host} does not see {folder}: put the archive where all hosts see it under the same name (`-o`)"
         )
     worker = get_worker()
-    kept: Kept = sync(worker.loop, Kept.on, worker, order)
+    kept: WorkerChildren = sync(worker.loop, WorkerChildren.on, worker, order)
     outcome = kept.carry_out(task, order["key"])
     if outcome.kind == "broken":
         return _broken(f"on {host}, {outcome.why}")
@@ -71,7 +71,7 @@ async def dismiss(campaign: str, dask_worker: Worker) -> None:
         await dask_worker.plugin_remove(name=campaign)
 
 
-class Kept(WorkerPlugin):
+class WorkerChildren(WorkerPlugin):
     """The children that a worker keeps for one campaign. All but `carry_out` is called in the worker's event loop.
 
     over     whether they have been sent home
@@ -85,15 +85,15 @@ class Kept(WorkerPlugin):
         self._last = time.monotonic()
 
     @staticmethod
-    async def on(worker: Worker, order: Mapping[str, Any]) -> Kept:
+    async def on(worker: Worker, order: Mapping[str, Any]) -> WorkerChildren:
         """Those of a worker, for one more task. Raises Reschedule where it is closing: it would not let go of them."""
         if worker.status not in WORKER_ANY_RUNNING:
             raise Reschedule
         name = order["campaign"]
         kept = worker.plugins.get(name)
-        if not isinstance(kept, Kept):
+        if not isinstance(kept, WorkerChildren):
             crew = Crew(Path(order["folder"]), threads=order["threads"], timeout=order["timeout"])
-            kept = Kept(name, crew)
+            kept = WorkerChildren(name, crew)
             await worker.plugin_add(plugin=kept, name=name)
         kept._at_work.add(order["key"])
         return kept

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from batch.campaigns.drive import Count, Driver, Stopped
-from batch.campaigns.folder import Busy, Folder, gaps
+from batch.campaigns.folder import Folder, FolderBusy, gaps
 from batch.campaigns.performing import perform
 from batch.campaigns.resuming import described
 from batch.campaigns.status import Reporter
@@ -40,7 +40,7 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
         return 0
     try:
         folder.lock(together=True)
-    except Busy:
+    except FolderBusy:
         say(f"met: {path} is in the hands of another run: nothing was done here", err=True)
         return 1
     try:

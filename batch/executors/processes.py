@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 
 from batch.campaigns.folder import Folder
-from batch.campaigns.tasks import Section, Task
+from batch.campaigns.tasks import CampaignSection, Task
 from batch.executors import Outcome
 from batch.executors.child import COMMAND, Crew
 
@@ -33,7 +33,7 @@ class Processes:
     def under_way(self) -> int:
         return self._crew.under_way if self._crew else 0
 
-    def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
+    def open(self, folder: Folder, sections: Mapping[int, CampaignSection], tell: Callable[[], None]) -> None:
         self._tell = tell
         self._crew = Crew(folder.path, threads=self._threads, timeout=self._timeout, command=self._command)
         self._pool = ThreadPoolExecutor(self.workers)

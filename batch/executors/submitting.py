@@ -11,7 +11,7 @@ from pathlib import Path
 
 from batch.campaigns import resuming
 from batch.campaigns.campaign import Campaign, values_sections
-from batch.campaigns.folder import Busy, Folder, beside, gaps, put
+from batch.campaigns.folder import Folder, FolderBusy, beside, gaps, put
 from batch.campaigns.output import busy, cannot_write, check_room
 from batch.campaigns.tasks import GRANULE, Task
 from met.diagnostic import Problem, error
@@ -80,7 +80,7 @@ def submit(
         tasks = folder.path / "jobs.json"
         dealt = [[[t.section, t.first, t.last] for t in each] for each in shares(missing, count)]
         put(tasks, {"shares": dealt, "timeout": timeout})
-    except Busy:
+    except FolderBusy:
         raise Problem(busy(campaign.output)) from None
     except OSError as reason:
         raise Problem(cannot_write(campaign.output, reason)) from reason

@@ -10,7 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from batch.campaigns import shard, tasks
 from batch.campaigns.folder import Folder
 from batch.campaigns.shard import cannot_keep
-from batch.campaigns.tasks import Done, Section, Task
+from batch.campaigns.tasks import CampaignSection, Done, Task
 from batch.executors import Outcome
 
 
@@ -31,7 +31,7 @@ class Threads:
     def under_way(self) -> int:
         return self._computed + sum(task.cases for task, _, _ in self._written)
 
-    def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
+    def open(self, folder: Folder, sections: Mapping[int, CampaignSection], tell: Callable[[], None]) -> None:
         self._folder, self._sections, self._tell = folder, sections, tell
         self._writer = ThreadPoolExecutor(1)
 

@@ -18,7 +18,7 @@ from typing import Any
 from batch.campaigns import tasks
 from batch.campaigns.folder import Folder
 from batch.campaigns.shard import cannot_keep
-from batch.campaigns.tasks import Section, Task
+from batch.campaigns.tasks import CampaignSection, Task
 from batch.executors.child import NO_MEMORY
 from met.diagnostic import Problem
 
@@ -54,7 +54,7 @@ def main(arguments: list[str]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to all; the parent decides
     folder, threads = Folder(Path(arguments[0])), int(arguments[2])
     parent = Parent()
-    sections: dict[int, Section] = {}
+    sections: dict[int, CampaignSection] = {}
     while True:
         task = parent.tasks.get()
         try:

@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from batch.export.formats import FORMATS, Request, Rows, endings, find, format_of
+from batch.export.formats import FORMATS, ExportRequest, Rows, endings, find, format_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 
@@ -84,7 +84,7 @@ def export(
 
     form, target = settled(archive, output, form)
     writer = find(form)
-    request = Request(table, tuple(signals), units, layout, force, named=bool(cases))
+    request = ExportRequest(table, tuple(signals), units, layout, force, named=bool(cases))
     writer.check_request(request, target)
     with ArchiveFile(Path(archive)) as file:
         check(target, file.path, writer.is_own, force=force)

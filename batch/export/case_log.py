@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from batch.archive.read import Group, Stored
+from batch.archive.read import ArchiveGroup, Stored
 from batch.export.picking import ExportedCase
 from batch.export.wire import MessageField
 from batch.queries.failures import STATUS
@@ -109,7 +109,7 @@ def varied(case: ExportedCase) -> dict[str, str]:
     return {**{v.path: str(_at(group, v.name, position)) for v in group.role("choice")}, **numbers}
 
 
-def _requirements(group: Group, position: int) -> list[tuple[str, str, str]]:
+def _requirements(group: ArchiveGroup, position: int) -> list[tuple[str, str, str]]:
     """Text, outcome and metric of each requirement."""
     if "met" not in group.variables:
         return []
@@ -124,9 +124,9 @@ def _requirements(group: Group, position: int) -> list[tuple[str, str, str]]:
     ]
 
 
-def _value(group: Group, variable: Stored, position: int) -> str:
+def _value(group: ArchiveGroup, variable: Stored, position: int) -> str:
     return value_text(float(_at(group, variable.name, position)), variable)
 
 
-def _at(group: Group, name: str, position: int) -> Any:
+def _at(group: ArchiveGroup, name: str, position: int) -> Any:
     return group.at(name, [position])[0]

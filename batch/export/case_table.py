@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Group, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.export.picking import rank
 from batch.queries import requirements
 from batch.queries.failures import STATUS
@@ -38,7 +38,7 @@ class CaseTable:
     """The cases of runs and sweeps. places: the group and the position in it of each row."""
 
     runs: tuple[str, ...]
-    groups: tuple[Group, ...]
+    groups: tuple[ArchiveGroup, ...]
     places: tuple[np.ndarray, np.ndarray]
     fields: tuple[TableColumn, ...]
 
@@ -83,7 +83,7 @@ def table(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], *, deck:
     return CaseTable(asked, groups, (group_of, positions), tuple(_fields(groups, deck=deck)))
 
 
-def _fields(groups: Sequence[Group], *, deck: bool) -> Iterator[TableColumn]:
+def _fields(groups: Sequence[ArchiveGroup], *, deck: bool) -> Iterator[TableColumn]:
     """Which case it is, what is varied, how it ended, metrics, requirements."""
     if len({group.sweep or group.name for group in groups}) > 1:
         yield TableColumn("run", "", "run or sweep", "str")
@@ -103,7 +103,7 @@ def _fields(groups: Sequence[Group], *, deck: bool) -> Iterator[TableColumn]:
         yield TableColumn("cause", "", "why it failed", "str", "cause")
 
 
-def varied(groups: Sequence[Group]) -> list[Stored]:
+def varied(groups: Sequence[ArchiveGroup]) -> list[Stored]:
     """What is varied in any of the groups: choices of structure, then numbers."""
     return list({v.name: v for role in ("choice", "coordinate") for group in groups for v in group.role(role)}.values())
 
@@ -124,13 +124,13 @@ def in_unit(variable: Stored, *, deck: bool) -> tuple[str, float]:
     return str(variable.attributes["deck_unit"]), float(variable.attributes.get("deck_scale", 1.0))
 
 
-def value_of(field: TableColumn, group: Group, position: int) -> object:
+def value_of(field: TableColumn, group: ArchiveGroup, position: int) -> object:
     """What is varied, in one case; None where its structure does not have it."""
     [value] = _values(group, field, np.array([position]))
     return value
 
 
-def _values(group: Group, field: TableColumn, positions: np.ndarray) -> list[object]:
+def _values(group: ArchiveGroup, field: TableColumn, positions: np.ndarray) -> list[object]:
     if field.name == "run" and not field.variable:
         return [group.sweep or group.name] * len(positions)
     if not field.variable:
@@ -147,7 +147,7 @@ def _values(group: Group, field: TableColumn, positions: np.ndarray) -> list[obj
     return [float(value) for value in (values / field.scale if field.scale != 1.0 else values)]
 
 
-def _outcomes(group: Group, text: str, positions: np.ndarray) -> list[object]:
+def _outcomes(group: ArchiveGroup, text: str, positions: np.ndarray) -> list[object]:
     texts = requirements.texts(group)
     if text not in texts:
         return [None] * len(positions)

@@ -21,7 +21,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile
 from batch.export.case_table import CaseTable, TableColumn, of_varied, value_of, varied
-from batch.export.formats import ExportFormat, Request, Written
+from batch.export.formats import ExportFormat, ExportRequest, WrittenExport
 from batch.export.output import whole
 from batch.export.picking import ExportedCase, SignalColumn
 from met.messages.visible import line
@@ -144,13 +144,13 @@ class Csv(ExportFormat):
 
     title = "a CSV file"
 
-    def write_metrics(self, file: ArchiveFile, table: CaseTable, target: Path) -> Written:
-        return Written(write_cases(file, table, target))
+    def write_metrics(self, file: ArchiveFile, table: CaseTable, target: Path) -> WrittenExport:
+        return WrittenExport(write_cases(file, table, target))
 
     def write_histories(
-        self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: Request
-    ) -> Written:
-        return Written(write(file, cases, target, deck=request.units == "deck"))
+        self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: ExportRequest
+    ) -> WrittenExport:
+        return WrittenExport(write(file, cases, target, deck=request.units == "deck"))
 
 
 FORMAT = Csv()

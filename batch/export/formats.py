@@ -35,7 +35,7 @@ Option = Literal["units", "layout"]
 
 
 @frozen
-class Request:
+class ExportRequest:
     """What was asked of an export besides its file.
 
     table     what its rows are to be; None: not said
@@ -55,7 +55,7 @@ class Request:
 
 
 @frozen
-class Written:
+class WrittenExport:
     """How many rows an export has, and the layout file written beside it, if any."""
 
     rows: int
@@ -83,17 +83,17 @@ class ExportFormat:
     def check_campaign(self, campaign: Campaign, target: Path) -> None:
         """Refuse, before anything runs, a campaign whose archive could not be exported. Raises Problem."""
 
-    def write_metrics(self, file: ArchiveFile, table: CaseTable, target: Path) -> Written:
+    def write_metrics(self, file: ArchiveFile, table: CaseTable, target: Path) -> WrittenExport:
         """Write a row a case: what is varied, metrics, requirements. Raises Problem."""
         raise NotImplementedError
 
     def write_histories(
-        self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: Request
-    ) -> Written:
+        self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: ExportRequest
+    ) -> WrittenExport:
         """Write the signals of these cases. Raises Problem."""
         raise NotImplementedError
 
-    def check_request(self, request: Request, target: Path) -> None:
+    def check_request(self, request: ExportRequest, target: Path) -> None:
         """Refuse options that this format has no use for. Raises Problem E375, E376."""
         if request.layout and "layout" not in self.options:
             helps = "`-o FILE.mcap` writes one, and its layout"

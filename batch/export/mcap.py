@@ -26,7 +26,7 @@ from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign
 from batch.export import scene, wire
 from batch.export.case_log import LogLine, log_lines, result, varied
-from batch.export.formats import ExportFormat, Request, Written
+from batch.export.formats import ExportFormat, ExportRequest, WrittenExport
 from batch.export.output import check, whole
 from batch.export.picking import ExportedCase, SignalColumn
 from batch.export.poses import PosedArm, arm_of
@@ -191,7 +191,7 @@ class Channels:
 
 
 @frozen
-class Stream:
+class SignalStream:
     """A signal's messages to be made. values: its numbers, (row, column)."""
 
     channel: int
@@ -231,14 +231,14 @@ def _messages(channels: Channels, arms: Sequence[PosedArm], number: int) -> Iter
     yield _ns(said[-1].time), number, channel, wire.message(parts, data)
 
 
-def _stream(channels: Channels, arm: PosedArm, name: str, columns: Sequence[SignalColumn]) -> Stream:
+def _stream(channels: Channels, arm: PosedArm, name: str, columns: Sequence[SignalColumn]) -> SignalStream:
     values = arm.case.signal(name)[:, [column.place for column in columns]]
     parts = fields(columns)
     units = {".".join(column.parts or ("value",)): column.unit for column in columns}
     one = len(set(units.values())) == 1
     told = {"unit": columns[0].unit} if one else {f"unit.{path}": unit for path, unit in units.items()}
     channel = channels.own(topic(arm, name), name.replace(".", "_"), parts, {**told, "about": columns[0].about})
-    return Stream(channel, parts, values)
+    return SignalStream(channel, parts, values)
 
 
 def _transforms(arm: PosedArm, base: str, times: Sequence[int], here: slice) -> list[bytes]:
@@ -341,18 +341,18 @@ class Mcap(ExportFormat):
             raise Problem(too_many(kept, ", ".join(campaign.asked), helps))
 
     def write_histories(
-        self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: Request
-    ) -> Written:
+        self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: ExportRequest
+    ) -> WrittenExport:
         from batch.export import layout
 
         shown = arms(file, cases, named=request.named)
         if not request.layout:
-            return Written(write(file, shown, target))
+            return WrittenExport(write(file, shown, target))
         text, beside = layout.text(shown), layout.beside(target)
         check(beside, file.path, lambda path: path.read_text("utf-8", "replace") == text, force=request.force)
         rows = write(file, shown, target)
         layout.write(beside, text)
-        return Written(rows, beside)
+        return WrittenExport(rows, beside)
 
 
 FORMAT = Mcap()

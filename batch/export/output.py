@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from batch.archive.sink import Busy, Sink, temporary_of
+from batch.archive.sink import FileBusy, Sink, temporary_of
 from met.diagnostic import Problem, error
 from met.outputs import cannot_write, check_overwrite, check_place
 
@@ -54,7 +54,7 @@ def whole(output: Path) -> Iterator[Sink]:
             os.fsync(folder)
         finally:
             os.close(folder)
-    except Busy:
+    except FileBusy:
         helps = "wait until it is done, or give another name with `-o`"
         raise Problem(error("E307", f"cannot write {output}: another export is writing it now", help=helps)) from None
     except OSError as reason:

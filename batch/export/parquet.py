@@ -20,7 +20,7 @@ from batch.archive.sink import temporary_of
 from batch.campaigns.campaign import Campaign
 from batch.export.case_table import CaseTable, TableColumn, of_varied, value_of, varied
 from batch.export.csv import united
-from batch.export.formats import ExportFormat, Request, Written
+from batch.export.formats import ExportFormat, ExportRequest, WrittenExport
 from batch.export.output import whole
 from batch.export.picking import ExportedCase, SignalColumn
 from met.diagnostic import Problem, error
@@ -159,13 +159,13 @@ class Parquet(ExportFormat):
     def check_campaign(self, campaign: Campaign, target: Path) -> None:
         pyarrow_here()
 
-    def write_metrics(self, file: ArchiveFile, table: CaseTable, target: Path) -> Written:
-        return Written(write_cases(file, table, target))
+    def write_metrics(self, file: ArchiveFile, table: CaseTable, target: Path) -> WrittenExport:
+        return WrittenExport(write_cases(file, table, target))
 
     def write_histories(
-        self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: Request
-    ) -> Written:
-        return Written(write(file, cases, target, deck=request.units == "deck"))
+        self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: ExportRequest
+    ) -> WrittenExport:
+        return WrittenExport(write(file, cases, target, deck=request.units == "deck"))
 
 
 FORMAT = Parquet()

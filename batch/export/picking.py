@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Group, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.queries.signals import panels
 from batch.terminal.show import chosen, picked
 from met.diagnostic import Problem
@@ -41,7 +41,7 @@ class ExportedCase:
     columns   of its signals, those of one signal side by side
     """
 
-    group: Group
+    group: ArchiveGroup
     position: int
     number: int
     time: np.ndarray
@@ -85,12 +85,12 @@ def pick(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: 
     return sorted(found, key=lambda case: (ranks[case.group.name], case.number))
 
 
-def rank(names: Sequence[str], group: Group) -> int:
+def rank(names: Sequence[str], group: ArchiveGroup) -> int:
     """The first of the names by which a group is asked for."""
     return min(at for at, name in enumerate(names) if name in (group.name, group.sweep))
 
 
-def _columns(groups: Sequence[Group], signals: Sequence[str]) -> dict[str, tuple[SignalColumn, ...]]:
+def _columns(groups: Sequence[ArchiveGroup], signals: Sequence[str]) -> dict[str, tuple[SignalColumn, ...]]:
     """The columns by group. A signal that only some structures of a sweep have is theirs; one that none has is a
     Problem, and so are groups without histories."""
     out: dict[str, list[SignalColumn]] = {}
@@ -112,7 +112,7 @@ def _columns(groups: Sequence[Group], signals: Sequence[str]) -> dict[str, tuple
     return {name: _ordered(columns) for name, columns in out.items()}
 
 
-def _columns_of(group: Group, variable: Stored) -> list[SignalColumn]:
+def _columns_of(group: ArchiveGroup, variable: Stored) -> list[SignalColumn]:
     """All numbers of a signal."""
     joints, components = group.joints(variable), group.components(variable)
     owners: list[tuple[str, ...]] = [(joint,) for joint in joints] or [()]

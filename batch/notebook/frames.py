@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray
 
-from batch.archive.read import Group
+from batch.archive.read import ArchiveGroup
 from batch.export.poses import (
     OF_FREE_BASE,
     POSITION,
@@ -63,7 +63,9 @@ def frames(
     return out
 
 
-def _frames(path: Path, data: xarray.Dataset, group: Group, own: Experiment, links: Sequence[str]) -> xarray.Dataset:
+def _frames(
+    path: Path, data: xarray.Dataset, group: ArchiveGroup, own: Experiment, links: Sequence[str]
+) -> xarray.Dataset:
     q = _positions(data, own)
     instants = q[0] if q else _instants(data)
     dims, shape = instants.dims, instants.shape
@@ -105,7 +107,7 @@ def _stacked(links: Sequence[np.ndarray], unknown: np.ndarray) -> np.ndarray:
     return out
 
 
-def _all_recorded(data: xarray.Dataset, group: Group) -> None:
+def _all_recorded(data: xarray.Dataset, group: ArchiveGroup) -> None:
     """Raises Problem E328 where a case has no history."""
     recorded = data[RECORDED].values if RECORDED in data.coords else np.empty(0)
     for case in data[CASE].values[~np.isin(data[CASE].values, recorded)] if CASE in data.coords else ():

@@ -19,7 +19,7 @@ EMPTIEST, SMALL = 100, 1_000_000
 
 
 @frozen
-class Axis:
+class GridAxis:
     """A dimension of the block. values: its labels; codes: the place along it of each case; beside: parameters that
     are varied in step with it, by path, with a value a label."""
 
@@ -118,9 +118,9 @@ def _held(data: xarray.Dataset, table: Mapping[str, xarray.DataArray], path: str
     return data[path] if path not in table and path == REPEAT and path in data.variables else table.get(path)
 
 
-def _axes(columns: Mapping[str, xarray.DataArray]) -> tuple[list[Axis], dict[str, Any]]:
+def _axes(columns: Mapping[str, xarray.DataArray]) -> tuple[list[GridAxis], dict[str, Any]]:
     """The dimensions, in the deck's order; and by path what all cases share."""
-    axes: list[Axis] = []
+    axes: list[GridAxis] = []
     alike: dict[str, Any] = {}
     for path, column in columns.items():
         values, codes = _labels(column.values)
@@ -132,14 +132,14 @@ def _axes(columns: Mapping[str, xarray.DataArray]) -> tuple[list[Axis], dict[str
         for number, axis in enumerate(axes):
             mine, yours = np.divmod(distinct(axis.codes * len(values) + codes), len(values))
             if len(mine) == len(axis.values):  # it follows from the other
-                axes[number] = Axis(axis.path, axis.values, axis.codes, {**axis.beside, path: values[yours]})
+                axes[number] = GridAxis(axis.path, axis.values, axis.codes, {**axis.beside, path: values[yours]})
                 break
             if len(mine) == len(values):  # the other follows from it
                 order = mine[np.argsort(yours)]
                 beside |= {axis.path: axis.values[order], **{k: v[order] for k, v in axis.beside.items()}}
                 within.append(number)
         else:
-            axes.insert(within[0] if within else len(axes), Axis(path, values, codes, beside))
+            axes.insert(within[0] if within else len(axes), GridAxis(path, values, codes, beside))
             axes = [axis for number, axis in enumerate(axes) if number - 1 not in within]
     return axes, alike
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import xarray
 
-from batch.archive.read import ArchiveFile, Group
+from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.notebook.table import CASE, PREFIX, RECORDED, cases_of, name_of, positions
 from met.diagnostic import Problem, error
 
@@ -30,7 +30,7 @@ def file_of(data: xarray.Dataset | xarray.DataTree) -> Path:
 
 
 @contextmanager
-def experiment(path: Path, data: xarray.Dataset) -> Iterator[tuple[ArchiveFile, Group]]:
+def experiment(path: Path, data: xarray.Dataset) -> Iterator[tuple[ArchiveFile, ArchiveGroup]]:
     """The open archive, and the group in it that a Dataset is of. Raises Problem E301-E303, E389."""
     name = name_of(data)
     if not name:
@@ -39,7 +39,7 @@ def experiment(path: Path, data: xarray.Dataset) -> Iterator[tuple[ArchiveFile, 
         yield file, _group(file, data)
 
 
-def _group(file: ArchiveFile, data: xarray.Dataset) -> Group:
+def _group(file: ArchiveFile, data: xarray.Dataset) -> ArchiveGroup:
     """The group that a Dataset is of. Raises Problem E389."""
     group = next((group for group in file.groups if group.name == name_of(data)), None)
     if group is None or group.attributes.get("code_key") != data.attrs.get("code_key"):
@@ -58,7 +58,7 @@ def archive(path: Path, parts: Mapping[str, xarray.Dataset]) -> Iterator[Archive
         yield file
 
 
-def places(group: Group, path: Path, data: xarray.Dataset, cases: np.ndarray) -> np.ndarray:
+def places(group: ArchiveGroup, path: Path, data: xarray.Dataset, cases: np.ndarray) -> np.ndarray:
     """Positions in the archive of cases of a Dataset. Raises Problem E389 where they are other cases there."""
     found = positions(group.values(CASE), cases)
     if found is None:

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from batch.archive.read import ArchiveFile, Group
-    from batch.plotting.sheet import Sheet
+    from batch.archive.read import ArchiveFile, ArchiveGroup
+    from batch.plotting.sheet import PictureSheet
 
 
 def plot(
@@ -61,18 +61,18 @@ def plot(
 
 def draw(
     archive: ArchiveFile, output: str | os.PathLike[str], names: Sequence[str] = (), *, run: str | None = None,
-    cases: Sequence[str] = (), over: Sequence[str] = (), against: ArchiveFile | None = None, sheet: Sheet | None = None,
+    cases: Sequence[str] = (), over: Sequence[str] = (), against: ArchiveFile | None = None, sheet: PictureSheet | None = None,
 ) -> Path:  # fmt: skip
     """The same of archives that are open."""
     from batch.plotting import histories, metrics
     from batch.plotting import output as place
     from batch.plotting.against import beside
     from batch.plotting.asked import asked
-    from batch.plotting.sheet import Sheet
+    from batch.plotting.sheet import PictureSheet
     from batch.queries.pool import pools
     from batch.terminal.show import chosen
 
-    target, sheet = Path(output), sheet or Sheet()
+    target, sheet = Path(output), sheet or PictureSheet()
     groups = chosen(archive, (run,) if run else ())
     group = _with_case(groups, cases[0]) if cases else groups[0]
     place.check(target)
@@ -93,7 +93,7 @@ def draw(
     return target
 
 
-def _with_case(groups: Sequence[Group], case: str) -> Group:
+def _with_case(groups: Sequence[ArchiveGroup], case: str) -> ArchiveGroup:
     """The first experiment that has a case; the first of all where none has it, which says so."""
     from met.diagnostic import Problem
 

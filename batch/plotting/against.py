@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Group
+from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.differences import matching
 from batch.queries.signals import Panel, pretty_unit
 from met.diagnostic import Problem, error
@@ -26,7 +26,7 @@ class Beside:
     places  of each case of the drawn group its position in the other; -1 where it is not there
     """
 
-    def __init__(self, drawn: Group, group: Group, names: tuple[str, str]) -> None:
+    def __init__(self, drawn: ArchiveGroup, group: ArchiveGroup, names: tuple[str, str]) -> None:
         self.drawn, self.group = drawn, group
         self.own, self.name = names
         found = matching.cases(drawn, group)
@@ -64,7 +64,7 @@ class Beside:
         return np.stack([values[:, column] if column >= 0 else lacking for column in columns], axis=1)
 
 
-def _channels(group: Group, name: str) -> dict[str, tuple[int, str]]:
+def _channels(group: ArchiveGroup, name: str) -> dict[str, tuple[int, str]]:
     """By channel: where it lies among a signal's columns, and its unit."""
     variable = group.variables.get(name)
     if variable is None or variable.role != "signal":
@@ -89,7 +89,7 @@ def lacking(name: str, beside: Beside, there: Sequence[str]) -> Problem:
     return Problem(error("E393", f"no `{name}` in {beside.name} to draw against", help=helps))
 
 
-def beside(archive: ArchiveFile, groups: Sequence[Group], other: ArchiveFile) -> list[Beside | None]:
+def beside(archive: ArchiveFile, groups: Sequence[ArchiveGroup], other: ArchiveFile) -> list[Beside | None]:
     """Of each group the other archive's; none where that has not this structure. Raises Problem E393 where nothing is
     the same in the two."""
     names = file_names(archive.path, other.path)

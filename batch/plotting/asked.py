@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Group, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.queries.grids import is_grid, levels
-from batch.queries.pool import Column, Pool
+from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import number_text, panels
 from met.diagnostic import Problem, did_you_mean, error
 from met.frozen import frozen
@@ -23,7 +23,7 @@ MAPPED = 5
 
 
 @frozen
-class Asked:
+class PlotRequest:
     """Signals, or metrics; of these both are empty where none is named."""
 
     signals: tuple[str, ...] = ()
@@ -31,7 +31,9 @@ class Asked:
     histories: bool = True
 
 
-def asked(group: Group, pool: Pool, names: Sequence[str], cases: Sequence[str], over: Sequence[str]) -> Asked:
+def asked(
+    group: ArchiveGroup, pool: Pool, names: Sequence[str], cases: Sequence[str], over: Sequence[str]
+) -> PlotRequest:
     """Signals or metrics, by what the names are, and by the other options. Raises Problem E323, E324, E391."""
     metrics = {name: v for v in pool_metrics(pool) for name in (v.path, v.name)}
     signals, others = [], []
@@ -53,9 +55,9 @@ def asked(group: Group, pool: Pool, names: Sequence[str], cases: Sequence[str], 
         message = f"`--case` is of signals, and {f'`{others[0]}` is a metric' if others else '`--over` of metrics'}"
         raise Problem(error("E391", message, help="a case's metrics are numbers: `met show --case` tells them"))
     if others or over:
-        return Asked(metrics=tuple(dict.fromkeys(others)), histories=False)
+        return PlotRequest(metrics=tuple(dict.fromkeys(others)), histories=False)
     whole = group.recorded == group.count or (group.recorded > 0 and not group.role("metric"))
-    return Asked(signals=tuple(signals), histories=bool(signals or cases or whole))
+    return PlotRequest(signals=tuple(signals), histories=bool(signals or cases or whole))
 
 
 def pool_metrics(pool: Pool) -> list[Stored]:
@@ -63,7 +65,7 @@ def pool_metrics(pool: Pool) -> list[Stored]:
     return list({v.name: v for group in reversed(pool.groups) for v in group.role("metric")}.values())
 
 
-def _is_signal(group: Group, name: str) -> bool:
+def _is_signal(group: ArchiveGroup, name: str) -> bool:
     try:
         panels(group, [name])
     except Problem:
@@ -71,7 +73,7 @@ def _is_signal(group: Group, name: str) -> bool:
     return True
 
 
-def _unknown(group: Group, name: str, metrics: Sequence[str]) -> Problem:
+def _unknown(group: ArchiveGroup, name: str, metrics: Sequence[str]) -> Problem:
     """What is said of a name that is neither: of signals what `panels` says."""
     signals = [v.name for v in group.role("signal")]
     here = f"metrics here: {', '.join(dict.fromkeys(metrics))}"
@@ -90,7 +92,7 @@ def _unknown(group: Group, name: str, metrics: Sequence[str]) -> Problem:
 # Over what
 
 
-def over(archive: ArchiveFile, pool: Pool, names: Sequence[str]) -> tuple[Column, ...]:
+def over(archive: ArchiveFile, pool: Pool, names: Sequence[str]) -> tuple[CaseColumn, ...]:
     """What metrics are drawn over: the parameters that are named; else two that make a grid of some size, or the one
     with most values; none where nothing is varied. Raises Problem E390."""
     varied = pool.varied()
@@ -149,7 +151,7 @@ def _here(known: Sequence[str]) -> str:
     return f"varied here: {', '.join(known)}" if known else "nothing is varied here"
 
 
-def coloured(pool: Pool, drawn: Sequence[Column]) -> Column | None:
+def coloured(pool: Pool, drawn: Sequence[CaseColumn]) -> CaseColumn | None:
     """What tells points over one parameter apart by colour: of what else is varied that with most values, which does
     not go in step with it."""
     for column in pool.varied():
@@ -158,7 +160,7 @@ def coloured(pool: Pool, drawn: Sequence[Column]) -> Column | None:
     return None
 
 
-def free(column: Column, other: Column) -> bool:
+def free(column: CaseColumn, other: CaseColumn) -> bool:
     """Whether a column does not rise, or fall, wherever another one rises."""
     ranks, others = (np.searchsorted(levels(each.values), each.values) for each in (column, other))
     return not (np.array_equal(ranks, others) or np.array_equal(ranks, others.max(initial=0) - others))

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from batch.plotting.measured import Measured
-from batch.plotting.sheet import INK, Sheet
-from batch.plotting.sides import Side
+from batch.plotting.sheet import INK, PictureSheet
+from batch.plotting.sides import MapSide
 from batch.queries.grids import standing
 from met.frozen import frozen
 
@@ -60,7 +60,7 @@ def any_in(cases: np.ndarray, cells: np.ndarray, count: int) -> np.ndarray:
     return out
 
 
-def draw(ax: Any, found: Picked, x: Side, y: Side, colours: Any, norm: Any, sheet: Sheet) -> Any:
+def draw(ax: Any, found: Picked, x: MapSide, y: MapSide, colours: Any, norm: Any, sheet: PictureSheet) -> Any:
     """Colours, greys, stripes and signs. Gives what a colour bar is of."""
     shape = (len(y.levels.texts), len(x.levels.texts))
     values = found.values
@@ -85,7 +85,7 @@ def draw(ax: Any, found: Picked, x: Side, y: Side, colours: Any, norm: Any, shee
     return mapped
 
 
-def _fill(ax: Any, x: Side, y: Side, which: np.ndarray, **style: Any) -> None:
+def _fill(ax: Any, x: MapSide, y: MapSide, which: np.ndarray, **style: Any) -> None:
     """Rectangles over these cells, one for each stretch of neighbours in a row."""
     from matplotlib.collections import PolyCollection
 
@@ -95,7 +95,7 @@ def _fill(ax: Any, x: Side, y: Side, which: np.ndarray, **style: Any) -> None:
     ax.add_collection(PolyCollection(list(corners), rasterized=which.size > FINE, **style), autolim=False)
 
 
-def _corners(x: Side, y: Side, rows: np.ndarray) -> np.ndarray:
+def _corners(x: MapSide, y: MapSide, rows: np.ndarray) -> np.ndarray:
     """[stretch, corner, 2] of the stretches of neighbouring cells in each row."""
     steps = np.diff(np.pad(rows, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     up, first = np.nonzero(steps > 0)
@@ -133,7 +133,7 @@ def _spaced(which: np.ndarray, room: tuple[int, int]) -> np.ndarray:
     return out
 
 
-def _signs(ax: Any, x: Side, y: Side, which: np.ndarray, room: tuple[int, int], text: str, size: float) -> None:
+def _signs(ax: Any, x: MapSide, y: MapSide, which: np.ndarray, room: tuple[int, int], text: str, size: float) -> None:
     """Signs over some of these cells. What is around an infinity sign covers no other cell, and a sign in a stretch
     that is narrower than itself stands in the stretch's middle, whole also at the map's edge."""
     if not which.any():
@@ -151,7 +151,7 @@ def _signs(ax: Any, x: Side, y: Side, which: np.ndarray, room: tuple[int, int], 
     ax.scatter(*centres, color=INK, linewidths=0.0, zorder=3, clip_on=False, **style)
 
 
-def _in_stretch(x: Side, which: np.ndarray, most: int) -> np.ndarray:
+def _in_stretch(x: MapSide, which: np.ndarray, most: int) -> np.ndarray:
     """Where a sign over each cell stands: in the middle of the stretch of neighbours, if these are at most so many."""
     place = np.arange(which.shape[1])
     beside = np.pad(which, ((0, 0), (1, 1)))

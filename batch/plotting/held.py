@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from batch.plotting.layout import BESIDE, LETTER, letters
-from batch.plotting.sheet import Sheet
+from batch.plotting.sheet import PictureSheet
 from batch.queries.limits import Mark
 
 TONE = "#a33a0a"
@@ -20,7 +20,7 @@ PLACES = (0.995, 0.005, 0.5, 0.75, 0.25)
 """Along a limit's line, where its name may stand."""
 
 
-def draw(ax: Any, marks: Sequence[Mark], time: np.ndarray, sheet: Sheet, columns: int) -> None:
+def draw(ax: Any, marks: Sequence[Mark], time: np.ndarray, sheet: PictureSheet, columns: int) -> None:
     """The limits of what is drawn in a panel already. Those that would squeeze it are named alone."""
     values = [mark for mark in dict.fromkeys(marks) if not mark.time]
     low, high = ax.dataLim.intervaly
@@ -44,7 +44,7 @@ def draw(ax: Any, marks: Sequence[Mark], time: np.ndarray, sheet: Sheet, columns
         _write(ax, mark.value, 0.03, text, ax.get_xaxis_transform(), sheet, ha="right" if late else "left", va="bottom")
 
 
-def above(ax: Any, marks: Sequence[Mark], sheet: Sheet, columns: int) -> None:
+def above(ax: Any, marks: Sequence[Mark], sheet: PictureSheet, columns: int) -> None:
     """Names of the limits that no line is drawn of, right of what stands above the panel, where there is room."""
     lines = {float(line.get_ydata()[0]) for line in ax.lines if line.get_label() == DOTS["label"]}
     inside = {mark.text for mark in marks if mark.time or mark.value in lines}
@@ -56,7 +56,7 @@ def above(ax: Any, marks: Sequence[Mark], sheet: Sheet, columns: int) -> None:
         ax.set_title(text, loc="right", fontsize=sheet.small - 1.0, color=TONE, pad=3 if sheet.paper else 4)
 
 
-def _along(ax: Any, value: float, text: str, sheet: Sheet, columns: int) -> None:
+def _along(ax: Any, value: float, text: str, sheet: PictureSheet, columns: int) -> None:
     """A name beside a line that lies level, where the fewest points of the data are under it."""
     left, right = ax.get_xlim()
     low, high = ax.get_ylim()
@@ -79,7 +79,7 @@ def _along(ax: Any, value: float, text: str, sheet: Sheet, columns: int) -> None
     _write(ax, place, value, text, ax.get_yaxis_transform(), sheet, **style)
 
 
-def _write(ax: Any, x: float, y: float, text: str, place: Any, sheet: Sheet, **style: Any) -> None:
+def _write(ax: Any, x: float, y: float, text: str, place: Any, sheet: PictureSheet, **style: Any) -> None:
     from matplotlib.patheffects import withStroke
 
     ax.text(x, y, text, transform=place, color=TONE, fontsize=sheet.small - 1.0, zorder=4, in_layout=False,

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Group, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.plotting import held, layout
 from batch.plotting.against import Beside, lacking
-from batch.plotting.sheet import COLOURS, FAINT, INK, Sheet, sequence
-from batch.queries.arrange import Cell, Command, arranged, joints_of, overlaid, spread
+from batch.plotting.sheet import COLOURS, FAINT, INK, PictureSheet, sequence
+from batch.queries.arrange import Cell, CommandCurve, arranged, joints_of, overlaid, spread
 from batch.queries.deck_units import DeckUnits
 from batch.queries.limits import Mark, limits_of
 from batch.queries.signals import Panel, case_text, deck_unit, history, number_text, panels
@@ -47,7 +47,7 @@ class Histories:
     """The signals of some cases of a group, and how they are drawn."""
 
     def __init__(
-        self, archive: ArchiveFile, group: Group, signals: Sequence[str], cases: Sequence[str], sheet: Sheet,
+        self, archive: ArchiveFile, group: ArchiveGroup, signals: Sequence[str], cases: Sequence[str], sheet: PictureSheet,
         other: Beside | None,
     ) -> None:  # fmt: skip
         self.archive, self.group, self.sheet, self.other = archive, group, sheet, other
@@ -218,7 +218,7 @@ class Histories:
                 tone = colour or sequence(index, len(self.positions))
                 ax.plot(other.time, y, color=tone, linewidth=1.2 + WIDER, **style)
 
-    def _draw_command(self, ax: Any, command: Command | None) -> None:
+    def _draw_command(self, ax: Any, command: CommandCurve | None) -> None:
         """Dashed, over what followed it; in the cases' colours where each has its own."""
         if command is None:
             return
@@ -294,7 +294,7 @@ def _line(ax: Any, time: np.ndarray, y: np.ndarray, **style: Any) -> None:
         ax.plot(time[valid[-1]], y[valid[-1]], marker="x", markersize=6, color=style["color"])
 
 
-def _differing(group: Group) -> list[Stored]:
+def _differing(group: ArchiveGroup) -> list[Stored]:
     """The varied parameters that tell the cases here apart."""
     return [v for v in group.role("coordinate") if len(distinct(group.values(v.name))) > 1]
 
@@ -304,7 +304,7 @@ def _faint(index: int, count: int) -> float:
     return 1.0 - 0.75 * index / max(1, count - 1)
 
 
-def _case_words(group: Group, position: int) -> str:
+def _case_words(group: ArchiveGroup, position: int) -> str:
     """What differs, by name, for a legend without a title."""
     scales = {v.name: deck_unit(v) for v in _differing(group)}
     texts = [f"{name} = {number_text(group.values(name)[position] / scale)} {unit}".rstrip()
@@ -312,13 +312,13 @@ def _case_words(group: Group, position: int) -> str:
     return layout.named(", ".join(texts)) or f"case #{group.values('case')[position]}"
 
 
-def _case_label(group: Group, position: int) -> str:
+def _case_label(group: ArchiveGroup, position: int) -> str:
     """The values of what differs; the legend's title says of what."""
     values = [number_text(group.values(v.name)[position] / deck_unit(v)[0]) for v in _differing(group)]
     return " · ".join(values) or f"case #{group.values('case')[position]}"
 
 
-def _case_title(group: Group) -> str:
+def _case_title(group: ArchiveGroup) -> str:
     """What the values in the legend are of, a line each."""
     return " ·\n".join(f"{v.name}  ({deck_unit(v)[1]})" if deck_unit(v)[1] else v.name for v in _differing(group))
 
@@ -326,7 +326,9 @@ def _case_title(group: Group) -> str:
 # Panels
 
 
-def grid(sheet: Sheet, rows: Sequence[Sequence[Cell | None]], flat: Sequence[bool]) -> tuple[Any, list[list[Any]]]:
+def grid(
+    sheet: PictureSheet, rows: Sequence[Sequence[Cell | None]], flat: Sequence[bool]
+) -> tuple[Any, list[list[Any]]]:
     """Axes for all cells; time shared, and in a row the scale of what has the same unit. flat: which rows are low."""
     figure, axes = layout.figure(sheet, len(rows[0]), [layout.FLAT if low else 1.0 for low in flat])
     for ax in (ax for row, low in zip(axes, flat, strict=True) for ax in row if low):
@@ -343,7 +345,7 @@ def grid(sheet: Sheet, rows: Sequence[Sequence[Cell | None]], flat: Sequence[boo
     return figure, axes
 
 
-def dress(axes: list[list[Any]], rows: Sequence[Sequence[Cell | None]], sheet: Sheet) -> None:
+def dress(axes: list[list[Any]], rows: Sequence[Sequence[Cell | None]], sheet: PictureSheet) -> None:
     """Labels of the axes, once where neighbours share them, and above each panel what it shows."""
     for number, (cells, row) in enumerate(zip(rows, axes, strict=True)):
         before = None

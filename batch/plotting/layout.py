@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from batch.archive.read import ArchiveFile
-from batch.plotting.sheet import FAINT, INK, Sheet
+from batch.plotting.sheet import FAINT, INK, PictureSheet
 from met.diagnostic import Problem, error
 from met.messages.visible import visible
 
@@ -37,7 +37,7 @@ TICK_INCHES = 0.5
 
 
 def figure(
-    sheet: Sheet, columns: int, heights: Sequence[float], *, tall: bool = False, share_y: bool = False
+    sheet: PictureSheet, columns: int, heights: Sequence[float], *, tall: bool = False, share_y: bool = False
 ) -> tuple[Any, list[list[Any]]]:
     """A figure and its axes, row by row, which share what is below. heights: of the rows, against one another; tall:
     panels are nearly as high as they are wide."""
@@ -85,12 +85,12 @@ def several(found: Sequence[T], asked: bool, what: str) -> tuple[Sequence[T], st
     return found[:MOST_PANELS], f"{MOST_PANELS} of {len(found):,} {what}, others by name"
 
 
-def letters(sheet: Sheet, inches: float) -> int:
+def letters(sheet: PictureSheet, inches: float) -> int:
     """How many letters of the small size stand side by side in a width."""
     return max(12, int(inches * 72 / (LETTER * sheet.small)))
 
 
-def head(ax: Any, text: str, sheet: Sheet, columns: int, colour: str = INK) -> None:
+def head(ax: Any, text: str, sheet: PictureSheet, columns: int, colour: str = INK) -> None:
     """What stands above a panel, in as many lines as its width asks for."""
     wide = letters(sheet, ax.figure.get_figwidth() / columns - (BESIDE_ON_PAPER if sheet.paper else BESIDE))
     parts = text.split(" · ") if len(text) > wide else [text]
@@ -100,7 +100,7 @@ def head(ax: Any, text: str, sheet: Sheet, columns: int, colour: str = INK) -> N
     ax.set_title("\n".join(lines), loc="left", fontsize=sheet.small, color=colour, pad=3 if sheet.paper else 4)
 
 
-def _grow(figure: Any, sheet: Sheet, lines: float) -> None:
+def _grow(figure: Any, sheet: PictureSheet, lines: float) -> None:
     """On paper, room for so many lines more, unless the height is given."""
     if sheet.paper and sheet.height is None:
         figure.set_figheight(figure.get_figheight() + lines * LINE * sheet.small / 72)
@@ -112,7 +112,7 @@ def broken(label: str, most: int = 16) -> str:
 
 
 def legend(
-    figure: Any, found: Mapping[str, Any], sheet: Sheet, title: str | None = None, *, below: bool = False
+    figure: Any, found: Mapping[str, Any], sheet: PictureSheet, title: str | None = None, *, below: bool = False
 ) -> None:
     """One for the whole picture, handles by their texts: right of the panels; under them on a narrow sheet, and where
     that is asked for."""
@@ -146,7 +146,7 @@ def labelled(axes: Sequence[Sequence[Any]]) -> dict[str, Any]:
     return known
 
 
-def title(figure: Any, archive: ArchiveFile, name: str, below: str, sheet: Sheet) -> None:
+def title(figure: Any, archive: ArchiveFile, name: str, below: str, sheet: PictureSheet) -> None:
     """On a screen deck and run, and `below` what is shown of it; on paper the latter alone."""
     if sheet.paper:
         if below:

@@ -18,11 +18,11 @@ from batch.plotting import cells, layout, sides
 from batch.plotting.cells import DOTTED, STRIPES, infinity
 from batch.plotting.measured import Measured
 from batch.plotting.points import RASTERED
-from batch.plotting.sheet import FAINT, INK, Sheet
-from batch.plotting.sides import Side
+from batch.plotting.sheet import FAINT, INK, PictureSheet
+from batch.plotting.sides import MapSide
 from batch.queries.colours import Reach, reach
 from batch.queries.grids import FULL, cells_of, levelled
-from batch.queries.pool import Column
+from batch.queries.pool import CaseColumn
 from met.distinct import distinct
 from met.frozen import frozen
 
@@ -41,11 +41,11 @@ WIDEST = 2.6
 
 
 @frozen
-class Plan:
+class MapLayout:
     """What is drawn over what: x and y of all maps, of which each holds some of the cases; names of the archives."""
 
-    x: Side
-    y: Side
+    x: MapSide
+    y: MapSide
     cells: np.ndarray
     filled: bool
     several: int
@@ -56,7 +56,7 @@ class Plan:
         return len(self.y.levels.texts), len(self.x.levels.texts)
 
 
-def plan(x: Column, y: Column, third: Column | None, other: tuple[str, str] | None) -> Plan:
+def plan(x: CaseColumn, y: CaseColumn, third: CaseColumn | None, other: tuple[str, str] | None) -> MapLayout:
     """Sides and cells. Cases fill the grid if most of its cells hold one; else they are points, by their values."""
     if x.role == "choice" and y.role != "choice":
         x, y = y, x
@@ -68,10 +68,12 @@ def plan(x: Column, y: Column, third: Column | None, other: tuple[str, str] | No
     several = int(np.unique(apart, return_counts=True)[1].max(initial=0))
     if not filled:
         across, up = sides.line(x), sides.line(y)
-    return Plan(across, up, cells, filled, several, other)
+    return MapLayout(across, up, cells, filled, several, other)
 
 
-def draw(sheet: Sheet, found: Plan, metrics: Sequence[Measured], third: Column | None) -> tuple[Any, list[list[Any]]]:
+def draw(
+    sheet: PictureSheet, found: MapLayout, metrics: Sequence[Measured], third: CaseColumn | None
+) -> tuple[Any, list[list[Any]]]:
     """The figure and its axes; what is written above it is left to the caller."""
     every = np.ones(len(found.cells), bool)
     if third is None:
@@ -99,7 +101,7 @@ def draw(sheet: Sheet, found: Plan, metrics: Sequence[Measured], third: Column |
     return figure, axes
 
 
-def said(found: Plan, metrics: Sequence[Measured], third: Column | None) -> str:
+def said(found: MapLayout, metrics: Sequence[Measured], third: CaseColumn | None) -> str:
     """What a cell or a point is, and beside a third parameter what is required."""
     if not found.filled:
         text = "a point a case"
@@ -111,7 +113,7 @@ def said(found: Plan, metrics: Sequence[Measured], third: Column | None) -> str:
     return "; ".join([text, *(required if third is not None else [])])
 
 
-def _stands(metrics: Sequence[Measured], found: Plan) -> str:
+def _stands(metrics: Sequence[Measured], found: MapLayout) -> str:
     if found.other is not None:
         return "the one that differs most"
     judged = {bool(each.column.limits) for each in metrics}
@@ -119,7 +121,7 @@ def _stands(metrics: Sequence[Measured], found: Plan) -> str:
     return worst if judged == {True} else middle if judged == {False} else f"{worst}, or {middle} where nothing is"
 
 
-def _about(each: Measured, found: Plan) -> str:
+def _about(each: Measured, found: MapLayout) -> str:
     if found.other is not None:
         return each.column.about or each.column.label
     return " · ".join(part for part in (each.about, _lost(each)) if part)
@@ -136,7 +138,7 @@ def _lost(each: Measured) -> str:
 # Colours
 
 
-def _shown(each: Measured, found: Plan) -> np.ndarray:
+def _shown(each: Measured, found: MapLayout) -> np.ndarray:
     return each.values if found.other is None else each.difference
 
 
@@ -148,7 +150,7 @@ class Tones:
     reach: Reach | None
 
 
-def _tones(each: Measured, found: Plan, values: np.ndarray) -> Tones:
+def _tones(each: Measured, found: MapLayout, values: np.ndarray) -> Tones:
     from matplotlib.colors import LogNorm, Normalize
 
     limits = [limit.value for limit in each.column.limits] if found.other is None else []
@@ -161,7 +163,7 @@ def _tones(each: Measured, found: Plan, values: np.ndarray) -> Tones:
     return Tones((LogNorm if far.log else Normalize)(far.low, far.high), far)
 
 
-def _colours(found: Plan) -> Any:
+def _colours(found: MapLayout) -> Any:
     import matplotlib
 
     if found.other is not None:
@@ -170,7 +172,7 @@ def _colours(found: Plan) -> Any:
 
 
 def _bar(
-    figure: Any, mapped: Any, axes: Sequence[Any], each: Measured, found: Plan, sheet: Sheet, tones: Tones
+    figure: Any, mapped: Any, axes: Sequence[Any], each: Measured, found: MapLayout, sheet: PictureSheet, tones: Tones
 ) -> None:
     """The colour bar; pointed where values lie beyond it, and how many."""
     far = tones.reach
@@ -197,7 +199,7 @@ def _bar(
 
 
 def _maps(
-    figure: Any, axes: Sequence[Any], each: Measured, found: Plan, parts: Sequence[np.ndarray], sheet: Sheet
+    figure: Any, axes: Sequence[Any], each: Measured, found: MapLayout, parts: Sequence[np.ndarray], sheet: PictureSheet
 ) -> None:
     """A map for each of some parts of the cases, in the same colours."""
     shown, count = _shown(each, found), found.shape[0] * found.shape[1]
@@ -226,14 +228,14 @@ def _maps(
     _bar(figure, mapped, axes, each, found, sheet, tones)
 
 
-def _striped(each: Measured, found: Plan) -> list[tuple[np.ndarray, str]]:
+def _striped(each: Measured, found: MapLayout) -> list[tuple[np.ndarray, str]]:
     if found.other is None or each.theirs_missed is None:
         return [(each.missed, STRIPES)]
     both = each.both
     return [(both & each.missed & ~each.theirs_missed, STRIPES), (both & ~each.missed & each.theirs_missed, DOTTED)]
 
 
-def _points(ax: Any, each: Measured, found: Plan, here: np.ndarray, norm: Any) -> Any:
+def _points(ax: Any, each: Measured, found: MapLayout, here: np.ndarray, norm: Any) -> Any:
     shown = _shown(each, found)
     x, y = found.x.of_cases(), found.y.of_cases()
     finite = here & np.isfinite(shown)
@@ -253,7 +255,7 @@ def _points(ax: Any, each: Measured, found: Plan, here: np.ndarray, norm: Any) -
 # What is written
 
 
-def _sides(axes: Sequence[Sequence[Any]], found: Plan, sheet: Sheet) -> None:
+def _sides(axes: Sequence[Sequence[Any]], found: MapLayout, sheet: PictureSheet) -> None:
     """Values and names of the parameters, on the left and below all."""
     width, height = axes[0][0].figure.get_size_inches()
     across = max(0.6, width / len(axes[0]) - (0.9 if sheet.paper else 1.5))
@@ -268,7 +270,7 @@ def _sides(axes: Sequence[Sequence[Any]], found: Plan, sheet: Sheet) -> None:
             ax.set_ylabel(layout.broken(found.y.label, 22) if column == 0 else "")
 
 
-def _marks(metrics: Sequence[Measured], found: Plan) -> dict[str, Any]:
+def _marks(metrics: Sequence[Measured], found: MapLayout) -> dict[str, Any]:
     """What stripes, greys and signs stand for, of those that are there."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch

@@ -9,7 +9,7 @@ import numpy as np
 from batch.plotting.against import Beside, lacking, unlike
 from batch.plotting.layout import drawable
 from batch.queries import requirements
-from batch.queries.pool import Column, Pool
+from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import deck_unit
 from met.frozen import frozen
 from met.run import DONE
@@ -21,7 +21,7 @@ class Measured:
     theirs_missed: whether a requirement of the metric is, of each archive its own; both: whether a case is in both,
     True where there is no other."""
 
-    column: Column
+    column: CaseColumn
     values: np.ndarray
     missed: np.ndarray
     failed: np.ndarray

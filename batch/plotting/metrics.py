@@ -12,14 +12,14 @@ from batch.plotting import layout, maps, points
 from batch.plotting.against import Beside, file_names
 from batch.plotting.asked import coloured, free, over
 from batch.plotting.measured import Measured, measured
-from batch.plotting.sheet import Sheet
-from batch.queries.pool import Column, Pool
+from batch.plotting.sheet import PictureSheet
+from batch.queries.pool import CaseColumn, Pool
 from met.diagnostic import Problem, error
 from met.outputs import quoted
 
 
 def draw(
-    archive: ArchiveFile, pool: Pool, names: Sequence[str], parameters: Sequence[str], sheet: Sheet,
+    archive: ArchiveFile, pool: Pool, names: Sequence[str], parameters: Sequence[str], sheet: PictureSheet,
     others: Mapping[int, Beside], other: ArchiveFile | None,
 ) -> Any:  # fmt: skip
     """The figure. names: of metrics, all for none; parameters: what they are drawn over, none: as is best. others: by
@@ -57,11 +57,11 @@ def draw(
 
 
 def _points(
-    pool: Pool, metrics: Sequence[Measured], x: Column | None, by: Column | None, sheet: Sheet,
+    pool: Pool, metrics: Sequence[Measured], x: CaseColumn | None, by: CaseColumn | None, sheet: PictureSheet,
     files: tuple[str, str] | None,
 ) -> Any:  # fmt: skip
     """A panel a metric."""
-    x = x or Column("case", "case", "", "case", pool.cases.astype(np.float64))
+    x = x or CaseColumn("case", "case", "", "case", pool.cases.astype(np.float64))
     figure, axes = layout.figure(sheet, 1, [1.0] * len(metrics))
     mapped = None
     for each, [ax] in zip(metrics, axes, strict=True):

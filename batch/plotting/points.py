@@ -10,10 +10,10 @@ import numpy as np
 
 from batch.plotting import layout
 from batch.plotting.measured import Measured
-from batch.plotting.sheet import COLOURS, FAINT, INK, Sheet, sequence
+from batch.plotting.sheet import COLOURS, FAINT, INK, PictureSheet, sequence
 from batch.plotting.sides import is_log, line, write_log
 from batch.queries.grids import MOST_LEVELS, is_grid, levelled, levels
-from batch.queries.pool import Column
+from batch.queries.pool import CaseColumn
 from met.frozen import frozen
 
 MARKER, NAMED = 14, 8
@@ -44,7 +44,7 @@ class Set:
     joined: bool
 
 
-def scatter(ax: Any, each: Measured, x: Column, by: Column | None, sheet: Sheet) -> Any:
+def scatter(ax: Any, each: Measured, x: CaseColumn, by: CaseColumn | None, sheet: PictureSheet) -> Any:
     """One metric over x, by the levels of another column. Gives what a colour bar is of, if there is to be one."""
     finite = np.isfinite(each.values)
     drawn = _apart(x.values, np.where(finite, each.values, np.nan))
@@ -73,7 +73,7 @@ def scatter(ax: Any, each: Measured, x: Column, by: Column | None, sheet: Sheet)
     return mapped
 
 
-def _sets(x: Column, by: Column | None) -> list[Set]:
+def _sets(x: CaseColumn, by: CaseColumn | None) -> list[Set]:
     """One for each level that the legend names; none where there are too many of them and no curves."""
     if by is None:
         every = np.arange(len(x.values))
@@ -93,7 +93,7 @@ def _sets(x: Column, by: Column | None) -> list[Set]:
     return sets
 
 
-def _scale(by: Column) -> Any:
+def _scale(by: CaseColumn) -> Any:
     """Colours by value, where there are too many to name; by its logarithm where its axis would be logarithmic."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm, Normalize
@@ -102,7 +102,7 @@ def _scale(by: Column) -> Any:
     return ScalarMappable((LogNorm if is_log(by) else Normalize)(finite[0], finite[-1]), "viridis")
 
 
-def _curves(x: Column, by: Column) -> bool:
+def _curves(x: CaseColumn, by: CaseColumn) -> bool:
     """Whether there is one case for each value of both, so that a curve goes through those of one colour."""
     if x.role != "parameter" or not is_grid(x.values, by.values) or len(levels(by.values)) > MOST_LEVELS:
         return False
@@ -110,7 +110,7 @@ def _curves(x: Column, by: Column) -> bool:
     return pairs == len(x.values)
 
 
-def _theirs(ax: Any, each: Measured, x: Column, sets: list[Set], by: Column | None) -> None:
+def _theirs(ax: Any, each: Measured, x: CaseColumn, sets: list[Set], by: CaseColumn | None) -> None:
     """The other archive's cases: hollow, under the own ones, with wide pale curves."""
     assert each.theirs is not None
     y = np.where(np.isfinite(each.theirs), each.theirs, np.nan)
@@ -205,7 +205,7 @@ def legend_of(known: Mapping[str, Any], other: tuple[str, str] | None) -> dict[s
     }  # fmt: skip
 
 
-def bar(figure: Any, mapped: Any, axes: list[Any], by: Column, sheet: Sheet) -> None:
+def bar(figure: Any, mapped: Any, axes: list[Any], by: CaseColumn, sheet: PictureSheet) -> None:
     drawn = figure.colorbar(mapped, ax=axes, pad=0.01, aspect=18 * len(axes))
     if is_log(by):
         found = line(by)
@@ -215,7 +215,7 @@ def bar(figure: Any, mapped: Any, axes: list[Any], by: Column, sheet: Sheet) -> 
     drawn.outline.set_visible(False)
 
 
-def below(ax: Any, x: Column, sheet: Sheet) -> None:
+def below(ax: Any, x: CaseColumn, sheet: PictureSheet) -> None:
     """The axis of what is varied: a choice's words at their places, whole numbers of cases, orders of magnitude."""
     if is_log(x):
         found, wide = line(x), ax.figure.get_figwidth()

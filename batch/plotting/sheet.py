@@ -54,7 +54,7 @@ _SIZE = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(?:[x×]\s*(\d+(?:\.\d*)?|\.\d+)
 
 
 @frozen
-class Sheet:
+class PictureSheet:
     """What a picture is drawn on. width, height: inches; none: as the panels need it."""
 
     width: float | None = None
@@ -91,13 +91,13 @@ class Sheet:
         return {**STYLE, "font.size": self.normal, **thin, **dots}
 
 
-def sheet(size: str = "", dpi: int | None = None) -> Sheet:
+def sheet(size: str = "", dpi: int | None = None) -> PictureSheet:
     """A sheet of `8.5cm` wide, or of `8.5x6cm`. Raises Problem E392."""
     if dpi is not None and not LEAST_DPI <= dpi <= MOST_DPI:
         message = f"{dpi} dots per inch: they are from {LEAST_DPI} to {MOST_DPI}"
         raise Problem(error("E392", message, help="`--dpi 600`"))
     if not size:
-        return Sheet(dpi=dpi)
+        return PictureSheet(dpi=dpi)
     found = _SIZE.fullmatch(size)
     helps = "as `--size 8.5cm`, a column's width, or `--size 8.5x6cm`; in cm, mm or in"
     if found is None:
@@ -107,7 +107,7 @@ def sheet(size: str = "", dpi: int | None = None) -> Sheet:
     if not all(LEAST_CM <= side / INCHES["cm"] <= MOST_CM for side in sides):
         message = f"size `{size}`: sides are from {LEAST_CM:g} cm to {MOST_CM:g} cm"
         raise Problem(error("E392", message, help=helps))
-    return Sheet(sides[0], sides[1] if len(sides) > 1 else None, dpi)
+    return PictureSheet(sides[0], sides[1] if len(sides) > 1 else None, dpi)
 
 
 def sequence(index: int, count: int) -> Any:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from batch.plotting.layout import LETTER
-from batch.plotting.sheet import Sheet
+from batch.plotting.sheet import PictureSheet
 from batch.queries import grids
 from batch.queries.grids import ROUND, Levels, Scale, edges_of, levelled, levels, round_numbers
-from batch.queries.pool import Column
+from batch.queries.pool import CaseColumn
 from batch.queries.signals import number_text
 from met.frozen import frozen
 
@@ -31,11 +31,11 @@ BEYOND = 0.05
 
 
 @frozen
-class Side:
+class MapSide:
     """edges: of the cells, one more than there are, or of points the two ends of the axis;  scale: `place` where all
     cells have one width."""
 
-    column: Column
+    column: CaseColumn
     levels: Levels
     edges: np.ndarray
     scale: Scale
@@ -61,36 +61,36 @@ class Side:
         return self.levels.places.astype(float) if self.scale == "place" else self.column.values
 
 
-def side(column: Column) -> Side:
+def side(column: CaseColumn) -> MapSide:
     """The side of a map of cells."""
     found = levelled(column.values, column.words, MOST_CELLS)
     if found.scale == "place":
         edges = np.arange(len(found.texts) + 1) - 0.5
     else:
         edges = found.values if found.stretches else edges_of(found.values, found.scale)
-    return Side(column, found, edges, found.scale)
+    return MapSide(column, found, edges, found.scale)
 
 
-def line(column: Column) -> Side:
+def line(column: CaseColumn) -> MapSide:
     """The side of points, which lie by their values whatever these are; words, at their places."""
     found = levelled(column.values, column.words)
     if column.words:
         return side(column)
     values = levels(column.values)
     if not len(values):
-        return Side(column, found, np.array([0.0, 1.0]), "linear")
+        return MapSide(column, found, np.array([0.0, 1.0]), "linear")
     log = is_log(column)
     ends = np.log(values[[0, -1]]) if log else values[[0, -1]]
     ends = ends + BEYOND * (float(ends[1] - ends[0]) or abs(float(ends[0])) or 1.0) * np.array([-1.0, 1.0])
-    return Side(column, found, np.exp(ends) if log else ends, "log" if log else "linear")
+    return MapSide(column, found, np.exp(ends) if log else ends, "log" if log else "linear")
 
 
-def is_log(column: Column) -> bool:
+def is_log(column: CaseColumn) -> bool:
     """Whether a parameter has a logarithmic axis (`grids.is_log`)."""
     return column.role == "parameter" and grids.is_log(levels(column.values))
 
 
-def write(axis: Any, found: Side, inches: float, sheet: Sheet, *, upright: bool, cells: bool = True) -> None:
+def write(axis: Any, found: MapSide, inches: float, sheet: PictureSheet, *, upright: bool, cells: bool = True) -> None:
     """The values that have room on an axis of this length; of many, or of points, round numbers between them."""
     from matplotlib.ticker import NullLocator
 
@@ -105,7 +105,7 @@ def write(axis: Any, found: Side, inches: float, sheet: Sheet, *, upright: bool,
         axis.set_ticks(found.at[::every], texts[::every])
 
 
-def write_log(axis: Any, found: Side, inches: float, sheet: Sheet, *, upright: bool = False) -> None:
+def write_log(axis: Any, found: MapSide, inches: float, sheet: PictureSheet, *, upright: bool = False) -> None:
     """On a logarithmic axis of this length the values, where they are few and short, else round numbers, as many as
     have room; no others."""
     from matplotlib.ticker import NullLocator
@@ -123,14 +123,16 @@ def write_log(axis: Any, found: Side, inches: float, sheet: Sheet, *, upright: b
     axis.set_ticks(values, [number_text(x) for x in values])
 
 
-def _even_numbers(low: float, high: float, inches: float, sheet: Sheet) -> list[float]:
+def _even_numbers(low: float, high: float, inches: float, sheet: PictureSheet) -> list[float]:
     from matplotlib.ticker import MaxNLocator
 
     wide = _wide([number_text(low), number_text(high)], sheet) + APART
     return [float(x) for x in MaxNLocator(nbins=max(2, min(5, int(inches / wide)))).tick_values(low, high)]
 
 
-def _apart(values: Sequence[float], low: float, high: float, inches: float, sheet: Sheet, *, upright: bool) -> bool:
+def _apart(
+    values: Sequence[float], low: float, high: float, inches: float, sheet: PictureSheet, *, upright: bool
+) -> bool:
     """Whether the numbers stand clear of one another on a logarithmic axis."""
     if len(values) < 2 or not high > low:
         return True
@@ -140,6 +142,6 @@ def _apart(values: Sequence[float], low: float, high: float, inches: float, shee
     return all(b - a >= (one + other) / 2 for (a, b), (one, other) in between)
 
 
-def _wide(texts: Sequence[str], sheet: Sheet) -> float:
+def _wide(texts: Sequence[str], sheet: PictureSheet) -> float:
     """Inches of the longest."""
     return max(map(len, texts)) * LETTER * sheet.normal / 72

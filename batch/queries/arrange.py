@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from batch.archive.read import Group
+from batch.archive.read import ArchiveGroup
 from batch.queries.signals import Panel
 from met.frozen import frozen
 from met.plan.channel import joint_of
@@ -25,7 +25,7 @@ class Cell:
     title: str
 
 
-def arranged(group: Group, found: Sequence[Panel]) -> list[list[Cell | None]]:
+def arranged(group: ArchiveGroup, found: Sequence[Panel]) -> list[list[Cell | None]]:
     """A row a quantity, a column a joint: `q` of metres and of radians stand beside one another, each with its axis,
     and `elbow.servo.voltage` under the elbow. None where a joint has no such quantity. What is no joint's fills rows of
     its own, components side by side."""
@@ -52,7 +52,7 @@ def arranged(group: Group, found: Sequence[Panel]) -> list[list[Cell | None]]:
     return [row for _, row in rows]
 
 
-def joints_of(group: Group) -> list[str]:
+def joints_of(group: ArchiveGroup) -> list[str]:
     """All joints whose signals are here, in the arm's order where one signal has them all."""
     signals = group.role("signal")
     together = sorted((v for v in signals if group.joints(v)), key=lambda v: v.dims[2] != "joint")
@@ -62,7 +62,7 @@ def joints_of(group: Group) -> list[str]:
 
 
 @frozen
-class Command:
+class CommandCurve:
     """A servo's command that belongs over a line, in that line's unit; whether the cases share it, and which of them
     reaches furthest."""
 
@@ -72,14 +72,14 @@ class Command:
     longest: int = 0
     scale: float = 1.0
 
-    def values(self, group: Group, position: int) -> np.ndarray:
+    def values(self, group: ArchiveGroup, position: int) -> np.ndarray:
         values = group.signal(self.variable, position)
         return (values if values.ndim == 1 else values[:, self.column]) / self.scale
 
 
 def overlaid(
-    group: Group, found: Sequence[Panel], positions: Sequence[int], *, apart: bool
-) -> dict[tuple[str, str, int], Command]:
+    group: ArchiveGroup, found: Sequence[Panel], positions: Sequence[int], *, apart: bool
+) -> dict[tuple[str, str, int], CommandCurve]:
     """The recorded commands that are of the same kind as a line of q, qd or tau, by panel (name, unit) and line.
 
     apart: whether commands that differ between cases can be told apart; else only those that all cases share count.
@@ -98,15 +98,15 @@ def overlaid(
         for line, name in enumerate(panel.joints):
             command = commands.get((name, panel.si))
             if panel.variable.rpartition(".")[2] in ("q", "qd", "tau") and command is not None:
-                shared, longest = _shared(group, Command(*command), spread(positions))
+                shared, longest = _shared(group, CommandCurve(*command), spread(positions))
                 if shared or apart:
-                    out[panel.name, panel.unit, line] = Command(
+                    out[panel.name, panel.unit, line] = CommandCurve(
                         *command, shared=shared, longest=longest, scale=panel.scale
                     )  # fmt: skip
     return out
 
 
-def _shared(group: Group, command: Command, positions: Sequence[int]) -> tuple[bool, int]:
+def _shared(group: ArchiveGroup, command: CommandCurve, positions: Sequence[int]) -> tuple[bool, int]:
     """Whether all cases are told the same, as far as they come, and the case that comes furthest."""
     longest, best = positions[0], command.values(group, positions[0])
     for position in positions[1:]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Group, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.queries import ordering, requirements
 from batch.queries.failures import STATUS
 from batch.queries.ordering import By
@@ -22,7 +22,7 @@ SHOWN_CASES = 20
 MISSES = "\N{BALLOT X}"
 
 
-def table(group: Group, most: int | None = SHOWN_CASES, *, by: By | None = None, hint: bool = True) -> list[str]:
+def table(group: ArchiveGroup, most: int | None = SHOWN_CASES, *, by: By | None = None, hint: bool = True) -> list[str]:
     """The cases as lines, worst first or `by` what is asked for, in the deck's units; a metric that misses a
     requirement bears a cross.
 
@@ -88,7 +88,7 @@ def table_across(pool: Pool, by: By, most: int | None = SHOWN_CASES) -> list[str
     return [*out, f"  ... {left:,} more; --all-cases prints them"] if left else out
 
 
-def title(group: Group, most: int | None = None, *, by: By | None = None) -> str:
+def title(group: ArchiveGroup, most: int | None = None, *, by: By | None = None) -> str:
     """What the order of the table is, or of its beginning."""
     if (found := ordering.within(group, by)) is not None:
         return found.title
@@ -105,7 +105,7 @@ def title(group: Group, most: int | None = None, *, by: By | None = None) -> str
 
 
 def rows_json(
-    group: Group,
+    group: ArchiveGroup,
     most: int | None = SHOWN_CASES,
     *,
     by: By | None = None,
@@ -134,7 +134,7 @@ def rows_json(
     ]
 
 
-def parameters(archive: ArchiveFile, group: Group, position: int) -> dict[str, dict[str, Any]]:
+def parameters(archive: ArchiveFile, group: ArchiveGroup, position: int) -> dict[str, dict[str, Any]]:
     """All parameters of a case by path: SI value, unit, and whether it follows from what is varied."""
     from met.plan import Formula
 
@@ -149,7 +149,7 @@ def parameters(archive: ArchiveFile, group: Group, position: int) -> dict[str, d
     return out
 
 
-def varied_lines(archive: ArchiveFile, group: Group, position: int) -> list[str]:
+def varied_lines(archive: ArchiveFile, group: ArchiveGroup, position: int) -> list[str]:
     """What is varied in a case, and every parameter that follows from it."""
     from ic.printing.columns import columns
 
@@ -180,7 +180,7 @@ def _outcome(status: int, outcomes: np.ndarray) -> str:
     return "missed" if (outcomes == 0).any() else "unknown" if (outcomes < 0).any() else "met"
 
 
-def _marks(group: Group, outcomes: np.ndarray) -> dict[str, np.ndarray]:
+def _marks(group: ArchiveGroup, outcomes: np.ndarray) -> dict[str, np.ndarray]:
     """By metric that has requirements: which of the cases miss one."""
     out: dict[str, np.ndarray] = {}
     for each in requirements.required(group):

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 
-from batch.archive.read import ArchiveFile, Group
+from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.signals import Panel
 from met.diagnostic import Place, Problem
 from met.plan import Experiment, Plan
@@ -26,7 +26,7 @@ class DeckUnits:
     experiment  what was run, as the plan has it; None where the plan cannot be read here: units are SI then
     """
 
-    def __init__(self, archive: ArchiveFile, group: Group) -> None:
+    def __init__(self, archive: ArchiveFile, group: ArchiveGroup) -> None:
         self.group = group
         try:
             plan: Plan | None = archive.plan(as_written=True)

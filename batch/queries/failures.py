@@ -21,7 +21,7 @@ NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(e[-+]?\d+)?")
 
 
 @frozen
-class Failure:
+class FailureGroup:
     """Cases that failed alike: how they ended, the cause of the first, whose id this is, and all their positions."""
 
     status: str
@@ -35,7 +35,7 @@ class Failure:
         return self.cases[0]
 
 
-def failures(status: np.ndarray, cause: np.ndarray, case: np.ndarray, case_id: np.ndarray) -> tuple[Failure, ...]:
+def failures(status: np.ndarray, cause: np.ndarray, case: np.ndarray, case_id: np.ndarray) -> tuple[FailureGroup, ...]:
     """What failed, by cause, in the order of their first cases. Causes are alike that differ in numbers alone.
 
     status, cause, case, case_id   of failed cases, in order
@@ -44,13 +44,13 @@ def failures(status: np.ndarray, cause: np.ndarray, case: np.ndarray, case_id: n
     for place in range(len(status)):
         found.setdefault((int(status[place]), NUMBER.sub("#", str(cause[place]))), []).append(place)
     return tuple(
-        Failure(STATUS.get(ended, str(ended)), str(cause[places[0]]), str(case_id[places[0]]),
+        FailureGroup(STATUS.get(ended, str(ended)), str(cause[places[0]]), str(case_id[places[0]]),
                 tuple(int(case[place]) for place in places))
         for (ended, _), places in found.items()
     )  # fmt: skip
 
 
-def failure_lines(found: Sequence[Failure], width: int) -> list[str]:
+def failure_lines(found: Sequence[FailureGroup], width: int) -> list[str]:
     """Each cause with its cases, wrapped."""
     out = []
     width = max(width, 40)

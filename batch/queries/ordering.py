@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from batch.archive.read import Group
+from batch.archive.read import ArchiveGroup
 from batch.queries import requirements
 from batch.queries.pool import Pool, Role, pools
 from met.diagnostic import Problem, did_you_mean, error
@@ -60,7 +60,7 @@ def _joined(keys: Sequence[By]) -> By | None:
     return By(keys[0].name, keys[0].largest, tuple(keys[1:])) if keys else None
 
 
-def check(groups: Sequence[Group], by: By | None) -> None:
+def check(groups: Sequence[ArchiveGroup], by: By | None) -> None:
     """Raises Problem E329 where none of the groups has what cases are to be listed by, or each is of one case."""
     if by is None:
         return
@@ -80,7 +80,7 @@ def check(groups: Sequence[Group], by: By | None) -> None:
                             help="a sweep has several"))  # fmt: skip
 
 
-def positions(group: Group, by: By | None = None) -> np.ndarray:
+def positions(group: ArchiveGroup, by: By | None = None) -> np.ndarray:
     """Positions of the cases, by what is asked for, equal ones and those that have no value, which are last, in the
     order of the case table; worst first where nothing is asked for, or the group does not have it."""
     by = within(group, by)
@@ -102,18 +102,18 @@ def _order(by: By, values: Sequence[np.ndarray]) -> np.ndarray:
     return np.lexsort(keys[::-1])
 
 
-def within(group: Group, by: By | None) -> By | None:
+def within(group: ArchiveGroup, by: By | None) -> By | None:
     """Of what is asked for what the group has; None where it has none of it."""
     names = _names(group) if by is not None else {}
     return _joined([key for key in by.keys if key.name in names]) if by is not None else None
 
 
-def worst_first(group: Group) -> np.ndarray:
+def worst_first(group: ArchiveGroup) -> np.ndarray:
     """Positions of the cases as `ranking` has them."""
     return ranking(group).order
 
 
-def ranking(group: Group) -> requirements.Ranking:
+def ranking(group: ArchiveGroup) -> requirements.Ranking:
     """The cases: failed ones, then those that miss most requirements, then by how far they miss.
 
     How far is relative to the limit (to the largest value where the limit is 0); a case that meets all requirements
@@ -125,7 +125,7 @@ def ranking(group: Group) -> requirements.Ranking:
                                 lambda at: [group.values(name)[at] for name in names])  # fmt: skip
 
 
-def _far(group: Group) -> np.ndarray:
+def _far(group: ArchiveGroup) -> np.ndarray:
     """How far each case is beyond the limit that it misses most."""
     worst = np.full(group.count, -np.inf)
     for each in requirements.required(group):
@@ -134,7 +134,7 @@ def _far(group: Group) -> np.ndarray:
     return worst
 
 
-def _names(group: Group) -> dict[str, str]:
+def _names(group: ArchiveGroup) -> dict[str, str]:
     """What cases may be listed by, as users name it: the variable of each."""
     found = {variable.path: variable.name for variable in (*group.role("metric"), *group.role("coordinate"))}
     if REPEAT in group.variables and group.values(REPEAT).any():

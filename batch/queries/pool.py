@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from batch.archive.read import Group, Stored
+from batch.archive.read import ArchiveGroup, Stored
 from batch.queries import requirements
 from batch.queries.failures import STATUS
 from batch.queries.grids import METRIC_SPAN, is_log, levels, spans
@@ -26,7 +26,7 @@ ENDED: tuple[Ended, ...] = ("met", "missed", "unknown", "done", "failed", "timed
 
 
 @frozen
-class Limit:
+class RequirementLimit:
     """A requirement as a line in a plot: its text, its limit in the metric's unit, `<` or `>`."""
 
     text: str
@@ -35,7 +35,7 @@ class Limit:
 
 
 @frozen
-class Column:
+class CaseColumn:
     """A number a case: a metric, or what it may be drawn against. words: of a choice, what its numbers stand for.
 
     before  of a metric, what it is in the other archive, where one is compared with; not a number where it has no such
@@ -49,7 +49,7 @@ class Column:
     role: Role
     values: np.ndarray
     words: tuple[str, ...] = ()
-    limits: tuple[Limit, ...] = ()
+    limits: tuple[RequirementLimit, ...] = ()
     about: str = ""
     before: np.ndarray | None = None
     log: bool = False
@@ -58,7 +58,7 @@ class Column:
 class Pool:
     """The cases of the groups of one run or sweep, in the order of the case table."""
 
-    def __init__(self, name: str, groups: Sequence[Group]) -> None:
+    def __init__(self, name: str, groups: Sequence[ArchiveGroup]) -> None:
         self.name, self.groups = name, tuple(groups)
         numbers = [group.values("case").astype(np.int64) for group in groups]
         order = np.argsort(np.concatenate(numbers), kind="stable")
@@ -125,12 +125,14 @@ class Pool:
         return out
 
     @cached_property
-    def limits(self) -> dict[str, tuple[Limit, ...]]:
+    def limits(self) -> dict[str, tuple[RequirementLimit, ...]]:
         """By metric's variable: its requirements, limits in SI."""
-        out: dict[str, dict[str, Limit]] = {}
+        out: dict[str, dict[str, RequirementLimit]] = {}
         for group in self.groups:
             for each in requirements.required(group):
-                out.setdefault(each.metric, {})[each.text] = Limit(each.text, each.limit, each.comparison[:1])
+                out.setdefault(each.metric, {})[each.text] = RequirementLimit(
+                    each.text, each.limit, each.comparison[:1]
+                )
         return {metric: tuple(found.values()) for metric, found in out.items()}
 
     @cached_property
@@ -156,19 +158,19 @@ class Pool:
         return worst
 
     @cached_property
-    def columns(self) -> tuple[Column, ...]:
+    def columns(self) -> tuple[CaseColumn, ...]:
         """What may be drawn: choices, varied parameters, repeats, metrics; in the deck's units."""
         out = [self._choice(variable) for variable in self._variables("choice")]
         out += [self._numbers(variable, "parameter") for variable in self._variables("coordinate")]
         repeats = self.gathered("repeat", 0.0)
         if repeats.any():
-            out.append(Column("repeat", "repeat", "", "repeat", repeats))
+            out.append(CaseColumn("repeat", "repeat", "", "repeat", repeats))
         return (*out, *(self._numbers(variable, "metric") for variable in self._variables("metric")))
 
-    def metrics(self) -> tuple[Column, ...]:
+    def metrics(self) -> tuple[CaseColumn, ...]:
         return tuple(column for column in self.columns if column.role == "metric")
 
-    def varied(self) -> tuple[Column, ...]:
+    def varied(self) -> tuple[CaseColumn, ...]:
         """What tells the cases apart, that with most values first."""
         return tuple(sorted(
             (c for c in self.columns if c.role != "metric" and len(levels(c.values)) > 1),
@@ -179,16 +181,18 @@ class Pool:
         """Of all groups, by name."""
         return list({v.name: v for group in reversed(self.groups) for v in group.role(role)}.values())
 
-    def _numbers(self, variable: Stored, role: Role) -> Column:
+    def _numbers(self, variable: Stored, role: Role) -> CaseColumn:
         scale, unit = deck_unit(variable)
-        limits = tuple(Limit(each.text, each.value / scale, each.sense) for each in self.limits.get(variable.name, ()))
+        limits = tuple(
+            RequirementLimit(each.text, each.value / scale, each.sense) for each in self.limits.get(variable.name, ())
+        )
         values = self.gathered(variable.name) / scale
-        return Column(
+        return CaseColumn(
             f"{role}:{variable.name}", variable.path, unit, role, values, (), limits, variable.long_name,
             log=is_log(levels(values)) if role == "parameter" else spans(values, METRIC_SPAN),
         )  # fmt: skip
 
-    def _choice(self, variable: Stored) -> Column:
+    def _choice(self, variable: Stored) -> CaseColumn:
         """Its values number the words, in the order in which groups have them."""
         words: dict[str, int] = {}
         values = np.full(self.count, np.nan)
@@ -196,7 +200,7 @@ class Pool:
             if variable.name in group.variables and group.count:
                 word = str(group.at(variable.name, [0])[0])
                 values[self.group_of == number] = words.setdefault(word, len(words))
-        return Column(f"choice:{variable.name}", variable.path, "", "choice", values, tuple(words))
+        return CaseColumn(f"choice:{variable.name}", variable.path, "", "choice", values, tuple(words))
 
 
 def shown(value: float) -> str:
@@ -206,7 +210,7 @@ def shown(value: float) -> str:
     return number_text(value).replace("inf", "∞")
 
 
-def pools(groups: Sequence[Group]) -> list[Pool]:
+def pools(groups: Sequence[ArchiveGroup]) -> list[Pool]:
     """A pool for each run or sweep among the groups."""
     names = list(dict.fromkeys(group.sweep or group.name for group in groups))
     return [Pool(name, [g for g in groups if (g.sweep or g.name) == name]) for name in names]

@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from batch.archive.read import Group
+from batch.archive.read import ArchiveGroup
 from met.distinct import distinct
 from met.frozen import frozen
 from met.run import DONE
 
 
 @frozen
-class Required:
+class GroupRequirement:
     """A requirement: its text and place among the group's, the metric's variable, `<` or `>` with or without `=`, and
     the limit in SI."""
 
@@ -25,12 +25,12 @@ class Required:
     limit: float
 
 
-def texts(group: Group) -> list[str]:
+def texts(group: ArchiveGroup) -> list[str]:
     """The requirements as the deck wrote them."""
     return [str(text) for text in group.values("requirement")] if "requirement" in group.variables else []
 
 
-def required(group: Group) -> list[Required]:
+def required(group: ArchiveGroup) -> list[GroupRequirement]:
     """The requirements of which the archive says all of this; none in an archive that does not say."""
     known = texts(group)
     if not known:
@@ -42,13 +42,13 @@ def required(group: Group) -> list[Required]:
         return []
     there = {variable.name for variable in group.role("metric")}
     return [
-        Required(text, place, str(metric), str(comparison), limit)
+        GroupRequirement(text, place, str(metric), str(comparison), limit)
         for place, (text, metric, comparison, limit) in enumerate(zip(known, metrics, comparisons, limits, strict=True))
         if metric in there and isinstance(limit, float)
     ]
 
 
-def outcomes(group: Group, positions: np.ndarray | None = None) -> np.ndarray:
+def outcomes(group: ArchiveGroup, positions: np.ndarray | None = None) -> np.ndarray:
     """(case, requirement): 1 met, 0 missed, -1 unknown; of all cases or of some."""
     if "met" not in group.variables:
         return np.zeros((group.count if positions is None else len(positions), 0), np.int8)

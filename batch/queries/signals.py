@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from batch.archive.read import Group, Stored
+from batch.archive.read import ArchiveGroup, Stored
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan.channel import FAMILIES, channel_paths, joint_of
@@ -47,7 +47,7 @@ class Panel:
         return f"{self.name}  ({pretty_unit(self.unit)})" if self.unit not in ("", "1") else self.name
 
 
-def panels(group: Group, names: Sequence[str] = ()) -> list[Panel]:
+def panels(group: ArchiveGroup, names: Sequence[str] = ()) -> list[Panel]:
     """The panels for some signals, all by default; `shoulder.qd` is one joint of `qd`."""
     signals = {variable.name: variable for variable in group.role("signal")}
     if not signals:
@@ -71,7 +71,7 @@ def panels(group: Group, names: Sequence[str] = ()) -> list[Panel]:
 
 
 @frozen
-class Choice:
+class SignalSelection:
     """Some of a signal's columns, and the name by which they are asked for."""
 
     name: str
@@ -79,9 +79,9 @@ class Choice:
     columns: tuple[int, ...]
 
 
-def _choices(group: Group, signals: dict[str, Stored]) -> dict[str, tuple[Choice, ...]]:
+def _choices(group: ArchiveGroup, signals: dict[str, Stored]) -> dict[str, tuple[SignalSelection, ...]]:
     """By name: whole signals, one joint's, one component's, and what a family's name stands for."""
-    found: dict[str, tuple[Choice, ...]] = {}
+    found: dict[str, tuple[SignalSelection, ...]] = {}
     for variable in signals.values():
         joints, components = group.joints(variable), group.components(variable)
         parts: dict[str, list[int]] = {}
@@ -97,7 +97,7 @@ def _choices(group: Group, signals: dict[str, Stored]) -> dict[str, tuple[Choice
         parts[variable.name] = list(range(len(scalars)))
         for name, columns in parts.items():
             if name == variable.name or (name not in found and name not in signals):
-                found[name] = (Choice(name, variable, tuple(columns)),)
+                found[name] = (SignalSelection(name, variable, tuple(columns)),)
     for name, choice in list(found.items()):
         family, _, member = name.rpartition(".")
         if member in FAMILIES.get(family.rpartition(".")[2], ()):
@@ -105,7 +105,7 @@ def _choices(group: Group, signals: dict[str, Stored]) -> dict[str, tuple[Choice
     return found
 
 
-def _panels(group: Group, choice: Choice) -> list[Panel]:
+def _panels(group: ArchiveGroup, choice: SignalSelection) -> list[Panel]:
     """The panels of a choice: of several joints' vectors one a component, of unlike units one a unit."""
     variable = choice.variable
     joints, components = group.joints(variable), group.components(variable)
@@ -130,7 +130,7 @@ def _panels(group: Group, choice: Choice) -> list[Panel]:
     return out
 
 
-def history(group: Group, panel: Panel, position: int) -> np.ndarray:
+def history(group: ArchiveGroup, panel: Panel, position: int) -> np.ndarray:
     """The panel's lines in the recorded case at this position: (time, line)."""
     values = group.signal(panel.variable, position)
     return values.reshape(len(values), -1)[:, list(panel.columns)] / panel.scale
@@ -175,7 +175,7 @@ def value_text(value: float | str | tuple[float, ...], variable: Stored) -> str:
     return f"{text or number_text(value / scale)} {unit}".rstrip()  # type: ignore[operator]
 
 
-def case_text(group: Group, position: int, *, varied: bool = True) -> str:
+def case_text(group: ArchiveGroup, position: int, *, varied: bool = True) -> str:
     """A case in a few words: `case #4 8f3ab2c1 · gearbox.kp = 0.02 V·s/rad`."""
     row, case_id = group.values("case")[position], group.values("case_id")[position]
     words = [
@@ -186,7 +186,7 @@ def case_text(group: Group, position: int, *, varied: bool = True) -> str:
     return " · ".join([f"case #{row} {case_id[:8]}", *chosen, *words, *repeat_text(group, position)])
 
 
-def repeat_text(group: Group, position: int) -> list[str]:
+def repeat_text(group: ArchiveGroup, position: int) -> list[str]:
     """Which repeat a case is, where cases are repeated."""
     repeats = group.values("repeat") if "repeat" in group.variables else np.zeros(0)
     return [f"repeat {int(repeats[position])}"] if repeats.any() else []

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Group
+from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.signals import deck_unit
 from batch.queries.summary import Summary, median_text, summary_of
 
@@ -32,7 +32,7 @@ def _all_of(sweep: str, summaries: Sequence[Summary]) -> list[str]:
     return out
 
 
-def _table(groups: Sequence[Group]) -> list[str]:
+def _table(groups: Sequence[ArchiveGroup]) -> list[str]:
     """A row a structure: its name, cases, how many meet all, and the median of each metric, in the deck's unit."""
     from ic.printing.columns import columns
 

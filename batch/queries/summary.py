@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Group, Stored
-from batch.queries.failures import Failure, failures
+from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
+from batch.queries.failures import FailureGroup, failures
 from batch.queries.signals import number_text
 from met.frozen import frozen
 
 
 @frozen
-class Spread:
+class MetricSpread:
     """Smallest, median and largest of the values that are finite, not-a-number where none is; how many are not.
 
     infinite  such as a settling time that never comes;  unknown  not a number
@@ -30,7 +30,7 @@ class Spread:
 
 @frozen
 class SpreadColumn:
-    """A column of the table of metrics: a number of `Spread`, and its head in `met show` and in a report."""
+    """A column of the table of metrics: a number of `MetricSpread`, and its head in `met show` and in a report."""
 
     field: str
     head: str
@@ -45,7 +45,7 @@ SPREAD_COLUMNS = (
 
 
 @frozen
-class MetricSummary(Spread):
+class MetricSummary(MetricSpread):
     """A metric over cases: its spread in SI.
 
     deck_unit   the unit its requirement is written in, else that of its values; shown = value / deck_scale
@@ -85,7 +85,7 @@ class Summary:
     cases: int
     failed: int
     recorded: int
-    failures: tuple[Failure, ...]
+    failures: tuple[FailureGroup, ...]
     metrics: tuple[MetricSummary, ...]
     requirements: tuple[RequirementSummary, ...]
     limited: int = 0
@@ -102,12 +102,12 @@ def summarise(archive: ArchiveFile) -> tuple[Summary, ...]:
     return tuple(summary_of(group) for group in archive.groups)
 
 
-def summary_of(group: Group, position: int | None = None) -> Summary:
+def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
     """The outcome of one experiment, or of its case at this position."""
     here = slice(None) if position is None else slice(position, position + 1)
     status = group.values("status")[here]
     failed = np.flatnonzero(status != 0)
-    found: tuple[Failure, ...] = ()
+    found: tuple[FailureGroup, ...] = ()
     if len(failed):
         rows, ids, causes = (group.values(name)[here][failed] for name in ("case", "case_id", "cause"))
         found = failures(status[failed], causes, rows, ids)
@@ -149,15 +149,15 @@ def _metric(variable: Stored, values: np.ndarray) -> MetricSummary:
     )
 
 
-def spread(values: np.ndarray) -> Spread:
+def spread(values: np.ndarray) -> MetricSpread:
     """How a metric's values lie: the one rule of tables, reports and comparisons."""
     rising = np.sort(values[np.isfinite(values)])
     infinite, unknown = int(np.isinf(values).sum()), int(np.isnan(values).sum())
     if not len(rising):
-        return Spread(np.nan, np.nan, np.nan, infinite, unknown)
+        return MetricSpread(np.nan, np.nan, np.nan, infinite, unknown)
     half = len(rising) // 2  # numpy's own median takes 60 ms to import
     middle = rising[half] if len(rising) % 2 else 0.5 * rising[half - 1] + 0.5 * rising[half]
-    return Spread(float(rising[0]), float(middle), float(rising[-1]), infinite, unknown)
+    return MetricSpread(float(rising[0]), float(middle), float(rising[-1]), infinite, unknown)
 
 
 def median_text(values: np.ndarray, *, infinite: str = "inf", none: str = "-") -> str:

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from batch.archive.read import ArchiveFile, Group
+from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries import cases, ordering
 from batch.queries.deck_units import DeckUnits
 from batch.queries.failures import failure_lines
@@ -95,7 +95,7 @@ class _Lines:
 
 
 def _about(
-    archive: ArchiveFile, group: Group, position: int | None, all_cases: bool, by: By | None, width: int
+    archive: ArchiveFile, group: ArchiveGroup, position: int | None, all_cases: bool, by: By | None, width: int
 ) -> list[str]:
     """How the cases went, and which of them how; or one case: how it went, and what was varied in it."""
     if position is not None:
@@ -147,7 +147,7 @@ def as_json(
     return json.dumps(data, indent=1, allow_nan=False)
 
 
-def chosen(archive: ArchiveFile, names: Sequence[str]) -> tuple[Group, ...]:
+def chosen(archive: ArchiveFile, names: Sequence[str]) -> tuple[ArchiveGroup, ...]:
     """The experiments of these names, all where none is given."""
     known = [*dict.fromkeys(group.sweep or group.name for group in archive.groups)]
     for name in names:
@@ -158,12 +158,12 @@ def chosen(archive: ArchiveFile, names: Sequence[str]) -> tuple[Group, ...]:
     return tuple(dict.fromkeys(found)) if names else archive.groups
 
 
-def picked(archive: ArchiveFile, names: Sequence[str], case: str | None) -> list[tuple[Group, int | None]]:
+def picked(archive: ArchiveFile, names: Sequence[str], case: str | None) -> list[tuple[ArchiveGroup, int | None]]:
     """The experiments of these names; where a case is asked for, those that have it, and its position in each."""
     groups = chosen(archive, names)
     if case is None:
         return [(group, None) for group in groups]
-    found: list[tuple[Group, int | None]] = []
+    found: list[tuple[ArchiveGroup, int | None]] = []
     problems = []
     for group in groups:
         try:
@@ -175,7 +175,7 @@ def picked(archive: ArchiveFile, names: Sequence[str], case: str | None) -> list
     return found
 
 
-def heading(group: Group, width: int) -> list[str]:
+def heading(group: ArchiveGroup, width: int) -> list[str]:
     """What was run."""
     a = group.attributes
     count = f"{group.count:,} case{'s' if group.count != 1 else ''}"
@@ -269,7 +269,7 @@ def _metric_words(metric: MetricSummary, single: bool) -> str:
 
 
 def _plots(
-    archive: ArchiveFile, group: Group, signals: Sequence[str], case: int | None, width: int, colour: bool
+    archive: ArchiveFile, group: ArchiveGroup, signals: Sequence[str], case: int | None, width: int, colour: bool
 ) -> list[str]:
     if not group.recorded:
         if signals:

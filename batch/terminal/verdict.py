@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from batch.archive.read import ArchiveFile
-from batch.campaigns.campaign import Campaign, Part
+from batch.campaigns.campaign import Campaign, CampaignPart
 from batch.queries.failures import failure_lines
 from batch.queries.summary import Summary, as_json
 from batch.terminal.progress import duration
@@ -50,7 +50,7 @@ def writing(campaign: Campaign) -> str:
     return f"writing {campaign.output}, about {size_text(campaign.bytes)}{instead}"
 
 
-def _part_lines(part: Part, verbose: bool) -> list[str]:
+def _part_lines(part: CampaignPart, verbose: bool) -> list[str]:
     experiment = part.experiment
     schedule = experiment.structure.schedule
     count, whole = len(part.rows), experiment.cases.count
@@ -79,7 +79,7 @@ def _part_lines(part: Part, verbose: bool) -> list[str]:
 
 
 @frozen
-class Worst:
+class WorstCaseLines:
     """The worst cases of a sweep: as lines, for programs, and the row of the first."""
 
     lines: tuple[str, ...] = ()
@@ -90,7 +90,7 @@ class Worst:
         return f"#{self.rows[0]['row']}"
 
 
-def worst_cases(archive: ArchiveFile) -> tuple[Worst, ...]:
+def worst_cases(archive: ArchiveFile) -> tuple[WorstCaseLines, ...]:
     """Of every experiment; none where there is one case, or nothing by which one would be worse than another."""
     from batch.queries import cases
 
@@ -99,12 +99,12 @@ def worst_cases(archive: ArchiveFile) -> tuple[Worst, ...]:
         rows = tuple(cases.rows_json(group, WORST))
         judged = any(row["met"] or row["status"] != "done" for row in rows)
         lines = (cases.title(group, WORST), *cases.table(group, WORST, hint=False)) if judged else ()
-        out.append(Worst(lines, rows if judged else ()) if group.count > 1 else Worst())
+        out.append(WorstCaseLines(lines, rows if judged else ()) if group.count > 1 else WorstCaseLines())
     return tuple(out)
 
 
 def told(
-    source: str, campaign: Campaign, summaries: tuple[Summary, ...], worst: tuple[Worst, ...], picture: Path | None,
+    source: str, campaign: Campaign, summaries: tuple[Summary, ...], worst: tuple[WorstCaseLines, ...], picture: Path | None,
     excuse: str, exported: Exported | None, seconds: Mapping[str, float], ok: bool, tables: Sequence[Sequence[str]],
 ) -> list[str]:  # fmt: skip
     """The verdict, and where everything is. seconds: by experiment; tables: of sweeps of several structures."""
@@ -167,7 +167,7 @@ def brief(archive: Archive) -> list[str]:
 
 
 def verdict_json(
-    campaign: Campaign, summaries: tuple[Summary, ...], worst: tuple[Worst, ...], picture: Path | None,
+    campaign: Campaign, summaries: tuple[Summary, ...], worst: tuple[WorstCaseLines, ...], picture: Path | None,
     exported: Exported | None, seconds: Mapping[str, float], notes: Sequence[str], ok: bool,
 ) -> str:  # fmt: skip
     """The verdict for programs."""

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from batch.campaigns import tasks
-from batch.campaigns.tasks import Done, Section, Task
+from batch.campaigns.tasks import CampaignSection, Done, Task
 from batch.executors import worker
 
 
@@ -36,7 +36,7 @@ def poison(given: dict[str, Any]) -> None:
     written = 0
     words = {int(row): word for row, word in given.items()}
 
-    def poisoned(section: Section, task: Task, folder: Path, **options: Any) -> Done:
+    def poisoned(section: CampaignSection, task: Task, folder: Path, **options: Any) -> Done:
         if only is None or section.number == only:
             for row in section.rows[task.first : task.last].tolist():
                 if words.get(row) == "sleep":

@@ -205,10 +205,10 @@ def test_the_table_is_in_the_decks_units_and_marks_what_is_missed(here: Path) ->
 
 
 def test_smallest_median_and_largest_are_of_the_finite_values_everywhere() -> None:
-    from batch.queries.summary import Spread, median_text, spread
+    from batch.queries.summary import MetricSpread, median_text, spread
 
     values = np.array([3.0, np.inf, 1.0, np.nan, 2.5, np.inf, np.inf])
-    assert spread(values) == Spread(minimum=1.0, median=2.5, maximum=3.0, infinite=3, unknown=1)
+    assert spread(values) == MetricSpread(minimum=1.0, median=2.5, maximum=3.0, infinite=3, unknown=1)
     assert spread(values[:3]).median == 2.0
     assert np.isnan(spread(values[1::4]).median)
     texts = [median_text(each) for each in (values, values[[0, 2]], values[[1, 3]], values[[3]])]

@@ -19,7 +19,7 @@ from distributed import Client, LocalCluster, Reschedule
 import batch
 from batch.campaigns.campaign import prepare, values_sections
 from batch.campaigns.folder import Folder, beside
-from batch.campaigns.tasks import Section, Task
+from batch.campaigns.tasks import CampaignSection, Task
 from batch.executors import Outcome, dask_connection, dask_worker
 from batch.executors import dask as executor
 from batch.executors.child import Crew
@@ -45,7 +45,7 @@ def cluster(folder: Path, workers: int = 1, threads: int = 1) -> Iterator[LocalC
 
 
 @pytest.fixture
-def many(tmp_path: Path) -> tuple[Folder, dict[int, Section]]:
+def many(tmp_path: Path) -> tuple[Folder, dict[int, CampaignSection]]:
     """The folder of a small campaign, described as for workers."""
     campaign = prepare(plans.plan(plans.gains(96)), output=tmp_path / "a.h5")
     sections = {section.number: section for section in values_sections(campaign)}
@@ -55,7 +55,9 @@ def many(tmp_path: Path) -> tuple[Folder, dict[int, Section]]:
     return folder, sections
 
 
-def outcome(dask: Dask, many: tuple[Folder, dict[int, Section]], meanwhile: Callable[[], object] = int) -> Outcome:
+def outcome(
+    dask: Dask, many: tuple[Folder, dict[int, CampaignSection]], meanwhile: Callable[[], object] = int
+) -> Outcome:
     """What comes of the first task. meanwhile: called before it is submitted."""
     dask.open(*many, lambda: None)
     try:
@@ -333,7 +335,7 @@ class TestInThisProcess:
         with cluster(tmp_path) as started:
             (worker,) = started.workers.values()
         with pytest.raises(Reschedule):
-            asyncio.run(dask_worker.Kept.on(worker, order))
+            asyncio.run(dask_worker.WorkerChildren.on(worker, order))
         assert not [name for name in worker.plugins if "met" in name]
 
     @pytest.mark.slow

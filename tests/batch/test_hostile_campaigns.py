@@ -158,7 +158,7 @@ def test_what_replaces_an_archive_is_refused_before_it_is_submitted(
 class Undead(Losing):
     """What it loses alone comes to its end after all, with the whole section."""
 
-    def open(self, folder: Folder, sections: Mapping[int, tasks.Section], tell: Callable[[], None]) -> None:
+    def open(self, folder: Folder, sections: Mapping[int, tasks.CampaignSection], tell: Callable[[], None]) -> None:
         super().open(folder, sections, tell)
         self._folder, self._sections = folder, sections
 

@@ -12,7 +12,7 @@ import pytest
 
 import batch
 import ic
-from batch.archive.read import ArchiveFile, Group
+from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.campaigns import cutting, performing, tasks
 from met import cli
 from met.plan import Experiment, Plan
@@ -286,7 +286,7 @@ def sweep(comparison: str = "<") -> Experiment:
     return replace(experiment, requirements=(first, second))
 
 
-def opened(path: Path) -> Group:
+def opened(path: Path) -> ArchiveGroup:
     return ArchiveFile(path).groups[0]
 
 

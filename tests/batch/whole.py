@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from batch.campaigns.folder import Folder, beside, gaps
-from batch.campaigns.tasks import Section, Task
+from batch.campaigns.tasks import CampaignSection, Task
 from batch.executors import Executor, Outcome
 from batch.executors.threads import Threads
 from met.plan import Experiment
@@ -193,7 +193,7 @@ class Watched:
         """Cases that it was given, all together."""
         return sum(task.cases for task in self.tasks)
 
-    def open(self, folder: Folder, sections: Mapping[int, Section], tell: Callable[[], None]) -> None:
+    def open(self, folder: Folder, sections: Mapping[int, CampaignSection], tell: Callable[[], None]) -> None:
         self.inner.open(folder, sections, tell)
 
     def submit(self, task: Task) -> None:

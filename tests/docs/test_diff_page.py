@@ -30,13 +30,13 @@ def test_the_mended_servo_stops_at_once(folder: Path) -> None:
     import numpy as np
 
     import batch
-    from batch.differences.found import Required
+    from batch.differences.found import RequirementDiff
 
     found = batch.diff(folder / "before.h5", folder / "after.h5")
     assert found.verdict == "different" and not found.changed.meaning and not found.changed.decks
     [experiment] = found.experiments
     assert experiment.cases.count == 28 and not experiment.ended
-    assert experiment.requirements == [Required("creep < 0.001 rad/s", "creep < 0.001 rad/s", 20, 23, 3, 0)]
+    assert experiment.requirements == [RequirementDiff("creep < 0.001 rad/s", "creep < 0.001 rad/s", 20, 23, 3, 0)]
     before, after = (batch.open(folder / name).sel(recorded_case=27, joint="shoulder").qd for name in
                      ("before.h5", "after.h5"))  # fmt: skip
     at_rest = [float(qd.time[np.abs(qd) > 0.01][-1]) for qd in (before, after)]

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, Group
-from batch.differences.found import Diff, Experiment
-from batch.queries.pool import ENDED, Column, Pool
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.differences.found import Diff, ExperimentDiff
+from batch.queries.pool import ENDED, CaseColumn, Pool
 from batch.queries.signals import deck_unit
 from met.frozen import frozen
 
@@ -44,7 +44,7 @@ class Before:
     place  [case] which case of `pool` it is, -1 where there is none;  how: its place in VERDICTS, likewise
     """
 
-    def __init__(self, now: Pool, pairs: Sequence[tuple[int, Group, Experiment]]) -> None:
+    def __init__(self, now: Pool, pairs: Sequence[tuple[int, ArchiveGroup, ExperimentDiff]]) -> None:
         self.now, self.pairs = now, tuple(pairs)
         self.pool = Pool(now.name, [group for _, group, _ in pairs])
         self.place = np.full(now.count, -1)
@@ -70,7 +70,7 @@ class Before:
         ranked = [each for _, _, experiment in self.pairs for each in experiment.worst]
         return tuple(each.case_b for each in sorted(ranked, key=lambda each: -each.score))
 
-    def values(self, metric: Column) -> np.ndarray | None:
+    def values(self, metric: CaseColumn) -> np.ndarray | None:
         """A metric of the pool as it was, in its unit: [case], not a number where there is none; None where the other
         archive has no such metric in this unit."""
         name = metric.key.partition(":")[2]
@@ -81,7 +81,7 @@ class Before:
         before = self.pool.gathered(name) / deck_unit(mine[0])[0]
         return np.where(self.there, before[self.place], np.nan)
 
-    def history_of(self, number: int, position: int) -> tuple[Group, int] | None:
+    def history_of(self, number: int, position: int) -> tuple[ArchiveGroup, int] | None:
         """Of a case of the pool's structure `number`, the other archive's group and its position in it, where it has
         its history."""
         for mine, group, experiment in self.pairs:
@@ -100,14 +100,14 @@ def _places(pool: Pool, number: int) -> np.ndarray:
     return out
 
 
-def change(column: Column) -> Column | None:
+def change(column: CaseColumn) -> CaseColumn | None:
     """A metric less what it was; 0 where both are the same infinity. None where nothing is known of it."""
     before = column.before
     if before is None:
         return None
     with np.errstate(invalid="ignore"):
         values = np.where(column.values == before, 0.0, column.values - before)
-    return Column(f"change:{column.key}", f"change of {column.label}", column.unit, "change", values)
+    return CaseColumn(f"change:{column.key}", f"change of {column.label}", column.unit, "change", values)
 
 
 def called(before: Path, now: Path) -> tuple[str, str]:
@@ -136,7 +136,7 @@ def named(found: Diff, before: str, now: str) -> Diff:
     return replace(found, a=Path(before), b=Path(now), experiments=experiments)
 
 
-def narrowed(found: Diff, groups: Sequence[Group]) -> Diff:
+def narrowed(found: Diff, groups: Sequence[ArchiveGroup]) -> Diff:
     """What is found of these runs and sweeps of the second archive alone."""
     names = {group.name for group in groups}
     experiments = tuple(each for each in found.experiments if each.name_b in names)

@@ -8,12 +8,12 @@ import numpy as np
 
 from batch.differences import words
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, VERDICTS
-from batch.differences.found import Diff, Experiment
+from batch.differences.found import Diff, ExperimentDiff
 from batch.queries.failures import ranges
 from batch.queries.pool import Pool
 from batch.report.contents.against import GOOD, Against, Before
 from batch.report.contents.changes import ArchiveChanges, OtherOrigin, RunChanges
-from batch.report.contents.parts import Flow, Part, Verdict
+from batch.report.contents.parts import Flow, OutcomeCount, Verdict
 
 MOST_LINES = 200
 """Lines of one kind of change that are in a page."""
@@ -41,7 +41,7 @@ def run_changes(found: Diff, before: Before | None) -> tuple[RunChanges, ...]:
     return tuple(_run_changes(found, experiment, several) for _, _, experiment in before.pairs)
 
 
-def _run_changes(found: Diff, experiment: Experiment, several: bool) -> RunChanges:
+def _run_changes(found: Diff, experiment: ExperimentDiff, several: bool) -> RunChanges:
     """The changes of one structure. several: True where there are others, so that its requirements are listed here: the
     verdict has those of all structures together."""
     alone = words.missing(found, experiment)
@@ -85,7 +85,7 @@ def verdict(against: Against, pairs: Sequence[tuple[Pool, Before | None]]) -> Ve
     )
 
 
-def _parts(against: Against, pairs: Sequence[tuple[Pool, Before | None]]) -> tuple[Part, ...]:
+def _parts(against: Against, pairs: Sequence[tuple[Pool, Before | None]]) -> tuple[OutcomeCount, ...]:
     found = against.found
     how = np.concatenate([np.zeros(0, np.int8), *(each.how for each in found.experiments)])
     counts = {word: int((how == VERDICTS.index(word)).sum()) for word in (IDENTICAL, EQUIVALENT, DIFFERENT)}
@@ -93,7 +93,7 @@ def _parts(against: Against, pairs: Sequence[tuple[Pool, Before | None]]) -> tup
     new = sum(group.count for pool, _ in pairs for group in pool.groups if group.name in found.only_b)
     counts["only before"] = sum(len(each.only_a) for each in found.experiments) + gone
     counts["only now"] = sum(len(each.only_b) for each in found.experiments) + new
-    return tuple(Part(word, count) for word, count in counts.items() if count)
+    return tuple(OutcomeCount(word, count) for word, count in counts.items() if count)
 
 
 def _figure(both: Sequence[tuple[Pool, Before]]) -> tuple[int, int, int] | None:

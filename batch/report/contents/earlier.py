@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from batch.archive.read import Group
+from batch.archive.read import ArchiveGroup
 from batch.differences.matching import instants
 from batch.queries.signals import Panel, history, panels
 from batch.report.contents.against import Before
@@ -48,7 +48,7 @@ class Earlier:
         change = History(case, self._clock(time[rows]), changes) if changes else None
         return (History(case, self._clock(was_time), was_values), change) if was_values else (None, None)
 
-    def _of(self, other: bool, group: Group) -> dict[tuple[str, str], Panel]:
+    def _of(self, other: bool, group: ArchiveGroup) -> dict[tuple[str, str], Panel]:
         key = other, group.name
         if key not in self._panels:
             self._panels[key] = {(panel.name, panel.unit): panel for panel in panels(group)}

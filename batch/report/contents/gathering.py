@@ -8,14 +8,14 @@ from dataclasses import replace
 from pathlib import Path, PurePath
 from typing import Any
 
-from batch.archive.read import ArchiveFile, Group
+from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.pool import Pool, pools
 from batch.report.contents import comparison
 from batch.report.contents.against import Against, Before, narrowed
 from batch.report.contents.histories import MOST_VALUES, no_signals, signals
 from batch.report.contents.overview import overview
 from batch.report.contents.parameters import parameters, varied
-from batch.report.contents.parts import Fact, Report, Section, SourceText, Stability
+from batch.report.contents.parts import Fact, Report, ReportSection, SourceListing, Stability
 from batch.report.contents.stability import stability
 from batch.report.contents.tables import replay, structures, worst
 from batch.report.contents.verdicts import metric_rows, verdict
@@ -89,7 +89,7 @@ def _experiments(archive: ArchiveFile) -> tuple[dict[str, Experiment], str]:
 def _section(
     archive: str, pool: Pool, only: str, experiments: Mapping[str, Experiment], trouble: str, values: int,
     progress: Callable[[int], None] | None, before: Before | None,
-) -> Section:  # fmt: skip
+) -> ReportSection:  # fmt: skip
     own = {group.name: experiments[group.name] for group in pool.groups if group.name in experiments}
     beds: Stability | None = None
     rows: tuple[Any, ...] = ()
@@ -99,7 +99,7 @@ def _section(
     except Problem as problem:
         trouble = trouble or "; ".join(diagnostic.message for diagnostic in problem.diagnostics)
     drawn = signals(pool, values, before)
-    return Section(
+    return ReportSection(
         name=pool.name,
         lede=_lede(pool),
         facts=_facts(pool, own),
@@ -177,7 +177,7 @@ def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Fact, ...
 # Where it comes from
 
 
-def _sources(archive: ArchiveFile) -> tuple[SourceText, ...]:
+def _sources(archive: ArchiveFile) -> tuple[SourceListing, ...]:
     out = []
     for name, text in archive.sources().items():
         lines = text.split("\n")
@@ -187,11 +187,11 @@ def _sources(archive: ArchiveFile) -> tuple[SourceText, ...]:
         while sum(map(len, kept)) > MOST_LETTERS and kept:
             kept = kept[: len(kept) // 2]
         digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
-        out.append(SourceText(name, "\n".join(kept), digest, len(lines) - len(kept)))
+        out.append(SourceListing(name, "\n".join(kept), digest, len(lines) - len(kept)))
     return tuple(out)
 
 
-def _provenance(archive: ArchiveFile, groups: Sequence[Group]) -> tuple[Fact, ...]:
+def _provenance(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> tuple[Fact, ...]:
     told = archive.provenance
     size = archive.path.stat().st_size
     changed = {"yes": ", with changes that were not committed", "unknown": ""}.get(str(told.get("git_dirty")), "")

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from batch.archive.read import Group
+from batch.archive.read import ArchiveGroup
 from batch.queries.arrange import joints_of, overlaid
 from batch.queries.pool import Pool
 from batch.queries.signals import Panel, history, panels
 from batch.report.contents.against import Before
 from batch.report.contents.earlier import Earlier
-from batch.report.contents.parts import History, Line, SignalPanel, Signals
+from batch.report.contents.parts import History, PanelLine, SignalPanel, Signals
 from batch.report.contents.thinning import stretch, thin, thin_clock
 
 MOST_POINTS = 4000
@@ -127,7 +127,7 @@ def no_signals(pool: Pool) -> str:
 class _Group:
     """What was recorded of the cases of one structure, of which those at these positions are wanted."""
 
-    def __init__(self, group: Group, positions: Sequence[int]) -> None:
+    def __init__(self, group: ArchiveGroup, positions: Sequence[int]) -> None:
         self.group = group
         self.panels: tuple[Panel, ...] = ()
         self.rows = 0
@@ -150,8 +150,8 @@ class _Group:
         return sum(len(panel.lines) + len(self.commands[panel.name, panel.unit]) for panel in self.panels)
 
     def described(self, panel: Panel) -> SignalPanel:
-        lines = [Line(label, joint) for label, joint in zip(panel.lines, panel.joints, strict=True)]
-        lines += [Line(lines[n].label, lines[n].joint, True) for n, _ in self.commands[panel.name, panel.unit]]
+        lines = [PanelLine(label, joint) for label, joint in zip(panel.lines, panel.joints, strict=True)]
+        lines += [PanelLine(lines[n].label, lines[n].joint, True) for n, _ in self.commands[panel.name, panel.unit]]
         return SignalPanel(panel.name, panel.about, panel.unit, tuple(lines))
 
     def thinned(self, found: Sequence[SignalPanel], position: int, points: int) -> dict[int, np.ndarray]:

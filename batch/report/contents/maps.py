@@ -9,7 +9,7 @@ import numpy as np
 
 from batch.queries.colours import reach
 from batch.queries.grids import ROUND, Levels, cells_of, edges_of, is_grid, levelled, round_numbers, standing
-from batch.queries.pool import Column, Pool
+from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import number_text
 from batch.report.contents.parts import Map, Ruler
 from met.run import DONE
@@ -17,7 +17,7 @@ from met.run import DONE
 MOST_MAPS = 6
 
 
-def maps(pool: Pool, varied: Sequence[Column], metrics: Sequence[Column]) -> tuple[Map, ...]:
+def maps(pool: Pool, varied: Sequence[CaseColumn], metrics: Sequence[CaseColumn]) -> tuple[Map, ...]:
     """A map for each two parameters that make a grid, those first that have most values."""
     out: list[Map] = []
     for x, y in combinations(varied, 2):
@@ -30,7 +30,7 @@ def maps(pool: Pool, varied: Sequence[Column], metrics: Sequence[Column]) -> tup
     return tuple(out)
 
 
-def _map(pool: Pool, x: Column, y: Column, metrics: Sequence[Column]) -> Map:
+def _map(pool: Pool, x: CaseColumn, y: CaseColumn, metrics: Sequence[CaseColumn]) -> Map:
     across, up = levelled(x.values, x.words), levelled(y.values, y.words)
     shape = (len(up.texts), len(across.texts))
     cells = cells_of(across, up)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from batch.differences.compare import VERDICTS
-from batch.queries.pool import ENDED, Column, Pool
+from batch.queries.pool import ENDED, CaseColumn, Pool
 from batch.report.contents.against import GOOD, Before, change
 from batch.report.contents.maps import maps
 from batch.report.contents.parts import Overview
@@ -31,9 +31,9 @@ def overview(pool: Pool, before: Before | None = None) -> Overview | None:
     metrics, varied = pool.metrics(), pool.varied()
     if pool.count < 2 or not metrics:
         return None
-    table = Column(BAD_CASE, "case", "", "case", pool.cases.astype(float))
+    table = CaseColumn(BAD_CASE, "case", "", "case", pool.cases.astype(float))
     against = (*varied, *(() if len(varied) > 1 else (table,)))
-    changes: tuple[Column, ...] = ()
+    changes: tuple[CaseColumn, ...] = ()
     if before is not None:
         metrics = tuple(replace(column, before=before.values(column)) for column in metrics)
         changes = tuple(each for each in map(change, metrics) if each is not None)
@@ -63,18 +63,18 @@ def overview(pool: Pool, before: Before | None = None) -> Overview | None:
     )
 
 
-def _interest(pool: Pool, column: Column) -> tuple[bool, int]:
+def _interest(pool: Pool, column: CaseColumn) -> tuple[bool, int]:
     """By which a metric is drawn first: that it has a requirement, and that cases do not meet it."""
     outcomes = [pool.outcomes[:, pool.requirements.index(limit.text)] for limit in column.limits]
     return bool(outcomes), max((int((each == 0).sum()) for each in outcomes), default=0)
 
 
-def _at(column: Column, places: np.ndarray) -> Column:
+def _at(column: CaseColumn, places: np.ndarray) -> CaseColumn:
     before = None if column.before is None else column.before[places]
     return replace(column, values=column.values[places], before=before)
 
 
-def _compared(pool: Pool, before: Before) -> tuple[Column, ...]:
+def _compared(pool: Pool, before: Before) -> tuple[CaseColumn, ...]:
     """What a case is, compared with what it was: what `met diff` says of it, and whether it meets what is required."""
     verdicts = (*VERDICTS[:3], "only now")
     how = np.where(before.there, before.how, len(verdicts) - 1).astype(float)
@@ -84,12 +84,12 @@ def _compared(pool: Pool, before: Before) -> tuple[Column, ...]:
     flow = np.where(now, np.where(was, 1, 0), np.where(was, 3, 2))
     flow = np.where(before.there, flow, len(words) - 1).astype(float)
     return (
-        Column("choice:compared", "compared with before", "", "choice", how, verdicts),
-        Column("choice:outcome", "outcome, now and before", "", "choice", flow, words),
+        CaseColumn("choice:compared", "compared with before", "", "choice", how, verdicts),
+        CaseColumn("choice:outcome", "outcome, now and before", "", "choice", flow, words),
     )
 
 
-def _noted(pool: Pool, before: Before | None, changes: tuple[Column, ...]) -> np.ndarray:
+def _noted(pool: Pool, before: Before | None, changes: tuple[CaseColumn, ...]) -> np.ndarray:
     """Places of the cases that are drawn since they changed: those that changed most, and in each metric the extremes;
     and of those that came to miss a requirement, or to meet it, the first."""
     if before is None:
@@ -101,13 +101,13 @@ def _noted(pool: Pool, before: Before | None, changes: tuple[Column, ...]) -> np
     return np.concatenate(out)
 
 
-def _extremes(column: Column) -> np.ndarray:
+def _extremes(column: CaseColumn) -> np.ndarray:
     numbers = np.flatnonzero(np.isfinite(column.values))
     return numbers[[column.values[numbers].argmin(), column.values[numbers].argmax()]] if len(numbers) else numbers
 
 
 def _drawn(
-    pool: Pool, against: tuple[Column, ...], metrics: tuple[Column, ...], noted: np.ndarray
+    pool: Pool, against: tuple[CaseColumn, ...], metrics: tuple[CaseColumn, ...], noted: np.ndarray
 ) -> tuple[np.ndarray, tuple[int, ...]]:
     """Places of the cases to draw, among them those noted, and the dots that were told apart to choose them.
 

@@ -10,7 +10,7 @@ import numpy as np
 from batch.queries.grids import levels
 from batch.queries.pool import Pool, shown
 from batch.queries.signals import pretty_unit
-from batch.report.contents.parts import ParameterRow, Spot, Varied
+from batch.report.contents.parts import ParameterRow, Spot, VariedParameter
 from ic.printing.columns import number
 from ic.printing.settings import settings
 from met.diagnostic import Place
@@ -94,7 +94,7 @@ def _value(quantity: Quantity, spans: Mapping[int, tuple[float, float]]) -> str:
             return number(float(value))
 
 
-def varied(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Varied, ...]:
+def varied(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[VariedParameter, ...]:
     """What tells the cases apart, with its values."""
     places: dict[str, tuple[Spot | None, tuple[str, ...]]] = {}
     for experiment in experiments.values():
@@ -110,5 +110,7 @@ def varied(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Varied, .
         texts: Sequence[str] = column.words or [shown(float(value)) for value in levels(column.values)]
         few = ", ".join(texts) if len(texts) <= MOST_LISTED else ""
         many = f"{len(texts):,} values from {texts[0]} to {texts[-1]}" if texts else ""
-        out.append(Varied(column.label, few or many, column.unit, where, tuple(s for s in sets if s != column.label)))
+        out.append(
+            VariedParameter(column.label, few or many, column.unit, where, tuple(s for s in sets if s != column.label))
+        )
     return tuple(out)

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from batch.queries.colours import Reach
-from batch.queries.pool import Column
-from batch.queries.summary import Spread
+from batch.queries.pool import CaseColumn
+from batch.queries.summary import MetricSpread
 from batch.report.contents.changes import ArchiveChanges, RunChanges
 from met.frozen import frozen
 
@@ -36,7 +36,7 @@ class Spot:
 
 
 @frozen
-class Part:
+class OutcomeCount:
     """So many of all cases came out so."""
 
     word: str
@@ -94,7 +94,7 @@ class Verdict:
     about: str
     ok: bool
     headline: str
-    parts: tuple[Part, ...]
+    parts: tuple[OutcomeCount, ...]
     demands: tuple[Demand, ...] = ()
     failing: tuple[Failing, ...] = ()
     notes: tuple[str, ...] = ()
@@ -116,7 +116,7 @@ class Verdict:
 
 
 @frozen
-class Varied:
+class VariedParameter:
     """A parameter that differs between cases, or a choice: its values in words, and where the deck says so."""
 
     path: str
@@ -140,7 +140,7 @@ class MetricRow:
     name: str
     about: str
     unit: str
-    spread: Spread
+    spread: MetricSpread
     remark: str
     bars: tuple[int, ...] = ()
     low: float = 0.0
@@ -151,7 +151,7 @@ class MetricRow:
 
 
 @frozen
-class Table:
+class TextTable:
     """A table of texts. right: the columns that are set flush right; marked: (row, column) that miss a requirement."""
 
     heads: tuple[str, ...]
@@ -162,11 +162,11 @@ class Table:
 
 
 @frozen
-class Worst:
+class WorstCaseTable:
     """The worst cases: a table whose rows are these cases, the command that runs each again, and what is left out."""
 
     title: str
-    table: Table
+    table: TextTable
     cases: tuple[int, ...]
     commands: tuple[str, ...]
     left: int
@@ -241,7 +241,7 @@ class Overview:
     cases: np.ndarray
     ids: tuple[str, ...]
     ended: np.ndarray
-    columns: tuple[Column, ...]
+    columns: tuple[CaseColumn, ...]
     causes: dict[int, str]
     total: int
     start: tuple[str, str, str]
@@ -250,7 +250,7 @@ class Overview:
 
 
 @frozen
-class Line:
+class PanelLine:
     """One line of a panel: its label, its joint, and whether it is the command that the line should follow."""
 
     label: str
@@ -265,7 +265,7 @@ class SignalPanel:
     name: str
     about: str
     unit: str
-    lines: tuple[Line, ...]
+    lines: tuple[PanelLine, ...]
 
 
 @frozen
@@ -306,7 +306,7 @@ class Signals:
 
 
 @frozen
-class Bed:
+class BedStability:
     """A joint whose motor is on a bed: how heavy the arm is against the rotor, r, and how heavy it might be.
 
     r         of each case, the heaviest motion of all substituted joints together
@@ -338,8 +338,8 @@ class Stability:
     """
 
     cases: np.ndarray
-    columns: tuple[Column, ...]
-    beds: tuple[Bed, ...]
+    columns: tuple[CaseColumn, ...]
+    beds: tuple[BedStability, ...]
     unstable: tuple[str, ...]
     spans: bool = False
     said: str = ""
@@ -349,7 +349,7 @@ class Stability:
 
 
 @frozen
-class SourceText:
+class SourceListing:
     """A file of the deck. text: the beginning of it, where it is long; `left`: lines that are not here."""
 
     name: str
@@ -359,7 +359,7 @@ class SourceText:
 
 
 @frozen
-class Section:
+class ReportSection:
     """A run or sweep.
 
     name        as it is asked for;  lede  what it is, in a sentence
@@ -370,10 +370,10 @@ class Section:
     name: str
     lede: str
     facts: tuple[Fact, ...]
-    varied: tuple[Varied, ...]
+    varied: tuple[VariedParameter, ...]
     metrics: tuple[MetricRow, ...]
-    structures: Table | None
-    worst: Worst | None
+    structures: TextTable | None
+    worst: WorstCaseTable | None
     overview: Overview | None
     signals: Signals | None
     no_signals: str
@@ -394,7 +394,7 @@ class Report:
     deck: str
     replay: str
     verdicts: tuple[Verdict, ...]
-    sections: tuple[Section, ...]
-    sources: tuple[SourceText, ...]
+    sections: tuple[ReportSection, ...]
+    sources: tuple[SourceListing, ...]
     provenance: tuple[Fact, ...]
     changes: ArchiveChanges | None = None

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from batch.queries.failures import ranges
-from batch.queries.pool import Column, Pool
-from batch.report.contents.parts import Bed, Stability
+from batch.queries.pool import CaseColumn, Pool
+from batch.report.contents.parts import BedStability, Stability
 from batch.terminal.margin import stable_at, verdict
 from met.analysis.margin import Margin, margins
 from met.distinct import distinct
@@ -42,7 +42,7 @@ def stability(
     places = np.array(sorted(found))
     joints = list(dict.fromkeys(one.joint for place in places.tolist() for one in found[place]))
     columns = [replace(c, values=c.values[places]) for c in pool.varied()]
-    columns.append(Column("case", "case", "", "case", pool.cases[places].astype(float)))
+    columns.append(CaseColumn("case", "case", "", "case", pool.cases[places].astype(float)))
     spans = any(one.lower > 0.0 for case in found.values() for one in case)
     beds = tuple(_bed(joint, [_of(found[place], joint) for place in places.tolist()], spans) for joint in joints)
     said = f"Computed for {len(places):,} of {len(places) + left:,} cases, spread over all." if left else ""
@@ -72,7 +72,7 @@ def _of(case: Sequence[Margin], joint: str) -> Margin | None:
     return next((one for one in case if one.joint == joint), None)
 
 
-def _bed(joint: str, each: Sequence[Margin | None], spans: bool) -> Bed:
+def _bed(joint: str, each: Sequence[Margin | None], spans: bool) -> BedStability:
     there = [one for one in each if one is not None]
     tightest = min(there, key=lambda one: one.room)
     r = np.array([np.nan if one is None else one.together for one in each])
@@ -83,7 +83,7 @@ def _bed(joint: str, each: Sequence[Margin | None], spans: bool) -> Bed:
     spread = "-" if not len(known) else f"{known.min():.3g}"
     if len(known) and f"{known.max():.3g}" != spread:
         spread += f" to {known.max():.3g}"
-    return Bed(
+    return BedStability(
         joint, _words(one.law for one in there), _words(f"{one.rate_hz:g} Hz" for one in there),
         _words(f"{one.delay:g}" for one in there), r, lower, limit, unstable, spread,
         stable_at(tightest, spans), verdict(tightest, "none"), not unstable.any(),

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from batch.queries.pool import ENDED, Column, Pool, shown
+from batch.queries.pool import ENDED, CaseColumn, Pool, shown
 from batch.queries.summary import median_text
 from batch.report.contents.against import GOOD, Before
-from batch.report.contents.parts import Table, Worst
+from batch.report.contents.parts import TextTable, WorstCaseTable
 from met.distinct import distinct
 from met.outputs import quoted
 
@@ -17,7 +17,7 @@ MOST_CASES = 20
 MISSES = "\N{BALLOT X}"
 
 
-def worst(pool: Pool, archive: str, only: str, before: Before | None = None) -> Worst | None:
+def worst(pool: Pool, archive: str, only: str, before: Before | None = None) -> WorstCaseTable | None:
     """The worst cases, failed ones first. only: the run or sweep to be named in commands; "" where there is one.
     before: how they came out in another archive."""
     if pool.count < 2:
@@ -37,7 +37,7 @@ def worst(pool: Pool, archive: str, only: str, before: Before | None = None) -> 
         was = ENDED[before.ended[place]] if before is not None and before.there[place] else shown(np.nan)
         rows.append((*cells, *([was] if before is not None else []), ENDED[pool.ended[place]]))
     ends = ("before", "now") if before is not None else ("came out",)
-    table = Table(
+    table = TextTable(
         heads=("case", "id", *(column.label for column in columns), *ends),
         units=("", "", *(column.unit for column in columns), *("" for _ in ends)),
         rows=tuple(rows),
@@ -46,7 +46,7 @@ def worst(pool: Pool, archive: str, only: str, before: Before | None = None) -> 
     )
     numbers = tuple(int(pool.cases[place]) for place in places)
     commands = tuple(replay(archive, only, case) for case in numbers)
-    return Worst(_title(pool, len(rows)), table, numbers, commands, pool.count - len(rows))
+    return WorstCaseTable(_title(pool, len(rows)), table, numbers, commands, pool.count - len(rows))
 
 
 def replay(archive: str, only: str, case: int | str) -> str:
@@ -55,7 +55,7 @@ def replay(archive: str, only: str, case: int | str) -> str:
     return f"met run {quoted(archive)}{named} --case '#{case}'"
 
 
-def cell_text(column: Column, place: int) -> str:
+def cell_text(column: CaseColumn, place: int) -> str:
     """A value as a table shows it."""
     value = float(column.values[place])
     if column.words:
@@ -63,7 +63,7 @@ def cell_text(column: Column, place: int) -> str:
     return shown(value)
 
 
-def _misses(pool: Pool, column: Column, place: int) -> bool:
+def _misses(pool: Pool, column: CaseColumn, place: int) -> bool:
     """Whether a metric misses a requirement there."""
     return any(pool.outcomes[place, pool.requirements.index(limit.text)] == 0 for limit in column.limits)
 
@@ -79,7 +79,7 @@ def _title(pool: Pool, shown: int) -> str:
     return "Cases, closest to a limit first" if every else f"Cases closest to a limit{many}"
 
 
-def structures(pool: Pool, before: Before | None = None) -> Table | None:
+def structures(pool: Pool, before: Before | None = None) -> TextTable | None:
     """A row a structure: what is chosen, cases, how many meet all, those in another archive before, and the median of
     each metric."""
     if len(pool.groups) < 2:
@@ -99,7 +99,7 @@ def structures(pool: Pool, before: Before | None = None) -> Table | None:
         rows.append((*chosen, f"{len(here):,}", *counts, *medians))
     heads = (*(c.label for c in choices), "cases", "meet all" if judged else "reached their end")
     heads += ("before",) if before is not None else ()
-    return Table(
+    return TextTable(
         heads=(*heads, *(f"{c.label}, median" for c in metrics)),
         units=(*[""] * len(heads), *(c.unit for c in metrics)),
         rows=tuple(rows),

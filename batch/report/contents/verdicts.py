@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from batch.queries.failures import failures, ranges
-from batch.queries.pool import ENDED, Column, Pool, shown
+from batch.queries.pool import ENDED, CaseColumn, Pool, shown
 from batch.queries.summary import spread
 from batch.report.contents.against import Before
-from batch.report.contents.parts import Demand, Failing, MetricRow, Part, Verdict
+from batch.report.contents.parts import Demand, Failing, MetricRow, OutcomeCount, Verdict
 from ic.printing.columns import count as counted
 from met.run import DONE
 
@@ -22,7 +22,7 @@ FEWEST = 8
 def verdict(pool: Pool, *, named: bool) -> Verdict:
     """Whether all cases reached their end and met all that is required. named: whether to say of which run or sweep."""
     ended = np.bincount(pool.ended, minlength=len(ENDED))
-    parts = tuple(Part(word, int(n)) for word, n in zip(ENDED, ended, strict=True) if n)
+    parts = tuple(OutcomeCount(word, int(n)) for word, n in zip(ENDED, ended, strict=True) if n)
     good = int(ended[ENDED.index("met")] + ended[ENDED.index("done")])
     return Verdict(
         kind="requirements",
@@ -92,7 +92,7 @@ def metric_rows(pool: Pool, before: Before | None = None) -> tuple[MetricRow, ..
     return tuple(_metric(column, None if before is None else before.values(column)) for column in pool.metrics())
 
 
-def _metric(column: Column, before: np.ndarray | None) -> MetricRow:
+def _metric(column: CaseColumn, before: np.ndarray | None) -> MetricRow:
     """Spread of the finite values; of how many there are others is said. before: the values of the other archive."""
     found, finite = spread(column.values), column.values[np.isfinite(column.values)]
     was = np.zeros(0) if before is None else np.sort(before[np.isfinite(before)])

@@ -6,7 +6,17 @@ from collections.abc import Mapping, Sequence
 
 from batch.queries.pool import shown
 from batch.queries.summary import SPREAD_COLUMNS
-from batch.report.contents.parts import Demand, Fact, Failing, Flow, MetricRow, Section, Spot, Varied, Verdict
+from batch.report.contents.parts import (
+    Demand,
+    Fact,
+    Failing,
+    Flow,
+    MetricRow,
+    ReportSection,
+    Spot,
+    VariedParameter,
+    Verdict,
+)
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
 
 Anchors = Mapping[str, tuple[int, int]]
@@ -209,7 +219,7 @@ def facts(found: Sequence[Fact]) -> Html:
     ], cls="facts")  # fmt: skip
 
 
-def varied(found: Sequence[Varied], anchors: Anchors) -> Html | None:
+def varied(found: Sequence[VariedParameter], anchors: Anchors) -> Html | None:
     if not found:
         return None
     decides = any(each.sets for each in found)
@@ -229,7 +239,7 @@ def _sets(paths: Sequence[str]) -> list[Child]:
     return [*shown, f" and {len(paths) - 3} more" if len(paths) > 3 else None]
 
 
-def metrics(section: Section) -> Html | None:
+def metrics(section: ReportSection) -> Html | None:
     """Each metric with its spread, and the shape of it."""
     if not section.metrics:
         return None

@@ -10,8 +10,8 @@ from batch.differences.words import (
     DISTRIBUTION_HEADS,
     SAME,
     WORST,
+    DiffColumn,
     Ending,
-    SignalColumn,
     SignalRow,
     WorstCase,
     cause,
@@ -19,7 +19,7 @@ from batch.differences.words import (
 )
 from batch.queries.pool import shown
 from batch.report.contents.changes import ArchiveChanges, OtherOrigin, RunChanges
-from batch.report.contents.parts import Table
+from batch.report.contents.parts import TextTable
 from batch.report.html.blocks import case_link, likeness, scrolling
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
 from batch.report.html.tables import command, table
@@ -99,7 +99,7 @@ def _signals(found: Sequence[SignalRow]) -> Html | None:
     return scrolling(made, "Signals and metrics, before and now")
 
 
-def _cell(row: SignalRow, column: SignalColumn) -> Html:
+def _cell(row: SignalRow, column: DiffColumn) -> Html:
     """A cell of the table of signals; a case in it can be chosen."""
     text = getattr(row, column.field)
     if column.field == "name":
@@ -119,7 +119,9 @@ def _samples(found: RunChanges) -> Html | None:
         return None
     heads = tuple(head for _, head in DISTRIBUTION_HEADS)
     rows = tuple(each.cells for each in found.samples)
-    return table(Table(heads, ("",) * len(heads), rows, frozenset(range(1, len(heads)))), "Metrics as distributions")
+    return table(
+        TextTable(heads, ("",) * len(heads), rows, frozenset(range(1, len(heads)))), "Metrics as distributions"
+    )
 
 
 def _number(text: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from batch.report.contents.parts import Report, Section
+from batch.report.contents.parts import Report, ReportSection
 from batch.report.html import blocks, changes, inlined, tables
 from batch.report.html.markup import Child, Html, el, join, lines
 from batch.report.html.payload import script_json, section_data
@@ -49,7 +49,7 @@ def page(report: Report) -> str:
     return f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{head}\n</head>\n<body>\n{body}\n</body>\n</html>\n'
 
 
-def _replay(report: Report, section: Section) -> str:
+def _replay(report: Report, section: ReportSection) -> str:
     """The command that runs a case of a section again, with `#CASE` where its number goes."""
     if section.worst is None:
         return report.replay.rpartition("#")[0] + "#CASE'"
@@ -77,7 +77,7 @@ def _about(report: Report) -> str:
     return f"{report.deck} · {report.changes.now} against {report.changes.before}"
 
 
-def _links(number: int, section: Section, report: Report) -> list[tuple[str, str]]:
+def _links(number: int, section: ReportSection, report: Report) -> list[tuple[str, str]]:
     if len(report.sections) > 1:
         return [(f"s{number}", section.name)]
     found = [("run", "What was run", True), ("overview", "Cases", section.overview is not None),
@@ -108,7 +108,7 @@ def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
     return out
 
 
-def _section(number: int, section: Section, anchors: blocks.Anchors, head: str) -> list[Child]:
+def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head: str) -> list[Child]:
     def part(key: str, name: str, *children: Child, said: str = "") -> Html:
         told = el("p", said, cls="said") if said else None
         return el("section", el(head, name), told, *children, id=f"s{number}-{key}", cls=key)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from batch.queries.colours import Reach, reach
-from batch.queries.pool import ENDED, Column
+from batch.queries.pool import ENDED, CaseColumn
 from batch.queries.signals import pretty_unit
 from batch.report.contents.changes import ArchiveChanges
-from batch.report.contents.parts import History, Map, Overview, Ruler, Section, Signals, Stability
+from batch.report.contents.parts import History, Map, Overview, ReportSection, Ruler, Signals, Stability
 from batch.report.html.markup import Html
 from met.messages.visible import visible
 
@@ -28,7 +28,7 @@ def script_json(data: Any) -> Html:
     return Html(json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).translate(LEGIBLE))
 
 
-def section_data(section: Section, replay: str, changes: ArchiveChanges | None = None) -> dict[str, Any]:
+def section_data(section: ReportSection, replay: str, changes: ArchiveChanges | None = None) -> dict[str, Any]:
     """All that the plots of a section need. replay: the command that runs a case again, with `#CASE` for which."""
     return {
         "name": visible(section.name),
@@ -68,7 +68,7 @@ def _base64(values: np.ndarray) -> str:
     return base64.b64encode(values.tobytes()).decode("ascii")
 
 
-def _column(column: Column) -> dict[str, Any]:
+def _column(column: CaseColumn) -> dict[str, Any]:
     return {
         "key": visible(column.key),
         "label": visible(column.label),

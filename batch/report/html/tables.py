@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from batch.report.contents.parts import ParameterRow, SourceText, Stability, Table, Worst
+from batch.report.contents.parts import ParameterRow, SourceListing, Stability, TextTable, WorstCaseTable
 from batch.report.html.blocks import Anchors, case_link, scrolling, spot_link
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
 from batch.terminal.margin import stable_head
 
 
-def table(found: Table, label: str, cells: Sequence[Sequence[Child]] = (), more: Sequence[str] = ()) -> Html:
+def table(found: TextTable, label: str, cells: Sequence[Sequence[Child]] = (), more: Sequence[str] = ()) -> Html:
     """A table of texts. cells, more: further cells of each row, and their heads."""
     units = any(found.units)
     heads = [el("th", el("span", breaking(head)), el("span", unit, cls="unit") if units else None, scope="col",
@@ -28,7 +28,7 @@ def table(found: Table, label: str, cells: Sequence[Sequence[Child]] = (), more:
     return scrolling(el("table", el("thead", el("tr", heads)), el("tbody", lines(rows))), label)
 
 
-def worst(found: Worst) -> Html:
+def worst(found: WorstCaseTable) -> Html:
     """The worst cases with the command that runs each again."""
     rows = []
     columns = found.table
@@ -69,7 +69,7 @@ def beds(found: Stability) -> Html:
         (bed.joint, bed.law, bed.servo, bed.delay, bed.spread, bed.stable_at, bed.margin) for bed in found.beds
     )
     marked = frozenset((n, 6) for n, bed in enumerate(found.beds) if not bed.ok)
-    return table(Table(heads, ("",) * len(heads), rows, frozenset({3, 4, 5}), marked), "Beds")
+    return table(TextTable(heads, ("",) * len(heads), rows, frozenset({3, 4, 5}), marked), "Beds")
 
 
 # Parameters
@@ -104,7 +104,7 @@ def _overrides(row: ParameterRow, anchors: Anchors) -> Html | None:
 # The deck
 
 
-def source(number: int, file: SourceText) -> Html:
+def source(number: int, file: SourceListing) -> Html:
     """A file of the deck, each line with its number, to which others lead."""
     texts = file.text.split("\n")
     rows = [

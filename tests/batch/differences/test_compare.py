@@ -12,7 +12,7 @@ from batch.differences import campaigns
 from batch.differences.campaigns import diff
 from batch.differences.compare import Difference, Passed, compare, compare_cases
 from batch.differences.data import as_data
-from batch.differences.tolerance import Tolerance, tolerances
+from batch.differences.tolerance import SignalTolerance, tolerances
 from met.diagnostic import Problem
 from met.run import Run
 from tests.batch.differences.planted import order, two
@@ -32,7 +32,7 @@ def pair(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     return a, b
 
 
-def by_hand(a: np.ndarray, b: np.ndarray, allowed: Tolerance) -> tuple[int, int, float, int, int]:
+def by_hand(a: np.ndarray, b: np.ndarray, allowed: SignalTolerance) -> tuple[int, int, float, int, int]:
     """beyond, nan, largest, first, first_beyond, value by value."""
     beyond = nan = 0
     within, largest, first, first_beyond = 0.0, 0.0, -1, -1
@@ -61,9 +61,9 @@ def by_hand(a: np.ndarray, b: np.ndarray, allowed: Tolerance) -> tuple[int, int,
 def test_cases_at_once_are_what_each_is_by_itself_and_by_hand(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = pair(rng)
-    allowed = Tolerance(*(float(rng.choice([0.0, limit])) for limit in (0.5, 1e-3)))
+    allowed = SignalTolerance(*(float(rng.choice([0.0, limit])) for limit in (0.5, 1e-3)))
     for early in (0.0, 0.04, 0.25):
-        later = Tolerance(allowed.absolute, allowed.relative, early)
+        later = SignalTolerance(allowed.absolute, allowed.relative, early)
         for absolute in (None, np.array([0.1, 2.0])):
             each = [compare(before, after, later, TIME, absolute) for before, after in zip(a, b, strict=True)]
             assert repr(compare_cases(a, b, later, Passed(TIME, TIME, a), absolute)) == repr(each)
@@ -79,7 +79,7 @@ def test_where_the_difference_is_largest() -> None:
     a = np.zeros((3, 4, 2))
     b = a.copy()
     b[0, 2, 1], b[0, 3, 0], b[2, 1, 0] = 0.5, -2.0, -0.0
-    first, second, third = compare_cases(a, b, Tolerance(1.0))
+    first, second, third = compare_cases(a, b, SignalTolerance(1.0))
     assert first == Difference(
         beyond=1, nan=0, largest=2.0, row=3, column=0, before=0.0, after=-2.0, squares=4.25, values=8, first=2,
         first_beyond=3, used=2.0,

@@ -21,9 +21,9 @@ from batch.differences.campaigns import diff
 from batch.differences.compare import compare
 from batch.differences.data import as_data
 from batch.differences.decks import decks
-from batch.differences.found import Diff, Experiment, Required, Signal
+from batch.differences.found import Diff, ExperimentDiff, RequirementDiff, SignalDiff
 from batch.differences.told import told
-from batch.differences.tolerance import Tolerance, tolerances
+from batch.differences.tolerance import SignalTolerance, tolerances
 from batch.differences.words import heading, requirements, verdict
 from met import cli
 from met.diagnostic import Problem
@@ -87,12 +87,12 @@ def ran(here: Path) -> Callable[..., Path]:
     return make
 
 
-def only(found: Diff) -> Experiment:
+def only(found: Diff) -> ExperimentDiff:
     [experiment] = found.experiments
     return experiment
 
 
-def signal(found: Diff, name: str) -> Signal:
+def signal(found: Diff, name: str) -> SignalDiff:
     return next(each for each in only(found).signals if each.name == name)
 
 
@@ -189,7 +189,7 @@ def test_what_a_passes_through_is_all_of_it(ran: Callable[..., Path]) -> None:
 def test_a_shift_by_just_what_is_allowed_is_allowed(steps: int) -> None:
     jumps = np.sign(np.sin(np.arange(201) * 0.7))[:, None]
     later = np.concatenate([jumps[:1]] * steps + [jumps[:-steps]])
-    found = compare(jumps, later, Tolerance(time=steps / 30.0), np.arange(201) / 30.0)
+    found = compare(jumps, later, SignalTolerance(time=steps / 30.0), np.arange(201) / 30.0)
     assert found is not None and found.verdict == "equivalent"
 
 
@@ -198,7 +198,7 @@ def test_an_infinity_nearby_allows_nothing() -> None:
     a[50] = math.inf
     b = a.copy()
     b[51] = 1e6
-    found = compare(a, b, Tolerance(time=0.011), np.arange(101) * 0.01)
+    found = compare(a, b, SignalTolerance(time=0.011), np.arange(101) * 0.01)
     assert found is not None and found.verdict == "different"
 
 
@@ -300,7 +300,10 @@ def test_a_requirement_that_other_cases_meet_is_told(two: Callable[..., tuple[Pa
 def test_a_requirement_whose_limit_is_another_is_a_difference(ran: Callable[..., Path]) -> None:
     whole = diff(ran("a.h5", "bounded"), ran("b.h5", "strict"))
     found = only(whole)
-    assert found.requirements == [Required("top < 5 rad/s", "top < 0.5 rad/s", 1, 0, 0, 1, True)] and not found.notes
+    assert (
+        found.requirements == [RequirementDiff("top < 5 rad/s", "top < 0.5 rad/s", 1, 0, 0, 1, True)]
+        and not found.notes
+    )
     assert requirements(found) == ["require top < 0.5 rad/s (before: top < 5 rad/s)  met by 1, now by 0 of 1"]
     assert (whole.verdict, whole.of_values, found.how.tolist()) == ("different", "identical", [0])
     assert heading(found) == "bounded and strict: 1 case in both, identical, with other requirements"

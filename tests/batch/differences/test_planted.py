@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from batch.differences.campaigns import diff
-from batch.differences.found import Diff, Signal
+from batch.differences.found import Diff, SignalDiff
 from batch.differences.tolerance import tolerances
 from met.plan import Experiment, Origin, Quantity
 from met.run import Run
@@ -22,7 +22,7 @@ from tests.batch.differences.planted import CASES, order, two
 SIGNALS = {"q", "qd", "tau", "shoulder.servo.voltage", "settle", "volts"}
 
 
-def signal(found: Diff, name: str) -> Signal:
+def signal(found: Diff, name: str) -> SignalDiff:
     return next(each for each in found.experiments[0].signals if each.name == name)
 
 

@@ -14,7 +14,7 @@ import batch
 import ic
 from batch.differences.campaigns import diff
 from batch.differences.data import as_data
-from batch.differences.found import Diff, Signal
+from batch.differences.found import Diff, SignalDiff
 from batch.differences.told import told
 from batch.differences.tolerance import Tolerances, check, tolerances
 from met.diagnostic import Problem
@@ -42,7 +42,7 @@ def archives(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., t
     return lambda **given: two(monkeypatch, tmp_path, order(1, CASES), plant, allowing(**given), CASES)
 
 
-def q_of(found: Diff) -> Signal:
+def q_of(found: Diff) -> SignalDiff:
     return next(each for each in found.experiments[0].signals if each.name == "q")
 
 
@@ -165,7 +165,7 @@ def test_words_that_do_not_fit(words: str, message: str, helps: str) -> None:
 
 def test_what_is_within_is_within_for_every_column_by_itself() -> None:
     from batch.differences.compare import compare
-    from batch.differences.tolerance import Tolerance as Allowed
+    from batch.differences.tolerance import SignalTolerance as Allowed
 
     a = np.array([[1.0, 1.0], [1.0, 1.0]])
     b = a + np.array([[0.5, 0.0], [0.0, 0.02]])

@@ -11,7 +11,7 @@ import pytest
 
 from batch.differences import words
 from batch.differences.campaigns import diff
-from batch.differences.found import Ended
+from batch.differences.found import EndingDiff
 from batch.differences.told import told
 from batch.differences.tolerance import tolerances
 from met.run import Run
@@ -71,7 +71,7 @@ def test_a_command_names_the_run_where_there_are_several(
 def test_how_a_case_ends_otherwise(before: int, after: int, said: str) -> None:
     from types import SimpleNamespace
 
-    ended = [Ended(7, "8f3a", before, after, "it was stuck", "it broke" if after else "", 3, 5)]
+    ended = [EndingDiff(7, "8f3a", before, after, "it was stuck", "it broke" if after else "", 3, 5)]
     [ending] = words.endings(SimpleNamespace(ended=ended))  # type: ignore[arg-type]
     assert (ending.text, ending.cases) == (said, "#7")
     assert words.cause(ended[0]) == ("it broke" if after else "before: it was stuck")

@@ -10,7 +10,7 @@ import batch
 from batch.archive.read import ArchiveFile
 from batch.plotting import draw
 from batch.plotting.layout import FLAT
-from batch.plotting.sheet import COLOURS, Sheet
+from batch.plotting.sheet import COLOURS, PictureSheet
 from tests.batch import plans
 from tests.batch.plotting.pictures import archive, shown
 
@@ -51,7 +51,7 @@ def test_few_cases_are_overlaid_and_named_by_what_varies(here: Path, figures: li
 @pytest.mark.slow
 def test_cases_that_are_told_apart_by_how_faint_they_are_have_a_key(here: Path, figures: list[Any]) -> None:
     with archive(3) as file:
-        draw(file, "a.png", ["qd", "shoulder.servo.voltage"], sheet=Sheet(width=2.9))
+        draw(file, "a.png", ["qd", "shoulder.servo.voltage"], sheet=PictureSheet(width=2.9))
     [legend] = figures[0].legends
     keys = dict(zip([text.get_text() for text in legend.get_texts()], legend.get_lines(), strict=True))
     cases = [text for text in keys if text.startswith("gearbox.kp = ")]

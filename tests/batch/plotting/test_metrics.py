@@ -295,10 +295,10 @@ class TestMaps:
 
 def test_colours_of_words_are_those_that_eyes_tell_apart() -> None:
     from batch.plotting.points import _sets
-    from batch.queries.pool import Column
+    from batch.queries.pool import CaseColumn
 
-    by = Column("choice:a", "a", "", "choice", np.array([0.0, 1.0, 0.0, 1.0]), ("one", "two"))
-    x = Column("parameter:x", "x", "", "parameter", np.array([0.0, 0.0, 1.0, 1.0]))
+    by = CaseColumn("choice:a", "a", "", "choice", np.array([0.0, 1.0, 0.0, 1.0]), ("one", "two"))
+    x = CaseColumn("parameter:x", "x", "", "parameter", np.array([0.0, 0.0, 1.0, 1.0]))
     found = _sets(x, by)
     assert [(one.text, one.colour, one.joined) for one in found] == [
         ("one", COLOURS[0], True), ("two", COLOURS[1], True),

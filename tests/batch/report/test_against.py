@@ -14,7 +14,7 @@ import pytest
 import batch
 from batch.archive.read import ArchiveFile
 from batch.differences.told import told
-from batch.queries.pool import Column
+from batch.queries.pool import CaseColumn
 from batch.report import report
 from batch.report.contents import against as sides
 from batch.report.contents.gathering import gather
@@ -209,7 +209,7 @@ class TestThePage:
 
 
 class TestThePoints:
-    def columns(self, found: Report) -> dict[str, Column]:
+    def columns(self, found: Report) -> dict[str, CaseColumn]:
         overview = found.sections[0].overview
         assert overview is not None
         return {column.key: column for column in overview.columns}

@@ -12,11 +12,11 @@ import batch
 from batch.archive.read import ArchiveFile
 from batch.queries import ordering
 from batch.queries.grids import levelled
-from batch.queries.pool import ENDED, Column, Pool, pools
+from batch.queries.pool import ENDED, CaseColumn, Pool, pools
 from batch.report.contents import histories, overview, stability
 from batch.report.contents.gathering import gather
 from batch.report.contents.maps import ruler
-from batch.report.contents.parts import Part, Report
+from batch.report.contents.parts import OutcomeCount, Report
 from batch.report.contents.thinning import thin, thin_clock
 from batch.report.html.payload import _column
 from met.analysis.margin import margins
@@ -38,7 +38,7 @@ class TestTheVerdict:
     def test_counts_the_cases_that_meet_all_that_is_required(self, sweep: Path) -> None:
         [verdict] = gathered(sweep).verdicts
         assert (verdict.ok, verdict.headline) == (False, "0 of 20 cases meet every requirement")
-        assert verdict.parts == (Part("missed", 20),)
+        assert verdict.parts == (OutcomeCount("missed", 20),)
         first, second = verdict.demands
         assert (first.text, first.met, first.missed, first.of) == ("settle < 10 s", 19, 1, 20)
         assert (first.furthest, first.case) == ("∞ s", 0)
@@ -191,7 +191,7 @@ class TestMaps:
 
 
 def test_colours_of_a_logarithmic_sweep_are_logarithmic() -> None:
-    kp = Column("parameter:kp", "kp", "", "parameter", np.geomspace(1e-3, 1e-1, 9), log=True)
+    kp = CaseColumn("parameter:kp", "kp", "", "parameter", np.geomspace(1e-3, 1e-1, 9), log=True)
     assert _column(kp)["reach"] == {
         "low": pytest.approx(1e-3), "high": pytest.approx(1e-1), "log": True, "below": 0, "above": 0,
         "least": pytest.approx(1e-3), "most": pytest.approx(1e-1),

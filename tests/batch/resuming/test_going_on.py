@@ -140,10 +140,10 @@ def test_no_byte_of_a_shard_may_change_and_none_may_lack(tmp_path: Path) -> None
     sound = path.read_bytes()
     for position in range(len(sound)):
         flip(path, position, position % 8)
-        with pytest.raises(shard.Unsound):
+        with pytest.raises(shard.UnsoundShard):
             shard.read(path)
         path.write_bytes(sound[:position])
-        with pytest.raises(shard.Unsound):
+        with pytest.raises(shard.UnsoundShard):
             shard.read(path)
         path.write_bytes(sound)
     found = shard.read(path)
