@@ -67,10 +67,26 @@ EVENTS = {
 
 LIMITED = "ticks at which the load motor of a bed was at its limit"
 
-RESERVED = frozenset({
-    "case", "recorded_case", "time", "joint", "requirement", "case_id", "case_key", "repeat", "seed", "status",
-    "cause", "n_valid", "met", "provenance", "bed_limited", *(f"friction_{name}" for name in EVENTS),
-})  # fmt: skip
+RESERVED = frozenset(
+    {
+        "case",
+        "recorded_case",
+        "time",
+        "joint",
+        "requirement",
+        "case_id",
+        "case_key",
+        "repeat",
+        "seed",
+        "status",
+        "cause",
+        "n_valid",
+        "met",
+        "provenance",
+        "bed_limited",
+        *(f"friction_{name}" for name in EVENTS),
+    }
+)
 """What a group holds under names of our own. A deck's name that is taken here, or by a signal, gets a word before it:
 `coordinates.seed`, `metrics.time`, and for an experiment's group `experiments.provenance`."""
 
@@ -254,8 +270,10 @@ def _apart(name: str, word: str, taken: Collection[str], fellows: Collection[str
 
 def _coordinate(experiment: Experiment, coordinate: Coordinate, name: str) -> Variable:
     written: dict[str, Any] = {
-        "deck_unit": coordinate.unit, "deck_scale": coordinate.scale, "sets": " ".join(coordinate.sets)
-    }  # fmt: skip
+        "deck_unit": coordinate.unit,
+        "deck_scale": coordinate.scale,
+        "sets": " ".join(coordinate.sets),
+    }
     unit = coordinate_unit(experiment, coordinate)
     words = f"varied: {coordinate.path}"
     if name != coordinate.path:

@@ -374,9 +374,14 @@ def _stored(name: str, node: Any) -> Stored:
         raise Unlike(f"variable `{name}` has a role that is no word")
     by_joint = by_joint if isinstance(by_joint, list) else [by_joint] if by_joint else []
     return Stored(
-        name, dims, role, str(attributes.pop("units", "")), tuple(map(str, by_joint)),
-        str(attributes.pop("long_name", "")), attributes,
-    )  # fmt: skip
+        name,
+        dims,
+        role,
+        str(attributes.pop("units", "")),
+        tuple(map(str, by_joint)),
+        str(attributes.pop("long_name", "")),
+        attributes,
+    )
 
 
 INTERNAL = frozenset({"DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME", "_Netcdf4Dimid", "_Netcdf4Coordinates"})

@@ -26,9 +26,15 @@ NUMBERS, WHOLE, WORDS = "iuf", "iu", "O"
 """Kinds of numpy's types: of numbers, of whole ones, and of strings as h5py has them."""
 
 ATTRIBUTES: dict[str, tuple[type, ...]] = {
-    "experiment": (str,), "arm": (str,), "integrator": (str,), "velocity_products": (str,), "duration_s": (float,),
-    "dynamics_hz": (float,), "record_hz": (float,), "cases_in_table": (int,),
-}  # fmt: skip
+    "experiment": (str,),
+    "arm": (str,),
+    "integrator": (str,),
+    "velocity_products": (str,),
+    "duration_s": (float,),
+    "dynamics_hz": (float,),
+    "record_hz": (float,),
+    "cases_in_table": (int,),
+}
 """What every experiment's group says, and of which type; numbers are above 0."""
 
 WORDED = ("sweep", "structure_key", "code_key", "frame", "coordinates")
@@ -38,15 +44,23 @@ VARIABLES = {"case": WHOLE, "case_id": WORDS, "cause": WORDS, "status": WHOLE, "
 """What every experiment's group has along its cases, and of which type."""
 
 OTHERS: dict[str, tuple[tuple[str, ...], str]] = {
-    "case_key": (("case",), WORDS), "repeat": (("case",), WHOLE), "seed": (("case",), WHOLE),
-    "bed_limited": (("case",), WHOLE), "recorded_case": (("recorded_case",), WHOLE), "time": (("time",), "f"),
-    "requirement": (("requirement",), WORDS), "met": (("case", "requirement"), WHOLE),
-}  # fmt: skip
+    "case_key": (("case",), WORDS),
+    "repeat": (("case",), WHOLE),
+    "seed": (("case",), WHOLE),
+    "bed_limited": (("case",), WHOLE),
+    "recorded_case": (("recorded_case",), WHOLE),
+    "time": (("time",), "f"),
+    "requirement": (("requirement",), WORDS),
+    "met": (("case", "requirement"), WHOLE),
+}
 """What one may have besides under these names: its dimensions and type."""
 
 OF_ROLES: dict[str, str | tuple[str, ...]] = {
-    "coordinate": ("<f8",), "metric": ("<f8",), "signal": ("<f8", "<f4"), "choice": WORDS,
-}  # fmt: skip
+    "coordinate": ("<f8",),
+    "metric": ("<f8",),
+    "signal": ("<f8", "<f4"),
+    "choice": WORDS,
+}
 """Types by what a variable is for: kinds, or types as numpy writes them."""
 
 MOST = 1e15

@@ -147,8 +147,9 @@ class ArchiveWriter:
             if variable.role != "dimension":
                 for axis, dim in enumerate(variable.dims):
                     made[variable.name].dims[axis].attach_scale(made[dim])
-        gathered = {variable.source: np.empty(len(part.kept), KINDS[variable.kind])
-                    for variable in layout.role("recorded")}  # fmt: skip
+        gathered = {
+            variable.source: np.empty(len(part.kept), KINDS[variable.kind]) for variable in layout.role("recorded")
+        }
         return OpenGroup(part, layout, node, gathered)
 
     def _write_provenance(self) -> None:
@@ -197,11 +198,14 @@ def _values(group: OpenGroup, run: Run) -> dict[str, Any]:
         "case_id": keys.case_ids(experiment, rows, names),
         "seed": keys.case_seeds(experiment, rows),
         "repeat": 0 if experiment.cases.repeats is None else experiment.cases.repeats[rows],
-        "status": run.status, "cause": run.cause, "n_valid": run.n_valid, "bed_limited": run.limited,
+        "status": run.status,
+        "cause": run.cause,
+        "n_valid": run.n_valid,
+        "bed_limited": run.limited,
         **{f"friction_{name}": count for name, count in run.events.items()},
         **{variable.name: run.coordinates[variable.key] for variable in group.layout.role("coordinate")},
         **{variable.name: run.metrics[variable.key] for variable in group.layout.role("metric")},
-    }  # fmt: skip
+    }
     for choice, variable in zip(experiment.cases.choices, group.layout.role("choice"), strict=True):
         values[variable.name] = [choice.value] * len(rows)
     for name in ("case_id", "case_key", "cause"):

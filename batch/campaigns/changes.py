@@ -115,8 +115,9 @@ class _Computed:
         if ((one == two) | (np.isnan(one) & np.isnan(two))).all():
             return
         sides = ((replace(old, unit="1"), one), (replace(new, unit="1"), two))
-        ends = [_apart(*(replace(each, value=float(end(column))) for each, column in sides))
-                for end in (np.min, np.max)]  # fmt: skip
+        ends = [
+            _apart(*(replace(each, value=float(end(column))) for each, column in sides)) for end in (np.min, np.max)
+        ]
         unit = "" if new.unit == "1" else f" {new.unit}"
         texts = [f"{low if low == high else f'{low} to {high}'}{unit}" for low, high in zip(*ends, strict=True)]
         text = " -> ".join(texts) if texts[0] != texts[1] else f"other values of {texts[0]}"
@@ -224,17 +225,28 @@ def _array(values: np.ndarray | None) -> np.ndarray:
 # Structures
 
 ENTITIES = {
-    "links": ("link", ("links.{}.",)), "joints": ("joint", ("{}.", "initial.{}.")),
-    "servos": ("servo of", ("{}.servo.",)), "environment": ("environment", ("environment.{}.",)),
-    "metrics": ("metric", ("metrics.{}.",)), "record": ("record:", ()),
+    "links": ("link", ("links.{}.",)),
+    "joints": ("joint", ("{}.", "initial.{}.")),
+    "servos": ("servo of", ("{}.servo.",)),
+    "environment": ("environment", ("environment.{}.",)),
+    "metrics": ("metric", ("metrics.{}.",)),
+    "record": ("record:", ()),
     "substitutions": ("bed of", ("{}.bed.", "{}.law.")),
-    "payloads": ("payload", ("payloads.{}.",)), "guides": ("guide", ("guides.{}.",)),
+    "payloads": ("payload", ("payloads.{}.",)),
+    "guides": ("guide", ("guides.{}.",)),
     "sensors": ("sensor", ("sensors.{}.",)),
-}  # fmt: skip
+}
 """Of the fields that hold several things: what one is called, and how the paths of its parameters begin."""
 
-WHOLE = {"joints": {"kind"}, "servos": {"model", "command"}, "environment": {"model"}, "metrics": {"model"},
-         "guides": {"model"}, "sensors": {"model"}, "substitutions": {"bed", "law"}}  # fmt: skip
+WHOLE = {
+    "joints": {"kind"},
+    "servos": {"model", "command"},
+    "environment": {"model"},
+    "metrics": {"model"},
+    "guides": {"model"},
+    "sensors": {"model"},
+    "substitutions": {"bed", "law"},
+}
 """Fields by whose change a thing has other parameters."""
 
 NOT_TOLD = frozenset({"channels", "words", "schedule", "base"})

@@ -106,8 +106,9 @@ class Driver:
 
     def check(self) -> None:
         """Raises TooManyFailures."""
-        failed = sum(count.failed for number, count in self.counts.items()
-                     if self.sections is None or number < self.sections)  # fmt: skip
+        failed = sum(
+            count.failed for number, count in self.counts.items() if self.sections is None or number < self.sections
+        )
         if self.max_failures is not None and failed > self.max_failures:
             cases = f"{failed:,} case{'s' if failed != 1 else ''} failed"
             raise TooManyFailures(f"{cases}, more than the {self.max_failures:,} allowed")
@@ -169,8 +170,11 @@ class _SectionWork:
         if outcome.kind == "lost" and tries < TRIES:
             self._again.append(task)
             return
-        status, why = (LOST, f"its worker {outcome.why}, {tries} times") if outcome.kind == "lost" else (
-            TIMED_OUT, f"timed out: {outcome.why}")  # fmt: skip
+        status, why = (
+            (LOST, f"its worker {outcome.why}, {tries} times")
+            if outcome.kind == "lost"
+            else (TIMED_OUT, f"timed out: {outcome.why}")
+        )
         shard.write(self._driver.folder.shards / task.name, tasks.not_run(self._section, task, status, why))
         count.done += 1
         count.failed += 1

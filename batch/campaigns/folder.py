@@ -162,11 +162,19 @@ class Folder:
                 rows = f"rows.{section.number}.npy"
                 with new_file(self.path / rows) as file:
                     np.save(file, section.rows)
-            told.append({
-                "number": section.number, "name": section.name, "again": section.number != section.experiment,
-                "experiment": section.experiment, "cases": len(section.rows), "rows": rows,
-                "recorded": section.recorded, "single": section.single, "code": section.code,
-            })  # fmt: skip
+            told.append(
+                {
+                    "number": section.number,
+                    "name": section.name,
+                    "again": section.number != section.experiment,
+                    "experiment": section.experiment,
+                    "cases": len(section.rows),
+                    "rows": rows,
+                    "recorded": section.recorded,
+                    "single": section.single,
+                    "code": section.code,
+                }
+            )
         data = {"schema": SCHEMA, "version": FORMAT, "met": VERSION, "deck": plan.deck, "sections": told, **about}
         put(self.path / "campaign.json", data)
 
@@ -324,20 +332,23 @@ def _checked(data: Any) -> dict[str, Any]:
     ValueError, LookupError, TypeError."""
     sections = data["sections"]
     good = (
-        data["schema"] == SCHEMA and data["version"] == FORMAT
+        data["schema"] == SCHEMA
+        and data["version"] == FORMAT
         and all(isinstance(data[name], str) for name in ("key", "archive", "deck"))
         and Path(data["archive"]).name == data["archive"] != ""
         and all(isinstance(word, str) or is_count(word) for word in data["histories"])
         and isinstance(data["float32"], bool)
         and [each["number"] for each in sections] == list(range(len(sections)))
-    )  # fmt: skip
+    )
     for each in sections if good else ():
         good = good and (
-            is_count(each["experiment"]) and is_count(each["cases"])
-            and isinstance(each["name"], str) and isinstance(each["code"], str)
+            is_count(each["experiment"])
+            and is_count(each["cases"])
+            and isinstance(each["name"], str)
+            and isinstance(each["code"], str)
             and each["rows"] in (None, f"rows.{each['number']}.npy")
             and all(isinstance(each[name], bool) for name in ("again", "recorded", "single"))
-        )  # fmt: skip
+        )
     if not good:
         raise ValueError("it is no description of a campaign")
     return dict(data)

@@ -85,8 +85,12 @@ def _with(found: Keep, word: str | int, experiments: Sequence[Experiment]) -> Ke
     near = [each for each in difflib.get_close_matches(name, SINGLE, n=1) if each != name]
     helps = [*(f"did you mean `{each}`?" for each in near), f"what may be kept: {WORDS}"]
     if "," in word:
-        helps.insert(0, "several words are given one by one: `" + " ".join(
-            f"--histories {each.strip()}" for each in word.split(",")) + "`")  # fmt: skip
+        helps.insert(
+            0,
+            "several words are given one by one: `"
+            + " ".join(f"--histories {each.strip()}" for each in word.split(","))
+            + "`",
+        )
     raise Problem(error("E351", f"histories `{word}` is none of the words that say what to keep", help=helps))
 
 

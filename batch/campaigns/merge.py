@@ -28,9 +28,13 @@ class Missing(Exception):
 
 
 def merge(
-    writer: ArchiveWriter, number: int, folder: Folder, values: CampaignSection, histories: CampaignSection | None,
+    writer: ArchiveWriter,
+    number: int,
+    folder: Folder,
+    values: CampaignSection,
+    histories: CampaignSection | None,
     progress: Callable[[int], None] = lambda _: None,
-) -> None:  # fmt: skip
+) -> None:
     """Write one experiment. Raises Missing.
 
     values     all of its cases;  histories: those that were run again for them

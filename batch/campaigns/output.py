@@ -25,9 +25,11 @@ from met.plan import Experiment, Plan
 
 
 def default_output(
-    plan: Plan, experiments: Sequence[str] | None = None, selected: Sequence[tuple[Experiment, np.ndarray]] = (),
+    plan: Plan,
+    experiments: Sequence[str] | None = None,
+    selected: Sequence[tuple[Experiment, np.ndarray]] = (),
     whole: int | None = None,
-) -> Path:  # fmt: skip
+) -> Path:
     """`two_link.h5`; `two_link.gains.h5` where runs are named; `two_link.gains.case7.h5` for some of the cases.
 
     They are named here, or were when the plan was made (`two_link.all.h5` where all were asked for).
@@ -135,6 +137,7 @@ def more_files() -> str:
 
 def busy(output: Path) -> Any:
     helps = [
-        f"`met status {quoted(output)}` says how far it is", "wait until it is done, or give another name with `-o`",
-    ]  # fmt: skip
+        f"`met status {quoted(output)}` says how far it is",
+        "wait until it is done, or give another name with `-o`",
+    ]
     return error("E307", f"cannot write {output}: another run is writing it now", help=helps)

@@ -129,9 +129,16 @@ class _CampaignWork:
     """A campaign on its way, in its folder."""
 
     def __init__(
-        self, campaign: Campaign, folder: Folder, values: list[CampaignSection], key: str, max_failures: int | None,
-        progress: Progress | None, say: Callable[[str], None], more: Callable[[], Mapping[str, Any]],
-    ) -> None:  # fmt: skip
+        self,
+        campaign: Campaign,
+        folder: Folder,
+        values: list[CampaignSection],
+        key: str,
+        max_failures: int | None,
+        progress: Progress | None,
+        say: Callable[[str], None],
+        more: Callable[[], Mapping[str, Any]],
+    ) -> None:
         self.campaign, self.folder, self.key, self.say, self.more = campaign, folder, key, say, more
         self.sections = {section.number: section for section in values}
         self.values = values
@@ -193,8 +200,11 @@ class _CampaignWork:
             self.folder.remove()
             return ""
         self.reporter.state(state)
-        left = sum(last - first for section in self.values
-                   for first, last in gaps(self.folder.named(section.number), len(section.rows)))  # fmt: skip
+        left = sum(
+            last - first
+            for section in self.values
+            for first, last in gaps(self.folder.named(section.number), len(section.rows))
+        )
         done = self.campaign.cases - left
         return f"{done:,} of {self.campaign.cases:,} cases are kept in {self.folder.path}; the same command goes on"
 
@@ -240,9 +250,13 @@ class _CampaignWork:
             for number, section in enumerate(self.values):
                 self.reporter.begin(f"{section.name}, merging", len(section.rows), 0, 0, "")
                 merge.merge(
-                    writer, number, self.folder, section, histories.get(number),
+                    writer,
+                    number,
+                    self.folder,
+                    section,
+                    histories.get(number),
                     lambda cases: self.reporter.advance(cases, 0),
-                )  # fmt: skip
+                )
                 self.reporter.end()
             writer.finish()
             sidecar = {
@@ -267,11 +281,20 @@ class _CampaignWork:
     def _timings(self) -> list[dict[str, Any]]:
         counts = self.driver.counts if self.driver else {}
         return [
-            {"experiment": section.name, "cases": len(section.rows),
-             "seconds": round(sum(counts[n].seconds for n, s in self.sections.items()
-                                  if s.experiment == section.experiment and n in counts), 6)}
+            {
+                "experiment": section.name,
+                "cases": len(section.rows),
+                "seconds": round(
+                    sum(
+                        counts[n].seconds
+                        for n, s in self.sections.items()
+                        if s.experiment == section.experiment and n in counts
+                    ),
+                    6,
+                ),
+            }
             for section in self.values
-        ]  # fmt: skip
+        ]
 
     def _tell_found(self, *, first: bool) -> None:
         driver = self.driver

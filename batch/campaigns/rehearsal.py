@@ -51,8 +51,14 @@ def rehearse(timeout: float | None, **asked: Any) -> None:
         return
     limit = None if timeout is None else max(timeout, LEAST_SECONDS)
     with tempfile.TemporaryFile() as words, tempfile.TemporaryFile() as told:
-        process = subprocess.Popen(interpreter.command("batch.campaigns.rehearsal"), stdin=subprocess.PIPE, stdout=told,
-                                   stderr=words, env=interpreter.environment(), start_new_session=True)  # fmt: skip
+        process = subprocess.Popen(
+            interpreter.command("batch.campaigns.rehearsal"),
+            stdin=subprocess.PIPE,
+            stdout=told,
+            stderr=words,
+            env=interpreter.environment(),
+            start_new_session=True,
+        )
         try:
             with suppress(BrokenPipeError):
                 assert process.stdin is not None

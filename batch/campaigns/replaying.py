@@ -55,8 +55,10 @@ def replay(
             rows[group.name] = set(group.values("case").tolist())
             positions[group.name] = group.values("case")[group.recorded_positions]
         if not cases and not failed and not everything:
-            helps = ("`--case '#7'` runs a case again, `--failed` all that failed, `--all` all",
-                     "`met show` lists the cases")  # fmt: skip
+            helps = (
+                "`--case '#7'` runs a case again, `--failed` all that failed, `--all` all",
+                "`met show` lists the cases",
+            )
             raise Problem(error("E357", f"which cases of {file.path} are to be run again?", help=helps))
         if not rows:
             raise Problem(error("E357", f"no case of {file.path} failed: there is nothing to run again"))

@@ -104,9 +104,10 @@ def _what(found: Sequence[str]) -> list[str]:
     """What has changed, and what to do."""
     most = [*found[:MOST_CHANGES], *([f"and {len(found) - MOST_CHANGES} more"] if len(found) > MOST_CHANGES else [])]
     return [
-        "changed since: " + most[0], *(f"               {each}" for each in most[1:]),
+        "changed since: " + most[0],
+        *(f"               {each}" for each in most[1:]),
         "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it",
-    ]  # fmt: skip
+    ]
 
 
 def goes_on(folder: Folder, key: str) -> bool:
@@ -153,9 +154,13 @@ def take_up(
 def describe(folder: Folder, campaign: Campaign, sections: Iterable[CampaignSection], key: str) -> None:
     """Write down in the folder what is computed there."""
     folder.describe(
-        campaign.plan, sections, key=key, archive=campaign.output.name, histories=campaign.words,
+        campaign.plan,
+        sections,
+        key=key,
+        archive=campaign.output.name,
+        histories=campaign.words,
         float32=any(part.single for part in campaign.parts),
-    )  # fmt: skip
+    )
 
 
 def described(folder: Folder) -> Campaign:
@@ -168,9 +173,12 @@ def described(folder: Folder) -> Campaign:
     first = sorted((section for section in folder.sections().values()), key=lambda section: section.number)
     selected = [(each.prepared.experiment, each.rows) for each in first[: len(plan.experiments)]]
     return prepare(
-        plan, output=folder.path.with_name(told["archive"]), selected=selected, histories=told["histories"],
+        plan,
+        output=folder.path.with_name(told["archive"]),
+        selected=selected,
+        histories=told["histories"],
         float32=told["float32"],
-    )  # fmt: skip
+    )
 
 
 def _of_another(folder: Folder, campaign: Campaign, values: Sequence[CampaignSection], told: dict[str, Any]) -> Any:

@@ -23,9 +23,17 @@ STALE_SECONDS = 30.0
 
 
 TYPES: dict[str, type | tuple[type, ...]] = {
-    "state": str, "pid": int, "host": str, "workers": str, "cases": int, "failed": int, "updated": (int, float),
-    "section_done": int, "section_began": (int, float), "at_first": int,
-}  # fmt: skip
+    "state": str,
+    "pid": int,
+    "host": str,
+    "workers": str,
+    "cases": int,
+    "failed": int,
+    "updated": (int, float),
+    "section_done": int,
+    "section_began": (int, float),
+    "at_first": int,
+}
 """What a status file has at least."""
 
 
@@ -37,17 +45,31 @@ class Reporter:
         self._progress = progress
         self._next = 0.0
         self._told: dict[str, Any] = {
-            "state": "starting", "pid": os.getpid(), "host": socket.gethostname(), "began": time.time(), "cases": cases,
-            "failed": 0, "at_first": 0, "workers": "", "section_done": 0, "section_began": time.time(),
-        }  # fmt: skip
+            "state": "starting",
+            "pid": os.getpid(),
+            "host": socket.gethostname(),
+            "began": time.time(),
+            "cases": cases,
+            "failed": 0,
+            "at_first": 0,
+            "workers": "",
+            "section_done": 0,
+            "section_began": time.time(),
+        }
         self._before: dict[str, tuple[int, int]] = {}
         self._name = ""
 
     def begin(self, name: str, cases: int, done: int, failed: int, workers: str) -> None:
         """A section starts, or is taken up again."""
         self._name = name
-        self._told |= {"state": "running", "section": name, "section_cases": cases, "workers": workers,
-                       "section_began": time.time(), "at_first": done}  # fmt: skip
+        self._told |= {
+            "state": "running",
+            "section": name,
+            "section_cases": cases,
+            "workers": workers,
+            "section_began": time.time(),
+            "at_first": done,
+        }
         self._take(done, failed)
         self._write()
         if self._progress is not None:
@@ -110,10 +132,9 @@ def report(folder: Folder, now: float) -> dict[str, Any]:
     told_here = folder.described()
     for each in told_here["sections"]:
         left = sum(last - first for first, last in gaps(folder.named(each["number"]), each["cases"]))
-        sections.append({
-            "name": each["name"], "cases": each["cases"], "done": each["cases"] - left,
-            "again": each["again"],
-        })  # fmt: skip
+        sections.append(
+            {"name": each["name"], "cases": each["cases"], "done": each["cases"] - left, "again": each["again"]}
+        )
     workers = []
     for each in told(folder):
         rate = None
@@ -121,14 +142,27 @@ def report(folder: Folder, now: float) -> dict[str, Any]:
         seconds = each["updated"] - each["section_began"]
         if done > 0 and seconds > 0:
             rate = done / seconds
-        workers.append({
-            "job": each["name"], "state": each["state"] if alive(each, now) or each["state"] not in AT_WORK else "died",
-            "host": each["host"], "pid": each["pid"], "workers": each["workers"], "cases": each["cases"],
-            "done": each["section_done"], "failed": each["failed"], "cases_per_s": rate,
-            "seconds_ago": max(0.0, now - each["updated"]),
-        })  # fmt: skip
-    return {"folder": str(folder.path), "archive": told_here["archive"], "deck": told_here["deck"],
-            "sections": sections, "workers": workers}  # fmt: skip
+        workers.append(
+            {
+                "job": each["name"],
+                "state": each["state"] if alive(each, now) or each["state"] not in AT_WORK else "died",
+                "host": each["host"],
+                "pid": each["pid"],
+                "workers": each["workers"],
+                "cases": each["cases"],
+                "done": each["section_done"],
+                "failed": each["failed"],
+                "cases_per_s": rate,
+                "seconds_ago": max(0.0, now - each["updated"]),
+            }
+        )
+    return {
+        "folder": str(folder.path),
+        "archive": told_here["archive"],
+        "deck": told_here["deck"],
+        "sections": sections,
+        "workers": workers,
+    }
 
 
 def lines(data: dict[str, Any]) -> list[str]:
@@ -138,8 +172,14 @@ def lines(data: dict[str, Any]) -> list[str]:
     first = [each for each in data["sections"] if not each["again"]]
     cases, done = (sum(each[name] for each in first) for name in ("cases", "done"))
     out = [f"{data['folder']}: {done:,} of {cases:,} cases are done"]
-    rows = [[each["name"] + (", again for histories" if each["again"] else ""), f"{each['done']:,}",
-             f"of {each['cases']:,}"] for each in data["sections"]]  # fmt: skip
+    rows = [
+        [
+            each["name"] + (", again for histories" if each["again"] else ""),
+            f"{each['done']:,}",
+            f"of {each['cases']:,}",
+        ]
+        for each in data["sections"]
+    ]
     out += columns(rows, right=(1, 2)) if len(rows) > 1 else []
     working = [each for each in data["workers"] if each["state"] in AT_WORK]
     rates = [each["cases_per_s"] for each in working if each["cases_per_s"]]
@@ -151,9 +191,7 @@ def lines(data: dict[str, Any]) -> list[str]:
     for each in data["workers"]:
         failed = f"{each['failed']:,} failed" if each["failed"] else ""
         job, ago = f"job {each['job']}" if each["job"] else "", f"{duration(each['seconds_ago'])} ago"
-        rows.append([
-            job, each["state"], f"on {each['host']}", f"process {each['pid']}", each["workers"], failed, ago,
-        ])  # fmt: skip
+        rows.append([job, each["state"], f"on {each['host']}", f"process {each['pid']}", each["workers"], failed, ago])
     out += columns(rows, right=())
     if not working and done < cases:
         out.append("  nobody is at work: the command that began it goes on")

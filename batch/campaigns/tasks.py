@@ -100,9 +100,14 @@ class Done:
 
 
 def carry_out(
-    section: CampaignSection, task: Task, folder: Path, *, threads: int | None = None,
-    progress: Callable[[int], None] | None = None, computed: Callable[[], None] = lambda: None,
-) -> Done:  # fmt: skip
+    section: CampaignSection,
+    task: Task,
+    folder: Path,
+    *,
+    threads: int | None = None,
+    progress: Callable[[int], None] | None = None,
+    computed: Callable[[], None] = lambda: None,
+) -> Done:
     """Run a task's cases and write its shard into the folder. computed: called in between."""
     found = compute(section, task, threads=threads, progress=progress)
     computed()

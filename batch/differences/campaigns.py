@@ -57,9 +57,14 @@ def diff(a: str | Path, b: str | Path, given: Tolerances | None = None, *, distr
         plans = [_plan(file) for file in (file_a, file_b)]
         found = tuple(_experiment(one, two, allowed, plans[1], distributions) for one, two in pairs)
         return Diff(
-            Path(a), Path(b), allowed, changed(file_a, file_b, pairs, plans), found,
-            tuple(group.name for group in only_a), tuple(group.name for group in only_b),
-        )  # fmt: skip
+            Path(a),
+            Path(b),
+            allowed,
+            changed(file_a, file_b, pairs, plans),
+            found,
+            tuple(group.name for group in only_a),
+            tuple(group.name for group in only_b),
+        )
 
 
 def _check(allowed: Tolerances, groups: Sequence[ArchiveGroup]) -> None:
@@ -151,17 +156,26 @@ def _ended(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: Experim
     names = ("case", "case_id", "cause")
     told = {name: (a.at(name, matched.a[places]), b.at(name, matched.b[places])) for name in names}
     for i, place in enumerate(places.tolist()):
-        out.ended.append(EndingDiff(
-            int(told["case"][1][i]), str(told["case_id"][1][i]), int(here[place]), int(there[place]),
-            str(told["cause"][0][i]), str(told["cause"][1][i]), int(rows[0][matched.a[place]]),
-            int(rows[1][matched.b[place]]),
-        ))  # fmt: skip
+        out.ended.append(
+            EndingDiff(
+                int(told["case"][1][i]),
+                str(told["case_id"][1][i]),
+                int(here[place]),
+                int(there[place]),
+                str(told["cause"][0][i]),
+                str(told["cause"][1][i]),
+                int(rows[0][matched.a[place]]),
+                int(rows[1][matched.b[place]]),
+            )
+        )
 
 
 COUNTS = {
-    "friction_splits": "steps that friction split", "friction_clamped": "rates that friction clamped",
-    "friction_undecided": "modes of friction that were left open", "bed_limited": "ticks at a bed's limit",
-}  # fmt: skip
+    "friction_splits": "steps that friction split",
+    "friction_clamped": "rates that friction clamped",
+    "friction_undecided": "modes of friction that were left open",
+    "bed_limited": "ticks at a bed's limit",
+}
 """What is counted of each case besides what it records."""
 
 
@@ -202,10 +216,20 @@ class _Scores:
         case_a, case_b = a.at("case", matched.a[places]), b.at("case", matched.b[places])
         ids = b.at("case_id", matched.b[places])
         return [
-            Ranked(int(case_a[i]), int(case_b[i]), str(ids[i]), name, float(self.score[place]), where, difference,
-                   by_name[name].deck_unit, by_name[name].deck_scale)
-            for i, place in enumerate(places) for name, where, difference in [self.where[place]]
-        ]  # fmt: skip
+            Ranked(
+                int(case_a[i]),
+                int(case_b[i]),
+                str(ids[i]),
+                name,
+                float(self.score[place]),
+                where,
+                difference,
+                by_name[name].deck_unit,
+                by_name[name].deck_scale,
+            )
+            for i, place in enumerate(places)
+            for name, where, difference in [self.where[place]]
+        ]
 
 
 # Metrics
@@ -233,8 +257,9 @@ def _metric(
         return out
     case = int(b.at("case", [matched.b[found.row]])[0])
     _add(out, found, DiffPlace(case, "", float("nan"), found.before, found.after))
-    unlike = np.flatnonzero((values_a.view(np.int64) != values_b.view(np.int64))
-                            & ~(np.isnan(values_a) & np.isnan(values_b)))  # fmt: skip
+    unlike = np.flatnonzero(
+        (values_a.view(np.int64) != values_b.view(np.int64)) & ~(np.isnan(values_a) & np.isnan(values_b))
+    )
     scores.unlike[unlike] = True
     out.identical = out.compared - len(unlike)
     out.different = found.beyond
@@ -245,9 +270,15 @@ def _metric(
 
 
 def _rank_metric(
-    out: SignalDiff, a: np.ndarray, b: np.ndarray, allowed: SignalTolerance, unlike: np.ndarray, scores: _Scores, group: ArchiveGroup,
+    out: SignalDiff,
+    a: np.ndarray,
+    b: np.ndarray,
+    allowed: SignalTolerance,
+    unlike: np.ndarray,
+    scores: _Scores,
+    group: ArchiveGroup,
     matched: MatchedCases,
-) -> None:  # fmt: skip
+) -> None:
     with np.errstate(invalid="ignore", over="ignore"):
         apart = np.abs(b[unlike] - a[unlike])
         limit = allowed.absolute + allowed.relative * magnitude(a[unlike], b[unlike])
@@ -304,8 +335,10 @@ def _signals(
         about.partial = True
     aligned = len(rows_a) == len(time_a) == len(time_b)
     whole = slice(None)
-    at_a, at_b = (whole if np.array_equal(rows, np.arange(len(time))) else rows
-                  for rows, time in ((rows_a, time_a), (rows_b, time_b)))  # fmt: skip
+    at_a, at_b = (
+        whole if np.array_equal(rows, np.arange(len(time))) else rows
+        for rows, time in ((rows_a, time_a), (rows_b, time_b))
+    )
     numbers = b.values("recorded_case")[ib] if len(ib) else ib
     for name in names:
         unit = (a if name in a.variables else b).variables[name].unit
@@ -335,8 +368,17 @@ def _signals(
                 if which.any():
                     passed = Passed(time_b[rows_b], time_a, values_a[which])
                     values_b = values_b[which][:, at_b]
-                    worst += _cases(out, passed, values_b, rows_a, labels, absolute, scores, places[some][which],
-                                    numbers[some][which])  # fmt: skip
+                    worst += _cases(
+                        out,
+                        passed,
+                        values_b,
+                        rows_a,
+                        labels,
+                        absolute,
+                        scores,
+                        places[some][which],
+                        numbers[some][which],
+                    )
                     worst = sorted(worst, key=lambda each: -each[0])[:WORST]
             unit_of = _unit_of(out)
             for most, place, where, largest in worst:
@@ -366,9 +408,16 @@ def _absolute(group: ArchiveGroup, signal: Stored, found: SignalDiff) -> np.ndar
 
 
 def _cases(
-    out: SignalDiff, passed: Passed, b: np.ndarray, rows: np.ndarray, labels: Sequence[str], absolute: np.ndarray | None,
-    scores: _Scores, places: np.ndarray, numbers: np.ndarray,
-) -> Iterator[tuple[float, int, DiffPlace, float]]:  # fmt: skip
+    out: SignalDiff,
+    passed: Passed,
+    b: np.ndarray,
+    rows: np.ndarray,
+    labels: Sequence[str],
+    absolute: np.ndarray | None,
+    scores: _Scores,
+    places: np.ndarray,
+    numbers: np.ndarray,
+) -> Iterator[tuple[float, int, DiffPlace, float]]:
     """Cases of a signal whose bits are not all the same, or may not be. rows: of a, to which those of b belong; places:
     of the cases among those that are matched; numbers: in the case table of b. Those beyond: how far, and where."""
     time = passed.times[rows]

@@ -114,8 +114,11 @@ def _meaning(
     of: dict[tuple[int, str], list[str]] = {}
     for one, two in several:
         old, new = _experiment(before, one), _experiment(now, two)
-        fresh = {path: quantity for path, quantity in new.parameters.items()
-                 if path not in old.parameters and quantity.origin.kind == "default"}  # fmt: skip
+        fresh = {
+            path: quantity
+            for path, quantity in new.parameters.items()
+            if path not in old.parameters and quantity.origin.kind == "default"
+        }
         for each in between(old, new, ordered=False):
             path = each.text.partition(" is new")[0]
             kind = 2 if path in fresh and not each.follows else int(_follows(each, texts))

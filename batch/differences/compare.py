@@ -52,9 +52,12 @@ class Difference:
 
 
 def compare(
-    a: np.ndarray, b: np.ndarray, allowed: SignalTolerance, time: np.ndarray | None = None,
+    a: np.ndarray,
+    b: np.ndarray,
+    allowed: SignalTolerance,
+    time: np.ndarray | None = None,
     absolute: np.ndarray | None = None,
-) -> Difference | None:  # fmt: skip
+) -> Difference | None:
     """None where all bits are the same. time: s of each row, where `allowed` has a tolerance of time; absolute: of each
     column, where `allowed.absolute` is not for all."""
     return compare_cases(a[None], b[None], allowed, None if time is None else Passed(time, time, a[None]), absolute)[0]
@@ -97,9 +100,12 @@ def _flat(values: np.ndarray) -> np.ndarray:
 
 
 def compare_cases(
-    a: np.ndarray, b: np.ndarray, allowed: SignalTolerance, passed: Passed | None = None,
+    a: np.ndarray,
+    b: np.ndarray,
+    allowed: SignalTolerance,
+    passed: Passed | None = None,
     absolute: np.ndarray | None = None,
-) -> list[Difference | None]:  # fmt: skip
+) -> list[Difference | None]:
     """As `compare`, of several cases at once, [case, row, column]: one result a case. passed: where `allowed` has a
     tolerance of time."""
     shape = a.shape
@@ -140,9 +146,19 @@ def compare_cases(
         squares = np.square(apart if finite.all() else np.where(finite, apart, 0.0)).sum(axis=1)
     firsts_beyond = np.where(counts > 0, beyond.argmax(axis=1) // shape[2], -1)
     found = (
-        counts, nans, sizes.max(axis=1), places // shape[2], places % shape[2], a[each, places], b[each, places],
-        squares, finite.sum(axis=1), firsts // shape[2], firsts_beyond, used,
-    )  # fmt: skip
+        counts,
+        nans,
+        sizes.max(axis=1),
+        places // shape[2],
+        places % shape[2],
+        a[each, places],
+        b[each, places],
+        squares,
+        finite.sum(axis=1),
+        firsts // shape[2],
+        firsts_beyond,
+        used,
+    )
     rows = zip(*(array.tolist() for array in found), strict=True)
     return [Difference(*row) if some else None for some, row in zip(unlike.any(axis=1).tolist(), rows, strict=True)]
 

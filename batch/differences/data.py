@@ -14,27 +14,45 @@ SCHEMA, VERSION = "met.diff", 2
 def as_data(found: Diff) -> dict[str, Any]:
     """Plain data; a number that is not finite is null."""
     data = {
-        "schema": SCHEMA, "version": VERSION, "a": str(found.a), "b": str(found.b), "verdict": found.verdict,
+        "schema": SCHEMA,
+        "version": VERSION,
+        "a": str(found.a),
+        "b": str(found.b),
+        "verdict": found.verdict,
         "changed": dataclasses.asdict(found.changed),
-        "only_a": list(found.only_a), "only_b": list(found.only_b),
+        "only_a": list(found.only_a),
+        "only_b": list(found.only_b),
         "experiments": [_experiment(each) for each in found.experiments],
-    }  # fmt: skip
+    }
     plain: dict[str, Any] = finite(data)
     return plain
 
 
 def _experiment(found: ExperimentDiff) -> dict[str, Any]:
     return {
-        "name_a": found.name_a, "name_b": found.name_b, "verdict": found.verdict, "cases": found.cases.count,
+        "name_a": found.name_a,
+        "name_b": found.name_b,
+        "verdict": found.verdict,
+        "cases": found.cases.count,
         "tolerances": {
-            "relative": found.tolerances.relative, "time": found.tolerances.time,
+            "relative": found.tolerances.relative,
+            "time": found.tolerances.time,
             "absolute": {name: size for name, (size, _) in found.tolerances.absolute.items()},
         },
-        "cases_different": found.cases_different, "only_a": found.only_a, "only_b": found.only_b,
+        "cases_different": found.cases_different,
+        "only_a": found.only_a,
+        "only_b": found.only_b,
         "ended": [dataclasses.asdict(each) for each in found.ended],
         "requirements": [
-            {"text": each.now, "text_a": each.before, "met_a": each.met_before, "met_b": each.met_now,
-             "gained": each.gained, "lost": each.lost, "other": each.other}
+            {
+                "text": each.now,
+                "text_a": each.before,
+                "met_a": each.met_before,
+                "met_b": each.met_now,
+                "gained": each.gained,
+                "lost": each.lost,
+                "other": each.other,
+            }
             for each in found.requirements
         ],
         "required_in_one": found.required_in_one,
@@ -42,15 +60,30 @@ def _experiment(found: ExperimentDiff) -> dict[str, Any]:
         "worst": [dataclasses.asdict(each) for each in found.worst],
         "distributions": [{**dataclasses.asdict(each), "unlike": each.unlike} for each in found.samples],
         "notes": found.notes,
-    }  # fmt: skip
+    }
 
 
 def _signal(found: SignalDiff) -> dict[str, Any]:
-    kept = ("name", "unit", "metric", "compared", "identical", "equivalent", "different", "largest", "first",
-            "first_beyond", "used", "nan", "why")  # fmt: skip
+    kept = (
+        "name",
+        "unit",
+        "metric",
+        "compared",
+        "identical",
+        "equivalent",
+        "different",
+        "largest",
+        "first",
+        "first_beyond",
+        "used",
+        "nan",
+        "why",
+    )
     return {
-        **{name: getattr(found, name) for name in kept}, "verdict": found.verdict, "rms": found.rms,
+        **{name: getattr(found, name) for name in kept},
+        "verdict": found.verdict,
+        "rms": found.rms,
         "share": found.share,
         "place": None if found.place is None else dataclasses.asdict(found.place),
         "tolerance": {**dataclasses.asdict(found.tolerance), "by_joint": found.by_joint},
-    }  # fmt: skip
+    }

@@ -94,8 +94,10 @@ def _pairs(a: Mapping[str, str], b: Mapping[str, str]) -> list[tuple[str, str]]:
         pairs[heads[0]] = heads[1]
     left = [name for name in a if name not in pairs][:MOST_MOVED]
     rest = [name for name in b if name not in pairs.values()]
-    lines = [{name: Counter(texts[name].splitlines()) for name in names[:MOST_MOVED]}
-             for texts, names in ((a, left), (b, rest))]  # fmt: skip
+    lines = [
+        {name: Counter(texts[name].splitlines()) for name in names[:MOST_MOVED]}
+        for texts, names in ((a, left), (b, rest))
+    ]
     for name in left:
         alike = {each: _alike(name, each, lines[0][name], lines[1][each]) for each in rest if each in lines[1]}
         near = max(alike, key=alike.__getitem__, default="")
@@ -156,8 +158,10 @@ def _unified(before: Sequence[str], now: Sequence[str]) -> Iterator[str]:
 def _names(a: Mapping[str, str], b: Mapping[str, str]) -> Iterator[str]:
     """`let`s and macros of both decks that have another text; one that is written several times is left to its
     lines."""
-    old, new = (_written({name: text for name, text in mine.items() if other.get(name) != text})
-                for mine, other in ((a, b), (b, a)))  # fmt: skip
+    old, new = (
+        _written({name: text for name, text in mine.items() if other.get(name) != text})
+        for mine, other in ((a, b), (b, a))
+    )
     for key in dict.fromkeys([*old, *new]):
         before, now = old.get(key, []), new.get(key, [])
         if [text for text, _ in before] == [text for text, _ in now] or max(len(before), len(now)) > 1:

@@ -19,8 +19,13 @@ def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases
     known_a, known_b = ({each.text: each for each in requirements.required(group)} for group in (a, b))
     now = {text: text for text in met_a if text in met_b}
     for mine in known_a.values():
-        alike = [each.text for each in known_b.values() if (each.metric, each.comparison[:1]) == (
-            mine.metric, mine.comparison[:1]) and each.text not in met_a and each.text not in now.values()]  # fmt: skip
+        alike = [
+            each.text
+            for each in known_b.values()
+            if (each.metric, each.comparison[:1]) == (mine.metric, mine.comparison[:1])
+            and each.text not in met_a
+            and each.text not in now.values()
+        ]
         if mine.text not in now and alike:
             now[mine.text] = alike[0]
     for text, here in met_a.items():
@@ -28,13 +33,22 @@ def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases
             there = met_b[now[text]]
             one, other = known_a.get(text), known_b.get(now[text])
             gained, lost = int((there & ~here).sum()), int((here & ~there).sum())
-            out.requirements.append(RequirementDiff(
-                text, now[text], int(here.sum()), int(there.sum()), gained, lost, _unlike(one, other),
-                _limits(b, one, other) if text == now[text] else ("", ""),
-            ))  # fmt: skip
+            out.requirements.append(
+                RequirementDiff(
+                    text,
+                    now[text],
+                    int(here.sum()),
+                    int(there.sum()),
+                    gained,
+                    lost,
+                    _unlike(one, other),
+                    _limits(b, one, other) if text == now[text] else ("", ""),
+                )
+            )
             if gained == lost > 0:
-                out.notes.append(f"require {now[text]} is met by as many as before, but by others: "
-                                 f"{lost:,} no more, {gained:,} now")  # fmt: skip
+                out.notes.append(
+                    f"require {now[text]} is met by as many as before, but by others: {lost:,} no more, {gained:,} now"
+                )
     for known, others, path in ((met_a, now, a.path), (met_b, now.values(), b.path)):
         for text, met in known.items():
             if text not in others:

@@ -58,8 +58,9 @@ def cases(a: ArchiveGroup, b: ArchiveGroup) -> MatchedCases:
     found_a, found_b = order_a[in_a], order_b[in_b]
     by_a = np.argsort(found_a, kind="stable")
     found_a, found_b = found_a[by_a], found_b[by_a]
-    only_a, only_b = (np.flatnonzero(~np.isin(np.arange(len(keys)), found)) for keys, found in
-                      ((keys_a, found_a), (keys_b, found_b)))  # fmt: skip
+    only_a, only_b = (
+        np.flatnonzero(~np.isin(np.arange(len(keys)), found)) for keys, found in ((keys_a, found_a), (keys_b, found_b))
+    )
     return MatchedCases(found_a, found_b, only_a, only_b)
 
 

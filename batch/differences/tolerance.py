@@ -143,8 +143,10 @@ def check(found: Tolerances, known: Mapping[str, Sequence[str]], shown: Sequence
             raise _wrong(f"tolerance of `{name}`: neither archive has such a signal or metric", *helps)
         if len(known[name]) > 1:
             parts = [part for part in known if part.endswith(f".{name}")]
-            raise _wrong(f"tolerance of `{name}`: it is in {' and in '.join(known[name])}",
-                         f"give each joint its own: {', '.join(parts)}")  # fmt: skip
+            raise _wrong(
+                f"tolerance of `{name}`: it is in {' and in '.join(known[name])}",
+                f"give each joint its own: {', '.join(parts)}",
+            )
         [wanted] = known[name]
         if not fits(written, known[name]):
             unit = written.partition(" ")[2]

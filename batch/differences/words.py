@@ -60,8 +60,9 @@ def missing(found: Diff, experiment: ExperimentDiff) -> list[str]:
     """Cases that one archive has alone."""
     return [
         f"{len(cases):,} case{'s' if len(cases) > 1 else ''} only in {where}: {ranges(cases)}"
-        for cases, where in ((experiment.only_a, found.a), (experiment.only_b, found.b)) if cases
-    ]  # fmt: skip
+        for cases, where in ((experiment.only_a, found.a), (experiment.only_b, found.b))
+        if cases
+    ]
 
 
 def allowed(found: Diff, experiment: ExperimentDiff) -> list[str]:
@@ -74,8 +75,11 @@ def allowed(found: Diff, experiment: ExperimentDiff) -> list[str]:
 def requirements(experiment: ExperimentDiff) -> list[str]:
     """Those that are others, or are met by another number of cases."""
     count = experiment.cases.count
-    return [f"require {required(each)}  {requirement(each.met_before, each.met_now, count)}"
-            for each in experiment.requirements if each.told]  # fmt: skip
+    return [
+        f"require {required(each)}  {requirement(each.met_before, each.met_now, count)}"
+        for each in experiment.requirements
+        if each.told
+    ]
 
 
 def required(each: RequirementDiff) -> str:
@@ -106,10 +110,13 @@ def endings(experiment: ExperimentDiff) -> list[Ending]:
         kinds.setdefault(_kind(each), []).append(each)
     order = sorted(kinds, key=lambda kind: not kind.startswith(("fail", "are timed", "are lost")))
     return [
-        Ending(f"{len(cases):,} case{'s' if len(cases) > 1 else ''} {_one(kind, len(cases))}",
-               ranges(sorted(each.case for each in cases)), tuple(cases))
+        Ending(
+            f"{len(cases):,} case{'s' if len(cases) > 1 else ''} {_one(kind, len(cases))}",
+            ranges(sorted(each.case for each in cases)),
+            tuple(cases),
+        )
         for kind, cases in ((kind, kinds[kind]) for kind in order)
-    ]  # fmt: skip
+    ]
 
 
 def _kind(each: EndingDiff) -> str:
@@ -366,8 +373,11 @@ def _other_requirements(experiment: ExperimentDiff) -> list[str]:
         if each.other:
             before, now = each.limits
             change = f"{each.now}, limit {before} -> {now}" if now else f"{each.before} -> {each.now}"
-            moved = [f"{count:,}{of} cases {text}" for count, text in (
-                (each.lost, "no longer meet it"), (each.gained, "meet it now")) if count]  # fmt: skip
+            moved = [
+                f"{count:,}{of} cases {text}"
+                for count, text in ((each.lost, "no longer meet it"), (each.gained, "meet it now"))
+                if count
+            ]
             out.append(f"{change} ({', '.join(moved) or 'met by the same cases'})")
     return [*out, *(text.removeprefix("require ") for text in experiment.required_in_one)]
 

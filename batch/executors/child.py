@@ -43,10 +43,13 @@ class Child:
         self._words = tempfile.TemporaryFile()  # noqa: SIM115 - what it says on stderr, while it lives
         try:
             self._process = subprocess.Popen(
-                [*command, str(folder.resolve()), "--threads", str(threads)], stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE, stderr=self._words, env={**interpreter.environment(), "OMP_NUM_THREADS": "1"},
+                [*command, str(folder.resolve()), "--threads", str(threads)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._words,
+                env={**interpreter.environment(), "OMP_NUM_THREADS": "1"},
                 start_new_session=True,
-            )  # fmt: skip
+            )
         except OSError:
             self._words.close()
             raise
@@ -140,8 +143,9 @@ def _no_start(reason: OSError) -> str:
 class Crew:
     """Children that are taken for one task after the other; whoever calls waits. Several may call at once."""
 
-    def __init__(self, folder: Path, *, threads: int = 1, timeout: float | None = None,
-                 command: Sequence[str] = COMMAND) -> None:  # fmt: skip
+    def __init__(
+        self, folder: Path, *, threads: int = 1, timeout: float | None = None, command: Sequence[str] = COMMAND
+    ) -> None:
         self._folder, self._threads, self._timeout, self._command = folder, threads, timeout, command
         self._all: list[Child] = []
         self._idle: list[Child] = []

@@ -75,9 +75,13 @@ class Dask:
     """
 
     def __init__(
-        self, dask: object, *, threads: int | None = None, timeout: float | None = None,
+        self,
+        dask: object,
+        *,
+        threads: int | None = None,
+        timeout: float | None = None,
         say: Callable[[str], None] = _say,
-    ) -> None:  # fmt: skip
+    ) -> None:
         check(dask)
         self.under_way = 0
         self._dask, self._threads, self._timeout, self._say = dask, threads or 1, timeout, say
@@ -194,9 +198,15 @@ class Dask:
 
         key = f"{self._name}-{task.name}-{uuid.uuid4().hex}"
         order = {
-            "folder": str(self._folder), "token": self._token, "version": VERSION, "campaign": self._name, "key": key,
-            "task": [task.section, task.first, task.last], "threads": self._threads, "timeout": self._timeout,
-        }  # fmt: skip
+            "folder": str(self._folder),
+            "token": self._token,
+            "version": VERSION,
+            "campaign": self._name,
+            "key": key,
+            "task": [task.section, task.first, task.last],
+            "threads": self._threads,
+            "timeout": self._timeout,
+        }
         dask_future = None
         try:
             told = {"errand": ERRAND, "told": {"order": order}}

@@ -31,8 +31,13 @@ def check(dask: object) -> None:
     if not isinstance(dask, Client):
         raise TypeError(f'dask is the address of a scheduler, "local" or a Client, and not {type(dask).__name__}')
     if dask.asynchronous:
-        raise Problem(error("E356", "the Dask client is asynchronous, and batch.run is not",
-                            help="a Client made without `asynchronous=True` serves it"))  # fmt: skip
+        raise Problem(
+            error(
+                "E356",
+                "the Dask client is asynchronous, and batch.run is not",
+                help="a Client made without `asynchronous=True` serves it",
+            )
+        )
 
 
 @contextmanager
@@ -130,12 +135,19 @@ def _started(threads: int) -> Iterator[Any]:
         tempfile.TemporaryDirectory(prefix="met-dask-", ignore_cleanup_errors=True) as scratch,
         # the memory that tasks take is that of the worker's children, which Dask's limit does not count
         LocalCluster(
-            n_workers=1, threads_per_worker=at_once, processes=False, protocol="inproc://", memory_limit=0,
-            local_directory=scratch, dashboard_address=nowhere, worker_dashboard_address=nowhere,
-            scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL,
+            n_workers=1,
+            threads_per_worker=at_once,
+            processes=False,
+            protocol="inproc://",
+            memory_limit=0,
+            local_directory=scratch,
+            dashboard_address=nowhere,
+            worker_dashboard_address=nowhere,
+            scheduler_kwargs={"dashboard": False},
+            silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
-    ):  # fmt: skip
+    ):
         for each in (cluster.scheduler, *cluster.workers.values()):
             each.http_server.stop()  # each has one to be looked at with, which cannot be declined
         yield client

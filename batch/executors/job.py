@@ -49,8 +49,11 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
         timeout = asked["timeout"]
         sections = folder.sections()
         for task in itertools.chain(*dealt):
-            if not (is_count(task.section, len(sections) - 1) and is_count(task.first, task.last - 1)
-                    and is_count(task.last, len(sections[task.section].rows))):  # fmt: skip
+            if not (
+                is_count(task.section, len(sections) - 1)
+                and is_count(task.first, task.last - 1)
+                and is_count(task.last, len(sections[task.section].rows))
+            ):
                 raise ValueError(task)
         if timeout is not None and not (isinstance(timeout, int | float) and timeout > 0):
             raise ValueError(timeout)
@@ -96,8 +99,11 @@ def _left(wanted: Sequence[Task], there: Sequence[Task]) -> list[tuple[int, int]
     """Stretches of the wanted tasks that no shard covers, by its name: what it holds is proved when all is merged."""
     out = []
     for task in wanted:
-        inside = [Task(t.section, max(t.first, task.first) - task.first, min(t.last, task.last) - task.first)
-                  for t in there if t.first < task.last and t.last > task.first]  # fmt: skip
+        inside = [
+            Task(t.section, max(t.first, task.first) - task.first, min(t.last, task.last) - task.first)
+            for t in there
+            if t.first < task.last and t.last > task.first
+        ]
         out += [(task.first + first, task.first + last) for first, last in gaps(inside, task.cases)]
     return out
 

@@ -18,9 +18,13 @@ class Processes:
     """As many processes as asked for, each with its share of the cores."""
 
     def __init__(
-        self, processes: int | None = None, *, threads: int | None = None, timeout: float | None = None,
+        self,
+        processes: int | None = None,
+        *,
+        threads: int | None = None,
+        timeout: float | None = None,
         command: Sequence[str] = COMMAND,
-    ) -> None:  # fmt: skip
+    ) -> None:
         cores = len(os.sched_getaffinity(0))
         self.workers = processes or cores
         self.about = f"{self.workers} process{'es' if self.workers > 1 else ''}"

@@ -117,8 +117,11 @@ def shares(missing: Sequence[Task], count: int) -> list[list[Task]]:
     """What is missing, cut into stretches and dealt out, so that each job has about as many cases, from everywhere."""
     whole = sum(task.cases for task in missing)
     each = max(GRANULE, -(-whole // (count * STRIPES * GRANULE)) * GRANULE)
-    pieces = [Task(task.section, first, min(first + each, task.last)) for task in missing
-              for first in range(task.first, task.last, each)]  # fmt: skip
+    pieces = [
+        Task(task.section, first, min(first + each, task.last))
+        for task in missing
+        for first in range(task.first, task.last, each)
+    ]
     return [pieces[number::count] for number in range(count)]
 
 

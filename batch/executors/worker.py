@@ -64,9 +64,13 @@ def main(arguments: list[str]) -> None:
             section.prepared.kernel  # noqa: B018 - compiled here, so that a case's time does not begin before
             parent.tell(begun=[])
             done = tasks.carry_out(
-                section, task, folder.shards, threads=threads, progress=_slowly(parent),
+                section,
+                task,
+                folder.shards,
+                threads=threads,
+                progress=_slowly(parent),
                 computed=lambda: parent.tell(computed=[]),  # a slow disk is no case without an end
-            )  # fmt: skip
+            )
             parent.tell(done=[done.seconds, done.failed])
         except MemoryError:
             os._exit(NO_MEMORY)

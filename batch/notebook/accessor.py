@@ -106,10 +106,12 @@ class Accessor(Generic[Data]):
         for each in units:
             if not any(each in names for names in known.values()):
                 raise missing(list(parts.values()), each, "no variable", [str(v) for d in parts.values() for v in d])
-        return self._whole({
-            name: quantities.in_units(data, {each: units[each] for each in known[name]} if units else None)
-            for name, data in parts.items()
-        })  # fmt: skip
+        return self._whole(
+            {
+                name: quantities.in_units(data, {each: units[each] for each in known[name]} if units else None)
+                for name, data in parts.items()
+            }
+        )
 
     @told
     def parameters(self, case: Any = None) -> Any:

@@ -90,12 +90,14 @@ def _frames(
         {
             "position": ((*dims, LINK, "axis"), _stacked([pose.position for pose in poses], unknown), POSITION_TOLD),
             "orientation": (
-                (*dims, LINK, "quaternion"), _stacked([pose.orientation for pose in poses], unknown), ORIENTATION_TOLD
+                (*dims, LINK, "quaternion"),
+                _stacked([pose.orientation for pose in poses], unknown),
+                ORIENTATION_TOLD,
             ),
         },
         coords={**kept, LINK: list(links), "axis": list("xyz"), "quaternion": list("wxyz")},
         attrs=data.attrs,
-    )  # fmt: skip
+    )
     out.encoding = {"source": str(path)}
     return out
 

@@ -56,9 +56,9 @@ def unfolded(parts: Sequence[xarray.Dataset], names: Sequence[str]) -> xarray.Da
     inner = {str(dim) for data in parts for name in dims if name in data for dim in data[name].dims}
     for name in dims:
         same_units({name_of(data): data[name] for data in parts if name in data}, name)
-    return xarray.Dataset({
-        name: _block([data for data in parts if dim in data.dims], name, dim, inner) for name, dim in dims.items()
-    })  # fmt: skip
+    return xarray.Dataset(
+        {name: _block([data for data in parts if dim in data.dims], name, dim, inner) for name, dim in dims.items()}
+    )
 
 
 def _block(parts: Sequence[xarray.Dataset], name: str, dim: str, inner: Collection[str]) -> xarray.DataArray:
@@ -68,7 +68,7 @@ def _block(parts: Sequence[xarray.Dataset], name: str, dim: str, inner: Collecti
         raise Problem(error("E388", f"there are no cases of which `{name}` could be"))
     columns = {
         f"coordinates.{path}" if path in inner else path: column for path, column in _columns(parts, dim).items()
-    }  # fmt: skip
+    }
     axes, alike = _axes(columns)
     shape = tuple(len(axis.values) for axis in axes)
     if np.prod(shape, dtype=float) > max(SMALL, EMPTIEST * count):
@@ -92,9 +92,11 @@ def _block(parts: Sequence[xarray.Dataset], name: str, dim: str, inner: Collecti
     single = {path: ((), value, attributes[path]) for path, value in alike.items()}
     own = {str(each): array for each, array in inside.coords.items() if set(array.dims) and each not in columns}
     return xarray.DataArray(
-        block.reshape((*shape, *values.shape[1:])), dims=(*(axis.path for axis in axes), *inside.dims),
-        coords={**labels, **beside, **single, **own}, attrs=having[0].attrs,
-    )  # fmt: skip
+        block.reshape((*shape, *values.shape[1:])),
+        dims=(*(axis.path for axis in axes), *inside.dims),
+        coords={**labels, **beside, **single, **own},
+        attrs=having[0].attrs,
+    )
 
 
 def _columns(parts: Sequence[xarray.Dataset], dim: str) -> dict[str, xarray.DataArray]:

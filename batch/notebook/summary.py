@@ -22,8 +22,11 @@ def summary(data: xarray.Dataset) -> str:
     out = [f"{name_of(data)}{f' of {deck}' if deck else ''}: {_cases(data)}"]
     if CASE in data.dims and "status" in data:
         status = data["status"].values
-        ended = (f"{(status == code).sum():,} {word}" for code, word in STATUS.items()
-                 if code == DONE or (status == code).any())  # fmt: skip
+        ended = (
+            f"{(status == code).sum():,} {word}"
+            for code, word in STATUS.items()
+            if code == DONE or (status == code).any()
+        )
         out.append(f"  {', '.join(ended)}")
     if "met" in data and data["met"].dims == (CASE, "requirement"):
         for text, met in zip(data["requirement"].values.astype(str), data["met"].values.T, strict=True):

@@ -60,9 +60,16 @@ def plot(
 
 
 def draw(
-    archive: ArchiveFile, output: str | os.PathLike[str], names: Sequence[str] = (), *, run: str | None = None,
-    cases: Sequence[str] = (), over: Sequence[str] = (), against: ArchiveFile | None = None, sheet: PictureSheet | None = None,
-) -> Path:  # fmt: skip
+    archive: ArchiveFile,
+    output: str | os.PathLike[str],
+    names: Sequence[str] = (),
+    *,
+    run: str | None = None,
+    cases: Sequence[str] = (),
+    over: Sequence[str] = (),
+    against: ArchiveFile | None = None,
+    sheet: PictureSheet | None = None,
+) -> Path:
     """The same of archives that are open."""
     from batch.plotting import histories, metrics
     from batch.plotting import output as place

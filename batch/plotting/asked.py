@@ -133,8 +133,11 @@ def _not_varied(archive: ArchiveFile, pool: Pool, name: str, known: Sequence[str
             return Problem(error("E390", message, help=[f"`met plot {quoted(archive.path)} {name}`", _here(known)]))
     if pool.count == 1:
         return Problem(error("E390", f"`{pool.name}` is one case: nothing is varied in it", help=()))
-    message = f"`{name}` is not varied in `{pool.name}`" if _is_parameter(archive, pool, name) else (
-        f"no parameter `{name}` is varied in `{pool.name}`")  # fmt: skip
+    message = (
+        f"`{name}` is not varied in `{pool.name}`"
+        if _is_parameter(archive, pool, name)
+        else (f"no parameter `{name}` is varied in `{pool.name}`")
+    )
     return Problem(error("E390", message, help=helps))
 
 

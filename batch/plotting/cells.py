@@ -41,16 +41,24 @@ class Picked:
 
 
 def picked(
-    shown: np.ndarray, worse: str, each: Measured, cells: np.ndarray, count: int, striped: list[tuple[np.ndarray, str]],
-    *, differs: bool,
-) -> Picked:  # fmt: skip
+    shown: np.ndarray,
+    worse: str,
+    each: Measured,
+    cells: np.ndarray,
+    count: int,
+    striped: list[tuple[np.ndarray, str]],
+    *,
+    differs: bool,
+) -> Picked:
     """The case that stands for each cell. cells: of each case its cell, -1 for none; differs: changes are shown."""
     chosen = standing(np.abs(shown) if differs else shown, cells, count, "<" if differs else worse)
     values = np.where(chosen >= 0, shown[chosen], np.nan)
     return Picked(
-        values, any_in(cells >= 0, cells, count), any_in(each.failed, cells, count),
+        values,
+        any_in(cells >= 0, cells, count),
+        any_in(each.failed, cells, count),
         tuple((any_in(marked, cells, count), hatch) for marked, hatch in striped),
-    )  # fmt: skip
+    )
 
 
 def any_in(cases: np.ndarray, cells: np.ndarray, count: int) -> np.ndarray:
@@ -101,8 +109,10 @@ def _corners(x: MapSide, y: MapSide, rows: np.ndarray) -> np.ndarray:
     up, first = np.nonzero(steps > 0)
     end = np.nonzero(steps < 0)[1]
     left, right, low, high = x.edges[first], x.edges[end], y.edges[up], y.edges[up + 1]
-    return np.stack([np.stack([left, low], 1), np.stack([right, low], 1), np.stack([right, high], 1),
-                     np.stack([left, high], 1)], axis=1)  # fmt: skip
+    return np.stack(
+        [np.stack([left, low], 1), np.stack([right, low], 1), np.stack([right, high], 1), np.stack([left, high], 1)],
+        axis=1,
+    )
 
 
 def _lightness(colours: np.ndarray) -> np.ndarray:

@@ -13,9 +13,7 @@ from batch.plotting.sheet import PictureSheet
 from batch.queries.limits import Mark
 
 TONE = "#a33a0a"
-DOTS: dict[str, Any] = {
-    "color": TONE, "linewidth": 0.8, "linestyle": (0, (1, 1.6)), "zorder": 1.6, "label": "_limit",
-}  # fmt: skip
+DOTS: dict[str, Any] = {"color": TONE, "linewidth": 0.8, "linestyle": (0, (1, 1.6)), "zorder": 1.6, "label": "_limit"}
 PLACES = (0.995, 0.005, 0.5, 0.75, 0.25)
 """Along a limit's line, where its name may stand."""
 
@@ -82,5 +80,15 @@ def _along(ax: Any, value: float, text: str, sheet: PictureSheet, columns: int) 
 def _write(ax: Any, x: float, y: float, text: str, place: Any, sheet: PictureSheet, **style: Any) -> None:
     from matplotlib.patheffects import withStroke
 
-    ax.text(x, y, text, transform=place, color=TONE, fontsize=sheet.small - 1.0, zorder=4, in_layout=False,
-            path_effects=[withStroke(linewidth=2.0, foreground="white")], **style)  # fmt: skip
+    ax.text(
+        x,
+        y,
+        text,
+        transform=place,
+        color=TONE,
+        fontsize=sheet.small - 1.0,
+        zorder=4,
+        in_layout=False,
+        path_effects=[withStroke(linewidth=2.0, foreground="white")],
+        **style,
+    )

@@ -47,9 +47,14 @@ class Histories:
     """The signals of some cases of a group, and how they are drawn."""
 
     def __init__(
-        self, archive: ArchiveFile, group: ArchiveGroup, signals: Sequence[str], cases: Sequence[str], sheet: PictureSheet,
+        self,
+        archive: ArchiveFile,
+        group: ArchiveGroup,
+        signals: Sequence[str],
+        cases: Sequence[str],
+        sheet: PictureSheet,
         other: Beside | None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.archive, self.group, self.sheet, self.other = archive, group, sheet, other
         panels(group)  # refuses an archive without histories
         self.units = DeckUnits(archive, group)
@@ -121,8 +126,9 @@ class Histories:
         cells = [cell for cell in row if cell is not None]
         return not any(
             np.any(history(self.group, cell.panel, position)[:, list(cell.lines)])
-            for cell in cells for position in self.positions
-        )  # fmt: skip
+            for cell in cells
+            for position in self.positions
+        )
 
     def _cell(self, ax: Any, cell: Cell, by_joint: bool, columns: int) -> None:
         panel = cell.panel
@@ -132,8 +138,14 @@ class Histories:
             self._their_lines(ax, panel, line, colour if by_joint or self.fan else None)
             if self.single:
                 y = layout.drawable(history(self.group, panel, self.positions[0])[:, line])
-                _line(ax, self.time, y, color=colour, label=layout.named(panel.lines[line]),
-                      linestyle=ON_ANOTHER[above[line]] if above.get(line) else _dashes(line))  # fmt: skip
+                _line(
+                    ax,
+                    self.time,
+                    y,
+                    color=colour,
+                    label=layout.named(panel.lines[line]),
+                    linestyle=ON_ANOTHER[above[line]] if above.get(line) else _dashes(line),
+                )
             elif self.fan:
                 self._fan(ax, panel, line, colour)
             else:
@@ -233,9 +245,13 @@ class Histories:
         ax.plot([], [], color=INK, label=COMMAND, **DASHED)
 
     def _legend(
-        self, figure: Any, axes: list[list[Any]], rows: Sequence[Sequence[Cell | None]], flat: Sequence[bool],
+        self,
+        figure: Any,
+        axes: list[list[Any]],
+        rows: Sequence[Sequence[Cell | None]],
+        flat: Sequence[bool],
         by_joint: bool,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Beside the panels, once for some that share it; not beside a flat one, where it has no room."""
         archives = self._archives()
         if by_joint and not self.sheet.narrow:
@@ -246,14 +262,22 @@ class Histories:
                 since += 1
                 if (labels or (archives and last is None)) and (labels != last or (since > LEGEND_EVERY and not low)):
                     row[0].legend(
-                        [*handles, *archives.values()], [*labels, *archives], loc="upper left",
-                        bbox_to_anchor=(1.005, 1.06), fontsize=self.sheet.small, handlelength=1.4,
-                    )  # fmt: skip
+                        [*handles, *archives.values()],
+                        [*labels, *archives],
+                        loc="upper left",
+                        bbox_to_anchor=(1.005, 1.06),
+                        fontsize=self.sheet.small,
+                        handlelength=1.4,
+                    )
                     last, since = labels, 1
             layout.legend(figure, self._cases(), self.sheet, below=True)
             return
-        known = layout.labelled([[ax for cell, ax in zip(cells, row, strict=True) if cell is not None]
-                                 for cells, row in zip(rows, axes, strict=True)])  # fmt: skip
+        known = layout.labelled(
+            [
+                [ax for cell, ax in zip(cells, row, strict=True) if cell is not None]
+                for cells, row in zip(rows, axes, strict=True)
+            ]
+        )
         if self.fan and not by_joint:  # its panels have their joints' names above them
             known = {text: handle for text, handle in known.items() if text == COMMAND}
         command = {text: known.pop(text) for text in [COMMAND] if text in known}
@@ -268,8 +292,10 @@ class Histories:
         count = len(self.positions)
         if self.single or self.fan:
             return {}
-        return {_case_words(self.group, position): Line2D([], [], color=INK, linewidth=1.4, alpha=_faint(index, count))
-                for index, position in enumerate(self.positions)}  # fmt: skip
+        return {
+            _case_words(self.group, position): Line2D([], [], color=INK, linewidth=1.4, alpha=_faint(index, count))
+            for index, position in enumerate(self.positions)
+        }
 
     def _archives(self) -> dict[str, Any]:
         """What the legend says of the two archives."""
@@ -307,8 +333,10 @@ def _faint(index: int, count: int) -> float:
 def _case_words(group: ArchiveGroup, position: int) -> str:
     """What differs, by name, for a legend without a title."""
     scales = {v.name: deck_unit(v) for v in _differing(group)}
-    texts = [f"{name} = {number_text(group.values(name)[position] / scale)} {unit}".rstrip()
-             for name, (scale, unit) in scales.items()]  # fmt: skip
+    texts = [
+        f"{name} = {number_text(group.values(name)[position] / scale)} {unit}".rstrip()
+        for name, (scale, unit) in scales.items()
+    ]
     return layout.named(", ".join(texts)) or f"case #{group.values('case')[position]}"
 
 

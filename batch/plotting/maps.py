@@ -206,9 +206,17 @@ def _maps(
     striped = _striped(each, found)
     if found.filled:
         picked = [
-            cells.picked(shown, each.worse, each, np.where(here, found.cells, -1), count, striped,
-                         differs=found.other is not None) for here in parts
-        ]  # fmt: skip
+            cells.picked(
+                shown,
+                each.worse,
+                each,
+                np.where(here, found.cells, -1),
+                count,
+                striped,
+                differs=found.other is not None,
+            )
+            for here in parts
+        ]
         tones = _tones(each, found, np.concatenate([one.values for one in picked]))
     else:
         tones = _tones(each, found, shown)
@@ -245,8 +253,11 @@ def _points(ax: Any, each: Measured, found: MapLayout, here: np.ndarray, norm: A
     for marked, hatch in _striped(each, found):
         rings = finite & marked
         ax.scatter(x[rings], y[rings], marker=RINGS[hatch], facecolors="none", edgecolors=INK, linewidths=0.8, **style)
-    for marked, marker in ((here & np.isnan(shown), "x"), (here & np.isposinf(shown), infinity()),
-                           (here & np.isneginf(shown), infinity("−∞"))):  # fmt: skip
+    for marked, marker in (
+        (here & np.isnan(shown), "x"),
+        (here & np.isposinf(shown), infinity()),
+        (here & np.isneginf(shown), infinity("−∞")),
+    ):
         if marked.any():
             ax.scatter(x[marked], y[marked], marker=marker, color=FAINT, linewidths=0.8, **style)
     return mapped

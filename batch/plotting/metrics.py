@@ -19,9 +19,14 @@ from met.outputs import quoted
 
 
 def draw(
-    archive: ArchiveFile, pool: Pool, names: Sequence[str], parameters: Sequence[str], sheet: PictureSheet,
-    others: Mapping[int, Beside], other: ArchiveFile | None,
-) -> Any:  # fmt: skip
+    archive: ArchiveFile,
+    pool: Pool,
+    names: Sequence[str],
+    parameters: Sequence[str],
+    sheet: PictureSheet,
+    others: Mapping[int, Beside],
+    other: ArchiveFile | None,
+) -> Any:
     """The figure. names: of metrics, all for none; parameters: what they are drawn over, none: as is best. others: by
     number of a group of the pool that of the other archive. Raises Problem E327, E390, E393."""
     found = over(archive, pool, parameters)
@@ -57,9 +62,13 @@ def draw(
 
 
 def _points(
-    pool: Pool, metrics: Sequence[Measured], x: CaseColumn | None, by: CaseColumn | None, sheet: PictureSheet,
+    pool: Pool,
+    metrics: Sequence[Measured],
+    x: CaseColumn | None,
+    by: CaseColumn | None,
+    sheet: PictureSheet,
     files: tuple[str, str] | None,
-) -> Any:  # fmt: skip
+) -> Any:
     """A panel a metric."""
     x = x or CaseColumn("case", "case", "", "case", pool.cases.astype(np.float64))
     figure, axes = layout.figure(sheet, 1, [1.0] * len(metrics))

@@ -62,8 +62,10 @@ def save(figure: Any, output: Path) -> None:
     kind = output.suffix.lower()
     _check_dots(figure, kind)
     backend, canvas = {
-        ".png": ("agg", "FigureCanvasAgg"), ".svg": ("svg", "FigureCanvasSVG"), ".pdf": ("pdf", "FigureCanvasPdf"),
-    }[kind]  # fmt: skip
+        ".png": ("agg", "FigureCanvasAgg"),
+        ".svg": ("svg", "FigureCanvasSVG"),
+        ".pdf": ("pdf", "FigureCanvasPdf"),
+    }[kind]
     drawn = getattr(importlib.import_module(f"matplotlib.backends.backend_{backend}"), canvas)(figure)
     try:
         with whole_file(output) as file, warnings.catch_warnings():

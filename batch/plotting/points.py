@@ -120,10 +120,25 @@ def _theirs(ax: Any, each: Measured, x: CaseColumn, sets: list[Set], by: CaseCol
         here = drawn[np.isin(drawn, one.places)]
         if one.joined:
             order = one.places[np.argsort(x.values[one.places])]
-            ax.plot(x.values[order], y[order], color=one.colour, linewidth=1.0 + BEHIND, alpha=PALE, zorder=0.8,
-                    solid_capstyle="butt")  # fmt: skip
-        ax.scatter(x.values[here], y[here], s=size, facecolors="none", edgecolors=[one.colour], linewidths=0.7,
-                   zorder=0.9, rasterized=len(drawn) > RASTERED)  # fmt: skip
+            ax.plot(
+                x.values[order],
+                y[order],
+                color=one.colour,
+                linewidth=1.0 + BEHIND,
+                alpha=PALE,
+                zorder=0.8,
+                solid_capstyle="butt",
+            )
+        ax.scatter(
+            x.values[here],
+            y[here],
+            s=size,
+            facecolors="none",
+            edgecolors=[one.colour],
+            linewidths=0.7,
+            zorder=0.9,
+            rasterized=len(drawn) > RASTERED,
+        )
 
 
 def _reach(ax: Any, x: np.ndarray) -> None:
@@ -141,16 +156,27 @@ def _edge(ax: Any, values: np.ndarray, x: np.ndarray, size: float, *, hollow: bo
 
     size = max(12.0, size)
     style = {"facecolors": "none", "edgecolors": INK, "zorder": 3.9} if hollow else {"color": INK, "zorder": 4}
-    for there, marker, at in ((np.isposinf(values), "^", 1.0), (np.isneginf(values), "v", 0.0),
-                              (np.isnan(values), "x", 1.0)):  # fmt: skip
+    for there, marker, at in (
+        (np.isposinf(values), "^", 1.0),
+        (np.isneginf(values), "v", 0.0),
+        (np.isnan(values), "x", 1.0),
+    ):
         where = x[there & np.isfinite(x)]
         if len(where):
             where = where[_apart(where, np.zeros(len(where)))]
             tone = {"color": INK, "zorder": 3.9} if hollow and marker == "x" else style  # a cross has no face
             inside = (1.0 - 2.0 * at) * (0.5 * size**0.5 + 1.0) / 72
             place = ax.get_xaxis_transform() + ScaledTranslation(0.0, inside, ax.figure.dpi_scale_trans)
-            ax.scatter(where, np.full(len(where), at), marker=marker, s=size, linewidths=0.8, transform=place,
-                       clip_on=False, **tone)  # fmt: skip
+            ax.scatter(
+                where,
+                np.full(len(where), at),
+                marker=marker,
+                s=size,
+                linewidths=0.8,
+                transform=place,
+                clip_on=False,
+                **tone,
+            )
 
 
 def lost(values: np.ndarray) -> str:
@@ -200,9 +226,10 @@ def legend_of(known: Mapping[str, Any], other: tuple[str, str] | None) -> dict[s
         return {} if list(out) == ["limit"] else out  # the panel's head says what is required
     dot: dict[str, Any] = {"linestyle": "", "marker": "o", "color": INK}
     return {
-        **out, other[0]: Line2D([], [], markersize=3.5, markeredgewidth=0, **dot),
+        **out,
+        other[0]: Line2D([], [], markersize=3.5, markeredgewidth=0, **dot),
         other[1]: Line2D([], [], markersize=6, markerfacecolor="none", markeredgewidth=0.8, **dot),
-    }  # fmt: skip
+    }
 
 
 def bar(figure: Any, mapped: Any, axes: list[Any], by: CaseColumn, sheet: PictureSheet) -> None:

@@ -102,7 +102,7 @@ def overlaid(
                 if shared or apart:
                     out[panel.name, panel.unit, line] = CommandCurve(
                         *command, shared=shared, longest=longest, scale=panel.scale
-                    )  # fmt: skip
+                    )
     return out
 
 

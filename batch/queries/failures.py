@@ -44,10 +44,14 @@ def failures(status: np.ndarray, cause: np.ndarray, case: np.ndarray, case_id: n
     for place in range(len(status)):
         found.setdefault((int(status[place]), NUMBER.sub("#", str(cause[place]))), []).append(place)
     return tuple(
-        FailureGroup(STATUS.get(ended, str(ended)), str(cause[places[0]]), str(case_id[places[0]]),
-                tuple(int(case[place]) for place in places))
+        FailureGroup(
+            STATUS.get(ended, str(ended)),
+            str(cause[places[0]]),
+            str(case_id[places[0]]),
+            tuple(int(case[place]) for place in places),
+        )
         for (ended, _), places in found.items()
-    )  # fmt: skip
+    )
 
 
 def failure_lines(found: Sequence[FailureGroup], width: int) -> list[str]:

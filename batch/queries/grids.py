@@ -118,8 +118,10 @@ def _neighbours(found: np.ndarray, values: np.ndarray, most: int, scale: Scale) 
     first = np.searchsorted(stretch, np.arange(most))
     last = np.append(first[1:], len(found)) - 1
     edges = edges_of(found, scale)[np.append(first, len(found))]
-    texts = [number_text(float(a)) if a == b else f"{number_text(float(a))} … {number_text(float(b))}"
-             for a, b in zip(found[first], found[last], strict=True)]  # fmt: skip
+    texts = [
+        number_text(float(a)) if a == b else f"{number_text(float(a))} … {number_text(float(b))}"
+        for a, b in zip(found[first], found[last], strict=True)
+    ]
     finite = np.isfinite(values)
     places = np.full(len(values), -1)
     places[finite] = stretch[np.searchsorted(found, values[finite])]

@@ -13,8 +13,13 @@ from met.plan import Experiment
 POINTWISE = {"max": (1.0,), "min": (1.0,), "final": (1.0,), "peak": (1.0, -1.0)}
 """Metrics in whose unit a signal is, with the signs at which their limit stands; `peak` is of the size."""
 
-LIMITED = {"voltage": "v_max", "current": "i_max", "current_cmd": "i_max", "motor_torque": "tau_max",
-           "load_current": "i_max"}  # fmt: skip
+LIMITED = {
+    "voltage": "v_max",
+    "current": "i_max",
+    "current_cmd": "i_max",
+    "motor_torque": "tau_max",
+    "load_current": "i_max",
+}
 """By the last word of a servo's, or a bed's, channel the parameter that it does not exceed, either way."""
 
 

@@ -48,8 +48,9 @@ def by_names(names: Sequence[str], *, reverse: bool = False) -> By | None:
         name, colon, way = (each, "", "") if "," in each else each.partition(":")  # `check` tells of several in one
         if colon and way not in WAYS:
             helps = f"`--sort {name}:largest`, or `--sort {name}:smallest`"
-            raise Problem(error("E329", f"`{each}` is no order of cases: `{way}` is neither largest nor smallest",
-                                help=helps))  # fmt: skip
+            raise Problem(
+                error("E329", f"`{each}` is no order of cases: `{way}` is neither largest nor smallest", help=helps)
+            )
         if name in [key.name for key in keys]:
             raise Problem(error("E329", f"cases are to be listed by `{name}` twice", help="leave one out"))
         keys.append(By(name, WAYS[way] if colon else reverse))
@@ -76,8 +77,11 @@ def check(groups: Sequence[ArchiveGroup], by: By | None) -> None:
     if all(len(pool.cases) == 1 for pool in pools(groups)):
         names = " and ".join(f"`{group.name}`" for group in groups)
         verb = "is" if len(groups) == 1 else "are each"
-        raise Problem(error("E329", f"{names} {verb} one case: there is nothing to list by `{by.name}`",
-                            help="a sweep has several"))  # fmt: skip
+        raise Problem(
+            error(
+                "E329", f"{names} {verb} one case: there is nothing to list by `{by.name}`", help="a sweep has several"
+            )
+        )
 
 
 def positions(group: ArchiveGroup, by: By | None = None) -> np.ndarray:
@@ -121,8 +125,12 @@ def ranking(group: ArchiveGroup) -> requirements.Ranking:
     are far from one another in what is varied come first.
     """
     names = [variable.name for variable in group.role("coordinate")]
-    return requirements.ranking(group.values("status"), requirements.outcomes(group), _far(group),
-                                lambda at: [group.values(name)[at] for name in names])  # fmt: skip
+    return requirements.ranking(
+        group.values("status"),
+        requirements.outcomes(group),
+        _far(group),
+        lambda at: [group.values(name)[at] for name in names],
+    )
 
 
 def _far(group: ArchiveGroup) -> np.ndarray:

@@ -172,10 +172,12 @@ class Pool:
 
     def varied(self) -> tuple[CaseColumn, ...]:
         """What tells the cases apart, that with most values first."""
-        return tuple(sorted(
-            (c for c in self.columns if c.role != "metric" and len(levels(c.values)) > 1),
-            key=lambda c: (c.role == "choice", -len(levels(c.values))),
-        ))  # fmt: skip
+        return tuple(
+            sorted(
+                (c for c in self.columns if c.role != "metric" and len(levels(c.values)) > 1),
+                key=lambda c: (c.role == "choice", -len(levels(c.values))),
+            )
+        )
 
     def _variables(self, role: str) -> list[Stored]:
         """Of all groups, by name."""
@@ -188,9 +190,16 @@ class Pool:
         )
         values = self.gathered(variable.name) / scale
         return CaseColumn(
-            f"{role}:{variable.name}", variable.path, unit, role, values, (), limits, variable.long_name,
+            f"{role}:{variable.name}",
+            variable.path,
+            unit,
+            role,
+            values,
+            (),
+            limits,
+            variable.long_name,
             log=is_log(levels(values)) if role == "parameter" else spans(values, METRIC_SPAN),
-        )  # fmt: skip
+        )
 
     def _choice(self, variable: Stored) -> CaseColumn:
         """Its values number the words, in the order in which groups have them."""

@@ -23,10 +23,18 @@ def told(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> Iterator[
     rows = [["joint", "law", "servo", "delay", "r", *["together"] * several, stable_head(spans), "margin"]]
     for one in tightest:
         together = f"{one.least:.3g} to {one.together:.3g}" if spans else f"{one.together:.3g}"
-        rows.append([
-            one.joint, one.law, f"{one.rate_hz:g} Hz", f"{one.delay:g}", f"{one.r:.3g}", *[together] * several,
-            stable_at(one, spans), verdict(one),
-        ])  # fmt: skip
+        rows.append(
+            [
+                one.joint,
+                one.law,
+                f"{one.rate_hz:g} Hz",
+                f"{one.delay:g}",
+                f"{one.r:.3g}",
+                *[together] * several,
+                stable_at(one, spans),
+                verdict(one),
+            ]
+        )
     yield from columns(rows, right=(2, 3, 4, 5, 6) if several else (2, 3, 4, 5))
     yield ""
     for one in tightest:

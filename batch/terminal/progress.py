@@ -50,9 +50,16 @@ class Bar:
         elapsed = now - self._began
         self._next = now + (BAR_SECONDS if self._live else min(max(LINE_SECONDS, 0.2 * elapsed), SELDOM))
         said = status(
-            self._name, done, self._cases, elapsed, bar=self._live, first=self._first, failed=failed,
-            workers=self._workers, more=more,
-        )  # fmt: skip
+            self._name,
+            done,
+            self._cases,
+            elapsed,
+            bar=self._live,
+            first=self._first,
+            failed=failed,
+            workers=self._workers,
+            more=more,
+        )
         if self._live:
             width = shutil.get_terminal_size().columns
             self.stream.write(f"\r{said[: width - 1]}\x1b[K")
@@ -69,9 +76,17 @@ class Bar:
 
 
 def status(
-    name: str, done: float, cases: int, seconds: float, *, bar: bool, first: int = 0, failed: int = 0,
-    workers: str = "", more: str = "",
-) -> str:  # fmt: skip
+    name: str,
+    done: float,
+    cases: int,
+    seconds: float,
+    *,
+    bar: bool,
+    first: int = 0,
+    failed: int = 0,
+    workers: str = "",
+    more: str = "",
+) -> str:
     """One line: share, cases, failed ones, what else is told, rate, time left, workers. first: cases that were done
     when it began."""
     share = done / cases

@@ -59,8 +59,15 @@ def run_and_tell(
         raise Problem(error("E357", f"`--failed` is of an archive, and {source} is none", help=helps))
     executor = choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
     if not isinstance(executor, Threads):
-        rehearse(timeout, source=source, names=names, everything=everything, defines=defines,
-                 include_dirs=include_dirs, settings=settings)  # fmt: skip
+        rehearse(
+            timeout,
+            source=source,
+            names=names,
+            everything=everything,
+            defines=defines,
+            include_dirs=include_dirs,
+            settings=settings,
+        )
     archive, target = parted(output)
     again = None
     if names_archive(source):
@@ -70,24 +77,41 @@ def run_and_tell(
             helps = "`-o FILE` names another place"
             raise Problem(error("E305", f"cannot write {archive}: it is what is run again", help=helps))
         campaign = prepare(
-            again.plan, output=archive, selected=again.selected,
+            again.plan,
+            output=archive,
+            selected=again.selected,
             histories=histories or ("all" if again.kept is None else "none"),
-            kept=again.kept if not histories else None, float32=float32,
-        )  # fmt: skip
+            kept=again.kept if not histories else None,
+            float32=float32,
+        )
     else:
         campaign = _of_deck(
-            source, names, everything, archive, cases, histories, float32, defines, include_dirs, settings,
+            source,
+            names,
+            everything,
+            archive,
+            cases,
+            histories,
+            float32,
+            defines,
+            include_dirs,
+            settings,
             quiet or json,
-        )  # fmt: skip
+        )
     of_histories = bool(histories)
     if target is not None:
         check(campaign, target, histories=of_histories)
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
     try:
         performed = perform(
-            campaign, executor=executor, fresh=fresh, max_failures=max_failures,
-            progress=None if quiet or json else Bar(), ready=lambda: say(writing(campaign)), say=say,
-        )  # fmt: skip
+            campaign,
+            executor=executor,
+            fresh=fresh,
+            max_failures=max_failures,
+            progress=None if quiet or json else Bar(),
+            ready=lambda: say(writing(campaign)),
+            say=say,
+        )
     except TooMany as problem:
         _complain(problem, json)
         return False
@@ -123,12 +147,24 @@ def run_and_tell(
     unlike = differences(again.archive, campaign.output) if again is not None else []
     notes = [*performed.notes, *_compared(again, unlike), *refused]
     if json:
-        print(verdict_json(campaign, summaries, worst, picture, exported, performed.seconds, notes,
-                           ok and not unlike and not missing))  # fmt: skip
+        print(
+            verdict_json(
+                campaign,
+                summaries,
+                worst,
+                picture,
+                exported,
+                performed.seconds,
+                notes,
+                ok and not unlike and not missing,
+            )
+        )
     else:
-        say("\n".join(
-            told(source, campaign, summaries, worst, picture, excuse, exported, performed.seconds, ok, tables)
-        ))  # fmt: skip
+        say(
+            "\n".join(
+                told(source, campaign, summaries, worst, picture, excuse, exported, performed.seconds, ok, tables)
+            )
+        )
         for line in _compared(again, unlike):
             say(line)
         if missing and target is not None:
@@ -182,18 +218,30 @@ def submit_and_tell(
 
 
 def _of_deck(
-    source: str, names: tuple[str, ...], everything: bool, output: str | Path | None, cases: tuple[str, ...],
-    histories: str | Sequence[str], float32: bool, defines: tuple[str, ...], include_dirs: tuple[str, ...],
-    settings: tuple[str, ...], quiet: bool,
-) -> Campaign:  # fmt: skip
+    source: str,
+    names: tuple[str, ...],
+    everything: bool,
+    output: str | Path | None,
+    cases: tuple[str, ...],
+    histories: str | Sequence[str],
+    float32: bool,
+    defines: tuple[str, ...],
+    include_dirs: tuple[str, ...],
+    settings: tuple[str, ...],
+    quiet: bool,
+) -> Campaign:
     """The campaign that is asked of a deck or a plan."""
     plan = read_plan(
         source, names, everything=everything, defines=defines, include_dirs=include_dirs, settings=settings, quiet=quiet
     )
     return prepare(
-        plan, output=output, experiments=names or None, cases=cases or None, histories=histories or "default",
+        plan,
+        output=output,
+        experiments=names or None,
+        cases=cases or None,
+        histories=histories or "default",
         float32=float32,
-    )  # fmt: skip
+    )
 
 
 def _complain(problem: Problem, json: bool) -> None:

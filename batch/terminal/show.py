@@ -133,15 +133,19 @@ def as_json(
         if position is None:
             said: dict[str, Any] = {
                 "case_table": cases.rows_json(group, None if all_cases else cases.SHOWN_CASES, by=by)
-            }  # fmt: skip
+            }
         else:
             [about] = cases.rows_json(group, positions=[position])
             said = {"case": {**about, "parameters": outcomes.finite(cases.parameters(archive, group, position))}}
         variables = [{"name": v.name, "role": v.role, "dims": v.dims, "unit": v.unit} for v in group.variables.values()]
-        groups.append({
-            **outcomes.as_json(summary_of(group, position)), **said, "attributes": outcomes.finite(group.attributes),
-            "variables": variables,
-        })  # fmt: skip
+        groups.append(
+            {
+                **outcomes.as_json(summary_of(group, position)),
+                **said,
+                "attributes": outcomes.finite(group.attributes),
+                "variables": variables,
+            }
+        )
     provenance = outcomes.finite(archive.provenance)
     data = {"archive": str(archive.path), "deck": archive.deck, "provenance": provenance, "experiments": groups}
     return json.dumps(data, indent=1, allow_nan=False)

@@ -104,9 +104,17 @@ def worst_cases(archive: ArchiveFile) -> tuple[WorstCaseLines, ...]:
 
 
 def told(
-    source: str, campaign: Campaign, summaries: tuple[Summary, ...], worst: tuple[WorstCaseLines, ...], picture: Path | None,
-    excuse: str, exported: Exported | None, seconds: Mapping[str, float], ok: bool, tables: Sequence[Sequence[str]],
-) -> list[str]:  # fmt: skip
+    source: str,
+    campaign: Campaign,
+    summaries: tuple[Summary, ...],
+    worst: tuple[WorstCaseLines, ...],
+    picture: Path | None,
+    excuse: str,
+    exported: Exported | None,
+    seconds: Mapping[str, float],
+    ok: bool,
+    tables: Sequence[Sequence[str]],
+) -> list[str]:
     """The verdict, and where everything is. seconds: by experiment; tables: of sweeps of several structures."""
     out: list[str] = []
     many = {s.sweep for s in summaries if sum(s.sweep == other.sweep for other in summaries) > MOST_GROUPS} - {""}
@@ -167,9 +175,15 @@ def brief(archive: Archive) -> list[str]:
 
 
 def verdict_json(
-    campaign: Campaign, summaries: tuple[Summary, ...], worst: tuple[WorstCaseLines, ...], picture: Path | None,
-    exported: Exported | None, seconds: Mapping[str, float], notes: Sequence[str], ok: bool,
-) -> str:  # fmt: skip
+    campaign: Campaign,
+    summaries: tuple[Summary, ...],
+    worst: tuple[WorstCaseLines, ...],
+    picture: Path | None,
+    exported: Exported | None,
+    seconds: Mapping[str, float],
+    notes: Sequence[str],
+    ok: bool,
+) -> str:
     """The verdict for programs."""
     data = {
         "ok": ok,

@@ -122,19 +122,26 @@ def gains(cases: int = 7, name: str = "gains", ticks: int = 200) -> Experiment:
     place = Place("two_link.ic", 40, 9, 10)
     varied = parameters()
     follows = {
-        "shoulder.servo.kp": 0, "elbow.servo.kp": 0, "links.lower.mass": 1,
-        "links.lower.inertia.yy": 2, "links.lower.inertia.zz": 2,
-    }  # fmt: skip
+        "shoulder.servo.kp": 0,
+        "elbow.servo.kp": 0,
+        "links.lower.mass": 1,
+        "links.lower.inertia.yy": 2,
+        "links.lower.inertia.zz": 2,
+    }
     for path, output in follows.items():
         varied[path] = Quantity(Formula(output), varied[path].unit, Origin("case", place))
     rows = np.arange(cases)
     coordinates = (
         Coordinate(
-            "gearbox.kp", "V*s/rad", 1.0, 0.01 + 0.03 * rows / max(1, cases - 1),
-            ("shoulder.servo.kp", "elbow.servo.kp"), place,
+            "gearbox.kp",
+            "V*s/rad",
+            1.0,
+            0.01 + 0.03 * rows / max(1, cases - 1),
+            ("shoulder.servo.kp", "elbow.servo.kp"),
+            place,
         ),
         Coordinate("links.lower.mass", "g", 1e-3, 20.0 + 0.1 * (rows % 3), ("links.lower.mass",), place),
-    )  # fmt: skip
+    )
     return Experiment(
         name=name,
         structure=structure(ticks),

@@ -60,10 +60,18 @@ def test_every_variable_has_a_long_name_and_every_number_its_unit(here: Path, en
     with opened(here / "a.h5", engine_name) as data:
         units = {name: data[name].attrs.get("units") for name in data.variables if data[name].dtype == float}
         assert units == {
-            "gearbox.kp": "V*s/rad", "links.lower.mass": "kg", "settle": "s", "volts": "V", "time": "s",
-            "q": "rad", "qd": "rad/s", "tau": "N*m", "shoulder.servo.voltage": "V",
-            "recorded.gearbox.kp": "V*s/rad", "recorded.links.lower.mass": "kg",
-        }  # fmt: skip
+            "gearbox.kp": "V*s/rad",
+            "links.lower.mass": "kg",
+            "settle": "s",
+            "volts": "V",
+            "time": "s",
+            "q": "rad",
+            "qd": "rad/s",
+            "tau": "N*m",
+            "shoulder.servo.voltage": "V",
+            "recorded.gearbox.kp": "V*s/rad",
+            "recorded.links.lower.mass": "kg",
+        }
         assert all(data[name].attrs.get("long_name") for name in data.variables)
         assert data.q.attrs["frame"] == "about or along the joint's axis"
         assert data["links.lower.mass"].attrs["deck_unit"] == "g"
@@ -310,8 +318,9 @@ def test_what_is_no_archive_is_told_what_makes_one(here: Path) -> None:
         batch.open("a.txt")
     [told] = caught.value.diagnostics
     assert (told.message, told.help) == (
-        "a.txt is no archive of MET: it is not an HDF5 file", ("archives are written by `met run DECK`",)
-    )  # fmt: skip
+        "a.txt is no archive of MET: it is not an HDF5 file",
+        ("archives are written by `met run DECK`",),
+    )
 
 
 def test_a_truncated_archive_is_refused(here: Path) -> None:
@@ -345,9 +354,24 @@ def test_an_archive_of_a_newer_met_is_refused(here: Path) -> None:
 
 
 OWN_NAMES = (
-    "q", "time", "case", "status", "seed", "met", "joint", "recorded_case", "case_id", "requirement", "cause",
-    "n_valid", "repeat", "friction_splits", "provenance", "failure", "volts",
-)  # fmt: skip
+    "q",
+    "time",
+    "case",
+    "status",
+    "seed",
+    "met",
+    "joint",
+    "recorded_case",
+    "case_id",
+    "requirement",
+    "cause",
+    "n_valid",
+    "repeat",
+    "friction_splits",
+    "provenance",
+    "failure",
+    "volts",
+)
 
 
 @pytest.mark.slow
@@ -415,25 +439,37 @@ def damaged(change: Any, *experiments: Any) -> str:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda f: f.attrs.__delitem__("schema_version"),
-         "E302: the archive a.h5 is damaged: it has no schema version"),
-        (lambda f: f.attrs.__setitem__("schema_version", "new"),
-         "E302: the archive a.h5 is damaged: it has no schema version"),
+        (
+            lambda f: f.attrs.__delitem__("schema_version"),
+            "E302: the archive a.h5 is damaged: it has no schema version",
+        ),
+        (
+            lambda f: f.attrs.__setitem__("schema_version", "new"),
+            "E302: the archive a.h5 is damaged: it has no schema version",
+        ),
         (lambda f: f.attrs.__delitem__("deck"), "E302: the archive a.h5 is damaged: it does not name its deck"),
-        (lambda f: f.attrs.__delitem__("experiment"),
-         "E302: the archive a.h5 is damaged: attribute `experiment` is missing or of another type"),
-        (lambda f: f.attrs.__setitem__("duration_s", "long"),
-         "E302: the archive a.h5 is damaged: attribute `duration_s` is missing or of another type"),
+        (
+            lambda f: f.attrs.__delitem__("experiment"),
+            "E302: the archive a.h5 is damaged: attribute `experiment` is missing or of another type",
+        ),
+        (
+            lambda f: f.attrs.__setitem__("duration_s", "long"),
+            "E302: the archive a.h5 is damaged: attribute `duration_s` is missing or of another type",
+        ),
         (lambda f: f.__delitem__("case"), "E302: the archive a.h5 is damaged"),
-        (lambda f: f.__delitem__("status"), "E302: the archive a.h5 is damaged: variable `status` is missing or of "
-         "another type"),
+        (
+            lambda f: f.__delitem__("status"),
+            "E302: the archive a.h5 is damaged: variable `status` is missing or of another type",
+        ),
         (lambda f: f.__delitem__("time"), "E302: the archive a.h5 is damaged"),
         (lambda f: f.__delitem__("joint"), "E302: the archive a.h5 is damaged"),
-        (lambda f: f.__delitem__("provenance"), "E302: the archive a.h5 is damaged: it does not say where it comes "
-         "from"),
+        (
+            lambda f: f.__delitem__("provenance"),
+            "E302: the archive a.h5 is damaged: it does not say where it comes from",
+        ),
         (lambda f: f["provenance"].__delitem__("plan"), "E302: the archive a.h5 is damaged"),
     ],
-)  # fmt: skip
+)
 def test_what_an_archive_lacks_is_said(here: Path, change: Any, said: str) -> None:
     assert damaged(change, plans.nominal()).startswith(said)
 

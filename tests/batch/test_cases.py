@@ -143,19 +143,36 @@ def test_which_way_round_is_said_of_each_or_of_all() -> None:
     assert ways("a", "b:largest", "c:smallest", reverse=True) == [True, True, False]
 
 
-@pytest.mark.parametrize(("words", "said"), [
-    (["volts:up"], "error[E329]: `volts:up` is no order of cases: `up` is neither largest nor smallest\n"
-                   " = help: `--sort volts:largest`, or `--sort volts:smallest`\n\n1 error\n"),
-    (["volts", "volts:largest"], "error[E329]: cases are to be listed by `volts` twice\n"
-                                 " = help: leave one out\n\n1 error\n"),
-    (["volts:largest,settle"], "error[E329]: no metric or varied parameter `volts:largest,settle`\n"
-                               " = help: one name each: `--sort volts:largest --sort settle`\n\n1 error\n"),
-    (["settle,volts"], "error[E329]: no metric or varied parameter `settle,volts`\n"
-                       " = help: one name each: `--sort settle --sort volts`\n\n1 error\n"),
-    (["volts", "vlts"], "error[E329]: no metric or varied parameter `vlts`\n"
-                        " = help: did you mean `volts`?\n"
-                        " = help: here: settle, volts, gearbox.kp, links.lower.mass\n\n1 error\n"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ["volts:up"],
+            "error[E329]: `volts:up` is no order of cases: `up` is neither largest nor smallest\n"
+            " = help: `--sort volts:largest`, or `--sort volts:smallest`\n\n1 error\n",
+        ),
+        (
+            ["volts", "volts:largest"],
+            "error[E329]: cases are to be listed by `volts` twice\n = help: leave one out\n\n1 error\n",
+        ),
+        (
+            ["volts:largest,settle"],
+            "error[E329]: no metric or varied parameter `volts:largest,settle`\n"
+            " = help: one name each: `--sort volts:largest --sort settle`\n\n1 error\n",
+        ),
+        (
+            ["settle,volts"],
+            "error[E329]: no metric or varied parameter `settle,volts`\n"
+            " = help: one name each: `--sort settle --sort volts`\n\n1 error\n",
+        ),
+        (
+            ["volts", "vlts"],
+            "error[E329]: no metric or varied parameter `vlts`\n"
+            " = help: did you mean `volts`?\n"
+            " = help: here: settle, volts, gearbox.kp, links.lower.mass\n\n1 error\n",
+        ),
+    ],
+)
 def test_an_order_that_is_none_is_told(
     here: Path, engine: None, capsys: pytest.CaptureFixture[str], words: list[str], said: str
 ) -> None:

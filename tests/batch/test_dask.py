@@ -37,10 +37,16 @@ HOST = os.uname().nodename
 def cluster(folder: Path, workers: int = 1, threads: int = 1) -> Iterator[LocalCluster]:
     """A scheduler that can be reached from anywhere on this machine, and workers, all in this process."""
     with LocalCluster(
-        n_workers=workers, threads_per_worker=threads, processes=False, protocol="tcp://", memory_limit=0,
-        dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False},
-        local_directory=str(folder / "scratch"), silence_logs=logging.CRITICAL,
-    ) as started:  # fmt: skip
+        n_workers=workers,
+        threads_per_worker=threads,
+        processes=False,
+        protocol="tcp://",
+        memory_limit=0,
+        dashboard_address="127.0.0.1:0",
+        scheduler_kwargs={"dashboard": False},
+        local_directory=str(folder / "scratch"),
+        silence_logs=logging.CRITICAL,
+    ) as started:
         yield started
 
 
@@ -78,7 +84,7 @@ class TestWhatItIsCalled:
             "error[E356]: `--processes` and `--dask` are two ways to run a campaign\n"
             " = help: Dask's processes are its own; `--dask local` has as many at work as there are cores\n"
             "\n1 error\n"
-        )  # fmt: skip
+        )
 
     def test_a_number_calls_no_cluster(self) -> None:
         with pytest.raises(TypeError) as caught:
@@ -95,7 +101,7 @@ class TestWhatItIsCalled:
             f"error[E356]: no Dask scheduler answers at `{address}`\n"
             " = help: `dask scheduler` starts one, and says its address\n"
             "\n1 error\n"
-        )  # fmt: skip
+        )
 
     def test_a_scheduler_file_that_is_not_there(self, many: Any, here: Path) -> None:
         with pytest.raises(Problem) as caught:
@@ -104,7 +110,7 @@ class TestWhatItIsCalled:
             "error[E356]: cannot read the Dask scheduler file s.json: no such file or directory\n"
             " = help: `dask scheduler --scheduler-file s.json` writes it\n"
             "\n1 error\n"
-        )  # fmt: skip
+        )
 
     def test_a_pipe_in_the_place_of_a_scheduler_file_is_not_waited_for(self, many: Any, here: Path) -> None:
         os.mkfifo("s.json")
@@ -123,7 +129,7 @@ class TestWhatItIsCalled:
             "error[E356]: s.json is no scheduler file of Dask\n"
             " = help: `dask scheduler --scheduler-file FILE.json` writes one\n"
             "\n1 error\n"
-        )  # fmt: skip
+        )
 
     def test_a_client_that_is_closed(self, many: Any, tmp_path: Path) -> None:
         with cluster(tmp_path, workers=0) as started, Client(started, set_as_default=False) as client:
@@ -157,7 +163,7 @@ class TestWorkersThatCannotServe:
             "error[E356]: Dask's scheduler has had no worker for 0.3 s\n"
             f" = help: `dask worker {address}` starts one, where MET is installed and this folder is seen\n"
             "\n1 error\n"
-        )  # fmt: skip
+        )
         said = f"Dask's scheduler at {address} has no worker yet: waiting for one, 0.3 s at most\n"
         assert capsys.readouterr().err == said
 
@@ -300,8 +306,9 @@ class TestInThisProcess:
             assert list(started.workers.values()) == [worker] and worker.status.name == "running"
         with archive.open() as data:
             assert {int(case): str(data.cause.values[case]) for case in data.case[data.status.values != 0]} == {
-                5: "its worker was killed by SIGKILL, 3 times", 40: "timed out: no progress for 1 s",
-            }  # fmt: skip
+                5: "its worker was killed by SIGKILL, 3 times",
+                40: "timed out: no progress for 1 s",
+            }
 
     @pytest.mark.usefixtures("poisoned")
     def test_closing_stops_a_case_that_hangs(self, many: Any, tmp_path: Path) -> None:

@@ -140,7 +140,7 @@ def test_where_the_scheduler_is_lost_what_is_done_is_kept(
         "error[E354]: the campaign cannot go on: the connection to Dask's scheduler was lost\n"
         f" = help: what is done is kept in {archive}.campaign: the same command goes on\n"
         "\n1 error\n"
-    )  # fmt: skip
+    )
     assert whole.met(words(archive, "--threads", "2"), archive.parent).returncode == 0
     assert archive.read_bytes() == undisturbed
 
@@ -183,8 +183,12 @@ def test_a_script_needs_no_guard_for_it_is_not_run_again(tmp_path: Path) -> None
     (tmp_path / "script.py").write_text(text)
     environment = {**os.environ, "PYTHONPATH": f"{whole.ROOT}"}
     done = subprocess.run(
-        [sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, env=environment,
+        [sys.executable, "script.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        env=environment,
         timeout=whole.PATIENCE_SECONDS,
-    )  # fmt: skip
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, "once\n", "")
     assert whole.beside_it(tmp_path / "a.h5") == ["a.h5", "a.h5.run.json", "p.json", "script.py", "tmp"]

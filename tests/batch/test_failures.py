@@ -141,10 +141,12 @@ class TestTenThousandCases:
         status[DIVERGE], status[[2500, 9001]], status[[1234, 4321, 7777]] = FAILED, TIMED_OUT, LOST
         assert np.array_equal(found["status"], status)
         assert [found["cause"][row] for row in POISONED] == [
-            "its worker was killed by SIGKILL, 3 times", "timed out: no progress for 2 s",
-            "its worker was killed by SIGSEGV, 3 times", "its worker was killed by SIGKILL, 3 times",
+            "its worker was killed by SIGKILL, 3 times",
             "timed out: no progress for 2 s",
-        ]  # fmt: skip
+            "its worker was killed by SIGSEGV, 3 times",
+            "its worker was killed by SIGKILL, 3 times",
+            "timed out: no progress for 2 s",
+        ]
         assert set(found["cause"][status == DONE]) == {""}
         assert not found["n_valid"][POISONED].any() and np.isnan(found["end"][POISONED]).all()
         assert found["initial.hinge.qd"][1234] == pytest.approx(0.35)
@@ -153,8 +155,11 @@ class TestTenThousandCases:
         (summary,) = batch.look(ran[0]).summaries
         assert (summary.cases, summary.failed, summary.ok) == (10_000, 105, False)
         assert [(failure.status, failure.cases) for failure in summary.failures] == [
-            ("failed", tuple(DIVERGE)), ("lost", (1234, 7777)), ("timed out", (2500, 9001)), ("lost", (4321,))
-        ]  # fmt: skip
+            ("failed", tuple(DIVERGE)),
+            ("lost", (1234, 7777)),
+            ("timed out", (2500, 9001)),
+            ("lost", (4321,)),
+        ]
 
     def test_the_exit_status_is_1_and_the_words_say_why(self, ran: tuple[Path, int, str]) -> None:
         _, status, said = ran
@@ -354,13 +359,19 @@ class TestWorkers:
         assert held and not held.keys() & set(rest.names)
         assert path.read_bytes() == batch.run(plan, output=here / "b.h5", threads=1).path.read_bytes()
 
-    @pytest.mark.parametrize(("number", "why"), [
-        (errno.ENOMEM, "cannot allocate memory; fewer processes may do"),
-        (errno.EAGAIN, "resource temporarily unavailable; fewer processes may do"),
-        (errno.EMFILE, "too many open files; `ulimit -n` allows 77 open files: allow more in the shell that runs it, "
-                       "or use fewer processes"),
-        (errno.EACCES, "permission denied"),
-    ])  # fmt: skip
+    @pytest.mark.parametrize(
+        ("number", "why"),
+        [
+            (errno.ENOMEM, "cannot allocate memory; fewer processes may do"),
+            (errno.EAGAIN, "resource temporarily unavailable; fewer processes may do"),
+            (
+                errno.EMFILE,
+                "too many open files; `ulimit -n` allows 77 open files: allow more in the shell that runs it, "
+                "or use fewer processes",
+            ),
+            (errno.EACCES, "permission denied"),
+        ],
+    )
     def test_a_process_that_cannot_be_had_is_no_fault_of_the_archive(
         self, here: Path, monkeypatch: pytest.MonkeyPatch, number: int, why: str
     ) -> None:

@@ -198,8 +198,12 @@ def test_an_archive_says_which_repeat_a_case_is(tmp_path: Path) -> None:
 def test_large_tables_of_groups_go_through_a_plan_file(tmp_path: Path) -> None:
     from met.plan import file as plan_file
 
-    plan = compiled(tmp_path, TIMED, "sweep it of hold { vary drive.kp = linspace(0.1, 0.2, 6000) V*s/rad;"
-                    " vary integrator = [rk4, midpoint]; vary links.bar.mass = [1, 2] kg; }")  # fmt: skip
+    plan = compiled(
+        tmp_path,
+        TIMED,
+        "sweep it of hold { vary drive.kp = linspace(0.1, 0.2, 6000) V*s/rad;"
+        " vary integrator = [rk4, midpoint]; vary links.bar.mass = [1, 2] kg; }",
+    )
     plan_file.write(plan, tmp_path / "p.json")
     again = plan_file.read(tmp_path / "p.json")
     for one, other in zip(plan.experiments, again.experiments, strict=True):
@@ -236,8 +240,9 @@ def test_by_a_metric_the_cases_of_all_structures_are_in_one_table(
     with ArchiveFile("deck.it.h5") as file:
         found = {
             int(group.values("case")[i]): (float(group.values("end")[i]), str(group.values("case_id")[i])[:8])
-            for group in file.groups for i in range(group.count)
-        }  # fmt: skip
+            for group in file.groups
+            for i in range(group.count)
+        }
     for more, sign in ((["--reverse"], -1.0), ([], 1.0)):
         capsys.readouterr()
         assert main(["show", "deck.it.h5", "--sort", "end", *more]) == 0

@@ -95,10 +95,7 @@ def test_a_case_of_a_sweep_of_structures_does_not_take_its_sweeps_place(here: Pa
     assert (here / "a.kinds.h5").read_bytes() == whole_sweep
 
 
-@pytest.mark.parametrize("name", [
-    "thesis.tex", *(each
-                    for each in ("plan of my thesis.txt", "status report.md")),
-])  # fmt: skip
+@pytest.mark.parametrize("name", ["thesis.tex", *(each for each in ("plan of my thesis.txt", "status report.md"))])
 def test_what_is_no_campaigns_is_not_removed(here: Path, name: str) -> None:
     mine = here / "a.h5.campaign" / name
     mine.parent.mkdir()
@@ -281,10 +278,17 @@ def test_odd_words_of_the_queue_stop_no_share(
 
 @pytest.mark.parametrize(
     "text",
-    ["{", "[]", '{"shares": [[[0]]], "timeout": null}', '{"shares": [[["a", null, {}]]], "timeout": null}',
-     '{"shares": [[[0, 3, 1]]], "timeout": null}', '{"shares": [[[0, 0, 1000000000000]]], "timeout": null}',
-     '{"shares": [[[7, 0, 1]]], "timeout": null}', '{"shares": [[[0, 0, 1]]], "timeout": "soon"}'],
-)  # fmt: skip
+    [
+        "{",
+        "[]",
+        '{"shares": [[[0]]], "timeout": null}',
+        '{"shares": [[["a", null, {}]]], "timeout": null}',
+        '{"shares": [[[0, 3, 1]]], "timeout": null}',
+        '{"shares": [[[0, 0, 1000000000000]]], "timeout": null}',
+        '{"shares": [[[7, 0, 1]]], "timeout": null}',
+        '{"shares": [[[0, 0, 1]]], "timeout": "soon"}',
+    ],
+)
 def test_damaged_shares_are_told(submitted: Path, capsys: pytest.CaptureFixture[str], text: str) -> None:
     (submitted / "jobs.json").write_text(text)
     assert run_job(submitted, "share", "0", str(submitted / "jobs.json")) == 1

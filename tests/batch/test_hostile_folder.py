@@ -31,9 +31,24 @@ echo 7
 """A queue that runs its jobs at once, where they were submitted."""
 
 PACKAGES = (
-    "batch", "hw", "ic", "met", "numpy", "click", "h5py", "llvmlite", "distributed", "dask", "tornado", "xarray",
-    "serial", "matplotlib", "sitecustomize", "usercustomize", "hostile",
-)  # fmt: skip
+    "batch",
+    "hw",
+    "ic",
+    "met",
+    "numpy",
+    "click",
+    "h5py",
+    "llvmlite",
+    "distributed",
+    "dask",
+    "tornado",
+    "xarray",
+    "serial",
+    "matplotlib",
+    "sitecustomize",
+    "usercustomize",
+    "hostile",
+)
 """What else is imported by somebody; `hostile` is what the entry points name."""
 
 DECK = """\
@@ -84,9 +99,13 @@ def met(folder: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
 
     def run(*words: str, **more: str) -> subprocess.CompletedProcess[str]:
         done = subprocess.run(
-            [sys.executable, str(script), *words], cwd=folder, env=environment | more, capture_output=True, text=True,
+            [sys.executable, str(script), *words],
+            cwd=folder,
+            env=environment | more,
+            capture_output=True,
+            text=True,
             timeout=120,
-        )  # fmt: skip
+        )
         assert not folder.with_name("ran").exists(), folder.with_name("ran").read_text() + done.stderr
         return done
 
@@ -96,12 +115,13 @@ def met(folder: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
 @pytest.mark.parametrize(
     "way",
     [
-        pytest.param((), marks=pytest.mark.slow), ("--processes", "1"),
+        pytest.param((), marks=pytest.mark.slow),
+        ("--processes", "1"),
         pytest.param(("--timeout", "60 s"), marks=pytest.mark.slow),
         pytest.param(("--dask", "local"), marks=pytest.mark.slow),
     ],
     ids=" ".join,
-)  # fmt: skip
+)
 def test_a_campaign_runs_nothing_of_the_folder(
     met: Callable[..., subprocess.CompletedProcess[str]], way: tuple[str, ...], folder: Path
 ) -> None:

@@ -17,8 +17,22 @@ from met.cli import main
 from tests.batch import plans
 
 MADE_UP = RunProfile(
-    experiment="gains", cases=36, joints=2, lanes=32, vector=8, cpu="znver4", code_bytes=19442, pieces=18, cached=True,
-    recording_s=0.0104, compiling_s=0.0057, blocks=2, steps=1500, ns=20.0, peak=50e9, constants=59,
+    experiment="gains",
+    cases=36,
+    joints=2,
+    lanes=32,
+    vector=8,
+    cpu="znver4",
+    code_bytes=19442,
+    pieces=18,
+    cached=True,
+    recording_s=0.0104,
+    compiling_s=0.0057,
+    blocks=2,
+    steps=1500,
+    ns=20.0,
+    peak=50e9,
+    constants=59,
     inputs=(Input("gearbox.kp", 2, 0, 2, 2), Input("links.lower.mass", 1, 1234, 3, 18)),
     parts=(
         WorkCost("servo computers", "", False, 4.0, 176.0, 96.0, 5.5),
@@ -29,7 +43,7 @@ MADE_UP = RunProfile(
         WorkCost("friction decisions", "", True, 0.326, 41.8, 2.3, 0.25),
         WorkCost("friction splits", "", True, 0.0, 0.0, 0.0, 0.0),
     ),
-)  # fmt: skip
+)
 
 SHOWN = """\
 gains: 2 joints, 36 cases, modified_euler, steps of 40 ms

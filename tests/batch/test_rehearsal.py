@@ -65,15 +65,21 @@ def offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     models.available.cache_clear()
 
 
-@pytest.mark.parametrize(("does", "how"), [
-    ("ctypes.string_at(0)", "was killed by SIGSEGV"),
-    ("os._exit(3)", "ended with status 3"),
-    pytest.param("while True: pass", "has not ended after 4 s", marks=pytest.mark.slow),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("does", "how"),
+    [
+        ("ctypes.string_at(0)", "was killed by SIGSEGV"),
+        ("os._exit(3)", "ended with status 3"),
+        pytest.param("while True: pass", "has not ended after 4 s", marks=pytest.mark.slow),
+    ],
+)
 def test_a_model_that_ends_its_process_is_named(
-    offered: Callable[[str], Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
-    does: str, how: str,
-) -> None:  # fmt: skip
+    offered: Callable[[str], Path],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    does: str,
+    how: str,
+) -> None:
     monkeypatch.setattr(rehearsal, "LEAST_SECONDS", 4.0)
     file = offered(does)
     assert cli.main(["run", "deck.ic", "stopped", "--timeout", "1 s", "-o", "a.h5"]) == cli.BAD_INPUT

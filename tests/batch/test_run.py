@@ -45,7 +45,7 @@ class TestWhichCases:
             " = help: `gains` has #0 to #8\n"
             " = help: `met cases DECK` lists them\n"
             "\n1 error\n"
-        )  # fmt: skip
+        )
 
     def test_an_id_of_several_cases(self, here: Path) -> None:
         ids = keys.case_ids(plans.gains(40))
@@ -64,7 +64,7 @@ class TestWhichCases:
             " = help: did you mean `gains`?\n"
             " = help: runs and sweeps of two_link.ic: nominal, gains\n"
             "\n1 error\n"
-        )  # fmt: skip
+        )
 
 
 @pytest.mark.usefixtures("engine")

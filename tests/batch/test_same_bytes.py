@@ -211,35 +211,47 @@ EXTENSIONS = {
     "more values, between": ("brief", GAIN, GAIN.replace("0.020", "0.015, 0.020, 0.025")),
     "values in another order": ("brief", GAIN, GAIN.replace("0.010, 0.020", "0.020, 0.010")),
     "more values of a second axis": (
-        "brief", f"{GAIN} {KI}", f"{GAIN} {KI.replace('0.1, ', '0.1, 0.15, ')}",
+        "brief",
+        f"{GAIN} {KI}",
+        f"{GAIN} {KI.replace('0.1, ', '0.1, 0.15, ')}",
     ),
     "axes the other way round": (
-        "brief", f"{GAIN} {KI}", f"{KI} {GAIN}",
+        "brief",
+        f"{GAIN} {KI}",
+        f"{KI} {GAIN}",
     ),
     "fewer left out": (
-        "brief", f"{GAIN} exclude when gearbox.kp < 0.012 V*s/rad;", f"{GAIN} exclude when gearbox.kp < 0.002 V*s/rad;",
+        "brief",
+        f"{GAIN} exclude when gearbox.kp < 0.012 V*s/rad;",
+        f"{GAIN} exclude when gearbox.kp < 0.002 V*s/rad;",
     ),
     "another structure": (
-        "brief", f"{GAIN} vary integrator = [modified_euler, rk4];",
+        "brief",
+        f"{GAIN} vary integrator = [modified_euler, rk4];",
         f"{GAIN} vary integrator = [midpoint, modified_euler, rk4];",
     ),
     "more repeats, common noise": ("bench", f"{KT} repeat 2;", f"{KT} repeat 5;"),
     "more repeats, own noise": (
-        "bench", f"{KT} repeat 2; seeds = independent;", f"{KT} repeat 5; seeds = independent;",
+        "bench",
+        f"{KT} repeat 2; seeds = independent;",
+        f"{KT} repeat 5; seeds = independent;",
     ),
     "more values, own noise": (
-        "bench", f"{KT} repeat 2; seeds = independent;",
+        "bench",
+        f"{KT} repeat 2; seeds = independent;",
         f"{KT.replace('0.064', '0.061, 0.064')} repeat 2; seeds = independent;",
     ),
     "more samples at random": (
-        "brief", "sample random(5) { gearbox.kp = uniform(0.01, 0.04) V*s/rad; }",
+        "brief",
+        "sample random(5) { gearbox.kp = uniform(0.01, 0.04) V*s/rad; }",
         "sample random(9) { gearbox.kp = uniform(0.01, 0.04) V*s/rad; }",
     ),
     "more samples of Sobol's": (
-        "brief", "sample sobol(4) { gearbox.kp = uniform(0.01, 0.04) V*s/rad; }",
+        "brief",
+        "sample sobol(4) { gearbox.kp = uniform(0.01, 0.04) V*s/rad; }",
         "sample sobol(16) { gearbox.kp = uniform(0.01, 0.04) V*s/rad; }",
     ),
-}  # fmt: skip
+}
 
 
 def extended(run: str, entries: str) -> Path:

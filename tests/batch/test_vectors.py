@@ -101,8 +101,11 @@ def test_units_and_frames_are_told(files: dict[str, Path]) -> None:
     assert told["links.sled.jacobian.angular"]["units_by_joint"] == ["1", "rad/m"]
     assert told["links.hook.jacobian.linear"]["units"] == "m/rad"
     assert {name: told[name]["units"] for name in ("reaction.moment", "reaction.force", "x.b", "mode")} == {
-        "reaction.moment": "N*m", "reaction.force": "N", "x.b": "N", "mode": "1",
-    }  # fmt: skip
+        "reaction.moment": "N*m",
+        "reaction.force": "N",
+        "x.b": "N",
+        "mode": "1",
+    }
     assert told["momentum.angular"]["units"] == "kg*m^2/s" and told["energy.potential"]["units"] == "J"
     assert told["reaction.moment"]["frame"] == "link axes, about the link frame's origin"
     assert told["links.sled.position"]["frame"] == "world axes" and "frame" not in told["energy.kinetic"]
@@ -125,11 +128,13 @@ def test_a_vector_of_joints_has_a_panel_a_component_and_others_a_line(one: Archi
     assert brief(panels(group, ["reaction.force", "links.sled.orientation", "energy"])) == [
         *((f"reaction.force.{axis}", "N", ("y", "x")) for axis in "xyz"),
         ("links.sled.orientation", "1", ("w", "x", "y", "z")),
-        ("energy.kinetic", "J", ("",)), ("energy.potential", "J", ("",)),
-    ]  # fmt: skip
+        ("energy.kinetic", "J", ("",)),
+        ("energy.potential", "J", ("",)),
+    ]
     assert brief(panels(group, ["links.sled.jacobian.linear"]))[:2] == [
-        ("links.sled.jacobian.linear.x", "m/rad", ("y",)), ("links.sled.jacobian.linear.x", "1", ("x",)),
-    ]  # fmt: skip
+        ("links.sled.jacobian.linear.x", "m/rad", ("y",)),
+        ("links.sled.jacobian.linear.x", "1", ("x",)),
+    ]
 
 
 def test_a_part_of_a_vector_is_asked_for_by_its_name(one: ArchiveFile) -> None:
@@ -191,10 +196,11 @@ def test_cases_of_a_vector_have_a_plot_a_component(sweep: ArchiveFile, figures: 
     draw(sweep, tmp_path / "a.png", ["q", "x.reaction.force", "links.sled.position"])
     axes = shown(figures[0])
     assert [(ax.get_title("left"), ax.get_ylabel().replace("\n", " ")) for ax in axes] == [
-        ("y · joint position", "q  (rad)"), ("x · joint position", "q  (m)"),
+        ("y · joint position", "q  (rad)"),
+        ("x · joint position", "q  (m)"),
         *(("x · force of the joint on its link, link axes", f"reaction.force.{axis} (N)") for axis in "xyz"),
         *(("origin of the link's frame, world axes", f"links.sled.position.{axis} (m)") for axis in "xyz"),
-    ]  # fmt: skip
+    ]
     assert all(len(ax.lines) == 3 for ax in axes)
 
 

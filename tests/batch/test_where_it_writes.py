@@ -57,7 +57,7 @@ class TestRefusedBeforeAnythingRuns:
             " = help: `met status a.h5` says how far it is\n"
             " = help: wait until it is done, or give another name with `-o`\n"
             "\n1 error\n"
-        )  # fmt: skip
+        )
         other.remove()
         other.close()
 
@@ -66,7 +66,7 @@ class TestRefusedBeforeAnythingRuns:
             "error[E305]: cannot write no/such/a.h5: no/such does not exist\n"
             " = help: make it first: `mkdir -p no/such`\n"
             "\n1 error\n"
-        )  # fmt: skip
+        )
 
     def test_a_file_where_a_folder_should_be(self, here: Path) -> None:
         (here / "file").write_text("x")
@@ -86,14 +86,14 @@ class TestRefusedBeforeAnythingRuns:
             "error[E305]: two_link.ic exists and is no archive of MET: it is not written over\n"
             " = help: give another name with `-o`, or remove the file\n"
             "\n1 error\n"
-        )  # fmt: skip
+        )
 
     def test_a_place_that_refuses_files(self, here: Path) -> None:
         assert self.run("/proc/a.h5") == (
             "error[E305]: cannot write /proc/a.h5: no such file or directory\n"
             " = help: nothing was kept; `-o FILE` names another place\n"
             "\n1 error\n"
-        )  # fmt: skip
+        )
 
     def test_what_is_no_file_is_not_replaced_by_one(self, here: Path) -> None:
         os.mkfifo("pipe")
@@ -113,7 +113,7 @@ class TestRefusedBeforeAnythingRuns:
             " = help: `--histories none` keeps metrics only; `--float32`, fewer signals in `record`, or a slower "
             "`rates.record`, take less\n"
             "\n1 error\n"
-        )  # fmt: skip
+        )
 
 
 @pytest.mark.usefixtures("engine")
@@ -219,9 +219,9 @@ class TestHowItEnds:
 
 
 @pytest.mark.usefixtures("engine")
-@pytest.mark.parametrize(("name", "why"), [
-    ("shards", "shards: file exists"), ("plan.json/x", "plan.json: is a directory"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "why"), [("shards", "shards: file exists"), ("plan.json/x", "plan.json: is a directory")]
+)
 def test_what_is_in_the_way_in_the_campaigns_folder_is_named(here: Path, name: str, why: str) -> None:
     there = here / "a.h5.campaign" / name
     there.parent.mkdir(parents=True)

@@ -42,8 +42,9 @@ sys.exit(main(sys.argv[2:]))
 """`met` with names of modules set: `{"batch.campaigns.cutting.WORK_SECONDS": 0.1}`."""
 
 SHORT_TASKS: Mapping[str, float] = {
-    "batch.campaigns.cutting.WORK_SECONDS": 0.1, "batch.campaigns.cutting.FIRST_SECONDS": 0.01
-}  # fmt: skip
+    "batch.campaigns.cutting.WORK_SECONDS": 0.1,
+    "batch.campaigns.cutting.FIRST_SECONDS": 0.01,
+}
 
 
 # Plans

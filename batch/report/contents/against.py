@@ -32,8 +32,9 @@ class Against:
         by_name = {experiment.name_b: experiment for experiment in self.found.experiments}
         pairs = [
             (number, groups[by_name[group.name].name_a], by_name[group.name])
-            for number, group in enumerate(pool.groups) if group.name in by_name
-        ]  # fmt: skip
+            for number, group in enumerate(pool.groups)
+            if group.name in by_name
+        ]
         return Before(pool, pairs) if pairs else None
 
 
@@ -74,8 +75,14 @@ class Before:
         """A metric of the pool as it was, in its unit: [case], not a number where there is none; None where the other
         archive has no such metric in this unit."""
         name = metric.key.partition(":")[2]
-        mine, theirs = ([group.variables[name] for group in pool.groups if name in group.variables
-                         and group.variables[name].role == "metric"] for pool in (self.now, self.pool))  # fmt: skip
+        mine, theirs = (
+            [
+                group.variables[name]
+                for group in pool.groups
+                if name in group.variables and group.variables[name].role == "metric"
+            ]
+            for pool in (self.now, self.pool)
+        )
         if not theirs or {each.unit for each in theirs} != {each.unit for each in mine}:
             return None
         before = self.pool.gathered(name) / deck_unit(mine[0])[0]
@@ -129,10 +136,13 @@ def named(found: Diff, before: str, now: str) -> Diff:
         return either.sub(lambda match: names[match[0]], text)
 
     experiments = tuple(
-        replace(each, signals=[replace(signal, why=said(signal.why)) for signal in each.signals],
-                notes=[said(note) for note in each.notes])
+        replace(
+            each,
+            signals=[replace(signal, why=said(signal.why)) for signal in each.signals],
+            notes=[said(note) for note in each.notes],
+        )
         for each in found.experiments
-    )  # fmt: skip
+    )
     return replace(found, a=Path(before), b=Path(now), experiments=experiments)
 
 

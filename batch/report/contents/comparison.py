@@ -19,9 +19,14 @@ MOST_LINES = 200
 """Lines of one kind of change that are in a page."""
 
 KINDS = {
-    "versions": "Versions", "code": "Code", "structure": "Structure", "deck": "Deck",
-    "changed": "Parameters and models", "follows": "What follows", "new": "New parameters",
-}  # fmt: skip
+    "versions": "Versions",
+    "code": "Code",
+    "structure": "Structure",
+    "deck": "Deck",
+    "changed": "Parameters and models",
+    "follows": "What follows",
+    "new": "New parameters",
+}
 
 
 def archive_changes(found: Diff) -> ArchiveChanges:

@@ -36,9 +36,12 @@ BEGINS = 200
 
 
 def gather(
-    archive: ArchiveFile, names: Sequence[str] = (), title: str = "", progress: Callable[[int], None] | None = None,
+    archive: ArchiveFile,
+    names: Sequence[str] = (),
+    title: str = "",
+    progress: Callable[[int], None] | None = None,
     against: Against | None = None,
-) -> Report:  # fmt: skip
+) -> Report:
     """All that a page says of an archive, or of these runs and sweeps of it. Raises Problem E325 for another name.
 
     progress  called with the number of cases whose margin is known, where motors are on beds
@@ -54,10 +57,12 @@ def gather(
     share = MOST_VALUES // max(1, len(found))
     befores = [None if against is None else against.of(pool) for pool in found]
     sections = tuple(
-        replace(_section(name, pool, pool.name if several else "", experiments, trouble, share, progress, before),
-                changes=() if against is None else comparison.run_changes(against.found, before))
+        replace(
+            _section(name, pool, pool.name if several else "", experiments, trouble, share, progress, before),
+            changes=() if against is None else comparison.run_changes(against.found, before),
+        )
         for pool, before in zip(found, befores, strict=True)
-    )  # fmt: skip
+    )
     verdicts = [verdict(pool, named=len(found) > 1) for pool in found]
     if against is not None:
         verdicts.append(comparison.verdict(against, list(zip(found, befores, strict=True))))
@@ -87,9 +92,15 @@ def _experiments(archive: ArchiveFile) -> tuple[dict[str, Experiment], str]:
 
 
 def _section(
-    archive: str, pool: Pool, only: str, experiments: Mapping[str, Experiment], trouble: str, values: int,
-    progress: Callable[[int], None] | None, before: Before | None,
-) -> ReportSection:  # fmt: skip
+    archive: str,
+    pool: Pool,
+    only: str,
+    experiments: Mapping[str, Experiment],
+    trouble: str,
+    values: int,
+    progress: Callable[[int], None] | None,
+    before: Before | None,
+) -> ReportSection:
     own = {group.name: experiments[group.name] for group in pool.groups if group.name in experiments}
     beds: Stability | None = None
     rows: tuple[Any, ...] = ()

@@ -68,10 +68,14 @@ def signals(pool: Pool, values: int = MOST_VALUES, before: Before | None = None)
     numbers = {each: int(pool.groups[each[0]].at("case", [each[1]])[0]) for each in wanted}
     was = None if before is None else Earlier(before, found, clocks, points)
     histories = tuple(
-        History(numbers[n, position], clock_of[n], groups[n].thinned(found, position, points),
-                *(was.of(numbers[n, position], n, position) if was is not None else ()))
+        History(
+            numbers[n, position],
+            clock_of[n],
+            groups[n].thinned(found, position, points),
+            *(was.of(numbers[n, position], n, position) if was is not None else ()),
+        )
         for n, position in wanted
-    )  # fmt: skip
+    )
     joints = tuple(dict.fromkeys(joint for each in groups if each.panels for joint in joints_of(each.group)))
     shown = [numbers[each] for each in wanted[: COMPARED if before is None else 1]]
     here = {each.case for each in histories}
@@ -139,10 +143,13 @@ class _Group:
         drawn = {(command.variable, command.column) for command in commands.values()}
         self.panels = tuple(p for p in found if not drawn.issuperset((p.variable, column) for column in p.columns))
         self.commands = {
-            (p.name, p.unit): [(line, commands[p.name, p.unit, line]) for line in range(len(p.lines))
-                               if (p.name, p.unit, line) in commands]
+            (p.name, p.unit): [
+                (line, commands[p.name, p.unit, line])
+                for line in range(len(p.lines))
+                if (p.name, p.unit, line) in commands
+            ]
             for p in self.panels
-        }  # fmt: skip
+        }
 
     @property
     def width(self) -> int:

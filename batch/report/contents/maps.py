@@ -50,8 +50,9 @@ def _map(pool: Pool, x: CaseColumn, y: CaseColumn, metrics: Sequence[CaseColumn]
     counts, failed = (
         np.bincount(cells[which], minlength=shape[0] * shape[1]).reshape(shape) for which in (there, there & ~done)
     )
-    return Map(x.key, y.key, across.texts, up.texts, counts, values, cases, missed, failed, reaches,
-               ruler(across), ruler(up))  # fmt: skip
+    return Map(
+        x.key, y.key, across.texts, up.texts, counts, values, cases, missed, failed, reaches, ruler(across), ruler(up)
+    )
 
 
 def ruler(found: Levels) -> Ruler:

@@ -66,9 +66,13 @@ def _row(path: str, quantity: Quantity, spans: Mapping[int, tuple[float, float]]
     unit = "" if quantity.unit == "1" else pretty_unit(quantity.unit)
     origin = quantity.origin
     return ParameterRow(
-        path, _value(quantity, spans), unit, _said(origin), spot(origin.place),
+        path,
+        _value(quantity, spans),
+        unit,
+        _said(origin),
+        spot(origin.place),
         tuple(dict.fromkeys(place for place in map(spot, origin.overrides) if place is not None)),
-    )  # fmt: skip
+    )
 
 
 def _said(origin: Origin) -> str:

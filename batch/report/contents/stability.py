@@ -84,10 +84,19 @@ def _bed(joint: str, each: Sequence[Margin | None], spans: bool) -> BedStability
     if len(known) and f"{known.max():.3g}" != spread:
         spread += f" to {known.max():.3g}"
     return BedStability(
-        joint, _words(one.law for one in there), _words(f"{one.rate_hz:g} Hz" for one in there),
-        _words(f"{one.delay:g}" for one in there), r, lower, limit, unstable, spread,
-        stable_at(tightest, spans), verdict(tightest, "none"), not unstable.any(),
-    )  # fmt: skip
+        joint,
+        _words(one.law for one in there),
+        _words(f"{one.rate_hz:g} Hz" for one in there),
+        _words(f"{one.delay:g}" for one in there),
+        r,
+        lower,
+        limit,
+        unstable,
+        spread,
+        stable_at(tightest, spans),
+        verdict(tightest, "none"),
+        not unstable.any(),
+    )
 
 
 def _words(texts: Iterable[str]) -> str:

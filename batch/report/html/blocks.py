@@ -92,9 +92,10 @@ def _drawn(path: str) -> Html:
 
 
 ALIKE = {
-    "identical": "M3 5.7h10M3 10.3h10", "equivalent": "M3 6.2q2.5-2.4 5 0t5 0M3 10.8q2.5-2.4 5 0t5 0",
+    "identical": "M3 5.7h10M3 10.3h10",
+    "equivalent": "M3 6.2q2.5-2.4 5 0t5 0M3 10.8q2.5-2.4 5 0t5 0",
     "different": "M3 5.7h10M3 10.3h10M10.7 2.6L5.3 13.4",
-}  # fmt: skip
+}
 UNCLEAR = "M5.2 6q0-3 2.8-3t2.8 2.6q0 1.6-1.6 2.4T7.9 10.4M7.9 13v.3"
 
 
@@ -104,9 +105,12 @@ def likeness(word: str) -> Html:
 
 
 SHARES = {
-    "identical": ("same", "identical"), "equivalent": ("near", "equivalent"), "different": ("other", "different"),
-    "only before": ("gone", "only before"), "only now": ("new", "only now"),
-}  # fmt: skip
+    "identical": ("same", "identical"),
+    "equivalent": ("near", "equivalent"),
+    "different": ("other", "different"),
+    "only before": ("gone", "only before"),
+    "only now": ("new", "only now"),
+}
 
 
 def _comparison(found: Verdict) -> Html:
@@ -119,9 +123,13 @@ def _comparison(found: Verdict) -> Html:
         said = f"of the {of:,} cases in both meet all{', as before' if was == now else ''}"
         figure = [el("p", text, cls="share two"), el("p", said, cls="under")]
     answer = el(
-        "div", el("p", found.about, cls="about"), el("p", likeness(found.word), found.word.capitalize(), cls="word"),
-        figure, el("p", found.headline, ".", cls="headline") if found.headline else None, cls="answer",
-    )  # fmt: skip
+        "div",
+        el("p", found.about, cls="about"),
+        el("p", likeness(found.word), found.word.capitalize(), cls="word"),
+        figure,
+        el("p", found.headline, ".", cls="headline") if found.headline else None,
+        cls="answer",
+    )
     parts = [(*SHARES.get(part.word, ("other", part.word)), part.count) for part in found.parts]
     words = [(cls, f"{count:,} {word}") for cls, word, count in parts]
     legend = el("ul", [el("li", el("span", cls=f"key {cls}"), text) for cls, text in words], cls="legend")
@@ -134,14 +142,22 @@ def _flows(found: Sequence[Flow]) -> Html | None:
     if not found:
         return None
     gained, lost = any(each.gained for each in found), any(each.lost for each in found)
-    heads = ["requirement", "cases in both", *(["met now, and not before"] if gained else []),
-             *(["missed now, and not before"] if lost else [])]  # fmt: skip
+    heads = [
+        "requirement",
+        "cases in both",
+        *(["met now, and not before"] if gained else []),
+        *(["missed now, and not before"] if lost else []),
+    ]
     rows = [
-        el("tr", el("th", el("code", breaking(each.text)), scope="row"), el("td", each.met, cls="words"),
-           el("td", each.gained or "–", cls="good words" if each.gained else None) if gained else None,
-           el("td", each.lost or "–", cls="bad words" if each.lost else None) if lost else None)
+        el(
+            "tr",
+            el("th", el("code", breaking(each.text)), scope="row"),
+            el("td", each.met, cls="words"),
+            el("td", each.gained or "–", cls="good words" if each.gained else None) if gained else None,
+            el("td", each.lost or "–", cls="bad words" if each.lost else None) if lost else None,
+        )
         for each in found
-    ]  # fmt: skip
+    ]
     head = el("tr", [el("th", head, scope="col") for head in heads])
     return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "Requirements, before and now")
 
@@ -162,12 +178,19 @@ def _demands(found: Verdict) -> Html | None:
     single = found.cases == 1
     missed = not single and any(each.missed for each in found.demands)
     unknown = not single and any(each.unknown for each in found.demands)
-    heads = ["requirement", *(["outcome"] if single else ["met by", "yield"]), *(["missed"] if missed else []),
-             *(["not known"] if unknown else []), "value" if single else "worst value"]  # fmt: skip
+    heads = [
+        "requirement",
+        *(["outcome"] if single else ["met by", "yield"]),
+        *(["missed"] if missed else []),
+        *(["not known"] if unknown else []),
+        "value" if single else "worst value",
+    ]
     right = [False, not single, *[True] * (len(heads) - 2)]
     rows = [el("tr", _demand(each, single, missed, unknown)) for each in found.demands]
-    head = el("tr", [el("th", name, scope="col", cls="right" if flush else None)
-                     for name, flush in zip(heads, right, strict=True)])  # fmt: skip
+    head = el(
+        "tr",
+        [el("th", name, scope="col", cls="right" if flush else None) for name, flush in zip(heads, right, strict=True)],
+    )
     return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "Requirements")
 
 
@@ -175,8 +198,11 @@ def _demand(each: Demand, single: bool, missed: bool, unknown: bool) -> list[Htm
     name = el("th", el("code", breaking(each.text)), scope="row")
     if single:
         word = "met" if each.met else "missed" if each.missed else "not known"
-        return [name, el("td", mark(word == "met") if word != "not known" else None, word,
-                         cls="good" if each.met else "bad"), el("td", each.furthest, cls="right")]  # fmt: skip
+        return [
+            name,
+            el("td", mark(word == "met") if word != "not known" else None, word, cls="good" if each.met else "bad"),
+            el("td", each.furthest, cls="right"),
+        ]
     far: Child = each.furthest
     if each.case is not None:
         far = [each.furthest, " ", case_link(each.case)]
@@ -202,11 +228,13 @@ def _failing(found: Sequence[Failing], of: int) -> Html:
     rows = []
     for each in found:
         who: Child = f"case #{each.first}" if each.count == 1 else f"{each.count:,} cases"
-        rows.append(el(
-            "li",
-            el("p", el("strong", who if of > 1 else "The case", " ", each.status), " ", el("span", each.cause)),
-            el("p", each.cases, cls="cases") if each.count > 1 else None,
-        ))  # fmt: skip
+        rows.append(
+            el(
+                "li",
+                el("p", el("strong", who if of > 1 else "The case", " ", each.status), " ", el("span", each.cause)),
+                el("p", each.cases, cls="cases") if each.count > 1 else None,
+            )
+        )
     return join([el("h4", "Did not reach their end" if of > 1 else "Why"), el("ul", rows, cls="failing")])
 
 
@@ -214,9 +242,11 @@ def _failing(found: Sequence[Failing], of: int) -> Html:
 
 
 def facts(found: Sequence[Fact]) -> Html:
-    return el("dl", [
-        el("div", el("dt", fact.name), el("dd", el("code", fact.text) if fact.code else fact.text)) for fact in found
-    ], cls="facts")  # fmt: skip
+    return el(
+        "dl",
+        [el("div", el("dt", fact.name), el("dd", el("code", fact.text) if fact.code else fact.text)) for fact in found],
+        cls="facts",
+    )
 
 
 def varied(found: Sequence[VariedParameter], anchors: Anchors) -> Html | None:
@@ -224,11 +254,16 @@ def varied(found: Sequence[VariedParameter], anchors: Anchors) -> Html | None:
         return None
     decides = any(each.sets for each in found)
     rows = [
-        el("tr", el("th", el("code", breaking(each.path)), scope="row"), el("td", each.text, cls="words"),
-           el("td", each.unit), el("td", _sets(each.sets)) if decides else None,
-           el("td", spot_link(each.spot, anchors)))
+        el(
+            "tr",
+            el("th", el("code", breaking(each.path)), scope="row"),
+            el("td", each.text, cls="words"),
+            el("td", each.unit),
+            el("td", _sets(each.sets)) if decides else None,
+            el("td", spot_link(each.spot, anchors)),
+        )
         for each in found
-    ]  # fmt: skip
+    ]
     heads = ("varied", "values", "unit", *(["decides"] if decides else []), "written in")
     head = el("tr", [el("th", head, scope="col") for head in heads])
     return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "What was varied")
@@ -252,8 +287,13 @@ def metrics(section: ReportSection) -> Html | None:
     remarks = any(each.remark for each in section.metrics)
     rows = [el("tr", _metric(each, section.single, remarks, compared)) for each in section.metrics]
     numbers = range(1, len(values) + 1)
-    head = el("tr", [el("th", name, scope="col", cls="right" if n in numbers else None)
-                     for n, name in enumerate([*heads, *([""] if remarks else [])])])  # fmt: skip
+    head = el(
+        "tr",
+        [
+            el("th", name, scope="col", cls="right" if n in numbers else None)
+            for n, name in enumerate([*heads, *([""] if remarks else [])])
+        ],
+    )
     made = el("table", el("thead", head), el("tbody", lines(rows)), cls="few" if section.single else None)
     outline = any(each.bars_before for each in section.metrics)
     said = el("p", "Bars: how often now. Outline: before.", cls="said") if outline else None
@@ -278,10 +318,17 @@ def histogram(each: MetricRow) -> Html | None:
         return None
     top, wide = max(each.bars + each.bars_before), 160 / len(each.bars)
     bars = [
-        el("rect", x=f"{n * wide:.2f}", y=f"{26 - 24 * count / top:.2f}", width=f"{wide - 0.6:.2f}",
-           height=f"{24 * count / top:.2f}", cls="count")
-        for n, count in enumerate(each.bars) if count
-    ]  # fmt: skip
+        el(
+            "rect",
+            x=f"{n * wide:.2f}",
+            y=f"{26 - 24 * count / top:.2f}",
+            width=f"{wide - 0.6:.2f}",
+            height=f"{24 * count / top:.2f}",
+            cls="count",
+        )
+        for n, count in enumerate(each.bars)
+        if count
+    ]
     limits = []
     for limit in each.limits:
         at = f"{160 * (limit - each.low) / (each.high - each.low):.2f}"

@@ -64,17 +64,19 @@ def run_changes(found: RunChanges) -> Html:
     signals = _signals(found.signals)
     if found.word == IDENTICAL:
         signals = el("details", el("summary", f"{len(found.signals)} signals and metrics, all identical"), signals)
-    return join([
-        head,
-        _noted(found.alone),
-        [_ended(each) for each in found.endings],
-        [el("p", f"Note: {note}", cls="said") for note in found.notes],
-        [el("p", line, ".", cls="said") for line in found.allowed],
-        signals,
-        _samples(found),
-        el("p", found.starred, cls="said") if found.starred else None,
-        _worst(found),
-    ])  # fmt: skip
+    return join(
+        [
+            head,
+            _noted(found.alone),
+            [_ended(each) for each in found.endings],
+            [el("p", f"Note: {note}", cls="said") for note in found.notes],
+            [el("p", line, ".", cls="said") for line in found.allowed],
+            signals,
+            _samples(found),
+            el("p", found.starred, cls="said") if found.starred else None,
+            _worst(found),
+        ]
+    )
 
 
 def _ended(found: Ending) -> Html:
@@ -152,13 +154,25 @@ def _worst(found: RunChanges) -> Html | None:
 def _cases(found: Sequence[WorstCase]) -> Html:
     heads = ("case", "id", "what changed most", "before", "now", "unit", "run it again, before and now")
     right = {0, 3, 4}
-    head = el("tr", [el("th", name, scope="col", cls="right" if n in right else "command" if n == 6 else None)
-                     for n, name in enumerate(heads)])  # fmt: skip
+    head = el(
+        "tr",
+        [
+            el("th", name, scope="col", cls="right" if n in right else "command" if n == 6 else None)
+            for n, name in enumerate(heads)
+        ],
+    )
     rows = [
-        el("tr", el("th", case_link(each.case), scope="row", cls="right"), el("td", el("code", each.id), cls="id"),
-           el("td", each.what), el("td", _number(each.before), cls="right"), el("td", _number(each.now), cls="right"),
-           el("td", each.unit), el("td", [el("p", command(words)) for words in each.commands], cls="command"),
-           data_case=each.case)
+        el(
+            "tr",
+            el("th", case_link(each.case), scope="row", cls="right"),
+            el("td", el("code", each.id), cls="id"),
+            el("td", each.what),
+            el("td", _number(each.before), cls="right"),
+            el("td", _number(each.now), cls="right"),
+            el("td", each.unit),
+            el("td", [el("p", command(words)) for words in each.commands], cls="command"),
+            data_case=each.case,
+        )
         for each in found
-    ]  # fmt: skip
+    ]
     return scrolling(el("table", el("thead", head), el("tbody", lines(rows)), cls="cases"), "Cases that changed most")

@@ -11,9 +11,16 @@ FOLDER = Path(__file__).with_name("assets")
 
 STYLES = ("uPlot.min.css", "report.css")
 SCRIPTS = (
-    "uPlot.iife.min.js", "core.js", "points.js", "overview.js", "cells.js", "map.js", "signals.js", "stability.js",
+    "uPlot.iife.min.js",
+    "core.js",
+    "points.js",
+    "overview.js",
+    "cells.js",
+    "map.js",
+    "signals.js",
+    "stability.js",
     "report.js",
-)  # fmt: skip
+)
 """In the order in which they stand in a page; each builds on those before."""
 
 

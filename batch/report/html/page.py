@@ -21,31 +21,39 @@ def page(report: Report) -> str:
         f"default-src 'none'; script-src {inlined.digest(script)}; style-src {inlined.digest(style)}; img-src data:; "
         "base-uri 'none'; form-action 'none'"
     )
-    head = lines([
-        el("meta", charset="utf-8"),
-        el("meta", name="generator", content=GENERATOR),
-        Html(f'<meta http-equiv="Content-Security-Policy" content="{rules}">'),
-        el("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        el("meta", name="color-scheme", content="light dark"),
-        el("meta", name="referrer", content="no-referrer"),
-        el("link", rel="icon", href="data:,"),
-        el("title", report.title),
-        Html(f"<style>{style}</style>"),
-    ])  # fmt: skip
+    head = lines(
+        [
+            el("meta", charset="utf-8"),
+            el("meta", name="generator", content=GENERATOR),
+            Html(f'<meta http-equiv="Content-Security-Policy" content="{rules}">'),
+            el("meta", name="viewport", content="width=device-width, initial-scale=1"),
+            el("meta", name="color-scheme", content="light dark"),
+            el("meta", name="referrer", content="no-referrer"),
+            el("link", rel="icon", href="data:,"),
+            el("title", report.title),
+            Html(f"<style>{style}</style>"),
+        ]
+    )
     data = [
-        el("script", script_json(section_data(section, _replay(report, section), report.changes)),
-           type="application/json", id=f"d{n}")
+        el(
+            "script",
+            script_json(section_data(section, _replay(report, section), report.changes)),
+            type="application/json",
+            id=f"d{n}",
+        )
         for n, section in enumerate(report.sections)
-    ]  # fmt: skip
-    body = lines([
-        el("a", "To the report", href="#verdict", cls="skip"),
-        _header(report),
-        el("main", lines([*_main(report, anchors)])),
-        _footer(report),
-        el("div", id="tip", role="status", hidden=True),
-        *data,
-        Html(f"<script>{script}</script>"),
-    ])  # fmt: skip
+    ]
+    body = lines(
+        [
+            el("a", "To the report", href="#verdict", cls="skip"),
+            _header(report),
+            el("main", lines([*_main(report, anchors)])),
+            _footer(report),
+            el("div", id="tip", role="status", hidden=True),
+            *data,
+            Html(f"<script>{script}</script>"),
+        ]
+    )
     return f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{head}\n</head>\n<body>\n{body}\n</body>\n</html>\n'
 
 
@@ -80,10 +88,14 @@ def _about(report: Report) -> str:
 def _links(number: int, section: ReportSection, report: Report) -> list[tuple[str, str]]:
     if len(report.sections) > 1:
         return [(f"s{number}", section.name)]
-    found = [("run", "What was run", True), ("overview", "Cases", section.overview is not None),
-             ("worst", "Worst cases", section.worst is not None), ("signals", "Signals", section.signals is not None),
-             ("structures", "Structures", section.structures is not None),
-             ("stability", "Stability", section.stability is not None)]  # fmt: skip
+    found = [
+        ("run", "What was run", True),
+        ("overview", "Cases", section.overview is not None),
+        ("worst", "Worst cases", section.worst is not None),
+        ("signals", "Signals", section.signals is not None),
+        ("structures", "Structures", section.structures is not None),
+        ("stability", "Stability", section.stability is not None),
+    ]
     return [(f"s{number}-{key}", name) for key, name, there in found if there]
 
 
@@ -101,10 +113,15 @@ def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
         else:
             out.append(el("div", parts, data_section=number))
     out.append(_parameters(report, anchors))
-    out.append(el(
-        "section", el("h2", "Provenance"), blocks.facts(report.provenance),
-        [tables.source(n, file) for n, file in enumerate(report.sources)], id="provenance",
-    ))  # fmt: skip
+    out.append(
+        el(
+            "section",
+            el("h2", "Provenance"),
+            blocks.facts(report.provenance),
+            [tables.source(n, file) for n, file in enumerate(report.sources)],
+            id="provenance",
+        )
+    )
     return out
 
 
@@ -115,20 +132,36 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
 
     out: list[Child] = []
     if section.changes:
-        out.append(el("section", [changes.run_changes(each) for each in section.changes], id=f"s{number}-compared",
-                      cls="compared"))  # fmt: skip
-    out.append(part(
-        "run", "What was run", blocks.facts(section.facts), blocks.varied(section.varied, anchors),
-        _notes(section.notes),
-    ))  # fmt: skip
+        out.append(
+            el(
+                "section",
+                [changes.run_changes(each) for each in section.changes],
+                id=f"s{number}-compared",
+                cls="compared",
+            )
+        )
+    out.append(
+        part(
+            "run",
+            "What was run",
+            blocks.facts(section.facts),
+            blocks.varied(section.varied, anchors),
+            _notes(section.notes),
+        )
+    )
     table = blocks.metrics(section)
     if section.overview is not None:
-        out.append(part(
-            "overview", "Cases at a glance", table, el("div", cls="points plot", data_plot="points"),
-            el("p", section.overview.said, cls="said") if section.overview.said else None,
-            el("div", cls="card", data_plot="card"),
-            el("div", cls="map plot", data_plot="map") if section.overview.maps else None,
-        ))  # fmt: skip
+        out.append(
+            part(
+                "overview",
+                "Cases at a glance",
+                table,
+                el("div", cls="points plot", data_plot="points"),
+                el("p", section.overview.said, cls="said") if section.overview.said else None,
+                el("div", cls="card", data_plot="card"),
+                el("div", cls="map plot", data_plot="map") if section.overview.maps else None,
+            )
+        )
     elif table is not None:
         out.append(part("overview", "Metrics", table))
     if section.structures is not None:
@@ -142,12 +175,17 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
         out.append(part("signals", "Signals", said=section.no_signals))
     if section.stability is not None:
         found = section.stability
-        out.append(part(
-            "stability", "Stability of the beds", el("p", ABOUT_STABILITY, cls="said"), tables.beds(found),
-            [el("p", each, cls="note") for each in found.unstable],
-            el("div", cls="stability plot", data_plot="stability"),
-            el("p", found.said, cls="said") if found.said else None,
-        ))  # fmt: skip
+        out.append(
+            part(
+                "stability",
+                "Stability of the beds",
+                el("p", ABOUT_STABILITY, cls="said"),
+                tables.beds(found),
+                [el("p", each, cls="note") for each in found.unstable],
+                el("div", cls="stability plot", data_plot="stability"),
+                el("p", found.said, cls="said") if found.said else None,
+            )
+        )
     if section.trouble:
         words = f"Parameters and stability are not shown, for the plan could not be read here: {section.trouble}."
         out.append(el("p", words, cls="note"))
@@ -174,13 +212,30 @@ def _parameters(report: Report, anchors: blocks.Anchors) -> Html:
             continue
         count = f"{len(section.parameters):,} parameters and settings"
         of = f" of {section.name}" if len(report.sections) > 1 else ""
-        search = el("label", "Search ", el("input", type="search", cls="search", placeholder="kp, links.upper, default",
-                                           spellcheck="false", autocomplete="off"), cls="controls")  # fmt: skip
-        out.append(el(
-            "details", el("summary", f"{count}{of}, each with the line of the deck that wrote it"), search,
-            tables.parameters(section.parameters, anchors), el("p", role="status", cls="said found"), cls="all",
-            id=f"p{number}",
-        ))  # fmt: skip
+        search = el(
+            "label",
+            "Search ",
+            el(
+                "input",
+                type="search",
+                cls="search",
+                placeholder="kp, links.upper, default",
+                spellcheck="false",
+                autocomplete="off",
+            ),
+            cls="controls",
+        )
+        out.append(
+            el(
+                "details",
+                el("summary", f"{count}{of}, each with the line of the deck that wrote it"),
+                search,
+                tables.parameters(section.parameters, anchors),
+                el("p", role="status", cls="said found"),
+                cls="all",
+                id=f"p{number}",
+            )
+        )
     if len(out) == 1:
         out.append(el("p", "The plan could not be read here.", cls="said"))
     return el("section", out, id="parameters")
@@ -188,7 +243,15 @@ def _parameters(report: Report, anchors: blocks.Anchors) -> Html:
 
 def _footer(report: Report) -> Html:
     against = None if report.changes is None else [" against ", el("code", report.changes.before)]
-    words = join(["Made by ", el("code", "met report"), " from ", el("code", report.archive), against,
-                  ". The page is whole in this file and asks nothing of any network."])  # fmt: skip
+    words = join(
+        [
+            "Made by ",
+            el("code", "met report"),
+            " from ",
+            el("code", report.archive),
+            against,
+            ". The page is whole in this file and asks nothing of any network.",
+        ]
+    )
     scripts = el("noscript", el("p", "The plots need JavaScript; all tables are here without.", cls="note"))
     return el("footer", el("p", words), scripts)

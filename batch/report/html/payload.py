@@ -77,13 +77,20 @@ def _column(column: CaseColumn) -> dict[str, Any]:
         "about": visible(column.about),
         "words": [visible(word) for word in column.words],
         "log": column.log,
-        "reach": _reach(reach(column.values, [e.value for e in column.limits], parting=column.role == "change",
-                              by_factors=column.role == "parameter" and column.log)),
+        "reach": _reach(
+            reach(
+                column.values,
+                [e.value for e in column.limits],
+                parting=column.role == "change",
+                by_factors=column.role == "parameter" and column.log,
+            )
+        ),
         "values": packed(column.values),
         "before": None if column.before is None else packed(column.before),
-        "limits": [{"text": visible(e.text), "value": e.value, "sense": e.sense}
-                   for e in column.limits if np.isfinite(e.value)],
-    }  # fmt: skip
+        "limits": [
+            {"text": visible(e.text), "value": e.value, "sense": e.sense} for e in column.limits if np.isfinite(e.value)
+        ],
+    }
 
 
 def _overview(overview: Overview) -> dict[str, Any]:
@@ -111,12 +118,14 @@ def _map(each: Map) -> dict[str, Any]:
         "failed": packed(each.failed),
         "of": {
             visible(key): {
-                "values": packed(each.values[key]), "cases": packed(each.cases[key]),
-                "missed": packed(each.missed[key]), "reach": _reach(each.reaches[key]),
+                "values": packed(each.values[key]),
+                "cases": packed(each.cases[key]),
+                "missed": packed(each.missed[key]),
+                "reach": _reach(each.reaches[key]),
             }
             for key in each.values
         },
-    }  # fmt: skip
+    }
 
 
 def _ruler(found: Ruler) -> dict[str, Any]:
@@ -127,8 +136,15 @@ def _reach(found: Reach | None) -> dict[str, Any] | None:
     """How far colours reach, and how many values lie beyond."""
     if found is None:
         return None
-    return {"low": found.low, "high": found.high, "log": found.log, "below": found.below, "above": found.above,
-            "least": found.least, "most": found.most}  # fmt: skip
+    return {
+        "low": found.low,
+        "high": found.high,
+        "log": found.log,
+        "below": found.below,
+        "above": found.above,
+        "least": found.least,
+        "most": found.most,
+    }
 
 
 def _signals(signals: Signals) -> dict[str, Any]:
@@ -140,8 +156,9 @@ def _signals(signals: Signals) -> dict[str, Any]:
                 "name": visible(panel.name),
                 "about": visible(panel.about),
                 "unit": visible("" if panel.unit == "1" else pretty_unit(panel.unit)),
-                "lines": [{"label": visible(e.label), "joint": visible(e.joint), "command": e.command}
-                          for e in panel.lines],
+                "lines": [
+                    {"label": visible(e.label), "joint": visible(e.joint), "command": e.command} for e in panel.lines
+                ],
             }
             for panel in signals.panels
         ],
@@ -153,7 +170,7 @@ def _signals(signals: Signals) -> dict[str, Any]:
         "most": list(signals.most),
         "worst": signals.worst if signals.most else None,
         "middle": signals.middle,
-    }  # fmt: skip
+    }
 
 
 def _history(each: History | None) -> dict[str, Any]:

@@ -13,17 +13,30 @@ from batch.terminal.margin import stable_head
 def table(found: TextTable, label: str, cells: Sequence[Sequence[Child]] = (), more: Sequence[str] = ()) -> Html:
     """A table of texts. cells, more: further cells of each row, and their heads."""
     units = any(found.units)
-    heads = [el("th", el("span", breaking(head)), el("span", unit, cls="unit") if units else None, scope="col",
-                cls="right" if n in found.right else None)
-             for n, (head, unit) in enumerate(zip(found.heads, found.units, strict=True))]  # fmt: skip
+    heads = [
+        el(
+            "th",
+            el("span", breaking(head)),
+            el("span", unit, cls="unit") if units else None,
+            scope="col",
+            cls="right" if n in found.right else None,
+        )
+        for n, (head, unit) in enumerate(zip(found.heads, found.units, strict=True))
+    ]
     heads += [el("th", head, scope="col") for head in more]
     rows = []
     for number, row in enumerate(found.rows):
         own = [
-            el("td", text, cls=" ".join(filter(None, ["right" if n in found.right else "",
-                                                      "bad" if (number, n) in found.marked else ""])) or None)
+            el(
+                "td",
+                text,
+                cls=" ".join(
+                    filter(None, ["right" if n in found.right else "", "bad" if (number, n) in found.marked else ""])
+                )
+                or None,
+            )
             for n, text in enumerate(row)
-        ]  # fmt: skip
+        ]
         rows.append(el("tr", own, [el("td", cell) for cell in (cells[number] if cells else ())]))
     return scrolling(el("table", el("thead", el("tr", heads)), el("tbody", lines(rows))), label)
 
@@ -44,10 +57,15 @@ def worst(found: WorstCaseTable) -> Html:
         own.append(el("td", command(found.commands[number]), cls="command"))
         rows.append(el("tr", own, data_case=found.cases[number]))
     heads = [
-        el("th", el("span", breaking(head)), el("span", unit, cls="unit") if any(columns.units) else None, scope="col",
-           cls="right" if n in columns.right else None)
+        el(
+            "th",
+            el("span", breaking(head)),
+            el("span", unit, cls="unit") if any(columns.units) else None,
+            scope="col",
+            cls="right" if n in columns.right else None,
+        )
         for n, (head, unit) in enumerate(zip(columns.heads, columns.units, strict=True))
-    ]  # fmt: skip
+    ]
     heads.append(el("th", "run it again, to the same bits", scope="col", cls="command"))
     made = scrolling(el("table", el("thead", el("tr", heads)), el("tbody", lines(rows)), cls="cases"), found.title)
     left = f"{found.left:,} more cases are in the archive." if found.left else ""
@@ -107,9 +125,7 @@ def _overrides(row: ParameterRow, anchors: Anchors) -> Html | None:
 def source(number: int, file: SourceListing) -> Html:
     """A file of the deck, each line with its number, to which others lead."""
     texts = file.text.split("\n")
-    rows = [
-        el("li", el("code", line), id=f"f{number}-{n}") for n, line in enumerate(texts, start=1)
-    ]  # fmt: skip
+    rows = [el("li", el("code", line), id=f"f{number}-{n}") for n, line in enumerate(texts, start=1)]
     left = el("p", f"{file.left:,} more lines are in the archive.", cls="said") if file.left else None
     count = f"{len(texts) + file.left:,} lines"
     head = el("summary", el("code", file.name), el("span", f" {count} · SHA-256 {file.sha256}", cls="under"))

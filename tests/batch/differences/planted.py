@@ -29,9 +29,13 @@ def shuffled(experiment: Experiment, order: Sequence[int]) -> Experiment:
 
 
 def two(
-    monkeypatch: pytest.MonkeyPatch, folder: Path, order: Sequence[int], plant: Plant | None = None,
-    change: Callable[[Experiment], Experiment] = lambda each: each, cases: int = CASES,
-) -> tuple[Path, Path]:  # fmt: skip
+    monkeypatch: pytest.MonkeyPatch,
+    folder: Path,
+    order: Sequence[int],
+    plant: Plant | None = None,
+    change: Callable[[Experiment], Experiment] = lambda each: each,
+    cases: int = CASES,
+) -> tuple[Path, Path]:
     """Archives a and b. order: positions in a of b's cases; plant: into b's results; change: of b's experiment."""
     plans.answering(monkeypatch)
     experiment = plans.gains(cases)

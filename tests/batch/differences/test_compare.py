@@ -46,8 +46,11 @@ def by_hand(a: np.ndarray, b: np.ndarray, allowed: SignalTolerance) -> tuple[int
             if math.isnan(apart):
                 beyond += 1
                 first_beyond = row if first_beyond < 0 else first_beyond
-            elif not (math.isfinite(x) and math.isfinite(y)
-                    and apart <= allowed.absolute + allowed.relative * max(abs(x), abs(y))):  # fmt: skip
+            elif not (
+                math.isfinite(x)
+                and math.isfinite(y)
+                and apart <= allowed.absolute + allowed.relative * max(abs(x), abs(y))
+            ):
                 beyond += 1
                 first_beyond = row if first_beyond < 0 else first_beyond
                 largest = max(largest, apart)
@@ -81,9 +84,19 @@ def test_where_the_difference_is_largest() -> None:
     b[0, 2, 1], b[0, 3, 0], b[2, 1, 0] = 0.5, -2.0, -0.0
     first, second, third = compare_cases(a, b, SignalTolerance(1.0))
     assert first == Difference(
-        beyond=1, nan=0, largest=2.0, row=3, column=0, before=0.0, after=-2.0, squares=4.25, values=8, first=2,
-        first_beyond=3, used=2.0,
-    )  # fmt: skip
+        beyond=1,
+        nan=0,
+        largest=2.0,
+        row=3,
+        column=0,
+        before=0.0,
+        after=-2.0,
+        squares=4.25,
+        values=8,
+        first=2,
+        first_beyond=3,
+        used=2.0,
+    )
     assert second is None
     assert third is not None and (third.row, third.column, third.largest, third.beyond) == (1, 0, 0.0, 0)
 
@@ -115,6 +128,4 @@ def test_a_case_key_that_is_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     with pytest.raises(Problem) as caught:
         diff(a, b)
     [told] = caught.value.diagnostics
-    assert (told.code, told.message) == (
-        "E302", f"the archive {b} is damaged: variable `case_key` is not of digests"
-    )  # fmt: skip
+    assert (told.code, told.message) == ("E302", f"the archive {b} is damaged: variable `case_key` is not of digests")

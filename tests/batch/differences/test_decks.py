@@ -95,53 +95,69 @@ def test_a_let_is_told_before_the_parameters_that_follow_from_it(here: Path) -> 
 
 
 CHANGES: dict[str, tuple[list[tuple[str, str]], list[str]]] = {
-    "a gain": ([("rate(slow);", "rate(slow); kp = 0.03 V*s/rad;")], [
-        "changed: elbow.servo.kp: 0.02 V*s/rad -> 0.03 V*s/rad (deck.ic:4)",
-        "changed: shoulder.servo.kp: 0.02 V*s/rad -> 0.03 V*s/rad (deck.ic:4)",
-    ]),
-    "a macro": ([("mass = MASS;", "mass = 2 * MASS;")], [
-        "changed: #define ROD() is another (arm.ic:3)",
-        "changed: links.fore.mass: 20 kg -> 40 kg (arm.ic:3)",
-        "changed: links.upper.mass: 40 kg -> 80 kg (arm.ic:3)",
-        "follows: links.fore.inertia.yy: 15 kg*m^2 -> 30 kg*m^2 (arm.ic:3)",
-        "follows: links.fore.inertia.zz: 15 kg*m^2 -> 30 kg*m^2 (arm.ic:3)",
-        "follows: links.upper.inertia.yy: 13.3333 kg*m^2 -> 26.6667 kg*m^2 (arm.ic:3)",
-        "follows: links.upper.inertia.zz: 13.3333 kg*m^2 -> 26.6667 kg*m^2 (arm.ic:3)",
-    ]),
-    "a joint": ([("wrist    fixed    { parent = fore;", "wrist revolute { axis = z;  parent = fore;")], [
-        "changed: joint wrist: kind fixed -> revolute",
-        "follows: initial.wrist.q is new: 0 rad",
-        "follows: initial.wrist.qd is new: 0 rad/s",
-        "follows: wrist.axis is new: [0, 0, 1] (arm.ic:10)",
-    ]),
-    "a metric": ([("    metric settle", "    metric top = max { of = elbow.q; }\n    metric settle")], [
-        "changed: metric top is new",
-    ]),
+    "a gain": (
+        [("rate(slow);", "rate(slow); kp = 0.03 V*s/rad;")],
+        [
+            "changed: elbow.servo.kp: 0.02 V*s/rad -> 0.03 V*s/rad (deck.ic:4)",
+            "changed: shoulder.servo.kp: 0.02 V*s/rad -> 0.03 V*s/rad (deck.ic:4)",
+        ],
+    ),
+    "a macro": (
+        [("mass = MASS;", "mass = 2 * MASS;")],
+        [
+            "changed: #define ROD() is another (arm.ic:3)",
+            "changed: links.fore.mass: 20 kg -> 40 kg (arm.ic:3)",
+            "changed: links.upper.mass: 40 kg -> 80 kg (arm.ic:3)",
+            "follows: links.fore.inertia.yy: 15 kg*m^2 -> 30 kg*m^2 (arm.ic:3)",
+            "follows: links.fore.inertia.zz: 15 kg*m^2 -> 30 kg*m^2 (arm.ic:3)",
+            "follows: links.upper.inertia.yy: 13.3333 kg*m^2 -> 26.6667 kg*m^2 (arm.ic:3)",
+            "follows: links.upper.inertia.zz: 13.3333 kg*m^2 -> 26.6667 kg*m^2 (arm.ic:3)",
+        ],
+    ),
+    "a joint": (
+        [("wrist    fixed    { parent = fore;", "wrist revolute { axis = z;  parent = fore;")],
+        [
+            "changed: joint wrist: kind fixed -> revolute",
+            "follows: initial.wrist.q is new: 0 rad",
+            "follows: initial.wrist.qd is new: 0 rad/s",
+            "follows: wrist.axis is new: [0, 0, 1] (arm.ic:10)",
+        ],
+    ),
+    "a metric": (
+        [("    metric settle", "    metric top = max { of = elbow.q; }\n    metric settle")],
+        [
+            "changed: metric top is new",
+        ],
+    ),
     "a run's name": ([("nominal", "slewing")], []),
     "the seed": ([("    duration", "    seed = 7;\n    duration")], ["changed: seed: 0 -> 7"]),
     "rates and duration": (
-        [("dynamics = 100 Hz;  servos = 100 Hz;", "dynamics = 200 Hz;  servos = 50 Hz;"), ("= 5 s", "= 6 s")], [
+        [("dynamics = 100 Hz;  servos = 100 Hz;", "dynamics = 200 Hz;  servos = 50 Hz;"), ("= 5 s", "= 6 s")],
+        [
             "changed: duration: 5 s -> 6 s",
             "changed: rates.dynamics: 100 Hz -> 200 Hz",
             "changed: servo of shoulder: rate 100 Hz -> 50 Hz",
             "changed: servo of elbow: rate 100 Hz -> 50 Hz",
         ],
     ),
-    "a command": ([("rate(slow)", "rate(step(to = slow))")], [
-        "changed: servo of shoulder: command rate(constant) -> rate(step)",
-        "changed: servo of elbow: command rate(constant) -> rate(step)",
-        "follows: elbow.servo.command.at is new: 0 s",
-        "follows: elbow.servo.command.start is new: 0 rad/s",
-        "follows: elbow.servo.command.to is new: 0.03 rad/s (deck.ic:4)",
-        "follows: shoulder.servo.command.at is new: 0 s",
-        "follows: shoulder.servo.command.start is new: 0 rad/s",
-        "follows: shoulder.servo.command.to is new: 0.03 rad/s (deck.ic:4)",
-        "follows: elbow.servo.command.value is gone: 0.03 rad/s (deck.ic:4)",
-        "follows: shoulder.servo.command.value is gone: 0.03 rad/s (deck.ic:4)",
-    ]),
+    "a command": (
+        [("rate(slow)", "rate(step(to = slow))")],
+        [
+            "changed: servo of shoulder: command rate(constant) -> rate(step)",
+            "changed: servo of elbow: command rate(constant) -> rate(step)",
+            "follows: elbow.servo.command.at is new: 0 s",
+            "follows: elbow.servo.command.start is new: 0 rad/s",
+            "follows: elbow.servo.command.to is new: 0.03 rad/s (deck.ic:4)",
+            "follows: shoulder.servo.command.at is new: 0 s",
+            "follows: shoulder.servo.command.start is new: 0 rad/s",
+            "follows: shoulder.servo.command.to is new: 0.03 rad/s (deck.ic:4)",
+            "follows: elbow.servo.command.value is gone: 0.03 rad/s (deck.ic:4)",
+            "follows: shoulder.servo.command.value is gone: 0.03 rad/s (deck.ic:4)",
+        ],
+    ),
     "a comment": ([("let slow", "// as slow as it gets\nlet slow")], []),
     "a let that nothing needs": ([("let slow", "let unused = 3 m;\nlet slow")], []),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("what", CHANGES)
@@ -174,9 +190,10 @@ def test_an_axis_with_more_values_is_one_change_beside_their_number(here: Path) 
 def test_what_follows_is_told_of_parameters_that_vary_with_the_case_too(here: Path) -> None:
     axis = ("vary gearbox.kp = linspace(0.010, 0.040, 4) V*s/rad;", "vary links.fore.mass = [10, 20, 40] kg;")
     varied = DECK.replace(*axis)
-    a, b = made(Path(), deck=varied, select="gains"), made(
-        Path(), deck=varied, arm=ARM.replace("fore_l  = 3 m", "fore_l  = 6 m"), select="gains"
-    )  # fmt: skip
+    a, b = (
+        made(Path(), deck=varied, select="gains"),
+        made(Path(), deck=varied, arm=ARM.replace("fore_l  = 3 m", "fore_l  = 6 m"), select="gains"),
+    )
     assert told(a, b) == [
         "changed: let fore_l: 3 m -> 6 m (arm.ic:1)",
         "follows: links.fore.com.x: 1.5 m -> 3 m (arm.ic:3)",
@@ -215,9 +232,18 @@ def test_what_is_set_on_the_command_line_was_written_there(here: Path) -> None:
 
 def test_more_than_a_screen_is_cut_with_the_command_that_shows_it() -> None:
     lines = tuple(f"p{i}: 1 -> 2" for i in range(9))
-    found = SimpleNamespace(changed=SimpleNamespace(
-        versions=(), decks=(), meaning=("let x: 1 -> 2",), follows=lines, defaults=(), structure=(), code=(), results=()
-    ))  # fmt: skip
+    found = SimpleNamespace(
+        changed=SimpleNamespace(
+            versions=(),
+            decks=(),
+            meaning=("let x: 1 -> 2",),
+            follows=lines,
+            defaults=(),
+            structure=(),
+            code=(),
+            results=(),
+        )
+    )
     short = list(_changed(found, Cut(remedy="`met diff a.h5 b.h5 --all`")))  # type: ignore[arg-type]
     assert short[-1] == "  follows    and 3 more: `met diff a.h5 b.h5 --all`" and len(short) == 9
     assert len(list(_changed(found, Cut(every=True)))) == 11  # type: ignore[arg-type]
@@ -228,12 +254,16 @@ def test_more_than_a_screen_is_cut_with_the_command_that_shows_it() -> None:
 
 def test_a_file_under_another_name_or_in_another_folder_is_the_same_file() -> None:
     text = "one\ntwo\nthree\nfour\n"
-    found = decks({"/a/deck.ic": "x\n", "/a/arm.ic": text, "/a/gone.ic": "-"},
-                  {"/b/deck.ic": "y\n", "/b/crane.ic": text.replace("two", "2"), "/b/more.ic": "+\n+\n"})  # fmt: skip
+    found = decks(
+        {"/a/deck.ic": "x\n", "/a/arm.ic": text, "/a/gone.ic": "-"},
+        {"/b/deck.ic": "y\n", "/b/crane.ic": text.replace("two", "2"), "/b/more.ic": "+\n+\n"},
+    )
     assert [each.said for each in found.files] == [
-        "/a/deck.ic, now /b/deck.ic: 1 line new, 1 gone", "/a/arm.ic, now /b/crane.ic: 1 line new, 1 gone",
-        "/a/gone.ic is gone: 1 line", "/b/more.ic is new: 2 lines",
-    ]  # fmt: skip
+        "/a/deck.ic, now /b/deck.ic: 1 line new, 1 gone",
+        "/a/arm.ic, now /b/crane.ic: 1 line new, 1 gone",
+        "/a/gone.ic is gone: 1 line",
+        "/b/more.ic is new: 2 lines",
+    ]
     assert found.files[1].lines == ("@@ -1,3 +1,3 @@", " one", "-two", "+2", " three")
     same = decks({"/a/deck.ic": text}, {"/b/deck.ic": text})
     assert not same.files
@@ -244,12 +274,15 @@ def test_another_deck_is_counted_alone() -> None:
     assert (found.said, found.lines) == ("one.ic, now two.ic: another deck, 2 lines new, 3 gone", ())
 
 
-@pytest.mark.parametrize(("before", "now", "lines"), [
-    ("", "a\n", ["@@ -1,0 +1,1 @@", "+a"]),
-    ("a\n", "a\na\n", ["@@ -1,1 +1,2 @@", " a", "+a"]),
-    ("a\nb\nc\nd\n", "a\nd\n", ["@@ -1,4 +1,2 @@", " a", "-b", "-c", " d"]),
-    ("a\n", "a", []),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("before", "now", "lines"),
+    [
+        ("", "a\n", ["@@ -1,0 +1,1 @@", "+a"]),
+        ("a\n", "a\na\n", ["@@ -1,1 +1,2 @@", " a", "+a"]),
+        ("a\nb\nc\nd\n", "a\nd\n", ["@@ -1,4 +1,2 @@", " a", "-b", "-c", " d"]),
+        ("a\n", "a", []),
+    ],
+)
 def test_the_lines_that_differ(before: str, now: str, lines: list[str]) -> None:
     [found] = decks({"d.ic": before}, {"d.ic": now}).files
     assert list(found.lines) == lines
@@ -267,13 +300,17 @@ def test_lets_and_macros_are_told_by_their_text_alone() -> None:
     before = "let a = 1 m;\n#define N 3\nlet b = /* two */ 2  m; // b\n#define F(X) X\nlet twice = 1;\nlet twice = 2;\n"
     after = "#define N 4\nlet a =\n  3 m;\nlet b = 2 m;\n#define F(X) (X)\nlet c = 5;\nlet twice = 3;\nlet twice = 2;\n"
     assert decks({"d.ic": before}, {"d.ic": after}).names == (
-        "let a: 1 m -> 3 m (d.ic:2)", "#define N: 3 -> 4 (d.ic:1)", "#define F() is another (d.ic:5)",
+        "let a: 1 m -> 3 m (d.ic:2)",
+        "#define N: 3 -> 4 (d.ic:1)",
+        "#define F() is another (d.ic:5)",
         "let c is new: 5 (d.ic:6)",
-    )  # fmt: skip
+    )
     assert decks({"d.ic": before}, {"d.ic": ""}).names == (
-        "let a is gone: 1 m (d.ic:1)", "#define N is gone: 3 (d.ic:2)", "let b is gone: 2 m (d.ic:3)",
+        "let a is gone: 1 m (d.ic:1)",
+        "#define N is gone: 3 (d.ic:2)",
+        "let b is gone: 2 m (d.ic:3)",
         "#define F() is gone (d.ic:4)",
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("text", ["let", "let a", "let a =", "#define", "#", "let = 3;", '"', "/*", "let a = let b"])
@@ -284,7 +321,11 @@ def test_a_deck_that_is_none_is_no_traceback(text: str) -> None:
 
 def test_what_cannot_be_seen_is_made_visible() -> None:
     found = decks({"d.ic": "a\n"}, {"d.ic": "\x1b[31mred\n"})
-    lines = words.made(SimpleNamespace(changed=SimpleNamespace(  # type: ignore[arg-type]
-        versions=(), decks=found.files, meaning=(), follows=(), defaults=(), structure=(), code=(), results=()
-    )))  # fmt: skip
+    lines = words.made(
+        SimpleNamespace(
+            changed=SimpleNamespace(  # type: ignore[arg-type]
+                versions=(), decks=found.files, meaning=(), follows=(), defaults=(), structure=(), code=(), results=()
+            )
+        )
+    )
     assert lines[0][1][-1] == "  +\\x1b[31mred"

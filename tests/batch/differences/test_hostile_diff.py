@@ -117,9 +117,17 @@ def test_histories_of_other_cases_are_not_identical(two: Callable[..., tuple[Pat
 
 
 def test_a_run_that_lasts_longer_is_not_identical(ran: Callable[..., Path]) -> None:
-    a, b = ran("a.h5", "sliding"), ran("b.h5", "sliding", change=("run sliding { arm = slides; rates { dynamics = "
-               "1 kHz; record = 50 Hz; } duration = 1 s", "run sliding { arm = slides; rates { dynamics = "
-               "1 kHz; record = 50 Hz; } duration = 2 s"))  # fmt: skip
+    a, b = (
+        ran("a.h5", "sliding"),
+        ran(
+            "b.h5",
+            "sliding",
+            change=(
+                "run sliding { arm = slides; rates { dynamics = 1 kHz; record = 50 Hz; } duration = 1 s",
+                "run sliding { arm = slides; rates { dynamics = 1 kHz; record = 50 Hz; } duration = 2 s",
+            ),
+        ),
+    )
     assert cli.main(["diff", str(a), str(b)]) == cli.YES
     assert cli.main(["diff", str(a), str(b), "--require", "identical"]) == cli.NO
 
@@ -284,8 +292,9 @@ def test_the_span_is_that_of_all_cases(two: Callable[..., tuple[Path, Path]]) ->
 
     found = diff(*two(plant, calm))
     assert [(each.case_a, each.score) for each in only(found).worst] == [
-        (1, pytest.approx(0.01)), (0, pytest.approx(1e-5))
-    ]  # fmt: skip
+        (1, pytest.approx(0.01)),
+        (0, pytest.approx(1e-5)),
+    ]
     assert signal(found, "qd").share == pytest.approx(0.01)
 
 
@@ -318,7 +327,7 @@ def test_a_limit_that_a_name_stands_for_is_compared_too(ran: Callable[..., Path]
     whole = diff(a, ran("b.h5", "lettered", change=("let fastest = 0.5 rad/s", "let fastest = 9 rad/s")))
     assert requirements(only(whole)) == [
         "require top < fastest (limit before: 0.5 rad/s, now: 9 rad/s)  met by 0, now by 1 of 1"
-    ]  # fmt: skip
+    ]
     assert verdict(whole).startswith(
         "different; requirements differ: top < fastest, limit 0.5 rad/s -> 9 rad/s (1 of 1 cases meet it now); values: "
     )
@@ -327,9 +336,7 @@ def test_a_limit_that_a_name_stands_for_is_compared_too(ran: Callable[..., Path]
 def test_a_limit_in_another_unit_is_no_difference(ran: Callable[..., Path]) -> None:
     whole = diff(ran("a.h5", "bounded"), ran("b.h5", "milli"))
     assert (whole.verdict, verdict(whole)) == ("identical", "identical, to the bit")
-    assert requirements(only(whole)) == [
-        "require top < 5000 mrad/s (before: top < 5 rad/s)  met by 1, now by 1 of 1"
-    ]  # fmt: skip
+    assert requirements(only(whole)) == ["require top < 5000 mrad/s (before: top < 5 rad/s)  met by 1, now by 1 of 1"]
 
 
 def test_a_requirement_in_one_alone_is_a_difference(ran: Callable[..., Path]) -> None:

@@ -136,8 +136,9 @@ def test_a_renamed_signal_is_incomparable(monkeypatch: pytest.MonkeyPatch, tmp_p
     found = diff(a, b)
     assert found.verdict == "incomparable"
     assert {each.name: each.why for each in found.experiments[0].signals if each.why} == {
-        "qd": f"only in {a}", "speed": f"only in {b}"
-    }  # fmt: skip
+        "qd": f"only in {a}",
+        "speed": f"only in {b}",
+    }
 
 
 def test_parameters_that_changed_and_one_that_is_new(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -161,10 +162,13 @@ def test_planted_changes_are_found_and_none_is_invented(
 ) -> None:
     cases = 40
     names = sorted(SIGNALS - {"settle", "volts"})
-    spots = data.draw(st.dictionaries(
-        st.tuples(st.integers(0, cases - 1), st.sampled_from(names)),
-        st.tuples(st.integers(0, 50), st.sampled_from([1e-12, 1e-3, -5.0, math.nan])), max_size=6,
-    ))  # fmt: skip
+    spots = data.draw(
+        st.dictionaries(
+            st.tuples(st.integers(0, cases - 1), st.sampled_from(names)),
+            st.tuples(st.integers(0, 50), st.sampled_from([1e-12, 1e-3, -5.0, math.nan])),
+            max_size=6,
+        )
+    )
     gone = data.draw(st.sets(st.integers(0, cases - 1), max_size=3))
     mixed = [each for each in data.draw(st.permutations(range(cases))) if each not in gone]
 

@@ -133,15 +133,18 @@ def test_a_deck_that_cannot_be_read_is_told(
     assert not any("not known" in line for line in told(diff(a, b, tolerances(["none"]))))
 
 
-@pytest.mark.parametrize(("words", "message"), [
-    ("qd", "tolerance `qd` cannot be read"),
-    ("q=1rad,q=2rad", "tolerance `q` is given twice"),
-    ("rel=1,rel=0", "tolerance `rel` is given twice"),
-    ("rel=1m", "tolerance `rel=1m` has a unit: `rel` is a share of the value"),
-    ("time=1m", "tolerance `time=1m`: `m` is no unit of time"),
-    ("q=-1rad", "tolerance `q=-1rad` is no size: it must be at least 0"),
-    ("q=1foo", "tolerance `q=1foo`: `foo` is no unit"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("qd", "tolerance `qd` cannot be read"),
+        ("q=1rad,q=2rad", "tolerance `q` is given twice"),
+        ("rel=1,rel=0", "tolerance `rel` is given twice"),
+        ("rel=1m", "tolerance `rel=1m` has a unit: `rel` is a share of the value"),
+        ("time=1m", "tolerance `time=1m`: `m` is no unit of time"),
+        ("q=-1rad", "tolerance `q=-1rad` is no size: it must be at least 0"),
+        ("q=1foo", "tolerance `q=1foo`: `foo` is no unit"),
+    ],
+)
 def test_words_that_are_wrong(words: str, message: str) -> None:
     with pytest.raises(Problem) as problem:
         tolerances([words])
@@ -149,12 +152,18 @@ def test_words_that_are_wrong(words: str, message: str) -> None:
     assert problem.value.diagnostics[0].help == ("as in `--tol qd=1e-6rad/s,rel=1e-9,time=1ms`",)
 
 
-@pytest.mark.parametrize(("words", "message", "helps"), [
-    ("x=1m", "tolerance of `x`: neither archive has such a signal or metric", "signals and metrics here: q"),
-    ("q=1deg", "tolerance of `q`: it is in rad and in m", "give each joint its own: one.q, two.q"),
-    ("two.q=1deg", "tolerance of `two.q` is in `deg`, and `two.q` in `m`",
-     "as in `--tol qd=1e-6rad/s,rel=1e-9,time=1ms`"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("words", "message", "helps"),
+    [
+        ("x=1m", "tolerance of `x`: neither archive has such a signal or metric", "signals and metrics here: q"),
+        ("q=1deg", "tolerance of `q`: it is in rad and in m", "give each joint its own: one.q, two.q"),
+        (
+            "two.q=1deg",
+            "tolerance of `two.q` is in `deg`, and `two.q` in `m`",
+            "as in `--tol qd=1e-6rad/s,rel=1e-9,time=1ms`",
+        ),
+    ],
+)
 def test_words_that_do_not_fit(words: str, message: str, helps: str) -> None:
     known = {"q": ["rad", "m"], "one.q": ["rad"], "two.q": ["m"]}
     with pytest.raises(Problem) as problem:

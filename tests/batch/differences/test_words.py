@@ -58,16 +58,23 @@ def test_a_command_names_the_run_where_there_are_several(
     for experiment in found.experiments:
         commands = words.again(found, experiment, experiment.worst[0])
         assert [shlex.split(each)[2:4] for each in commands] == [
-            ["a.h5", experiment.name_a], ["b.h5", experiment.name_b]
-        ]  # fmt: skip
+            ["a.h5", experiment.name_a],
+            ["b.h5", experiment.name_b],
+        ]
         assert f"      {'; '.join(commands)}" in told(found)
 
 
-@pytest.mark.parametrize(("before", "after", "said"), [
-    (0, 1, "1 case fails that did not"), (0, 2, "1 case is timed out that was done"),
-    (1, 0, "1 case is done that failed"), (3, 0, "1 case is done that was lost"),
-    (1, 2, "1 case is timed out that was failed"), (1, 1, "1 case failed earlier or later"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        (0, 1, "1 case fails that did not"),
+        (0, 2, "1 case is timed out that was done"),
+        (1, 0, "1 case is done that failed"),
+        (3, 0, "1 case is done that was lost"),
+        (1, 2, "1 case is timed out that was failed"),
+        (1, 1, "1 case failed earlier or later"),
+    ],
+)
 def test_how_a_case_ends_otherwise(before: int, after: int, said: str) -> None:
     from types import SimpleNamespace
 

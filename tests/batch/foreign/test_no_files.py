@@ -72,8 +72,9 @@ def test_a_pipe_in_the_place_of_a_plan_and_of_its_table(here: Path) -> None:
 
 
 def test_a_pipe_where_a_plans_table_is_to_be_written(here: Path) -> None:
-    [plan_there, table] = sorted(plan_file.write(plans.plan(plans.gains(plan_file.INLINE_ROWS + 1)), "big.json"),
-                                 key=lambda path: path.suffix)  # fmt: skip
+    [plan_there, table] = sorted(
+        plan_file.write(plans.plan(plans.gains(plan_file.INLINE_ROWS + 1)), "big.json"), key=lambda path: path.suffix
+    )
     table.unlink()
     os.mkfifo(table)
     with pytest.raises(Problem) as caught:
@@ -88,8 +89,12 @@ def test_a_pipe_where_a_plans_table_is_to_be_written(here: Path) -> None:
 def test_a_pipe_where_something_is_to_be_written(output: str, archive: Path, here: Path) -> None:
     os.mkfifo(output)
     Path("door.ic").write_text(DECK, encoding="utf-8")
-    words = {".h5": ("run", "door.ic", "open", "-o"), ".html": ("report", str(archive), "-o"),
-             ".svg": ("plot", str(archive), "-o"), ".json": ("plan", "door.ic", "open", "-o")}  # fmt: skip
+    words = {
+        ".h5": ("run", "door.ic", "open", "-o"),
+        ".html": ("report", str(archive), "-o"),
+        ".svg": ("plot", str(archive), "-o"),
+        ".json": ("plan", "door.ic", "open", "-o"),
+    }
     said = met(*words.get(Path(output).suffix, ("export", str(archive), "-o")), output)
     assert said.status == 2
     assert f"cannot write {output}: it is not a regular file" in said.text

@@ -120,7 +120,7 @@ TRAPS: dict[Trap, str] = {
     compound: "`open/time:pair` is neither of numbers nor of strings",
     named_type: "`open/kind` is a type of numbers by itself",
     huge: "`open/many` has more values than the file has room for",
-}  # fmt: skip
+}
 
 
 @pytest.fixture

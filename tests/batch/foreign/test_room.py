@@ -74,7 +74,7 @@ TRAPS: dict[Callable[[Any], None], str] = {
     strings: "has more letters than the file has room for",
     packed_strings: "has more letters than the file has room for",
     unwritten: "has more values than the file has room for",
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("trap", TRAPS, ids=lambda trap: trap.__name__)
@@ -97,11 +97,14 @@ def test_a_small_file_that_would_fill_the_memory_is_refused(
 @pytest.mark.parametrize(
     "how",
     [
-        {"compression": "gzip"}, {"compression": "gzip", "shuffle": True, "fletcher32": True}, {"fletcher32": True},
-        {"chunks": (2,)}, {},
+        {"compression": "gzip"},
+        {"compression": "gzip", "shuffle": True, "fletcher32": True},
+        {"fletcher32": True},
+        {"chunks": (2,)},
+        {},
     ],
     ids=str,
-)  # fmt: skip
+)
 def test_an_archive_that_somebody_has_packed_is_shown_as_before(
     how: dict[str, Any], archive: Path, tmp_path: Path
 ) -> None:
@@ -178,8 +181,9 @@ def test_thousands_of_attributes_are_not_looked_through(single: Path, tmp_path: 
         count = len(file["repeat"].attrs)
     said = met("show", str(copy))
     assert (said.status, said.text.splitlines()[0]) == (
-        2, f"error[E308]: the archive {copy} holds what MET writes into none: `repeat` has {count:,} attributes"
-    )  # fmt: skip
+        2,
+        f"error[E308]: the archive {copy} holds what MET writes into none: `repeat` has {count:,} attributes",
+    )
 
 
 def test_a_role_that_is_no_word_is_told(single: Path, tmp_path: Path) -> None:

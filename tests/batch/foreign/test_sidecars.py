@@ -62,10 +62,23 @@ def test_a_description_that_is_none_is_told(text: str, campaign: Path) -> None:
     assert refused(Path("a.h5")) == DAMAGED
 
 
-@pytest.mark.parametrize(("name", "value"), [
-    ("rows", "../../rows.0.npy"), ("rows", "/etc/passwd"), ("rows", 0), ("number", 1), ("number", "0"), ("cases", -1),
-    ("cases", 1e3), ("cases", 2**70), ("experiment", None), ("name", ["x"]), ("again", 0), ("recorded", "yes"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("rows", "../../rows.0.npy"),
+        ("rows", "/etc/passwd"),
+        ("rows", 0),
+        ("number", 1),
+        ("number", "0"),
+        ("cases", -1),
+        ("cases", 1e3),
+        ("cases", 2**70),
+        ("experiment", None),
+        ("name", ["x"]),
+        ("again", 0),
+        ("recorded", "yes"),
+    ],
+)
 def test_a_section_that_is_none_is_told(name: str, value: Any, campaign: Path) -> None:
     data = json.loads((campaign / "campaign.json").read_text(encoding="utf-8"))
     data["sections"][0][name] = value
@@ -126,13 +139,22 @@ def test_whatever_it_says_the_campaign_goes_on_or_says_why_not(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("text", [
-    DEEP, "[]", '{"experiments": [{"seconds": 1e400, "cases": 1}]}', '{"experiments": [{"seconds": NaN}]}',
-    '{"experiments": 3}', '{"experiments": [{"seconds": 1e308, "cases": 9}, {"seconds": 1e308, "cases": 1}]}',
-    '{"experiments": [{"seconds": 1e308, "cases": 9}, {"seconds": 1e308, "cases": 1}], "began": 1}',
-    '{"experiments": [{"seconds": [], "cases": "x"}]}', '{"experiments": [{"cases": -1}], "began": []}', "1" * 5000,
-    '{"experiments": [{"seconds": 0, "cases": 1}], "beds": 7, "began": "\\u001b[2J"}',
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "text",
+    [
+        DEEP,
+        "[]",
+        '{"experiments": [{"seconds": 1e400, "cases": 1}]}',
+        '{"experiments": [{"seconds": NaN}]}',
+        '{"experiments": 3}',
+        '{"experiments": [{"seconds": 1e308, "cases": 9}, {"seconds": 1e308, "cases": 1}]}',
+        '{"experiments": [{"seconds": 1e308, "cases": 9}, {"seconds": 1e308, "cases": 1}], "began": 1}',
+        '{"experiments": [{"seconds": [], "cases": "x"}]}',
+        '{"experiments": [{"cases": -1}], "began": []}',
+        "1" * 5000,
+        '{"experiments": [{"seconds": 0, "cases": 1}], "beds": 7, "began": "\\u001b[2J"}',
+    ],
+)
 def test_a_sidecar_of_any_kind_is_read_or_left(text: str, here: Path, engine: None) -> None:
     batch.run(campaigns_plan(), output="a.h5")
     Path("a.h5.run.json").write_text(text, encoding="utf-8")
@@ -236,9 +258,9 @@ def transcript_of(header: bytes, times: tuple[float, ...] = ()) -> bytes:
     return data
 
 
-@pytest.mark.parametrize("header", [
-    DEEP.encode()[:60_000], b"[]", b"null", b"NaN", b"9" * 5000, b'{"period": 1e999, "first": 0}', b"\xff",
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "header", [DEEP.encode()[:60_000], b"[]", b"null", b"NaN", b"9" * 5000, b'{"period": 1e999, "first": 0}', b"\xff"]
+)
 def test_a_transcript_whose_header_is_none_is_told(header: bytes, here: Path) -> None:
     Path("a.transcript").write_bytes(transcript_of(header))
     with pytest.raises(Problem) as caught:
@@ -250,10 +272,18 @@ def test_a_transcript_whose_header_is_none_is_told(header: bytes, here: Path) ->
     )
 
 
-@pytest.mark.parametrize("header", [
-    b"{}", b'{"period": "x", "first": 0}', b'{"period": 0.001, "first": []}', b'{"period": 0, "first": 0}',
-    b'{"period": -1, "first": 0}', b'{"period": 0.001, "first": -7}', b'{"period": 1e308, "first": 70000}',
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "header",
+    [
+        b"{}",
+        b'{"period": "x", "first": 0}',
+        b'{"period": 0.001, "first": []}',
+        b'{"period": 0, "first": 0}',
+        b'{"period": -1, "first": 0}',
+        b'{"period": 0.001, "first": -7}',
+        b'{"period": 1e308, "first": 70000}',
+    ],
+)
 def test_a_transcript_that_does_not_say_how_its_bed_was_driven_is_told(header: bytes, here: Path) -> None:
     Path("a.transcript").write_bytes(transcript_of(header))
     with pytest.raises(Problem) as caught:
@@ -266,14 +296,31 @@ def test_a_transcript_ends_where_a_time_is_none(here: Path) -> None:
     assert [each.time for each in transcript.read("a.transcript").records] == [0.0, 1.0]
 
 
-GOOD_HEAD = {"key": "k", "row": 0, "joints": ["a"], "beds": [{"name": "b", "firmware": "1"}], "tick_hz": 100.0,
-             "repeats": 1}  # fmt: skip
+GOOD_HEAD = {
+    "key": "k",
+    "row": 0,
+    "joints": ["a"],
+    "beds": [{"name": "b", "firmware": "1"}],
+    "tick_hz": 100.0,
+    "repeats": 1,
+}
 
 
-@pytest.mark.parametrize(("name", "value"), [
-    ("joints", "a"), ("joints", []), ("joints", [1]), ("beds", {}), ("beds", [1]), ("beds", [{"name": 3}]),
-    ("tick_hz", 0), ("tick_hz", "x"), ("repeats", 0), ("repeats", 1.5),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("joints", "a"),
+        ("joints", []),
+        ("joints", [1]),
+        ("beds", {}),
+        ("beds", [1]),
+        ("beds", [{"name": 3}]),
+        ("tick_hz", 0),
+        ("tick_hz", "x"),
+        ("repeats", 0),
+        ("repeats", 1.5),
+    ],
+)
 def test_records_with_a_head_that_is_none_count_as_none(name: str, value: Any) -> None:
     rows = np.empty(0, records.LAYOUT)
     check_head(records.Records(GOOD_HEAD, rows, 0))

@@ -138,8 +138,9 @@ def test_of_one_case_of_several_and_of_those_that_are_selected(reaches: xarray.D
 def test_structures_have_their_own_links(chain: xarray.DataTree) -> None:
     frames = chain.met.frames()
     assert {name: node["link"].values.tolist() for name, node in frames.children.items()} == {
-        "links.1": ["first"], "links.2": ["first", "second"]
-    }  # fmt: skip
+        "links.1": ["first"],
+        "links.2": ["first", "second"],
+    }
     assert list(chain.met.frames("second").children) == ["links.2"]
     angle = chain["links.2"]["q"].sel(joint="one")
     place = chain["links.2"].met.frames("second")["position"].isel(link=0)
@@ -183,10 +184,11 @@ def test_an_arm_whose_joints_are_all_fixed(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_what_cannot_be_placed(reaches: xarray.Dataset, tmp_path: Path) -> None:
     assert said(lambda: reaches.met.frames("tol")) == (
-        "E385", "no link `tol` in `reaches`\n"
+        "E385",
+        "no link `tol` in `reaches`\n"
         "  did you mean `tool`?\n"
-        "  there are: stand, carriage, boom, wrist, pointer, tool, plate, lamp"
-    )  # fmt: skip
+        "  there are: stand, carriage, boom, wrist, pointer, tool, plate, lamp",
+    )
     remedy = "  `record = [q, ...]` in the run keeps where its joints are; then run it again"
     assert said(lambda: reaches[["qd", "n_valid"]].met.frames()) == (
         "E370",
@@ -213,9 +215,10 @@ def test_a_case_without_a_history(tmp_path: Path) -> None:
         assert data.met.frames()["recorded_case"].values.tolist() == [1]
         for case in ("#2", [1, 2]):
             assert said(lambda case=case: data.met.frames(case=case)) == (
-                "E328", "no history of case #2 of `reaches` was kept\n"
-                f"  `met run {archive} --case '#2'` runs it again, to the same bits, into an archive of its own"
-            )  # fmt: skip
+                "E328",
+                "no history of case #2 of `reaches` was kept\n"
+                f"  `met run {archive} --case '#2'` runs it again, to the same bits, into an archive of its own",
+            )
 
 
 def test_orientations_do_not_jump_where_a_link_passes_half_a_turn(reaches: xarray.Dataset) -> None:

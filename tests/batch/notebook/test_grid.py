@@ -27,8 +27,9 @@ def of_values(**columns: Any) -> Any:
     """A sweep over kp and the lower mass with these values in its cases."""
     kp, mass = plans.gains(1).cases.coordinates
     given = {"kp": kp, "mass": mass}
-    coordinates = tuple(replace(given[name], values=np.array(values, float)) for name, values in columns.items()
-                        if name in given)  # fmt: skip
+    coordinates = tuple(
+        replace(given[name], values=np.array(values, float)) for name, values in columns.items() if name in given
+    )
     repeats = np.array(columns["repeats"]) if "repeats" in columns else None
     cases = replace(plans.gains(1).cases, count=len(coordinates[0].values), coordinates=coordinates, repeats=repeats)
     return replace(plans.gains(1), cases=cases)
@@ -119,23 +120,27 @@ def test_structures_are_side_by_side(tmp_path: Path) -> None:
         for name in ("rk4", "midpoint"):
             np.testing.assert_array_equal(grid.sel(integrator=name), tree[f"ways.{name}"]["volts"])
         assert said(lambda: tree.met.grid("volts")) == (
-            "E388", "these are the cases of several: brief, ways\n"
-            "  of one of them: `data.met.sel(run='brief').met.grid(...)`"
-        )  # fmt: skip
+            "E388",
+            "these are the cases of several: brief, ways\n  of one of them: `data.met.sel(run='brief').met.grid(...)`",
+        )
         assert said(lambda: ways.met.grid("qd")) == (
-            "E388", "`qd` is a signal, which each structure has at times of its own\n"
-            "  of one structure: `data[NAME].met.grid(...)`"
-        )  # fmt: skip
+            "E388",
+            "`qd` is a signal, which each structure has at times of its own\n"
+            "  of one structure: `data[NAME].met.grid(...)`",
+        )
         assert tree["ways.rk4"].met.grid("qd").sizes == {"gearbox.kp": 2, "time": 11, "joint": 2}
 
 
 @pytest.mark.slow
 def test_a_sum_of_sweeps_that_vary_different_things(tmp_path: Path) -> None:
     deck = tmp_path / "sum.ic"
-    deck.write_text(TUNING + """
+    deck.write_text(
+        TUNING
+        + """
         sweep gain of brief { vary gearbox.kp = [0.03] V*s/rad; }
         sweep both = ways + gain;
-    """)  # fmt: skip
+    """
+    )
     batch.run(ic.compile(deck, select=["both"]), output=tmp_path / "both.h5")
     with batch.open(tmp_path / "both.h5") as tree:
         grid = tree.met.grid("volts")
@@ -154,18 +159,20 @@ class TestMessages:
     def test_two_cases_at_one_place(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         data = block(monkeypatch, tmp_path, kp=[0.01, 0.02, 0.02, 0.01], mass=[1, 2, 2, 2])
         assert said(lambda: data.met.grid("settle")) == (
-            "E388", "cases #1 and #2 are both at gearbox.kp = 0.02 V*s/rad, links.lower.mass = 2000 g\n"
-            "  choose some by `data.met.sel(...)`, one of them by `data.met.sel(case=[...])`"
-        )  # fmt: skip
+            "E388",
+            "cases #1 and #2 are both at gearbox.kp = 0.02 V*s/rad, links.lower.mass = 2000 g\n"
+            "  choose some by `data.met.sel(...)`, one of them by `data.met.sel(case=[...])`",
+        )
 
     @pytest.mark.slow
     def test_samples_are_no_block(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         each = np.arange(1, 2001)
         data = block(monkeypatch, tmp_path, kp=each // 2 + 1, mass=(each + 1) // 2)
         assert said(lambda: data.met.grid("settle")) == (
-            "E388", "2,000 cases are no block of 1001 of gearbox.kp x 1000 of links.lower.mass\n"
-            "  samples are points: plot them over `data[PATH]`, or choose fewer by `data.met.sel(...)`"
-        )  # fmt: skip
+            "E388",
+            "2,000 cases are no block of 1001 of gearbox.kp x 1000 of links.lower.mass\n"
+            "  samples are points: plot them over `data[PATH]`, or choose fewer by `data.met.sel(...)`",
+        )
 
     def test_names_of_nothing_over_cases(self, tuning: xarray.Dataset) -> None:
         assert said(lambda: tuning.met.grid("setle"))[1].startswith(
@@ -175,9 +182,10 @@ class TestMessages:
 
     def test_signals_beside_metrics(self, tuning: xarray.Dataset) -> None:
         assert said(lambda: tuning.met.grid("settle", "volts", "qd")) == (
-            "E388", "one of `settle` and `qd` is a signal, which only some cases may have\n"
-            "  a block of each: `data.met.grid(...)` twice"
-        )  # fmt: skip
+            "E388",
+            "one of `settle` and `qd` is a signal, which only some cases may have\n"
+            "  a block of each: `data.met.grid(...)` twice",
+        )
 
     def test_no_cases(self, tuning: xarray.Dataset) -> None:
         assert said(lambda: tuning.isel(case=[]).met.grid("settle")) == (

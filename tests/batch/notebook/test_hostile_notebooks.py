@@ -67,9 +67,13 @@ def swept(name: str = "gains", choice: str = "", **columns: Any) -> Any:
     given = dict(zip(("kp", "mass"), base.cases.coordinates, strict=True))
     coordinates = tuple(replace(given[key], values=np.array(columns[key], float)) for key in given if key in columns)
     cases = replace(
-        base.cases, count=len(columns["kp"]), coordinates=coordinates, repeats=columns.get("repeats"),
-        positions=columns.get("positions"), choices=(Choice("integrator", choice),) if choice else (),
-    )  # fmt: skip
+        base.cases,
+        count=len(columns["kp"]),
+        coordinates=coordinates,
+        repeats=columns.get("repeats"),
+        positions=columns.get("positions"),
+        choices=(Choice("integrator", choice),) if choice else (),
+    )
     return replace(base, name=name, cases=cases, sweep="s" if choice else "")
 
 

@@ -80,9 +80,9 @@ def test_an_archive_that_is_run_anew_meanwhile(tmp_path: Path) -> None:
         np.testing.assert_array_equal(data["q"].isel(recorded_case=3), before)
         assert data.met.sel({"gearbox.kp": 0.01}).sizes["case"] == 6
         told = (
-            "E389", f"{archive} is another archive than the one that was opened\n"
-            "  open it again: `batch.open(...)`"
-        )  # fmt: skip
+            "E389",
+            f"{archive} is another archive than the one that was opened\n  open it again: `batch.open(...)`",
+        )
         assert said(lambda: data.met.frames()) == told
         assert said(lambda: data.met.parameters("#3")) == told
         assert said(lambda: data.met.plan) == told == said(lambda: data[["qd"]].met.sources)
@@ -95,9 +95,9 @@ def test_who_has_forgotten_the_archive_can_be_told(archive: Path, data: xarray.D
     lost = data.drop_encoding()
     assert lost.met.grid("volts").sizes["gearbox.kp"] == 4
     assert said(lambda: lost.met.frames("lower")) == (
-        "E389", "it is not known from which archive these numbers are\n"
-        '  `data.encoding["source"] = "FILE.h5"` says it'
-    )  # fmt: skip
+        "E389",
+        'it is not known from which archive these numbers are\n  `data.encoding["source"] = "FILE.h5"` says it',
+    )
     lost.encoding["source"] = str(archive)
     xarray.testing.assert_identical(lost.met.frames("lower"), data.met.frames("lower"))
 
@@ -106,13 +106,14 @@ def test_what_is_of_no_archive(archive: Path) -> None:
     other = xarray.Dataset({"a": ("x", [1.0, 2.0])})
     assert repr(other.met) == "a Dataset that is of no archive of MET"
     assert said(lambda: other.met.sel(a=1)) == (
-        "E385", "this Dataset has no dimension of cases\n"
-        "  one case was taken out of it, or none"
-    )  # fmt: skip
+        "E385",
+        "this Dataset has no dimension of cases\n  one case was taken out of it, or none",
+    )
     other.encoding["source"] = str(archive)
     assert said(lambda: other.met.frames()) == (
-        "E389", "this Dataset is of no archive: it has no attribute `experiment`"
-    )  # fmt: skip
+        "E389",
+        "this Dataset is of no archive: it has no attribute `experiment`",
+    )
     assert said(lambda: xarray.DataTree(other).met.grid()) == (
         "E389",
         "this DataTree is of no archive: nothing in it has an attribute `experiment`",
@@ -133,7 +134,7 @@ class TestTheVariableOfVerdicts:
             data.met.values  # noqa: B018
         assert str(asked.value) == (
             '`data.met` has no `values`; the variable of that name, of verdicts, is data["met"]'
-        )  # fmt: skip
+        )
 
 
 class TestWhatWasRun:
@@ -148,9 +149,10 @@ class TestWhatWasRun:
         assert at["place"].startswith("<two_link.ic>:")
         assert data.met.sel(case="#20").met.parameters().equals(table)
         assert said(lambda: data.met.parameters()) == (
-            "E388", "parameters are those of one case, and here are 21\n"
-            '  name one: `data.met.parameters("#0")`; of several runs, `data.met.sel(run=NAME)` before'
-        )  # fmt: skip
+            "E388",
+            "parameters are those of one case, and here are 21\n"
+            '  name one: `data.met.parameters("#0")`; of several runs, `data.met.sel(run=NAME)` before',
+        )
 
     @pytest.mark.slow
     def test_of_one_run_among_several(self, tmp_path: Path) -> None:
@@ -171,7 +173,9 @@ class TestWhatWasRun:
         archive = answered(monkeypatch, tmp_path / "a.h5", plans.gains(7), plans.nominal(), fails=frozenset({3}))
         with batch.open(archive) as tree:
             told = repr(tree.met)
-            assert told == """\
+            assert (
+                told
+                == """\
 gains: 7 cases, 7 with a history
   6 done, 1 failed
   require settle < 10 s: met by 5 of 7
@@ -180,7 +184,8 @@ gains: 7 cases, 7 with a history
   links.lower.mass: 20000 g, 20100 g, 20200 g
 nominal: 1 case, 1 with a history
   1 done
-  require settle < 10 s: met by 1 of 1"""  # fmt: skip
+  require settle < 10 s: met by 1 of 1"""
+            )
             one = tree["gains"].to_dataset().met.sel(case=4)
             assert repr(one.met) == "gains: case #4"
             assert repr(tree["gains"].to_dataset()[["q"]].met).splitlines()[0] == "gains: histories of 7 cases"
@@ -201,17 +206,18 @@ class TestUnits:
         assert deck["recorded.links.lower.mass"].values.max() == 20000
         assert set(deck.coords) == set(data.coords)
         assert deck.met.grid("volts")["gearbox.ki"].attrs["units"] == "mV/rad"
-        xarray.testing.assert_identical(deck["volts"].drop_vars(list(deck["volts"].coords)),
-                                        data["volts"].drop_vars(list(data["volts"].coords)))  # fmt: skip
+        xarray.testing.assert_identical(
+            deck["volts"].drop_vars(list(deck["volts"].coords)), data["volts"].drop_vars(list(data["volts"].coords))
+        )
 
     def test_a_selection_knows_them(self, data: xarray.Dataset) -> None:
         deck = data.met.in_units()
         for value in ("125 mV/rad", "0.125 V/rad", 125):
             assert deck.met.sel({"gearbox.ki": value}).sizes["case"] == 7
         assert said(lambda: deck.met.sel({"gearbox.ki": 0.125})) == (
-            "E387", "no case has `gearbox.ki` = 0.125 mV/rad\n"
-            '  nearest are: "60 mV/rad", "125 mV/rad"'
-        )  # fmt: skip
+            "E387",
+            'no case has `gearbox.ki` = 0.125 mV/rad\n  nearest are: "60 mV/rad", "125 mV/rad"',
+        )
 
     @pytest.mark.slow
     def test_of_several(self, tmp_path: Path) -> None:
@@ -222,9 +228,9 @@ class TestUnits:
     def test_units_that_cannot_be(self, data: xarray.Dataset) -> None:
         assert said(lambda: data.met.in_units(qd="rad")) == ("E386", "`qd` cannot be in rad; it is in rad/s")
         assert said(lambda: data.met.in_units(qd="rads")) == (
-            "E386", "`qd`: unit `rads`: `rads` is not a unit; `rad`?\n"
-            "  units are those of decks: `met doc units`"
-        )  # fmt: skip
+            "E386",
+            "`qd`: unit `rads`: `rads` is not a unit; `rad`?\n  units are those of decks: `met doc units`",
+        )
         assert said(lambda: data.met.in_units(status="s")) == ("E386", "`status` cannot be in s; it is in 1")
         assert said(lambda: data.met.in_units(qdd="deg/s^2"))[1].startswith("no variable `qdd` in `tuning`\n")
 

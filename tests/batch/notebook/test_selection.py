@@ -143,51 +143,51 @@ class TestOfSeveral:
             assert list(tree.met.sel(run="ways").children) == ["ways.rk4", "ways.midpoint"]
             assert list(tree.met.sel(run=["brief", "ways.rk4"]).children) == ["brief", "ways.rk4"]
             assert said(lambda: tree.met.sel(run="way")) == (
-                "E325", "no run or sweep `way` here\n"
-                "  there are: brief, ways"
-            )  # fmt: skip
+                "E325",
+                "no run or sweep `way` here\n  there are: brief, ways",
+            )
 
     def test_messages_are_about_all_structures(self, ways: xarray.DataTree) -> None:
         assert said(lambda: ways.met.sel(integrator="rk5")) == (
-            "E387", "no case has `integrator` = rk5\n"
-            "  did you mean `rk4`?\n"
-            "  there are: rk4, midpoint"
-        )  # fmt: skip
+            "E387",
+            "no case has `integrator` = rk5\n  did you mean `rk4`?\n  there are: rk4, midpoint",
+        )
         assert said(lambda: ways.met.sel(case="#4")) == (
-            "E321", "no case `#4` in `ways`\n"
-            "  cases here: #0 to #3; or the beginning of a case_id"
-        )  # fmt: skip
+            "E321",
+            "no case `#4` in `ways`\n  cases here: #0 to #3; or the beginning of a case_id",
+        )
         ids = [case_id for name in ("ways.rk4", "ways.midpoint") for case_id in ways[name]["case_id"].values]
         assert said(lambda: ways.met.sel(case="")) == (
-            "E322", f"case `` may be any of 4: {', '.join(ids)}\n"
-            "  give more of its id"
-        )  # fmt: skip
+            "E322",
+            f"case `` may be any of 4: {', '.join(ids)}\n  give more of its id",
+        )
 
 
 class TestMessages:
     def test_a_name_that_nothing_has(self, tuning: xarray.Dataset) -> None:
         there = "there are: gearbox.kp, gearbox.ki, links.upper.mass, links.lower.mass, settle, volts, case, failed, "
         assert said(lambda: tuning.met.sel({"gearbox.kpp": 0.02})) == (
-            "E385", "no parameter or metric `gearbox.kpp` in `tuning`\n"
-            "  did you mean `gearbox.kp`?\n"
-            f"  {there}met, missed"
-        )  # fmt: skip
+            "E385",
+            f"no parameter or metric `gearbox.kpp` in `tuning`\n  did you mean `gearbox.kp`?\n  {there}met, missed",
+        )
         assert said(lambda: tuning.met.sel(time=1.0)) == (
-            "E385", "no parameter or metric `time` in `tuning`\n"
+            "E385",
+            "no parameter or metric `time` in `tuning`\n"
             "  `time` is a dimension: `data.sel(time=...)`\n"
-            f"  {there}met, missed"
-        )  # fmt: skip
+            f"  {there}met, missed",
+        )
 
     def test_a_value_that_no_case_has(self, tuning: xarray.Dataset) -> None:
         assert said(lambda: tuning.met.sel({"gearbox.ki": "130 mV/rad"})) == (
-            "E387", "no case has `gearbox.ki` = 130 mV/rad\n"
-            '  nearest are: "60 mV/rad", "125 mV/rad"'
-        )  # fmt: skip
+            "E387",
+            'no case has `gearbox.ki` = 130 mV/rad\n  nearest are: "60 mV/rad", "125 mV/rad"',
+        )
         assert said(lambda: tuning.met.sel({"links.lower.mass": [20, 25000]})) == (
-            "E387", "no case has `links.lower.mass` = 25000 kg\n"
+            "E387",
+            "no case has `links.lower.mass` = 25000 kg\n"
             '  nearest are: "20000 g", "30000 g"\n'
-            "  a number alone is in kg, as the values here are"
-        )  # fmt: skip
+            "  a number alone is in kg, as the values here are",
+        )
 
     def test_what_is_nearest_can_be_typed(self, gains: xarray.Dataset) -> None:
         third = (gains["gearbox.kp"] / 3.0).assign_attrs(gains["gearbox.kp"].attrs)
@@ -203,41 +203,42 @@ class TestMessages:
         [
             ("0.02 s", "`gearbox.kp` = '0.02 s' is in s; it is in V*s/rad\n  write one such as \"0.5 V*s/rad\""),
             ("0.02", "`gearbox.kp` = '0.02' has no unit; it is in V*s/rad\n  write one such as \"0.5 V*s/rad\""),
-            ("0.02 Vs", "`gearbox.kp`: unit `Vs`: `Vs` is not a unit; `V*s`?\n"
-             "  units are those of decks: `met doc units`"),
-            ("much", "`gearbox.kp` = 'much' cannot be read\n"
-             '  write a number and its unit, such as "0.5 V*s/rad"'),
-            (True, "`gearbox.kp` = True: it is a number\n  write a number, or a text such as \"0.5 V*s/rad\""),
+            (
+                "0.02 Vs",
+                "`gearbox.kp`: unit `Vs`: `Vs` is not a unit; `V*s`?\n  units are those of decks: `met doc units`",
+            ),
+            ("much", "`gearbox.kp` = 'much' cannot be read\n  write a number and its unit, such as \"0.5 V*s/rad\""),
+            (True, '`gearbox.kp` = True: it is a number\n  write a number, or a text such as "0.5 V*s/rad"'),
             (slice(0.01, 0.02, 2), "`gearbox.kp`: a range of values has no step\n  `slice(first, last)`"),
         ],
-    )  # fmt: skip
+    )
     def test_a_value_that_cannot_be_one(self, tuning: xarray.Dataset, value: Any, message: str) -> None:
         assert said(lambda: tuning.met.sel({"gearbox.kp": value})) == ("E386", message)
 
     def test_other_values_that_cannot_be(self, tuning: xarray.Dataset, ways: xarray.DataTree) -> None:
         assert said(lambda: tuning.met.sel(failed="yes")) == ("E386", "`failed` = 'yes': it is True or False")
         assert said(lambda: tuning.met.sel(case=7.5)) == (
-            "E386", "`case` = 7.5 names no case\n"
-            '  a position, 7; "#7"; or the beginning of a case_id'
-        )  # fmt: skip
+            "E386",
+            '`case` = 7.5 names no case\n  a position, 7; "#7"; or the beginning of a case_id',
+        )
         assert said(lambda: ways.met.sel(integrator=slice("a", "b"))) == (
-            "E386", "`integrator` is a word: it has no range\n"
-            "  write a list of words"
-        )  # fmt: skip
+            "E386",
+            "`integrator` is a word: it has no range\n  write a list of words",
+        )
 
     def test_cases_that_there_are_not(self, tuning: xarray.Dataset) -> None:
         assert said(lambda: tuning.met.sel(case="#21")) == (
-            "E321", "no case `#21` in `tuning`\n"
-            "  cases here: #0 to #20; or the beginning of a case_id"
-        )  # fmt: skip
+            "E321",
+            "no case `#21` in `tuning`\n  cases here: #0 to #20; or the beginning of a case_id",
+        )
         assert said(lambda: tuning.met.sel({"gearbox.kp": 0.01}, case="#20")) == (
             "E387",
             "case '#20' is none of those that are chosen by the other values",
         )
         assert said(lambda: tuning.isel(case=0, recorded_case=0).met.sel(case=0)) == (
-            "E385", "this Dataset has no dimension of cases\n"
-            "  one case was taken out of it, or none"
-        )  # fmt: skip
+            "E385",
+            "this Dataset has no dimension of cases\n  one case was taken out of it, or none",
+        )
 
     def test_what_a_part_of_a_dataset_does_not_say(self, tuning: xarray.Dataset) -> None:
         assert said(lambda: tuning[["settle"]].met.sel(failed=True)) == (
@@ -245,9 +246,10 @@ class TestMessages:
             "how cases ended is not in this Dataset: it lacks the variable `status`",
         )
         assert said(lambda: tuning[["settle", "status"]].met.sel(met=True)) == (
-            "E385", "how cases ended is not in this Dataset: it lacks the variable `met`\n"
-            "  a run that requires nothing has none"
-        )  # fmt: skip
+            "E385",
+            "how cases ended is not in this Dataset: it lacks the variable `met`\n"
+            "  a run that requires nothing has none",
+        )
 
     def test_nothing_is_said_of_where_in_met_it_was_noticed(self, tuning: xarray.Dataset) -> None:
         from met.diagnostic import Problem

@@ -44,7 +44,9 @@ def cells(ax: Any, *, hatch: str | None = None, face: str = "") -> int:
     return sum(
         int(np.diff(np.searchsorted(edges, path.get_extents().intervalx * (1 + 1e-12)))[0])
         for each in ax.collections
-        if isinstance(each, PolyCollection) and not isinstance(each, QuadMesh) and each.get_hatch() == hatch
+        if isinstance(each, PolyCollection)
+        and not isinstance(each, QuadMesh)
+        and each.get_hatch() == hatch
         and (not face or to_hex(each.get_facecolor()[0]) == face)
         for path in each.get_paths()
-    )  # fmt: skip
+    )

@@ -182,8 +182,9 @@ class TestMetrics:
     def test_that_the_other_lacks_are_told_of(self, here: Path) -> None:
         one = archives.grid(KP, MASS)
         archives.made(here / "a.h5", one, histories="none")
-        fewer = replace(one, structure=replace(one.structure, metrics=one.structure.metrics[:1]),
-                        requirements=one.requirements[:1])  # fmt: skip
+        fewer = replace(
+            one, structure=replace(one.structure, metrics=one.structure.metrics[:1]), requirements=one.requirements[:1]
+        )
         archives.made(here / "b.h5", fewer, histories="none")
         assert refused("volts") == "error[E393]: no `volts` in b.h5 to draw against\n = help: in b.h5: settle\n"
 

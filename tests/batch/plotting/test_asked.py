@@ -35,14 +35,17 @@ def sweep(here: Path) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("options", "labels"), [
-    ({"names": ["qd"]}, {"qd  (rad/s)"}),
-    ({"names": ["volts"]}, {"volts  (V)"}),
-    ({"names": ["volts", "settle"]}, {"volts  (V)", "settle  (s)"}),
-    ({"over": ["links.lower.mass"]}, {"settle  (s)", "volts  (V)"}),
-    ({"cases": ["#3"], "names": ["shoulder.qd"]}, {"shoulder.qd\n(rad/s)"}),
-    ({}, {"q  (rad)", "qd  (rad/s)", "tau  (N·m)", "servo.voltage\n(V)"}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("options", "labels"),
+    [
+        ({"names": ["qd"]}, {"qd  (rad/s)"}),
+        ({"names": ["volts"]}, {"volts  (V)"}),
+        ({"names": ["volts", "settle"]}, {"volts  (V)", "settle  (s)"}),
+        ({"over": ["links.lower.mass"]}, {"settle  (s)", "volts  (V)"}),
+        ({"cases": ["#3"], "names": ["shoulder.qd"]}, {"shoulder.qd\n(rad/s)"}),
+        ({}, {"q  (rad)", "qd  (rad/s)", "tau  (N·m)", "servo.voltage\n(V)"}),
+    ],
+)
 def test_names_are_those_of_signals_or_of_metrics(
     sweep: Path, figures: list[Any], options: dict[str, Any], labels: set[str]
 ) -> None:
@@ -51,37 +54,60 @@ def test_names_are_those_of_signals_or_of_metrics(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("options", "said"), [
-    ({"names": ["qdd"]},
-     "error[E324]: no signal or metric `qdd` in `gains`\n = help: did you mean `qd`?\n"
-     " = help: signals here: q, qd, tau, shoulder.servo.voltage\n = help: metrics here: settle, volts\n"),
-    ({"names": ["qd", "settle"]},
-     "error[E391]: `qd` is a signal and `settle` a metric: they have no axis in common\n"
-     " = help: draw two pictures, each with a name of its own: `-o FILE.png`\n"),
-    ({"names": ["qd"], "over": ["gearbox.kp"]},
-     "error[E391]: `qd` is a signal, which is drawn over time, and not over `gearbox.kp`\n"
-     " = help: `--over` is of metrics: settle, volts\n"),
-    ({"names": ["volts"], "cases": ["#1"]},
-     "error[E391]: `--case` is of signals, and `volts` is a metric\n"
-     " = help: a case's metrics are numbers: `met show --case` tells them\n"),
-    ({"over": ["gearbox.kp"], "cases": ["#1"]},
-     "error[E391]: `--case` is of signals, and `--over` of metrics\n"
-     " = help: a case's metrics are numbers: `met show --case` tells them\n"),
-    ({"over": ["gearbox.kq"]},
-     "error[E390]: no parameter `gearbox.kq` is varied in `gains`\n = help: did you mean `gearbox.kp`?\n"
-     " = help: varied here: links.lower.mass, gearbox.kp\n"),
-    ({"over": ["shoulder.servo.ki"]},
-     "error[E390]: `shoulder.servo.ki` is not varied in `gains`\n"
-     " = help: varied here: links.lower.mass, gearbox.kp\n"),
-    ({"over": ["volts"]},
-     "error[E390]: `volts` is a metric: it is drawn over what is varied\n = help: `met plot a.h5 volts`\n"
-     " = help: varied here: links.lower.mass, gearbox.kp\n"),
-    ({"over": ["gearbox.kp", "gearbox.kp"]},
-     "error[E390]: `gearbox.kp` twice in `--over`\n = help: varied here: links.lower.mass, gearbox.kp\n"),
-    ({"over": ["a", "b", "c", "d"]},
-     "error[E390]: 4 parameters in `--over`: 3 at most\n"
-     " = help: one gives points, two a map, a third maps beside one another\n"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (
+            {"names": ["qdd"]},
+            "error[E324]: no signal or metric `qdd` in `gains`\n = help: did you mean `qd`?\n"
+            " = help: signals here: q, qd, tau, shoulder.servo.voltage\n = help: metrics here: settle, volts\n",
+        ),
+        (
+            {"names": ["qd", "settle"]},
+            "error[E391]: `qd` is a signal and `settle` a metric: they have no axis in common\n"
+            " = help: draw two pictures, each with a name of its own: `-o FILE.png`\n",
+        ),
+        (
+            {"names": ["qd"], "over": ["gearbox.kp"]},
+            "error[E391]: `qd` is a signal, which is drawn over time, and not over `gearbox.kp`\n"
+            " = help: `--over` is of metrics: settle, volts\n",
+        ),
+        (
+            {"names": ["volts"], "cases": ["#1"]},
+            "error[E391]: `--case` is of signals, and `volts` is a metric\n"
+            " = help: a case's metrics are numbers: `met show --case` tells them\n",
+        ),
+        (
+            {"over": ["gearbox.kp"], "cases": ["#1"]},
+            "error[E391]: `--case` is of signals, and `--over` of metrics\n"
+            " = help: a case's metrics are numbers: `met show --case` tells them\n",
+        ),
+        (
+            {"over": ["gearbox.kq"]},
+            "error[E390]: no parameter `gearbox.kq` is varied in `gains`\n = help: did you mean `gearbox.kp`?\n"
+            " = help: varied here: links.lower.mass, gearbox.kp\n",
+        ),
+        (
+            {"over": ["shoulder.servo.ki"]},
+            "error[E390]: `shoulder.servo.ki` is not varied in `gains`\n"
+            " = help: varied here: links.lower.mass, gearbox.kp\n",
+        ),
+        (
+            {"over": ["volts"]},
+            "error[E390]: `volts` is a metric: it is drawn over what is varied\n = help: `met plot a.h5 volts`\n"
+            " = help: varied here: links.lower.mass, gearbox.kp\n",
+        ),
+        (
+            {"over": ["gearbox.kp", "gearbox.kp"]},
+            "error[E390]: `gearbox.kp` twice in `--over`\n = help: varied here: links.lower.mass, gearbox.kp\n",
+        ),
+        (
+            {"over": ["a", "b", "c", "d"]},
+            "error[E390]: 4 parameters in `--over`: 3 at most\n"
+            " = help: one gives points, two a map, a third maps beside one another\n",
+        ),
+    ],
+)
 def test_what_cannot_be_drawn_is_said(sweep: Path, options: dict[str, Any], said: str) -> None:
     assert refused(**options) == said
 

@@ -64,8 +64,12 @@ def units(file: ArchiveFile) -> tuple[DeckUnits, dict[str, Any]]:
 def test_a_signal_is_in_the_unit_in_which_the_deck_wrote_what_it_does(ran: dict[str, ArchiveFile]) -> None:
     _, found = units(ran["slew"])
     assert {name: panel.unit for name, panel in found.items()} == {
-        "q": "deg", "qd": "deg/s", "tau": "N*m", "shoulder.servo.voltage": "V", "servo.command": "deg/s",
-    }  # fmt: skip
+        "q": "deg",
+        "qd": "deg/s",
+        "tau": "N*m",
+        "shoulder.servo.voltage": "V",
+        "servo.command": "deg/s",
+    }
     start = history(ran["slew"].groups[0], found["q"], 0)[0]
     np.testing.assert_allclose(start, [30.0, -45.0], rtol=1e-12)
     assert found["q"].axis == "q  (deg)" and found["q"].si == "rad"
@@ -83,8 +87,9 @@ def test_limits_are_those_of_requirements_stops_and_servos(ran: dict[str, Archiv
     assert known.experiment is not None
     marks = {
         (name, line): limits_of(known.experiment, panel, line)
-        for name, panel in found.items() for line in range(len(panel.lines))
-    }  # fmt: skip
+        for name, panel in found.items()
+        for line in range(len(panel.lines))
+    }
     assert {key: [(m.text, round(m.value, 9), m.time) for m in each] for key, each in marks.items() if each} == {
         ("q", 0): [("far < 60 deg", 60.0, False)],
         ("q", 1): [("end.upper -30 deg", -30.0, False)],
@@ -128,8 +133,9 @@ def test_lines_of_a_panel_are_equally_thick(ran: dict[str, ArchiveFile], figures
 
 def test_a_line_that_lies_on_another_has_gaps(ran: dict[str, ArchiveFile], figures: list[Any], tmp_path: Path) -> None:
     draw(ran["turning"], tmp_path / "a.png", ["q", "tau"])
-    styles = [[line.get_linestyle() for line in ax.lines if line.get_label() != DOTS["label"]]
-              for ax in shown(figures[0])]  # fmt: skip
+    styles = [
+        [line.get_linestyle() for line in ax.lines if line.get_label() != DOTS["label"]] for ax in shown(figures[0])
+    ]
     assert styles == [["-", "--"], ["-", "-"]]
 
 

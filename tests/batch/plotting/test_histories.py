@@ -66,8 +66,10 @@ def test_joints_of_unlike_unit_stand_beside_one_another(here: Path, figures: lis
         draw(file, "a.png")
     axes = shown(figures[0])
     assert [ax.get_title("left") for ax in axes] == [
-        "shoulder · joint position", "elbow · joint position", "shoulder · voltage on the drive motor",
-    ]  # fmt: skip
+        "shoulder · joint position",
+        "elbow · joint position",
+        "shoulder · voltage on the drive motor",
+    ]
     assert [ax.get_ylabel() for ax in axes] == ["q  (rad)", "q  (m)", "servo.voltage\n(V)"]
     assert [ax.get_xlabel() for ax in axes] == ["", "time  (s)", "time  (s)"]
     left, right = axes[:2]

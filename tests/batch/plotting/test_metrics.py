@@ -90,8 +90,14 @@ class TestPoints:
         assert (bar.get_ylabel(), bar.get_yscale()) == ("gearbox.kp  (V·s/rad)", "log")
         assert bar.get_ylim() == pytest.approx((0.001, 0.1), rel=1e-12)
         assert [text.get_text() for text in bar.get_yticklabels()] == [
-            "0.001", "0.002", "0.005", "0.01", "0.02", "0.05", "0.1",
-        ]  # fmt: skip
+            "0.001",
+            "0.002",
+            "0.005",
+            "0.01",
+            "0.02",
+            "0.05",
+            "0.1",
+        ]
 
     def test_have_the_limit_as_a_line_where_it_is_near(self, here: Path, figures: list[Any]) -> None:
         def limits(ax: Any) -> list[float]:
@@ -171,8 +177,10 @@ class TestMaps:
         marks = [len(each.get_offsets()) for each in settle.collections if isinstance(each, PathCollection)]
         assert marks == [1, 5, 5]  # what is around an infinity sign is drawn by itself
         assert [text.get_text() for text in figures[0].legends[0].get_texts()] == [
-            "misses what is required", "infinite", "failed",
-        ]  # fmt: skip
+            "misses what is required",
+            "infinite",
+            "failed",
+        ]
 
     def test_have_signs_that_are_whole_at_the_edge_and_cover_no_other_cell(
         self, here: Path, figures: list[Any]
@@ -301,8 +309,9 @@ def test_colours_of_words_are_those_that_eyes_tell_apart() -> None:
     x = CaseColumn("parameter:x", "x", "", "parameter", np.array([0.0, 0.0, 1.0, 1.0]))
     found = _sets(x, by)
     assert [(one.text, one.colour, one.joined) for one in found] == [
-        ("one", COLOURS[0], True), ("two", COLOURS[1], True),
-    ]  # fmt: skip
+        ("one", COLOURS[0], True),
+        ("two", COLOURS[1], True),
+    ]
 
 
 @pytest.mark.slow

@@ -51,12 +51,15 @@ def test_letters_of_an_svg_are_drawn_and_those_of_a_pdf_are_letters(here: Path) 
         ),
         ("no/a.png", "error[E305]: cannot write no/a.png: no does not exist\n = help: make it first: `mkdir -p no`\n"),
         *(
-            (f"photo{ending}", f"error[E305]: photo{ending} exists and was not drawn by MET: it is not written over\n"
-             " = help: give another name with `-o`, or remove the file\n")
+            (
+                f"photo{ending}",
+                f"error[E305]: photo{ending} exists and was not drawn by MET: it is not written over\n"
+                " = help: give another name with `-o`, or remove the file\n",
+            )
             for ending in BEGINS
         ),
     ],
-)  # fmt: skip
+)
 def test_a_picture_that_cannot_be_written(here: Path, output: str, said: str) -> None:
     (here / "folder.png").mkdir()
     for ending, begins in BEGINS.items():
@@ -88,9 +91,14 @@ def test_a_full_disk_leaves_the_picture_that_was_there(here: Path, monkeypatch: 
 
 @pytest.mark.parametrize(
     ("text", "inches"),
-    [("8.5cm", (8.5 / 2.54, None)), ("85 mm x 60 mm", None), ("85x60mm", (85 / 25.4, 60 / 25.4)),
-     ("6.5in", (6.5, None)), (" 8.5 × 6 cm", (8.5 / 2.54, 6 / 2.54))],
-)  # fmt: skip
+    [
+        ("8.5cm", (8.5 / 2.54, None)),
+        ("85 mm x 60 mm", None),
+        ("85x60mm", (85 / 25.4, 60 / 25.4)),
+        ("6.5in", (6.5, None)),
+        (" 8.5 × 6 cm", (8.5 / 2.54, 6 / 2.54)),
+    ],
+)
 def test_a_size_is_a_width_or_both_sides(text: str, inches: tuple[float, float | None] | None) -> None:
     if inches is not None:
         assert (sheet(text).width, sheet(text).height) == pytest.approx(inches)
@@ -104,16 +112,28 @@ def test_a_size_is_a_width_or_both_sides(text: str, inches: tuple[float, float |
 @pytest.mark.parametrize(
     ("size", "dpi", "said"),
     [
-        ("8,5x6", None, "error[E392]: size `8,5x6` cannot be read\n"
-         " = help: as `--size 8.5cm`, a column's width, or `--size 8.5x6cm`; in cm, mm or in\n"),
-        ("8.5x2cm", None, "error[E392]: size `8.5x2cm`: sides are from 4 cm to 120 cm\n"
-         " = help: as `--size 8.5cm`, a column's width, or `--size 8.5x6cm`; in cm, mm or in\n"),
+        (
+            "8,5x6",
+            None,
+            "error[E392]: size `8,5x6` cannot be read\n"
+            " = help: as `--size 8.5cm`, a column's width, or `--size 8.5x6cm`; in cm, mm or in\n",
+        ),
+        (
+            "8.5x2cm",
+            None,
+            "error[E392]: size `8.5x2cm`: sides are from 4 cm to 120 cm\n"
+            " = help: as `--size 8.5cm`, a column's width, or `--size 8.5x6cm`; in cm, mm or in\n",
+        ),
         ("", 5, "error[E392]: 5 dots per inch: they are from 30 to 2400\n = help: `--dpi 600`\n"),
-        ("8.5x4cm", None, "error[E392]: 8.5 x 4 cm have no room for 4 panels, with what is written on them\n"
-         " = help: a larger `--size`, or its width alone: the height is then what is needed\n"
-         " = help: name fewer to draw\n"),
+        (
+            "8.5x4cm",
+            None,
+            "error[E392]: 8.5 x 4 cm have no room for 4 panels, with what is written on them\n"
+            " = help: a larger `--size`, or its width alone: the height is then what is needed\n"
+            " = help: name fewer to draw\n",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_size_that_cannot_be(here: Path, size: str, dpi: int | None, said: str) -> None:
     archive(1)
     with pytest.raises(Problem) as caught:
@@ -131,21 +151,36 @@ def test_paper_has_its_size_its_letters_and_no_title(here: Path, figures: list[A
         assert picture.size == (int(8.5 / 2.54 * 600), int(6 / 2.54 * 600))
     plot("a.h5", "b.svg", ["qd"], size="8.5cm")
     assert f'width="{8.5 / 2.54 * 72:.6f}'[:12] in (here / "b.svg").read_text(encoding="utf-8")
-    sizes = {text.get_fontsize() for text in figures[1].findobj(lambda each: hasattr(each, "get_fontsize"))
-             if text.get_text() and text.get_visible()}  # fmt: skip
+    sizes = {
+        text.get_fontsize()
+        for text in figures[1].findobj(lambda each: hasattr(each, "get_fontsize"))
+        if text.get_text() and text.get_visible()
+    }
     assert sizes == {8.0}
     assert figures[1].get_suptitle() == "3 cases"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("width", ["8.5cm", "17.5cm"])
-@pytest.mark.parametrize(("cases", "histories", "over"), [
-    (1, "all", ()), (3, "all", ()), (40, "all", ()), (40, "none", ()), (40, "none", ("gearbox.kp", "links.lower.mass")),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("cases", "histories", "over"),
+    [
+        (1, "all", ()),
+        (3, "all", ()),
+        (40, "all", ()),
+        (40, "none", ()),
+        (40, "none", ("gearbox.kp", "links.lower.mass")),
+    ],
+)
 def test_nothing_that_is_written_lies_on_another_or_outside(
-    here: Path, figures: list[Any], monkeypatch: pytest.MonkeyPatch, width: str, cases: int, histories: str,
+    here: Path,
+    figures: list[Any],
+    monkeypatch: pytest.MonkeyPatch,
+    width: str,
+    cases: int,
+    histories: str,
     over: tuple[str, ...],
-) -> None:  # fmt: skip
+) -> None:
     from matplotlib.text import Text
 
     boxes: dict[Text, Any] = {}

@@ -30,11 +30,23 @@ PATIENCE_SECONDS = 60.0
 
 # 3 and 4 are where Chromium reads and writes; without a sandbox, for it has none as root and in containers.
 WORDS = (
-    "--headless", "--no-sandbox", "--remote-debugging-pipe", "--disable-gpu", "--disable-dev-shm-usage",
-    "--disable-background-networking", "--disable-component-update", "--disable-default-apps", "--disable-extensions",
-    "--disable-sync", "--no-first-run", "--no-default-browser-check", "--hide-scrollbars", "--mute-audio",
-    "--font-render-hinting=none", "--force-color-profile=srgb",
-)  # fmt: skip
+    "--headless",
+    "--no-sandbox",
+    "--remote-debugging-pipe",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-default-apps",
+    "--disable-extensions",
+    "--disable-sync",
+    "--no-first-run",
+    "--no-default-browser-check",
+    "--hide-scrollbars",
+    "--mute-audio",
+    "--font-render-hinting=none",
+    "--force-color-profile=srgb",
+)
 
 
 INK = """(selector => Array.from(document.querySelectorAll(selector), canvas => {
@@ -66,9 +78,14 @@ def browser() -> Iterator[Chromium]:
         command = [found, *WORDS, f"--user-data-dir={home}", "about:blank"]
         shell = ["/bin/bash", "-c", f'exec "$@" 3<&{down[0]} 4>&{up[1]}', "chromium", *command]
         with subprocess.Popen(
-            shell, pass_fds=(down[0], up[1]), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL, env={**os.environ, "HOME": home}, start_new_session=True,
-        ) as process:  # fmt: skip
+            shell,
+            pass_fds=(down[0], up[1]),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "HOME": home},
+            start_new_session=True,
+        ) as process:
             os.close(down[0])
             os.close(up[1])
             chromium = Chromium(down[1], up[0])
@@ -131,9 +148,15 @@ class Chromium:
         return said
 
     def open(
-        self, path: Path, *, width: int = 1280, height: int = 900, dark: bool = False, scale: float = 1.0,
+        self,
+        path: Path,
+        *,
+        width: int = 1280,
+        height: int = 900,
+        dark: bool = False,
+        scale: float = 1.0,
         scripts: bool = True,
-    ) -> Page:  # fmt: skip
+    ) -> Page:
         """A page of this size (CSS pixels), when all of it is there."""
         target = self.ask("Target.createTarget", url="about:blank")["targetId"]
         session = self.ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
@@ -141,11 +164,17 @@ class Chromium:
         self.pages[session] = page
         for domain in ("Page", "Runtime", "Network", "Log"):
             page.ask(f"{domain}.enable")
-        page.ask("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale,
-                 mobile=width < 600)  # fmt: skip
-        page.ask("Emulation.setEmulatedMedia", features=[
-            {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        ])  # fmt: skip
+        page.ask(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=scale,
+            mobile=width < 600,
+        )
+        page.ask(
+            "Emulation.setEmulatedMedia",
+            features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}],
+        )
         if not scripts:
             page.ask("Emulation.setScriptExecutionDisabled", value=True)
         page.ask("Page.navigate", url=path.resolve().as_uri())
@@ -206,8 +235,13 @@ class Page:
                 f"(() => {{ const b = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
                 "return [b.left + scrollX, b.top + scrollY, b.width, b.height]; })()"
             )
-            words["clip"] = {"x": max(0, box[0] - margin), "y": max(0, box[1] - margin), "width": box[2] + 2 * margin,
-                             "height": box[3] + 2 * margin, "scale": 1}  # fmt: skip
+            words["clip"] = {
+                "x": max(0, box[0] - margin),
+                "y": max(0, box[1] - margin),
+                "width": box[2] + 2 * margin,
+                "height": box[3] + 2 * margin,
+                "scale": 1,
+            }
         answer = self.ask("Page.captureScreenshot", format="png", captureBeyondViewport=True, **words)
         path.write_bytes(base64.b64decode(answer["data"]))
         return path

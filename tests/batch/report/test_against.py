@@ -81,8 +81,11 @@ class TestTheVerdict:
         assert (verdict.kind, verdict.about) == ("comparison", "Against a.h5")
         assert (verdict.word, verdict.ok) == ("different", False)
         assert [(part.word, part.count) for part in verdict.parts] == [
-            ("identical", CASES - 2 - 4), ("equivalent", 1), ("different", 3), ("only before", 2),
-        ]  # fmt: skip
+            ("identical", CASES - 2 - 4),
+            ("equivalent", 1),
+            ("different", 3),
+            ("only before", 2),
+        ]
 
     @pytest.mark.slow
     def test_says_which_cases_meet_a_requirement_now_and_which_no_longer(self, planted: tuple[Path, Path]) -> None:
@@ -112,9 +115,11 @@ class TestTheVerdict:
         assert [(part.word, part.count) for part in verdict.parts] == [("only before", 4), ("only now", 5)]
         assert found.changes is not None
         assert found.changes.alone == (
-            "`nominal` is only in a.h5", "`gains` is only in a.h5",
-            "`swing` is only in b.h5", "`loads` is only in b.h5",
-        )  # fmt: skip
+            "`nominal` is only in a.h5",
+            "`gains` is only in a.h5",
+            "`swing` is only in b.h5",
+            "`loads` is only in b.h5",
+        )
         assert "The two have no case in common." in words(page(found))
 
 
@@ -163,8 +168,9 @@ class TestThePage:
     def test_of_many_changes_folds_away_the_later_ones(self, here: Path, engine: None) -> None:
         one = plans.nominal()
         archives.made(here / "a.h5", one)
-        heavier = {path: replace(q, value=q.value + 1.0) for path, q in one.parameters.items()
-                   if isinstance(q.value, float)}  # fmt: skip
+        heavier = {
+            path: replace(q, value=q.value + 1.0) for path, q in one.parameters.items() if isinstance(q.value, float)
+        }
         archives.made(here / "b.h5", replace(one, parameters=heavier))
         found = gathered(Path("a.h5"), Path("b.h5"))
         assert found.changes is not None
@@ -344,13 +350,16 @@ def archives_of(record: int) -> Experiment:
 
 
 class TestNames:
-    @pytest.mark.parametrize(("before", "now", "said"), [
-        ("before.h5", "after.h5", ("before.h5", "after.h5")),
-        ("/x/before.h5", "y/after.h5", ("before.h5", "after.h5")),
-        ("/x/v1/a.h5", "/x/v2/a.h5", ("v1/a.h5", "v2/a.h5")),
-        ("/x/v1/out/a.h5", "/x/v2/out/a.h5", ("v1/out/a.h5", "v2/out/a.h5")),
-        ("/x/a.h5", "/x/a.h5", ("a.h5", "a.h5")),
-    ])  # fmt: skip
+    @pytest.mark.parametrize(
+        ("before", "now", "said"),
+        [
+            ("before.h5", "after.h5", ("before.h5", "after.h5")),
+            ("/x/before.h5", "y/after.h5", ("before.h5", "after.h5")),
+            ("/x/v1/a.h5", "/x/v2/a.h5", ("v1/a.h5", "v2/a.h5")),
+            ("/x/v1/out/a.h5", "/x/v2/out/a.h5", ("v1/out/a.h5", "v2/out/a.h5")),
+            ("/x/a.h5", "/x/a.h5", ("a.h5", "a.h5")),
+        ],
+    )
     def test_tell_the_two_apart(self, before: str, now: str, said: tuple[str, str]) -> None:
         assert sides.called(Path(before), Path(now)) == said
 
@@ -412,8 +421,11 @@ def test_says_which_cases_meet_a_requirement_whose_limit_is_another(here: Path) 
     verdict = found.verdicts[-1]
     flow = next(each for each in verdict.flows if "before" in each.text)
     assert (flow.text, flow.met, flow.gained, flow.lost) == (
-        "settle < 1 us (before: settle < 5 s)", "met by 1, now by 0 of 1", "", "#0"
-    )  # fmt: skip
+        "settle < 1 us (before: settle < 5 s)",
+        "met by 1, now by 0 of 1",
+        "",
+        "#0",
+    )
     assert verdict.headline.startswith("Requirements differ: settle < 5 s -> settle < 1 us (1 of 1 cases no longer")
     assert verdict.headline in words(page(found))
 

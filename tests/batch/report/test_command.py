@@ -51,9 +51,8 @@ def test_one_run_of_several(here: Path) -> None:
 
 def test_a_run_that_is_not_there(sweep: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert refused(sweep.name, "--run", "gain", capsys=capsys) == (
-        "error[E325]: no run or sweep `gain` in two_link.gains.h5\n"
-        " = help: in it: gains\n"
-    )  # fmt: skip
+        "error[E325]: no run or sweep `gain` in two_link.gains.h5\n = help: in it: gains\n"
+    )
     assert not Path("two_link.gains.html").exists()
 
 
@@ -67,16 +66,14 @@ def test_no_archive(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_folder(sweep: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("out").mkdir()
     assert refused(sweep.name, "-o", "out", capsys=capsys) == (
-        "error[E380]: cannot write out: it is a folder\n"
-        " = help: name a file in it: `-o out/report.html`\n"
-    )  # fmt: skip
+        "error[E380]: cannot write out: it is a folder\n = help: name a file in it: `-o out/report.html`\n"
+    )
 
 
 def test_a_folder_that_is_not_there(sweep: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert refused(sweep.name, "-o", "out/r.html", capsys=capsys) == (
-        "error[E380]: cannot write out/r.html: out does not exist\n"
-        " = help: make it first: `mkdir -p out`\n"
-    )  # fmt: skip
+        "error[E380]: cannot write out/r.html: out does not exist\n = help: make it first: `mkdir -p out`\n"
+    )
     Path("out").touch()
     assert refused(sweep.name, "-o", "out/r.html", capsys=capsys) == (
         "error[E380]: cannot write out/r.html: out is a file, not a folder\n"
@@ -107,9 +104,8 @@ def test_a_pipe_is_no_place(sweep: Path, capsys: pytest.CaptureFixture[str]) -> 
 
 def test_a_page_is_called_html(sweep: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert refused(sweep.name, "-o", sweep.name, capsys=capsys) == (
-        "error[E381]: cannot write two_link.gains.h5: reports are HTML files\n"
-        " = help: `-o two_link.gains.html`\n"
-    )  # fmt: skip
+        "error[E381]: cannot write two_link.gains.h5: reports are HTML files\n = help: `-o two_link.gains.html`\n"
+    )
     assert refused(sweep.name, "-o", "r.pdf", capsys=capsys) == (
         "error[E381]: cannot write r.pdf: reports are HTML files\n"
         " = help: `-o r.html`\n"

@@ -56,9 +56,9 @@ class TestTheVerdict:
         assert verdict.good == 0
         assert verdict.demands[0].unknown == 3
 
-    @pytest.mark.parametrize(("limit", "said"), [
-        (10.0, "The case meets its requirement"), (0.001, "The case does not meet its requirement"),
-    ])  # fmt: skip
+    @pytest.mark.parametrize(
+        ("limit", "said"), [(10.0, "The case meets its requirement"), (0.001, "The case does not meet its requirement")]
+    )
     def test_of_one_case_is_in_the_singular(self, here: Path, engine: None, limit: float, said: str) -> None:
         one = plans.nominal()
         one = replace(one, requirements=(replace(one.requirements[0], text=f"settle < {limit} s", limit=limit),))
@@ -182,8 +182,20 @@ class TestMaps:
         assert [at for at, _ in steps.ticks[0]] == pytest.approx([(x + 0.5) / 71 for x in range(0, 71, 10)])
         factors = ruler(levelled(np.geomspace(0.01, 100.0, 81)))
         assert [text for _, text in factors.ticks[0]] == [
-            "0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50", "100",
-        ]  # fmt: skip
+            "0.01",
+            "0.02",
+            "0.05",
+            "0.1",
+            "0.2",
+            "0.5",
+            "1",
+            "2",
+            "5",
+            "10",
+            "20",
+            "50",
+            "100",
+        ]
         assert {text: at for at, text in factors.ticks[0]}["1"] == pytest.approx(0.5)
         few = ruler(levelled(np.array([1.0, 10.0, 100.0])))
         assert [text for _, text in few.ticks[0]] == ["1", "10", "100"]
@@ -193,9 +205,14 @@ class TestMaps:
 def test_colours_of_a_logarithmic_sweep_are_logarithmic() -> None:
     kp = CaseColumn("parameter:kp", "kp", "", "parameter", np.geomspace(1e-3, 1e-1, 9), log=True)
     assert _column(kp)["reach"] == {
-        "low": pytest.approx(1e-3), "high": pytest.approx(1e-1), "log": True, "below": 0, "above": 0,
-        "least": pytest.approx(1e-3), "most": pytest.approx(1e-1),
-    }  # fmt: skip
+        "low": pytest.approx(1e-3),
+        "high": pytest.approx(1e-1),
+        "log": True,
+        "below": 0,
+        "above": 0,
+        "least": pytest.approx(1e-3),
+        "most": pytest.approx(1e-1),
+    }
     assert not _column(replace(kp, values=np.linspace(1e-3, 1e-1, 9), log=False))["reach"]["log"]
 
 
@@ -205,9 +222,11 @@ class TestSignals:
         assert found is not None and len(found.histories) == 20 and found.said == ()
         assert found.histories[0].case == 0 and found.shown == (0, found.histories[1].case, found.middle)
         assert [(panel.name, [line.label for line in panel.lines]) for panel in found.panels] == [
-            ("q", ["shoulder", "elbow"]), ("qd", ["shoulder", "elbow"]), ("tau", ["shoulder", "elbow"]),
+            ("q", ["shoulder", "elbow"]),
+            ("qd", ["shoulder", "elbow"]),
+            ("tau", ["shoulder", "elbow"]),
             ("shoulder.servo.voltage", [""]),
-        ]  # fmt: skip
+        ]
         with ArchiveFile(sweep) as file:
             assert found.histories[0].values[1] == pytest.approx(file.groups[0].signal("qd", 0), nan_ok=True)
 
@@ -268,8 +287,11 @@ class TestSignals:
         assert found is not None and "servo.command" not in [panel.name for panel in found.panels]
         [qd] = [panel for panel in found.panels if panel.name == "qd"]
         assert [(line.label, line.command) for line in qd.lines] == [
-            ("shoulder", False), ("elbow", False), ("shoulder", True), ("elbow", True),
-        ]  # fmt: skip
+            ("shoulder", False),
+            ("elbow", False),
+            ("shoulder", True),
+            ("elbow", True),
+        ]
         assert found.histories[0].values[found.panels.index(qd)][:, 2:] == pytest.approx(0.03)
 
 

@@ -127,8 +127,10 @@ def test_no_backtick_is_seen_but_in_the_deck(chromium: Chromium, compared: Path)
 
 def test_a_unit_is_told_once(chromium: Chromium, compared: Path) -> None:
     page = opened(chromium, compared)
-    rows = page.run("Array.from(document.querySelectorAll('.compared .cases tbody tr'), (row) => "
-                    "Array.from(row.children, (cell) => cell.textContent))")  # fmt: skip
+    rows = page.run(
+        "Array.from(document.querySelectorAll('.compared .cases tbody tr'), (row) => "
+        "Array.from(row.children, (cell) => cell.textContent))"
+    )
     assert rows and {row[5] for row in rows} <= {"%", "s", "deg", "V", "rad", "rad/s", "N·m"}
     for text in (text for row in rows for text in row[3:5]):
         float(text.replace("∞", "inf"))  # a number alone

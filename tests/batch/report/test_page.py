@@ -65,9 +65,10 @@ class Parsed(HTMLParser):
 def hostile(value: Any) -> Any:
     """The same, and every text of a deck in it is one that would like to be markup."""
     if is_dataclass(value) and not isinstance(value, type):
-        return replace(value, **{
-            field.name: hostile(getattr(value, field.name)) for field in fields(value) if field.name not in KEPT
-        })  # fmt: skip
+        return replace(
+            value,
+            **{field.name: hostile(getattr(value, field.name)) for field in fields(value) if field.name not in KEPT},
+        )
     if isinstance(value, tuple):
         return tuple(hostile(each) for each in value)
     if isinstance(value, dict):
@@ -150,8 +151,15 @@ def test_it_is_small_but_for_its_data(found: Report) -> None:
 @pytest.mark.slow
 def test_it_reads_without_scripts(found: Report) -> None:
     words = " ".join(text for tag, text in Parsed(page(found)).texts if tag not in ("script", "style"))
-    for said in ("0 of 12 cases meet every requirement", "settle < 10 s", "met run a.h5 gains --case '#2'",
-                 "2 cases failed", "shoulder.servo.kp", "run nominal { }", "The plots need JavaScript"):  # fmt: skip
+    for said in (
+        "0 of 12 cases meet every requirement",
+        "settle < 10 s",
+        "met run a.h5 gains --case '#2'",
+        "2 cases failed",
+        "shoulder.servo.kp",
+        "run nominal { }",
+        "The plots need JavaScript",
+    ):
         assert said in re.sub(r"\s+", " ", words)
 
 
@@ -193,11 +201,20 @@ class TestNumbers:
         kind = {"i4": "<i4", "f4": "<f4", "f8": "<f8"}[data["t"]]
         return np.frombuffer(base64.b64decode(data["b"]), kind).astype(float) + data.get("o", 0.0)
 
-    @pytest.mark.parametrize(("values", "kind"), [
-        (np.arange(5), "i4"), (np.array([1e300, 2.0]), "f8"), (np.full(9, 0.1), "c"), (np.array([]), "f8"),
-        (1e6 + np.linspace(0.0, 1e-3, 50), "f4"), (np.array([np.nan, np.inf, -np.inf, 1.0, 0.3]), "f4"),
-        (np.array([2**40, 1]), "f4"), (np.array([-1.7e308, 1.7e308]), "f8"), (np.array([1.0, 1e-30]), "f4"),
-    ])  # fmt: skip
+    @pytest.mark.parametrize(
+        ("values", "kind"),
+        [
+            (np.arange(5), "i4"),
+            (np.array([1e300, 2.0]), "f8"),
+            (np.full(9, 0.1), "c"),
+            (np.array([]), "f8"),
+            (1e6 + np.linspace(0.0, 1e-3, 50), "f4"),
+            (np.array([np.nan, np.inf, -np.inf, 1.0, 0.3]), "f4"),
+            (np.array([2**40, 1]), "f4"),
+            (np.array([-1.7e308, 1.7e308]), "f8"),
+            (np.array([1.0, 1e-30]), "f4"),
+        ],
+    )
     def test_survive_to_a_millionth_of_their_range(self, values: np.ndarray, kind: str) -> None:
         data = packed(values)
         assert data["t"] == kind
@@ -212,10 +229,18 @@ class TestNumbers:
         assert json.loads(written) == {"a": "</script><!--&\u2028", "n": 1.5}
 
 
-@pytest.mark.parametrize(("part", "of", "said"), [
-    (0, 5, "0 %"), (5, 5, "100 %"), (1, 3, "33.3 %"), (999_999, 1_000_000, "> 99.9 %"), (1, 1_000_000, "< 0.1 %"),
-    (0, 0, "0 %"), (9995, 10_000, "> 99.9 %"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("part", "of", "said"),
+    [
+        (0, 5, "0 %"),
+        (5, 5, "100 %"),
+        (1, 3, "33.3 %"),
+        (999_999, 1_000_000, "> 99.9 %"),
+        (1, 1_000_000, "< 0.1 %"),
+        (0, 0, "0 %"),
+        (9995, 10_000, "> 99.9 %"),
+    ],
+)
 def test_a_share_is_all_or_none_only_where_it_is(part: int, of: int, said: str) -> None:
     assert share(part, of) == said
 

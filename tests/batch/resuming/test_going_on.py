@@ -110,9 +110,13 @@ def fewer_cases(path: Path) -> None:
 CHECKSUM = "is not what was written: its checksum differs"
 ANOTHER = "is of another plan, or of another version of MET's code"
 DAMAGES = (
-    (cut_short, CHECKSUM), (emptied, "is cut short"), (turned_over, CHECKSUM), (of_another_plan, ANOTHER),
-    (of_other_cases, ANOTHER), (fewer_cases, "holds other cases than its name says"),
-)  # fmt: skip
+    (cut_short, CHECKSUM),
+    (emptied, "is cut short"),
+    (turned_over, CHECKSUM),
+    (of_another_plan, ANOTHER),
+    (of_other_cases, ANOTHER),
+    (fewer_cases, "holds other cases than its name says"),
+)
 
 
 @pytest.mark.slow

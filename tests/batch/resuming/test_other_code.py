@@ -24,9 +24,10 @@ def another_constant(patch: pytest.MonkeyPatch) -> None:
     """A MET in which steps are longer by a billionth."""
     write = RecordingTape.write
     patch.setattr(
-        RecordingTape, "write",
+        RecordingTape,
+        "write",
         lambda self, name, value: write(self, name, value * (1.0 + 1e-9) if name == "shoulder.q" else value),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.slow

@@ -87,14 +87,18 @@ AXIS = "gearbox.kp = linspace(0.010, 0.040, 40) V*s/rad"
 CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
     "the range of an axis": (
         ("0.040", "0.050"),
-        ("gearbox.kp: 40 values from 0.01 to 0.04 V*s/rad -> 40 values from 0.01 to 0.05 V*s/rad",)
+        ("gearbox.kp: 40 values from 0.01 to 0.04 V*s/rad -> 40 values from 0.01 to 0.05 V*s/rad",),
     ),
-    "values between": ((AXIS, "gearbox.kp = logspace(0.010, 0.040, 40) V*s/rad"),
-                       ("gearbox.kp: other values (40 values from 0.01 to 0.04 V*s/rad)",)),
+    "values between": (
+        (AXIS, "gearbox.kp = logspace(0.010, 0.040, 40) V*s/rad"),
+        ("gearbox.kp: other values (40 values from 0.01 to 0.04 V*s/rad)",),
+    ),
     "how many values": (
         ("40)", "41)"),
-        ("40 cases -> 41 cases",
-         "gearbox.kp: 40 values from 0.01 to 0.04 V*s/rad -> 41 values from 0.01 to 0.04 V*s/rad"),
+        (
+            "40 cases -> 41 cases",
+            "gearbox.kp: 40 values from 0.01 to 0.04 V*s/rad -> 41 values from 0.01 to 0.04 V*s/rad",
+        ),
     ),
     "another axis": (
         (AXIS, "gearbox.ki = linspace(0.1, 0.2, 40) V/rad"),
@@ -108,13 +112,14 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
         ),
     ),
     "a parameter": (
-        with_entry("servos { elbow { f_c = 0.03 N*m; } }"), ("elbow.servo.f_c: 0.0205 N*m -> 0.03 N*m (d.ic:4)",)
+        with_entry("servos { elbow { f_c = 0.03 N*m; } }"),
+        ("elbow.servo.f_c: 0.0205 N*m -> 0.03 N*m (d.ic:4)",),
     ),
     "a rate": (with_entry("rates { record = 12.5 Hz; }"), ("rates.record: 25 Hz -> 12.5 Hz",)),
     "a signal": (with_entry("record += [qdd];"), ("record: qdd is new",)),
     "a metric": (with_entry("metric end = final { of = elbow.q; }"), ("metric end is new",)),
     "the integrator": (with_entry("integrator = rk4;"), ("integrator: modified_euler -> rk4",)),
-}  # fmt: skip
+}
 
 
 @pytest.mark.slow
