@@ -33,7 +33,7 @@ class Archive:
 
     @property
     def ok(self) -> bool:
-        """Whether every case reached its end and met every requirement."""
+        """True if every case reached its end and met every requirement."""
         return all(summary.ok for summary in self.summaries)
 
     def open(self) -> Any:
@@ -104,7 +104,7 @@ def diff(
     tolerances: str | Sequence[str] = (),
     distributions: bool = False,
 ) -> Diff:
-    """What changed between two archives: `verdict` is identical, equivalent, different or incomparable.
+    """Compare two archives: `verdict` of the result is identical, equivalent, different or incomparable.
 
     tolerances     as `met diff --tol` has them: "qd=1e-6rad/s,rel=1e-9,time=1ms"; nothing may differ unless it is given
     distributions  compare metrics as distributions too, as is done where seeds differ

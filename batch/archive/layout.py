@@ -87,8 +87,8 @@ RESERVED = frozenset(
         *(f"friction_{name}" for name in EVENTS),
     }
 )
-"""What a group holds under names of our own. A deck's name that is taken here, or by a signal, gets a word before it:
-`coordinates.seed`, `metrics.time`, and for an experiment's group `experiments.provenance`."""
+"""Names of variables that MET writes into a group. A deck's name that is one of these, or a signal's, gets a word
+before it: `coordinates.seed`, `metrics.time`, and for an experiment's group `experiments.provenance`."""
 
 
 @frozen
@@ -106,7 +106,7 @@ class Variable:
 
     @property
     def key(self) -> str:
-        """What the engine calls it."""
+        """The engine's name of it."""
         return self.source or self.name
 
 
@@ -282,7 +282,7 @@ def _coordinate(experiment: Experiment, coordinate: Coordinate, name: str) -> Va
 
 
 def _recorded(experiment: Experiment, variables: list[Variable]) -> list[Variable]:
-    """What says which case is which, along recorded_case; `source` is the variable along case."""
+    """Variables along recorded_case that repeat those that identify a case; `source` is the variable along case."""
     taken = [variable.name for variable in variables] + [recorded.name for recorded in experiment.structure.record]
     out = []
     for v in variables:

@@ -44,7 +44,7 @@ def check(file: Any, path: Path) -> None:
 
 
 def _wrong(root: Any, raw: BufferedReader) -> Iterator[tuple[str, str]]:
-    """What is wrong with the things in a file: the name of each, and why. raw: the file itself."""
+    """Each object of a file that an archive must not have: its name, and why. raw: the file itself."""
     module = h5py()
     size = os.fstat(raw.fileno()).st_size
     seen = set()
@@ -122,7 +122,7 @@ def _attributes(where: str, node: Any) -> Iterator[tuple[str, str]]:
 
 
 def _refers(kind: Any) -> bool:
-    """Whether a type is that of HDF5's attributes of dimension scales, whose references stay in the file."""
+    """True for the type of HDF5's attributes of dimension scales, whose references stay in the file."""
     module = h5py()
     if kind.get_class() == module.h5t.VLEN:
         kind = kind.get_super()

@@ -41,13 +41,13 @@ class Stored:
 
     @property
     def path(self) -> str:
-        """Of a coordinate: its path in the deck, which is its name unless that was taken."""
+        """A coordinate's path in the deck, which is its name unless that was taken."""
         return str(self.attributes.get("path", self.name))
 
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
-    """What HDF5 and h5py raise over a file whose bytes are not what was written is Problem E302."""
+    """Turn whatever HDF5 and h5py raise over damaged bytes into Problem E302."""
     try:
         yield
     except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError, ArithmeticError) as reason:
@@ -130,7 +130,7 @@ class ArchiveGroup:
             return np.asarray(self._node[name][int(np.searchsorted(self.recorded_positions, position))])
 
     def histories(self, name: str, places: np.ndarray) -> np.ndarray:
-        """Of one signal in the recorded cases at these places along recorded_case, in their order: (case, time), then
+        """One signal in the recorded cases at these places along recorded_case, in their order: (case, time), then
         joints, then components. Neighbours are read at once."""
         with reading(self.path):
             dataset = self._node[name]
@@ -174,7 +174,7 @@ class ArchiveGroup:
 
     @property
     def recorded(self) -> int:
-        """How many cases have their histories here."""
+        """The number of cases whose histories are kept."""
         return int(self._node["recorded_case"].shape[0]) if "recorded_case" in self._node else 0
 
     def coordinates_of(self, position: int) -> dict[str, tuple[float, str]]:
@@ -193,8 +193,8 @@ class ArchiveGroup:
 
 
 def found_cases(wanted: str, rows: np.ndarray, ids: np.ndarray, name: str) -> np.ndarray:
-    """Where a case is among cases of `name`, by `#7`, its row, or the beginning of its case_id: at one place, unless
-    several have this row. ids: not read for a row. Raises Problem E321, E322."""
+    """The places, among cases of `name`, of the case that `#7`, its row, or the beginning of its case_id names: one,
+    unless several have this row. ids: not read for a row. Raises Problem E321, E322."""
     row = row_of(wanted)
     if row is not None:
         found = np.flatnonzero(rows == row)
@@ -209,7 +209,7 @@ def found_cases(wanted: str, rows: np.ndarray, ids: np.ndarray, name: str) -> np
 
 
 def _cases_here(rows: np.ndarray) -> str:
-    """Which cases an archive has: all of a table, or some of it."""
+    """Say which cases an archive has: all of a table, or some of it."""
     if not len(rows):
         return "there is no case here"
     if len(rows) == 1:
@@ -310,7 +310,7 @@ class ArchiveFile:
             return plan
 
     def _check_plan(self, plan: Plan) -> None:
-        """That the plan is that of the groups: the same experiments, with their cases and what is varied in them."""
+        """Check that the plan is that of the groups: the same experiments, cases and varied parameters."""
         known = {experiment.name: experiment for experiment in plan.experiments}
         if len(known) != len(plan.experiments) or known.keys() != {group.name for group in self.groups}:
             raise Unlike("its plan is of other runs than it holds")
@@ -348,7 +348,7 @@ HEAD_BYTES = 4096
 
 
 def is_archive(path: Path) -> bool:
-    """Whether a file is an archive of MET, sound or damaged: one that may be written over.
+    """True if a file is an archive of MET, sound or damaged: one that may be written over.
 
     HDF5 does not open it: over a damaged file it may never come back.
     """

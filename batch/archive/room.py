@@ -31,7 +31,7 @@ CHECKSUM = 4
 """Bytes that fletcher32 puts behind a chunk."""
 
 HEAP = b"GCOL\x01\0\0\0"
-"""How a heap of strings begins in a file."""
+"""The bytes that a global heap, HDF5's store of strings, begins with."""
 
 SEARCHED = 64 << 20
 """Bytes at either end of a file in which heaps are looked for: more would take seconds of a large archive."""
@@ -55,7 +55,7 @@ def check_heaps(raw: BufferedReader, size: int) -> None:
 
 
 def _endless(data: mmap.mmap, start: int, size: int) -> bool:
-    """Whether a heap that begins here has a gap of no bytes."""
+    """True if a heap that begins here has a gap of no bytes, over which a reader would never get on."""
     if start + 16 > size:
         return False
     end = min(size, start + int.from_bytes(data[start + 8 : start + 16], "little"))

@@ -21,7 +21,7 @@ class FileBusy(Exception):
 
 
 def temporary_of(target: Path) -> Path:
-    """Where a file is written until it is whole."""
+    """The hidden name beside `target` under which a file is written until it is whole."""
     return target.with_name(f".{target.name}.tmp")
 
 
@@ -130,7 +130,7 @@ def _locked(path: Path) -> int:
 
 
 def is_at(file: int, path: Path) -> bool:
-    """Whether an open file is the one that has this name now."""
+    """True if an open file is still the one that has this name."""
     try:
         return os.path.samestat(os.fstat(file), os.stat(path, follow_symlinks=False))
     except FileNotFoundError:

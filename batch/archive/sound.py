@@ -35,13 +35,13 @@ ATTRIBUTES: dict[str, tuple[type, ...]] = {
     "record_hz": (float,),
     "cases_in_table": (int,),
 }
-"""What every experiment's group says, and of which type; numbers are above 0."""
+"""Attributes that every experiment's group has, with their types; numbers are above 0."""
 
 WORDED = ("sweep", "structure_key", "code_key", "frame", "coordinates")
-"""What one may say besides, in words."""
+"""Attributes in words that an experiment's group may have besides."""
 
 VARIABLES = {"case": WHOLE, "case_id": WORDS, "cause": WORDS, "status": WHOLE, "n_valid": WHOLE}
-"""What every experiment's group has along its cases, and of which type."""
+"""Variables along `case` that every experiment's group has, with their types."""
 
 OTHERS: dict[str, tuple[tuple[str, ...], str]] = {
     "case_key": (("case",), WORDS),
@@ -53,7 +53,7 @@ OTHERS: dict[str, tuple[tuple[str, ...], str]] = {
     "requirement": (("requirement",), WORDS),
     "met": (("case", "requirement"), WHOLE),
 }
-"""What one may have besides under these names: its dimensions and type."""
+"""Variables that a group may have besides: dimensions and type of each."""
 
 OF_ROLES: dict[str, str | tuple[str, ...]] = {
     "coordinate": ("<f8",),
@@ -98,12 +98,12 @@ def check(group: ArchiveGroup) -> None:
 
 
 def of_joints(variable: Stored) -> bool:
-    """Whether a signal's third dimension holds joints."""
+    """True if a signal's third dimension holds joints."""
     return any(dim == "joint" or dim.startswith("joint_of_") for dim in variable.dims[2:3])
 
 
 def _names(group: ArchiveGroup) -> None:
-    """That what a deck calls things are names: of letters, numbers and marks that can be seen, in one line."""
+    """Check that the deck's names are names: letters, numbers and marks that can be seen, in one line."""
     attributes = group.attributes
     names = [attributes["experiment"], attributes.get("sweep", ""), *group.variables]
     for variable in group.role("signal"):
@@ -132,7 +132,7 @@ def _attributes(attributes: dict[str, Any]) -> None:
 
 
 def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
-    """That what a variable is for goes with its type and dimensions. types: of all variables, as numpy writes them."""
+    """Check that a variable's type and dimensions go with its role. types: of all variables, as numpy writes them."""
     kinds = {name: each[1] for name, each in types.items()}
     name, dims = variable.name, variable.dims
     wanted = OF_ROLES.get(variable.role, NUMBERS + WORDS)
@@ -153,7 +153,7 @@ def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
 
 
 def _requirements(group: ArchiveGroup) -> None:
-    """That what is required is said of each requirement, where it is said; and whether each case met it."""
+    """Check that each attribute of the requirements has a value for each of them, and that `met` is 1, 0 or -1."""
     if "requirement" not in group.variables:
         return
     count = group.shape("requirement")[0]
@@ -168,7 +168,7 @@ def _requirements(group: ArchiveGroup) -> None:
 
 
 def _values(group: ArchiveGroup) -> None:
-    """That cases, how they ended, times and names are such as there can be."""
+    """Check that cases rise, and that statuses, times and names have values that they can have."""
     cases, valid = group.values("case"), group.values("n_valid")
     if not _rises(cases) or (len(cases) and not (cases[0] >= 0 and cases[-1] <= MOST_CASE)):
         raise Unlike("its cases do not rise")

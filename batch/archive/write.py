@@ -86,7 +86,7 @@ class ArchiveWriter:
         self._sink.check()
 
     def put_cases(self, number: int, first: int, run: Run) -> None:
-        """What is one value a case, of the cases of an experiment from its `first` one on."""
+        """Write the variables along `case` for the cases of an experiment from its `first` one on."""
         group = self.groups[number]
         values = _values(group, run)
         for variable in group.layout.variables:
@@ -107,7 +107,7 @@ class ArchiveWriter:
 
     @property
     def failure(self) -> OSError | None:
-        """What the disk refused first, whatever HDF5 made of it."""
+        """The first error of the disk, whatever HDF5 made of it; None for none."""
         return self._sink.failure
 
     def close(self) -> None:
@@ -219,7 +219,7 @@ def _values(group: OpenGroup, run: Run) -> dict[str, Any]:
 
 
 def _write_rest(group: OpenGroup) -> None:
-    """What is neither a case's nor a signal: dimensions, and what says which case is which along recorded_case."""
+    """Write the dimensions, and the variables that identify a case along recorded_case."""
     part, layout = group.part, group.layout
     schedule = part.experiment.structure.schedule
     values: dict[str, Any] = {variable.name: group.gathered[variable.source] for variable in layout.role("recorded")}

@@ -59,14 +59,14 @@ class CampaignPart:
     wires: Wires | None = None
 
     def prepared(self) -> engine.Prepared:
-        """What runs it."""
+        """The program that runs it."""
         if self.wires is None:
             return engine.prepare(self.experiment)
         return engine.prepare(self.experiment, wire=True, late=self.wires.late)
 
     @property
     def recorded(self) -> int:
-        """Of how many cases histories are kept, at most."""
+        """The number of cases whose histories are kept, at most."""
         return min(len(self.rows), len(self.kept) + self.later)
 
     @property
@@ -89,7 +89,7 @@ class CampaignPart:
 
 @frozen
 class Campaign:
-    """What will be run, all of it checked. words: that say what is kept, as `prepare` takes them."""
+    """A campaign that is ready to run, all of it checked. words: the choice of histories, as `prepare` takes it."""
 
     plan: Plan
     parts: tuple[CampaignPart, ...]

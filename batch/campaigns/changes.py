@@ -48,7 +48,7 @@ def changes(before: Plan, now: Plan, *, ordered: bool = True) -> list[str]:
 
 
 def between(before: Experiment, now: Experiment, *, ordered: bool) -> list[Change]:
-    """What differs between two experiments. ordered: another order of cases does."""
+    """The differences of two experiments. ordered: True where another order of cases is one."""
     structures = [*_structures(before.structure, now.structure)]
     new = {entity for entity, _ in structures if entity}
     out = [Change(text) for _, text in structures if text]
@@ -106,7 +106,7 @@ class _Computed:
             self.values = before.formulas.replay(cases), now.formulas.replay(cases)
 
     def change(self, path: str) -> Iterator[Change]:
-        """How a parameter is computed otherwise; nothing where it has the same values."""
+        """The change of a parameter that follows from others; nothing where it has the same values."""
         old, new = self.before.parameters[path], self.now.parameters[path]
         if not self.values[0] or not isinstance(old.value, Formula) or not isinstance(new.value, Formula):
             return
@@ -200,7 +200,7 @@ def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
 
 
 def _same(before: np.ndarray, now: np.ndarray, ordered: bool) -> bool:
-    """Whether a parameter takes the same values; ordered: in the same cases of the table."""
+    """True if a parameter takes the same values; ordered: in the same cases of the table."""
     one, two = (before, now) if ordered else (distinct(before), distinct(now))
     return np.array_equal(one, two, equal_nan=True)
 
@@ -210,7 +210,7 @@ def _count(cases: Cases) -> str:
 
 
 def _span(coordinate: Any) -> str:
-    """Which values a varied parameter takes, in the deck's unit."""
+    """Say which values a varied parameter takes, in the deck's unit."""
     values = distinct(coordinate.values) / coordinate.scale
     unit = f" {coordinate.unit}" if coordinate.unit not in ("", "1") else ""
     if len(values) <= 3:
@@ -236,7 +236,8 @@ ENTITIES = {
     "guides": ("guide", ("guides.{}.",)),
     "sensors": ("sensor", ("sensors.{}.",)),
 }
-"""Of the fields that hold several things: what one is called, and how the paths of its parameters begin."""
+"""The fields of a structure that hold several things: the word for one of them, and how the paths of its parameters
+begin."""
 
 WHOLE = {
     "joints": {"kind"},
@@ -296,7 +297,7 @@ def _courses(what: str, path: str, before: Sequence[Course], now: Sequence[Cours
 
 
 def _entities(field: str, before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
-    """What several things of a kind are: which are new or gone, and what of the others differs."""
+    """Changes of the things that one field holds: which are new or gone, and what differs in the others."""
     what, begins = ENTITIES[field]
     old, new = ({_name(each): each for each in getattr(structure, field)} for structure in (before, now))
     if list(old) != list(new) and sorted(old) == sorted(new) and field != "servos":
@@ -315,7 +316,7 @@ def _entities(field: str, before: Structure, now: Structure) -> Iterator[tuple[s
 
 
 def _thing(field: str, old: Any, new: Any, before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
-    """What differs of one thing: the name of its field, and words."""
+    """Changes of one thing: the name of its field, and words."""
     for each in dataclasses.fields(new):
         one, two = getattr(old, each.name), getattr(new, each.name)
         if each.name == "divisor":
@@ -336,7 +337,8 @@ def _thing(field: str, old: Any, new: Any, before: Structure, now: Structure) ->
 
 
 def _with_dynamics(one: int | None, two: int | None, before: Structure, now: Structure) -> bool:
-    """Whether something ticked with the dynamics' steps, and does, so that its rate is told by theirs."""
+    """True if something ticked once a step of the dynamics and still does: the dynamics' own change then covers its
+    rate."""
     return one == before.schedule.dynamics and two == now.schedule.dynamics
 
 
@@ -353,7 +355,7 @@ def _rate(divisor: int | None, schedule: Schedule) -> str:
 
 
 def _name(each: Any) -> str:
-    """What one of several is called: a servo by its joint, a link by its name."""
+    """The name of one of several things: of a servo its joint, of a link its own."""
     return str(getattr(each, "joint", None) or each.name)
 
 

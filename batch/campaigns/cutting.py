@@ -6,13 +6,13 @@ from __future__ import annotations
 from batch.campaigns.tasks import GRANULE, CampaignSection
 
 WORK_SECONDS = 1.5
-"""Of a task, on what runs it."""
+"""Time that a task is to take on the worker that runs it, s."""
 
 FIRST_SECONDS = 0.2
-"""Of the first tasks, by a guess that is right within a factor of ten or so."""
+"""Time that the first tasks are to take, s, by a guess that may be off by a factor of ten."""
 
 GUESS_NS = 40.0
-"""Of a joint's step."""
+"""Time of one joint's step, ns, assumed before anything was measured."""
 
 
 class Cutter:

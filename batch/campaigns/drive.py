@@ -19,10 +19,10 @@ from batch.executors import Executor, Outcome
 from met.run import LOST, TIMED_OUT
 
 TRIES = 3
-"""How often a case is tried whose worker dies: a machine may fail by itself."""
+"""Times that a case whose worker dies is tried in all: a machine may fail by itself."""
 
 PIECES = 16
-"""Of a task that is lost."""
+"""The number of pieces that a lost task is cut into."""
 
 AHEAD = 1
 """Tasks that wait for a worker."""

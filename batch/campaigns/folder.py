@@ -69,17 +69,17 @@ class Folder:
 
     @property
     def submitted(self) -> bool:
-        """Whether jobs of a queue have it, which may not have begun."""
+        """True if the campaign was handed to a queue, whose jobs may not have begun."""
         return (self.path / "jobs.json").exists()
 
     @property
     def beds(self) -> Path:
-        """Where records of cases on motor beds are."""
+        """The folder for records of cases on motor beds."""
         return self.path / "beds"
 
     @property
     def recorded(self) -> bool:
-        """Whether there are some: what was driven is not driven again."""
+        """True if cases were driven on motor beds: they are not driven again."""
         return any(self.beds.glob("*.records"))
 
     def exists(self) -> bool:
@@ -110,7 +110,7 @@ class Folder:
             self._lock = -1
 
     def foreign(self) -> list[str]:
-        """What is in the folder where it is no campaign's; nothing of it is ours to remove."""
+        """Names of files in a folder that is no campaign's; none of them is ours to remove."""
         if self.exists() or not self.path.is_dir():
             return []
         return sorted(path.name for path in self.path.iterdir() if not OURS.match(path.name))
@@ -179,7 +179,8 @@ class Folder:
         put(self.path / "campaign.json", data)
 
     def described(self) -> dict[str, Any]:
-        """What was written down. Raises Problem where that is damaged, or of another version of MET."""
+        """The campaign's description, campaign.json. Raises Problem where that is damaged, or of another version of
+        MET."""
         path = self.path / "campaign.json"
         try:
             return _checked(read_json(path))
@@ -271,7 +272,7 @@ class Folder:
         return kept, told
 
     def bytes(self) -> int:
-        """Of the shards that are there."""
+        """The size of the shards that are there."""
         sizes = 0
         with contextlib.suppress(OSError):
             for path in self.shards.glob("*-*-*"):
@@ -279,7 +280,7 @@ class Folder:
         return sizes
 
     def seconds(self, enough: float) -> float:
-        """Of computing that the shards which are there took; when it is enough, no more are looked at."""
+        """Computing time of the shards that are there, s; once it is `enough`, no more are looked at."""
         total = 0.0
         for path in self.shards.glob("*-*-*"):
             with contextlib.suppress(shard.UnsoundShard, OSError):
@@ -328,8 +329,8 @@ def _lock_file(path: Path) -> int:
 
 
 def _checked(data: Any) -> dict[str, Any]:
-    """What campaign.json says, where it is what one says; all of it but the plan's and the rows' own sizes. Raises
-    ValueError, LookupError, TypeError."""
+    """The contents of campaign.json, checked, but for the sizes of plan and rows. Raises ValueError, LookupError,
+    TypeError."""
     sections = data["sections"]
     good = (
         data["schema"] == SCHEMA
@@ -355,19 +356,19 @@ def _checked(data: Any) -> dict[str, Any]:
 
 
 def _rise(rows: np.ndarray, count: int) -> bool:
-    """Whether these are rows of a case table with so many cases, each once and in order."""
+    """True if these are rows of a case table with so many cases, each once and in order."""
     return len(rows) == 0 or bool(rows[0] >= 0 and rows[-1] < count and (np.diff(rows) > 0).all())
 
 
 def _bytes_of_case(section: CampaignSection) -> int:
-    """What a case of a section takes in a shard."""
+    """The size of one case of a section in a shard."""
     program = section.prepared.program
     rows = section.prepared.experiment.structure.schedule.rows if section.recorded else 0
     return np.dtype(float).itemsize * (len(program.outputs) + rows * program.columns)
 
 
 def _fits(section: CampaignSection, found: shard.Shard) -> bool:
-    """Whether the arrays of a shard are of the program's size, and its failures such as there are."""
+    """True if the arrays of a shard are of the program's size, and its failures such as there are."""
     program, structure = section.prepared.program, section.prepared.experiment.structure
     if found.outputs.shape[1] != len(program.outputs):
         return False

@@ -23,7 +23,7 @@ WORDS = "default, all, none, every:N, failed, worst:N, worst:N:METRIC, or cases 
 
 @frozen
 class Keep:
-    """What is kept.
+    """The choice of cases whose histories are kept.
 
     default, everything   all while there is room, or whatever it takes;  every: of how many one
     cases    as users name them;  failed: those that failed;  worst: (how many, by which metric, "" for the first)
@@ -38,11 +38,11 @@ class Keep:
 
     @property
     def later(self) -> bool:
-        """Whether some of it is known only when all cases are done."""
+        """True if some of the choice can be made only when all cases are done."""
         return self.failed or bool(self.worst)
 
     def at_most(self, cases: int) -> int:
-        """How many are chosen later, at most; of those that fail, none are expected."""
+        """The most cases that are chosen later; no failures are expected."""
         return min(cases, sum(count for count, _ in self.worst))
 
 
@@ -53,7 +53,7 @@ def listed(words: str | int | Sequence[str | int]) -> list[str | int]:
 
 
 def keep(words: str | int | Sequence[str | int], experiments: Sequence[Experiment]) -> Keep:
-    """What words say (`WORDS`), one or several. Raises Problem E351."""
+    """Read one or several words of `--histories` (`WORDS`). Raises Problem E351."""
     given = listed(words)
     found = Keep()
     for word in given:
@@ -117,7 +117,7 @@ def known(found: Keep, experiment: Experiment, rows: np.ndarray, named: np.ndarr
 
 @frozen
 class CaseOutcomes:
-    """How each case of an experiment ended, and its metrics, as `met.run.Run` has them."""
+    """Status and metrics of each case of an experiment, as `met.run.Run` has them."""
 
     status: np.ndarray
     metrics: Mapping[str, np.ndarray]

@@ -106,7 +106,7 @@ def _alone(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, str]
 
 
 def results(folder: Folder, section: CampaignSection) -> CaseOutcomes:
-    """What became of all cases of a section, as far as it decides whose histories are kept."""
+    """Status and metrics of all cases of a section, by which histories are chosen."""
     status, metrics = np.empty(len(section.rows), np.int8), dict[str, np.ndarray]()
     for at, found in pieces(folder, section):
         run = _results(section, at, found.outputs, None, dict(found.fates))

@@ -32,12 +32,12 @@ WORTH_SECONDS = 1.0
 """Work that took less is not kept where a campaign ends early: it is done again as fast as it is found."""
 
 ATTEMPTS = 3
-"""How often shards that are found to be damaged when they are merged are run again."""
+"""Times that shards are run again which are found to be damaged in merging."""
 
 
 @frozen
 class Performed:
-    """What came of a campaign.
+    """A campaign that has been run.
 
     seconds  by experiment: of computing, on all workers together
     whole    whether all was there before, so that nothing was run

@@ -32,7 +32,7 @@ from met.host import interpreter
 from met.host.entry_points import PACKAGE, offered
 
 LEAST_SECONDS = 60.0
-"""That reading and recording may take whatever the time limit of a case is."""
+"""The least time limit for reading and recording, s, whatever that of a case is."""
 
 END_SECONDS = 5.0
 """After which a process that does not say where it was is killed."""
@@ -74,7 +74,7 @@ def rehearse(timeout: float | None, **asked: Any) -> None:
 
 
 def _ended(process: subprocess.Popen[bytes], limit: float | None) -> str:
-    """How the process ended, in words."""
+    """Say in words how the process ended."""
     try:
         status = process.wait(limit)
     except subprocess.TimeoutExpired:
@@ -111,7 +111,7 @@ def _taken_along(at: str, how: str, said: str) -> Problem:
 
 
 def _is_a_models(file: str) -> bool:
-    """Whether code is neither MET's nor Python's own."""
+    """True if code is neither MET's nor Python's own, so that it is a model's."""
     home = Path(__file__).resolve().parents[2]
     ours = ("<", *(str(home / name) + os.sep for name in ("batch", "hw", "ic", "met")))
     python = [os.path.dirname(os.__file__) + os.sep, sysconfig.get_paths()["stdlib"] + os.sep]

@@ -20,8 +20,8 @@ MOST_TOLD = 8
 
 @frozen
 class Replay:
-    """What of an archive is run again: its plan, and of each experiment the rows of the case table; `kept`, by name,
-    those whose histories the archive has, where all of it is run again."""
+    """The cases of an archive that are run again: its plan, and of each experiment the rows of the case table; `kept`,
+    by name: those whose histories the archive has, where all of it is run again."""
 
     archive: Path
     plan: Plan
@@ -31,15 +31,15 @@ class Replay:
 
     @property
     def output(self) -> Path:
-        """Where it goes unless the user says: `two_link.gains.case7.h5`, in the current folder."""
+        """The default archive: `two_link.gains.case7.h5`, in the current folder."""
         return Path(f"{self.archive.stem}.{self.word}.h5")
 
 
 def replay(
     archive: str | Path, names: Sequence[str], cases: Sequence[str], failed: bool = False, everything: bool = False
 ) -> Replay:
-    """What is asked for. cases: as `met show` takes them; failed: all that did not reach their end; everything: all of
-    the archive, with the histories that it has. Raises Problem."""
+    """Choose the cases to run again. cases: as `met show` takes them; failed: all that did not reach their end;
+    everything: all of the archive, with the histories that it has. Raises Problem."""
     with ArchiveFile(archive) as file:
         rows: dict[str, set[int]] = {}
         for case in cases:
@@ -86,8 +86,8 @@ def _row(group: ArchiveGroup, position: int) -> int:
 
 
 def differences(before: str | Path, after: str | Path) -> list[str]:
-    """Where the cases of the second archive came out otherwise than in the first, a line each; none where all of their
-    bits are the same. How a case ended that was lost or timed out is no part of it."""
+    """Say which cases of the second archive came out otherwise than in the first, a line each; none where all of their
+    bits are the same. How a case ended that was lost or timed out does not count."""
     out = []
     with ArchiveFile(before) as old_file, ArchiveFile(after) as new_file:
         groups = {group.name: group for group in old_file.groups}

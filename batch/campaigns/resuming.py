@@ -24,18 +24,18 @@ from met.plan import file as plan_file
 WHOLE, DAMAGED = "whole", "damaged"
 
 GUARDED_SECONDS = 60.0
-"""Of computing: a finished archive that took as long is not replaced by another campaign's unless it is asked for."""
+"""Computing time, s, from which a finished archive is not replaced by another campaign's unless that is asked for."""
 
 MOST_SECONDS = 1e12
-"""Of computing: more has no campaign taken, whatever its sidecar says."""
+"""More computing time, s, than any campaign takes: a sidecar that claims more is not believed."""
 
 MOST_CHANGES = 8
 """Changes that a refusal names."""
 
 
 def campaign_key(values: Sequence[CampaignSection]) -> str:
-    """Of all that decides the numbers of a campaign: code, and what goes into it. Which cases are run again for
-    their histories may change on the way."""
+    """A digest of all that decides the numbers of a campaign: code, and what goes into it. Which cases are run again
+    for their histories may change on the way."""
     return hashlib.sha256(json.dumps([[section.name, section.key()] for section in values]).encode()).hexdigest()
 
 
@@ -61,7 +61,7 @@ def _begun_key(folder: Folder, campaign: Campaign) -> str:
 
 
 def proof(campaign: Campaign, key: str, archive: Path) -> dict[str, str]:
-    """What is written beside a finished archive, so that `there` knows it again."""
+    """Entries of a finished archive's sidecar by which `there` knows it again."""
     return {"campaign": key, "asked_sha256": _asked_sum(campaign), "archive_sha256": _file_sum(archive)}
 
 
@@ -101,7 +101,7 @@ def guard(campaign: Campaign) -> None:
 
 
 def _what(found: Sequence[str]) -> list[str]:
-    """What has changed, and what to do."""
+    """Help for an error: what has changed, and what to do."""
     most = [*found[:MOST_CHANGES], *([f"and {len(found) - MOST_CHANGES} more"] if len(found) > MOST_CHANGES else [])]
     return [
         "changed since: " + most[0],
@@ -111,7 +111,7 @@ def _what(found: Sequence[str]) -> list[str]:
 
 
 def goes_on(folder: Folder, key: str) -> bool:
-    """Whether the folder holds this very campaign, begun."""
+    """True if the folder holds this very campaign, begun."""
     try:
         return folder.exists() and folder.described()["key"] == key
     except Problem:
@@ -194,7 +194,7 @@ def _of_another(folder: Folder, campaign: Campaign, values: Sequence[CampaignSec
 
 
 def _other_work(campaign: Campaign, values: Sequence[CampaignSection], told: dict[str, Any]) -> list[str]:
-    """What else may differ where the plan is the same."""
+    """Differences besides the plan between a campaign and the one in its folder."""
     before = told["sections"][: len(values)]
     if [len(section.rows) for section in values] != [each.get("cases") for each in before]:
         return ["other cases were asked for"]
@@ -208,7 +208,7 @@ def _other_work(campaign: Campaign, values: Sequence[CampaignSection], told: dic
 
 
 def _asked_sum(campaign: Campaign) -> str:
-    """Of the plan, the cases, and what is kept of them."""
+    """A digest of the plan, the cases, and the choice of histories."""
     summed = hashlib.sha256(json.dumps([campaign.keep.failed, campaign.keep.worst]).encode())
 
     def refer(experiment: Any, index: int) -> dict[str, Any]:

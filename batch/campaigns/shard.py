@@ -34,7 +34,7 @@ SUM_BYTES = SUM().digest_size
 TYPES: dict[str, np.dtype[Any]] = {"f8": np.dtype("<f8"), "f4": np.dtype("<f4")}
 
 HEAD_BYTES = 64 << 20
-"""Of what a shard holds besides its arrays: why cases were not run takes most."""
+"""The most that a shard's head may have, bytes: why cases were not run takes most of it."""
 
 
 class UnsoundShard(Exception):
@@ -43,7 +43,7 @@ class UnsoundShard(Exception):
 
 @frozen
 class Shard:
-    """What a task gave.
+    """The results of a task.
 
     key       of all that decided it (`tasks.CampaignSection.key`)
     outputs   [case, output]
@@ -60,7 +60,7 @@ class Shard:
 
     @property
     def failed(self) -> int:
-        """How many cases did not reach their end."""
+        """The number of cases that did not reach their end."""
         return self.failed_from(0)
 
     def failed_from(self, first: int) -> int:

@@ -34,7 +34,7 @@ TYPES: dict[str, type | tuple[type, ...]] = {
     "section_began": (int, float),
     "at_first": int,
 }
-"""What a status file has at least."""
+"""Entries that a status file has at least, with their types."""
 
 
 class Reporter:
@@ -104,7 +104,7 @@ class Reporter:
 
 
 def told(folder: Folder) -> list[dict[str, Any]]:
-    """What those who work or worked in a folder wrote last, the latest first."""
+    """The last status of each process that works or worked in a folder, the latest first."""
     found = []
     for path in folder.path.glob("status*.json"):
         try:
@@ -127,7 +127,7 @@ def found(name: str) -> Folder | None:
 
 
 def report(folder: Folder, now: float) -> dict[str, Any]:
-    """How far a campaign is, as data: of each section what is done, by the shards that are there, and who works."""
+    """The progress of a campaign as data: what is done of each section, by the shards that are there, and who works."""
     sections = []
     told_here = folder.described()
     for each in told_here["sections"]:
@@ -199,8 +199,8 @@ def lines(data: dict[str, Any]) -> list[str]:
 
 
 def whole(archive: Path) -> dict[str, Any] | None:
-    """What is beside a finished archive: its cases, and when it was begun; None where there is none. Raises
-    Problem for what is no sound archive."""
+    """Data about a finished archive from its sidecar: its cases, and when it was begun; None where there is none.
+    Raises Problem for what is no sound archive."""
     try:
         told = read_json(sidecar_path(archive))
         cases = sum(each["cases"] for each in told["experiments"] if is_count(each["cases"]))
@@ -222,7 +222,7 @@ AT_WORK = ("starting", "running", "merging")
 
 
 def died(folder: Folder) -> Iterator[str]:
-    """What is to be told of a run before this one that ended without a word."""
+    """Lines about an earlier run that ended without a word."""
     for each in told(folder):
         if not each["name"] and each["state"] in AT_WORK and not alive(each, time.time()):
             alone = "thread" in each["workers"] and not each["workers"].startswith("Dask")
@@ -231,7 +231,7 @@ def died(folder: Folder) -> Iterator[str]:
 
 
 def alive(told: dict[str, Any], now: float) -> bool:
-    """Whether who wrote this is still at work, as far as that can be known."""
+    """True if the process that wrote this status is still at work, as far as that can be known."""
     if told["state"] not in AT_WORK:
         return False
     if told["host"] == socket.gethostname():

@@ -53,7 +53,7 @@ class CampaignSection:
 
     @property
     def name(self) -> str:
-        """What a user calls it."""
+        """The user's name of the experiment."""
         return self.prepared.experiment.name
 
     @property
@@ -65,7 +65,8 @@ class CampaignSection:
         return cases if cases < GRANULE else cases // GRANULE * GRANULE
 
     def key(self, first: int = 0, last: int | None = None) -> str:
-        """Of all that decides what these cases give: the code, how long it runs, what goes into it, what is kept."""
+        """A digest of all that decides what these cases give: the code, how long it runs, what goes into it, what is
+        kept."""
         experiment = self.prepared.experiment
         inputs = engine.inputs(experiment, self.rows[first:last])
         kept = ("recorded" if self.recorded else "outputs", "f4" if self.single else "f8")
@@ -87,7 +88,7 @@ class Task:
 
     @property
     def name(self) -> str:
-        """Of its shard."""
+        """The file name of the task's shard."""
         return f"{self.section}-{self.first:09}-{self.last:09}"
 
 
@@ -118,7 +119,7 @@ def carry_out(
 def compute(
     section: CampaignSection, task: Task, *, threads: int | None = None, progress: Callable[[int], None] | None = None
 ) -> shard.Shard:
-    """What a task's cases give."""
+    """Run a task's cases and return their shard."""
     section.prepared.kernel  # noqa: B018 - compiling is not computing
     began = time.perf_counter()
     rows = section.rows[task.first : task.last]

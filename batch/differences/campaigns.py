@@ -68,7 +68,7 @@ def diff(a: str | Path, b: str | Path, given: Tolerances | None = None, *, distr
 
 
 def _check(allowed: Tolerances, groups: Sequence[ArchiveGroup]) -> None:
-    """That the command line's tolerances are of something in one of the archives."""
+    """Check that each tolerance of the command line is of something in one of the archives."""
     known: dict[str, Sequence[str]] = {}
     shown: dict[str, None] = {}
     for group in groups:
@@ -102,7 +102,7 @@ def _plan(file: ArchiveFile) -> Plan | str:
 def _experiment(
     a: ArchiveGroup, b: ArchiveGroup, given: Tolerances, plan: Plan | str, distributions: bool
 ) -> ExperimentDiff:
-    """Of two groups. plan: that of b, or why it cannot be read."""
+    """Compare two groups. plan: that of b, or why it cannot be read."""
     known = {} if isinstance(plan, str) else {experiment.name: experiment for experiment in plan.experiments}
     given = given.within(_known(a)).within(_known(b))
     allowed = given.over(of_deck(known[b.name], b) if b.name in known else Tolerances())
@@ -130,7 +130,7 @@ def _experiment(
 
 
 def _how(scores: _Scores, matched: MatchedCases, b: ArchiveGroup, found: ExperimentDiff) -> np.ndarray:
-    """Of each matched case its place in VERDICTS. One that ended otherwise is different."""
+    """The place in VERDICTS of each matched case. One that ended otherwise is different."""
     out = np.where(scores.unlike, VERDICTS.index(EQUIVALENT), VERDICTS.index(IDENTICAL)).astype(np.int8)
     out[scores.beyond] = VERDICTS.index(DIFFERENT)
     if found.ended:
@@ -140,7 +140,7 @@ def _how(scores: _Scores, matched: MatchedCases, b: ArchiveGroup, found: Experim
 
 
 def _other_noise(a: ArchiveGroup, b: ArchiveGroup) -> bool:
-    """Whether the two have other seeds, so that single cases differ by chance."""
+    """True if the two have other seeds, so that single cases differ by chance."""
     mine, theirs = a.values("seed"), b.values("seed")
     return not np.array_equal(mine, theirs) and not np.array_equal(distinct(mine), distinct(theirs))
 
@@ -176,7 +176,7 @@ COUNTS = {
     "friction_undecided": "modes of friction that were left open",
     "bed_limited": "ticks at a bed's limit",
 }
-"""What is counted of each case besides what it records."""
+"""Counters of each case besides what it records, and what they count."""
 
 
 def _counts(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: ExperimentDiff) -> None:
@@ -192,7 +192,7 @@ def _counts(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: Experi
 
 
 class _Scores:
-    """How badly each matched case differs, and where most."""
+    """For each matched case, how much it differs at worst, and where."""
 
     def __init__(self, count: int) -> None:
         self.score = np.zeros(count)
@@ -201,7 +201,7 @@ class _Scores:
         self.where: dict[int, tuple[str, DiffPlace, float]] = {}
 
     def take(self, place: int, score: float, signal: str, where: DiffPlace, difference: float) -> None:
-        """Of one case, that is among the worst of a signal."""
+        """Note a difference of a case that is among the worst of a signal."""
         if score > self.score[place] or place not in self.where:
             self.score[place] = score
             self.where[place] = (signal, where, difference)
@@ -296,7 +296,7 @@ def _rank_metric(
 
 
 def _unit_of(signal: SignalDiff) -> float:
-    """What a difference is measured by to rank cases: what the values of a span; finite."""
+    """The size against which a signal's differences are ranked: what the values of a span; finite."""
     if signal.low > signal.high:
         return 1.0
     return min(signal.high - signal.low, LARGEST) or max(abs(signal.high), 1e-300)
@@ -400,7 +400,7 @@ def _by_joint(group: ArchiveGroup, signal: Stored, allowed: Tolerances) -> dict[
 
 
 def _absolute(group: ArchiveGroup, signal: Stored, found: SignalDiff) -> np.ndarray | None:
-    """What is allowed of each column; None where it is the same for all."""
+    """The allowed difference of each column, SI; None where it is the same for all."""
     if not found.by_joint:
         return None
     each = [found.by_joint.get(joint, found.tolerance.absolute) for joint in group.joints(signal)]
@@ -457,7 +457,7 @@ def _recorded(
 
 
 def _labels(group: ArchiveGroup, variable: Stored) -> list[str]:
-    """What each column of a signal is called: joint, component, or both."""
+    """The label of each column of a signal: joint, component, or both."""
     joints, components = group.joints(variable), group.components(variable)
     if joints and components:
         return [f"{joint}.{component}" for joint in joints for component in components]

@@ -15,7 +15,7 @@ from met.run import comparable
 
 @frozen
 class ProvenanceChanges:
-    """What differs, in words.
+    """Differences of what two archives were made from, in words.
 
     versions   of MET, its libraries and its commit
     decks      files of the decks that differ, and how
@@ -40,7 +40,7 @@ class ProvenanceChanges:
 def changed(
     a: ArchiveFile, b: ArchiveFile, pairs: Sequence[tuple[ArchiveGroup, ArchiveGroup]], plans: Sequence[Plan | str]
 ) -> ProvenanceChanges:
-    """What differs between what two archives were made from. plans: of each, or why it cannot be read here."""
+    """Compare what two archives were made from. plans: of each, or why it cannot be read here."""
     texts = decks(a.sources(), b.sources())
     meaning, follows, defaults = _meaning(plans, pairs, texts)
     causes = [*_defines(a, b), *(texts.names if meaning or follows else ())]
@@ -57,7 +57,7 @@ def changed(
 
 
 def _other_code(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
-    """Whether two code keys differ; not so where one archive has none, or one of another kind."""
+    """True if two code keys differ; not so where one archive has none, or one of another kind."""
     one, two = a.get("code_key"), b.get("code_key")
     return comparable(one, two) and one != two
 
@@ -72,7 +72,7 @@ def _other_results(a: ArchiveGroup, b: ArchiveGroup) -> Iterator[str]:
 
 
 def _unlike(a: ArchiveGroup, b: ArchiveGroup, name: str) -> bool:
-    """Whether both say it, and say otherwise."""
+    """True if both groups have this attribute, with different values."""
     one, two = a.attributes.get(name), b.attributes.get(name)
     return one is not None and two is not None and one != two
 
@@ -92,7 +92,7 @@ def _versions(a: ArchiveFile, b: ArchiveFile) -> list[str]:
 
 
 def _defines(a: ArchiveFile, b: ArchiveFile) -> Iterator[str]:
-    """What the command lines defined."""
+    """Differences of the `-D` options."""
     one, two = (str(each.provenance.get("defines") or "nothing") for each in (a, b))
     if one != two:
         yield f"-D {one} -> {two}"
@@ -134,7 +134,7 @@ def _meaning(
 
 
 def _follows(change: Change, texts: Decks) -> bool:
-    """Whether a parameter has another value although no line that writes it differs."""
+    """True if a parameter has another value although no line that writes it differs."""
     if not texts.files or (change.before is None and change.now is None):
         return change.follows
     written = [(change.before, texts.stale), (change.now, texts.fresh)]

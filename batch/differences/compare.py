@@ -13,12 +13,12 @@ from met.frozen import frozen
 
 IDENTICAL, EQUIVALENT, DIFFERENT, INCOMPARABLE = "identical", "equivalent", "different", "incomparable"
 VERDICTS = (IDENTICAL, EQUIVALENT, DIFFERENT, INCOMPARABLE)
-"""From best to worst. equivalent: bits differ, and no value by more than its tolerance."""
+"""The verdicts from best to worst. equivalent: bits differ, and no value by more than its tolerance."""
 
 
 @frozen
 class Difference:
-    """Where two arrays [row, column] differ.
+    """The difference of two arrays [row, column].
 
     beyond      how many values differ by more than is allowed;  nan: how many are not-a-number on one side alone
     largest     the largest |b - a|, of those that are beyond where any is, not-a-number apart
@@ -43,7 +43,7 @@ class Difference:
 
     @property
     def most(self) -> float:
-        """How far: not-a-number on one side alone is as infinite."""
+        """The size of the difference: not-a-number on one side alone counts as infinite."""
         return float("inf") if self.nan else self.largest
 
     @property
@@ -65,7 +65,8 @@ def compare(
 
 @frozen
 class Passed:
-    """What a passes through: `values`, [case, row, column], at `times` s, which may be more than what is compared.
+    """The course of a between its rows: `values`, [case, row, column], at `times` s, which may be more than what is
+    compared.
 
     instants   s, of the rows that are compared, as b has them
     """
@@ -76,7 +77,7 @@ class Passed:
 
 
 def unlike_bits(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Which cases of two arrays of float64, [case, row, column], have a bit that differs."""
+    """True for each case in which a bit of two arrays of float64, [case, row, column], differs."""
     return np.asarray((_flat(a).view(np.int64) != _flat(b).view(np.int64)).any(axis=1))
 
 
@@ -164,8 +165,8 @@ def compare_cases(
 
 
 def _outside(passed: Passed, b: np.ndarray, early: float) -> np.ndarray:
-    """How far each value of b lies outside of what a passes through within `early` s of its instant; a is taken as
-    straight between its rows, and an infinite value is none. [case, row, column]"""
+    """The distance of each value of b from the range that a passes through within `early` s of its instant; a is taken
+    as straight between its rows, and an infinite value is none. [case, row, column]"""
     shape = b.shape
     a = np.where(np.isfinite(passed.values), passed.values, np.nan)
     a, b = (array.transpose(1, 0, 2).reshape(array.shape[1], -1) for array in (a, b))
@@ -184,8 +185,8 @@ def _outside(passed: Passed, b: np.ndarray, early: float) -> np.ndarray:
 
 
 def _lowest(values: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Of each stretch of rows, `first` to `last`, not itself, the lowest; not-a-number of none. Of two stretches of a
-    power of two, which are doubled: O(n log n)."""
+    """The lowest value of each stretch of rows, `first` to `last`, not itself; not-a-number for none. Made from two
+    stretches of a power of two, which are doubled: O(n log n)."""
     out = np.full((len(first), values.shape[1]), np.nan)
     wide, steps = last - first, 1
     while True:

@@ -29,7 +29,7 @@ MOST_MOVED = 30
 """Files of either that are looked for under another name."""
 
 OF_ARGUMENTS = "()"
-"""Of the name of a macro that takes some, whose text says little alone."""
+"""Ending of the names of macros with arguments, whose text says little alone."""
 
 ALIKE = 0.5
 """Share of the lines that a file has with one of another name, so that it is taken for the same."""
@@ -46,7 +46,7 @@ class DeckFileChange:
 
 @frozen
 class Decks:
-    """What differs between two archives' files.
+    """The differences of two archives' deck files.
 
     files   each that differs
     names   `let`s and macros whose text differs, in words
@@ -86,8 +86,8 @@ def decks(a: Mapping[str, str], b: Mapping[str, str]) -> Decks:
 
 
 def _pairs(a: Mapping[str, str], b: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Which file of the one is which of the other, by name; the decks themselves; then by what they have in common.
-    "" where there is none."""
+    """Pair the files of the two archives by name; the decks themselves; then by what they have in common. "" where a
+    file has no counterpart."""
     pairs = {name: name for name in a if name in b}
     heads = next(iter(a), ""), next(iter(b), "")
     if all(heads) and heads[0] not in pairs and heads[1] not in pairs.values():
@@ -119,7 +119,7 @@ def _share(before: Iterable[str], now: Iterable[str]) -> float:
 
 
 def _counted(before: str, after: str) -> str:
-    """How many lines are others."""
+    """Say how many lines were added and removed."""
     old, now = (Counter(text.splitlines(keepends=True)) for text in (before, after))
     new, gone = (now - old).total(), (old - now).total()
     said = f"{_lines(new)} new, {gone} gone" if new or gone else "its lines are in another order"
@@ -180,7 +180,7 @@ def _of(text: str) -> str:
 
 
 def _written(files: Mapping[str, str]) -> dict[str, list[tuple[str, str]]]:
-    """What is written of each name, and where: `let reach`, `#define PAIRS`, `#define ROD()`."""
+    """The text and place of each definition, by name: `let reach`, `#define PAIRS`, `#define ROD()`."""
     found: dict[str, list[tuple[str, str]]] = {}
     for name, text in files.items():
         if name.rstrip(">").endswith(".ic") and len(text) <= LONGEST_READ:

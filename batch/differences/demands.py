@@ -13,8 +13,8 @@ from batch.queries.signals import deck_unit
 
 
 def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: ExperimentDiff) -> None:
-    """How many matched cases meet each requirement in a, and in b; one whose limit is another is taken for the same.
-    Those of one alone are noted."""
+    """Count the matched cases that meet each requirement in a and in b; one whose limit is another is taken for the
+    same. Requirements of one archive alone are noted."""
     met_a, met_b = _met(a, matched.a), _met(b, matched.b)
     known_a, known_b = ({each.text: each for each in requirements.required(group)} for group in (a, b))
     now = {text: text for text in met_a if text in met_b}
@@ -67,7 +67,7 @@ def _met(group: ArchiveGroup, cases: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _unlike(one: requirements.GroupRequirement | None, other: requirements.GroupRequirement | None) -> bool:
-    """Whether two requirements ask for something else; those of which no limit is known differ in their texts alone."""
+    """True if two requirements ask for something else; those of which no limit is known differ in their texts alone."""
     return one is not None and other is not None and (one.comparison, one.limit) != (other.comparison, other.limit)
 
 

@@ -17,8 +17,8 @@ from met.frozen import frozen
 
 @frozen
 class DiffPlace:
-    """Where two archives differ most in one signal or metric: position of the case, label of the joint or component,
-    time (s), and both values."""
+    """The place of the largest difference of one signal or metric: position of the case, label of the joint or
+    component, time (s), and both values."""
 
     case: int
     label: str
@@ -139,7 +139,7 @@ class RequirementDiff:
 
     @property
     def told(self) -> bool:
-        """Whether it is another, or met by another number of cases."""
+        """True if the requirement is another, or is met by another number of cases."""
         return self.other or self.before != self.now or self.met_before != self.met_now
 
 
@@ -168,7 +168,7 @@ class ExperimentDiff:
 
     @property
     def other_requirements(self) -> bool:
-        """Whether the two do not require the same."""
+        """True if the two do not require the same."""
         return bool(self.required_in_one) or any(each.other for each in self.requirements)
 
     @property

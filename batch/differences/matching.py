@@ -96,12 +96,12 @@ def instants(a: np.ndarray, b: np.ndarray, early: float) -> tuple[np.ndarray, np
 
 
 def _nearest(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Of each of a its nearest in b, which rises."""
+    """The index of the nearest element of sorted `b` for each element of `a`."""
     after = np.clip(np.searchsorted(b, a), 0, len(b) - 1)
     before = np.clip(after - 1, 0, len(b) - 1)
     return np.where(np.abs(b[before] - a) < np.abs(b[after] - a), before, after)
 
 
 def names(a: Sequence[str], b: Sequence[str]) -> list[str]:
-    """Those of both, in the order of the first, then of the second."""
+    """The names of both, in the order of the first, then of the second."""
     return list(dict.fromkeys([*a, *b]))

@@ -10,7 +10,7 @@ from ic.printing.columns import columns
 from met.frozen import frozen
 
 MOST_LINES, OF_KIND = 12, {"deck": 24, "follows": 6}
-"""Of one kind of change."""
+"""Lines of one kind of change that are printed; for some kinds another number."""
 
 SHOWN_ENDED, SHOWN_WORST = 8, 5
 
@@ -20,7 +20,7 @@ LONGEST = 120
 
 @frozen
 class Cut:
-    """What is left out of a long text. every: nothing; remedy: what shows it, a command."""
+    """The shortening of a long text. every: True to leave nothing out; remedy: the command that shows all."""
 
     every: bool = False
     remedy: str = "`met diff ... --all`"

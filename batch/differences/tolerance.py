@@ -24,8 +24,8 @@ USAGE = "as in `--tol qd=1e-6rad/s,rel=1e-9,time=1ms`"
 
 @frozen
 class SignalTolerance:
-    """What one signal or metric may differ by: |b - a| <= absolute + relative * max(|a|, |b|), at an instant that may
-    be `time` s earlier or later. absolute in SI."""
+    """The allowed difference of one signal or metric: |b - a| <= absolute + relative * max(|a|, |b|), at an instant
+    that may be `time` s earlier or later. absolute in SI."""
 
     absolute: float = 0.0
     relative: float = 0.0
@@ -38,8 +38,8 @@ class SignalTolerance:
 
 @frozen
 class Tolerances:
-    """What is allowed of all, relative and time (s), None where nothing is said; and absolute, by the name of a signal,
-    of a joint's part of one (`elbow.q`), or of a metric: SI value, and as it was written.
+    """Allowed differences: relative and time (s) of all, None where nothing is said; and absolute, by the name of a
+    signal, of a joint's part of one (`elbow.q`), or of a metric: SI value, and as it was written.
 
     alone   whether decks have no say in it
     """
@@ -54,7 +54,7 @@ class Tolerances:
         return bool(self.relative or self.time or any(size for size, _ in self.absolute.values()))
 
     def of(self, name: str) -> SignalTolerance:
-        """Of a signal or a metric."""
+        """The tolerance of a signal or a metric."""
         return SignalTolerance(self.absolute.get(name, (0.0, ""))[0], self.relative or 0.0, self.time or 0.0)
 
     def over(self, deck: Tolerances) -> Tolerances:
@@ -71,7 +71,7 @@ class Tolerances:
         return replace(self, absolute=fit)
 
     def said(self, names: Mapping[str, str]) -> dict[str, str]:
-        """Those of some names as they were written, by what they are called here; names: by that."""
+        """Tolerances as they were written, by the names that `names` gives them."""
         return {called: self.absolute[name][1] for called, name in names.items() if name in self.absolute}
 
     def words(self) -> list[str]:
@@ -84,7 +84,7 @@ class Tolerances:
 
 
 def of_deck(experiment: Experiment, group: ArchiveGroup) -> Tolerances:
-    """What the deck of an archive allows. group: of the archive, in which a metric may be called otherwise."""
+    """The tolerances of an archive's deck. group: of the archive, in which a metric may be called otherwise."""
     metrics = {variable.path: variable.name for variable in group.role("metric")}
     signals = {recorded.name for recorded in experiment.structure.record}
     found = {each.of: each for each in experiment.tolerances}
@@ -99,7 +99,8 @@ def of_deck(experiment: Experiment, group: ArchiveGroup) -> Tolerances:
 
 
 def tolerances(texts: Iterable[str]) -> Tolerances:
-    """What words say, each several with commas between; `none`: what decks say does not count. Raises Problem E360."""
+    """Read the words of `--tol`, each several with commas between; `none`: those of decks do not count. Raises Problem
+    E360."""
     of_all: dict[str, float] = {}
     absolute: dict[str, tuple[float, str]] = {}
     words = [word.strip() for text in texts for word in text.split(",")]
@@ -127,15 +128,15 @@ def tolerances(texts: Iterable[str]) -> Tolerances:
 
 
 def fits(written: str, known: Sequence[str]) -> bool:
-    """Whether a tolerance as it was written has the one unit of what it is of."""
+    """True if a tolerance as it was written has the one unit of what it is of."""
     wanted, *others = known
     unit = written.partition(" ")[2]
     return not others and units.same(units.parse_unit(unit or "1").dimension, units.parse_unit(wanted or "1").dimension)
 
 
 def check(found: Tolerances, known: Mapping[str, Sequence[str]], shown: Sequence[str]) -> None:
-    """That every tolerance of the command line is of something, in its unit. known: SI units by the names of signals,
-    joints' parts of them and metrics, several where a signal's joints have several. Raises E360."""
+    """Check that every tolerance of the command line is of something, in its unit. known: SI units by the names of
+    signals, joints' parts of them and metrics, several where a signal's joints have several. Raises E360."""
     for name, (_, written) in found.absolute.items():
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1)

@@ -19,8 +19,8 @@ SAME = "made from the same: deck, parameters, models and versions"
 
 
 def made(found: Diff) -> list[tuple[str, tuple[str, ...]]]:
-    """What made the two and differs: its kind and what is said of it, causes before what follows from them. What is
-    indented belongs to the line above."""
+    """Differences of what the two were made from: kind and lines of each, causes before what follows from them. An
+    indented line belongs to the one above."""
     changed = found.changed
     why = ": constants are part of it" if changed.meaning or changed.structure else ""
     said = [
@@ -66,14 +66,14 @@ def missing(found: Diff, experiment: ExperimentDiff) -> list[str]:
 
 
 def allowed(found: Diff, experiment: ExperimentDiff) -> list[str]:
-    """What may differ, and who says so."""
+    """The tolerances, and who gives them."""
     mine, every = set(found.tolerances.words()), experiment.tolerances.words()
     both = (("the deck of b", [each for each in every if each not in mine]), ("--tol", sorted(mine & set(every))))
     return [f"{who} allows {', '.join(what)}" for who, what in both if what]
 
 
 def requirements(experiment: ExperimentDiff) -> list[str]:
-    """Those that are others, or are met by another number of cases."""
+    """Lines about requirements that are others, or are met by another number of cases."""
     count = experiment.cases.count
     return [
         f"require {required(each)}  {requirement(each.met_before, each.met_now, count)}"
@@ -104,7 +104,7 @@ class Ending:
 
 
 def endings(experiment: ExperimentDiff) -> list[Ending]:
-    """What fails now comes first."""
+    """Group the cases that end otherwise by how; those that fail now come first."""
     kinds: dict[str, list[EndingDiff]] = {}
     for each in experiment.ended:
         kinds.setdefault(_kind(each), []).append(each)
@@ -248,7 +248,7 @@ def _tolerance(signal: SignalDiff) -> str:
 
 
 def _used(share: float) -> str:
-    """Of a tolerance: how much was needed of it."""
+    """The share of a tolerance that was needed, as the end of its text."""
     if share == float("inf"):
         return ""
     return f", {100 * share:.3g} % used" if share <= 1.0 else f", {share:.3g} times that"
@@ -290,7 +290,7 @@ def distribution(each: MetricSamples) -> Distribution:
 
 
 def starred(experiment: ExperimentDiff) -> str:
-    """What a star is, where there is one."""
+    """A note on what a star means, where there is one."""
     if not any(each.unlike for each in experiment.samples):
         return ""
     return f"* less than {LEVEL:g}, corrected for {len(experiment.samples)} metrics (Kolmogorov-Smirnov, Holm)"

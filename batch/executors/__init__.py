@@ -19,7 +19,7 @@ from met.frozen import frozen
 
 @frozen
 class Outcome:
-    """What came of a task.
+    """The result of a task.
 
     done      its shard is there
     lost      what ran it died;  stalled: it made no progress for too long; the task may be tried again, or in parts
@@ -38,7 +38,7 @@ class Executor(Protocol):
 
     @property
     def about(self) -> str:
-        """What it is, for people: `2 threads`."""
+        """A description for people: `2 threads`."""
 
     @property
     def workers(self) -> int:
@@ -55,7 +55,7 @@ class Executor(Protocol):
         """Have a task run, after those submitted before."""
 
     def wait(self) -> list[Outcome]:
-        """What has come of tasks since; waits for one at least, unless none is submitted."""
+        """The outcomes since the last call; waits for one at least, unless none is submitted."""
 
     def close(self) -> None:
         """Stop at once. Tasks that are not done are forgotten."""

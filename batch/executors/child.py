@@ -120,7 +120,7 @@ class Child:
         return found
 
     def _death(self, task: Task) -> Outcome:
-        """What came of a task whose process is dead: killed, it is lost; ended by itself, none will do better."""
+        """The outcome of a task whose process is dead: killed, it is lost; ended by itself, none will do better."""
         status = self._process.wait()
         if status < 0:
             name = {each.value: each.name for each in signal.Signals}.get(-status, f"signal {-status}")

@@ -27,7 +27,7 @@ from met.version import VERSION
 LOST = "the connection to Dask's scheduler was lost"
 
 WORKER_SECONDS = 60.0
-"""How long we wait where there is no worker."""
+"""Longest wait for a first worker, s."""
 
 TELL_SECONDS = 0.1
 COUNT_SECONDS = 0.5
@@ -54,8 +54,8 @@ def _say(text: str) -> None:
 
 
 async def _held(future: Any) -> Any:
-    """What a Dask future holds. That it cannot be fetched may be a worker's end: then it will be computed again; or the
-    scheduler's, for which the future is cancelled, a little later."""
+    """The value of a Dask future. If it cannot be fetched, that may be a worker's end: then it will be computed again;
+    or the scheduler's, for which the future is cancelled, a little later."""
     from distributed.comm import CommClosedError
 
     for _ in range(FETCHES):
@@ -227,7 +227,7 @@ class Dask:
                 dask_future.release()
 
     def _outcome(self, task: Task, told: Mapping[str, Any]) -> Outcome:
-        """What a worker says has come of a task."""
+        """The outcome of a task from a worker's answer."""
         if told["kind"] != "done":
             return Outcome(task, told["kind"], why=told["why"])
         if "proof" in told and told["proof"] != self._sections[task.section].key(task.first, task.last):

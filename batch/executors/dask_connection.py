@@ -17,7 +17,7 @@ from met.diagnostic import Problem, error
 from met.host.files import read_json
 
 CONNECT_SECONDS = 5.0
-"""How long we try to reach a scheduler."""
+"""Longest wait for a scheduler, s."""
 
 LOCAL = "local"
 

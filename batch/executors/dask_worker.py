@@ -32,7 +32,7 @@ IDLE_SECONDS = 60.0
 LOOK_SECONDS = 1.0
 
 GIVEN_UP = ("released", "cancelled", "forgotten")
-"""What becomes of a running task that nobody waits for any more, in the worker's words."""
+"""States, in the worker's words, of a running task that nobody waits for any more."""
 
 
 def carry_out(order: Mapping[str, Any]) -> dict[str, Any]:
@@ -86,7 +86,8 @@ class WorkerChildren(WorkerPlugin):
 
     @staticmethod
     async def on(worker: Worker, order: Mapping[str, Any]) -> WorkerChildren:
-        """Those of a worker, for one more task. Raises Reschedule where it is closing: it would not let go of them."""
+        """The children of a worker, for one more task. Raises Reschedule where the worker is closing: it would not let
+        go of them."""
         if worker.status not in WORKER_ANY_RUNNING:
             raise Reschedule
         name = order["campaign"]

@@ -90,7 +90,7 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
 
 
 def cores() -> int:
-    """That the queue gives a job; one where it does not say in a number."""
+    """The number of cores that the queue gives a job; one where it gives no number."""
     said = os.environ.get("SLURM_CPUS_PER_TASK", "")
     return max(1, int(said)) if said.isdecimal() else 1
 
@@ -126,7 +126,7 @@ def together(path: Path) -> int:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """What the job's script calls."""
+    """The entry point that a job's script calls."""
     path, verb, *rest = arguments
     try:
         with terminable():

@@ -114,7 +114,8 @@ def _hand_over(campaign: Campaign, folder: Folder, count: int, cases: int, optio
 
 
 def shares(missing: Sequence[Task], count: int) -> list[list[Task]]:
-    """What is missing, cut into stretches and dealt out, so that each job has about as many cases, from everywhere."""
+    """Cut the missing tasks into stretches and deal them out, so that each job has about as many cases, from
+    everywhere."""
     whole = sum(task.cases for task in missing)
     each = max(GRANULE, -(-whole // (count * STRIPES * GRANULE)) * GRANULE)
     pieces = [

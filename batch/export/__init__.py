@@ -100,7 +100,7 @@ def export(
 
 
 def _row(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: Sequence[str]) -> Rows:
-    """What a row of a table is where nobody says it."""
+    """The rows of a table where nobody names them: cases if there are several, else instants."""
     from batch.terminal.show import chosen
 
     groups = chosen(file, tuple(runs) or (file.groups[0].sweep or file.groups[0].name,))

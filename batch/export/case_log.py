@@ -19,7 +19,7 @@ from met.run import DONE, FAILED
 Level = Literal["INFO", "WARNING", "ERROR"]
 
 FAILED_AT = re.compile(r"t = (\S+) s: ")
-"""How the cause of a case that failed begins."""
+"""The beginning of a failed case's cause, with its time, s."""
 
 OUTCOMES = {1: "met", 0: "missed", -1: "unknown"}
 
@@ -34,7 +34,7 @@ class LogLine:
 
 
 def log_lines(case: ExportedCase) -> list[LogLine]:
-    """What case it is, how it ended and when, and what it met; in the order of their times."""
+    """The log of a case in the order of time: its name, how it ended and when, which requirements it met."""
     group, position = case.group, case.position
     status, cause = int(_at(group, "status", position)), str(_at(group, "cause", position))
     end = ends(case)
@@ -103,7 +103,7 @@ def result(case: ExportedCase) -> tuple[tuple[MessageField, ...], dict[str, Any]
 
 
 def varied(case: ExportedCase) -> dict[str, str]:
-    """What is varied in a case, in the deck's units, by path; choices of structure in words."""
+    """Varied parameters of a case, in the deck's units, by path; choices of structure in words."""
     group, position = case.group, case.position
     numbers = {v.path: _value(group, v, position) for v in group.role("coordinate")}
     return {**{v.path: str(_at(group, v.name, position)) for v in group.role("choice")}, **numbers}

@@ -84,7 +84,7 @@ def table(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], *, deck:
 
 
 def _fields(groups: Sequence[ArchiveGroup], *, deck: bool) -> Iterator[TableColumn]:
-    """Which case it is, what is varied, how it ended, metrics, requirements."""
+    """The columns: which case it is, what is varied, how it ended, metrics, requirements."""
     if len({group.sweep or group.name for group in groups}) > 1:
         yield TableColumn("run", "", "run or sweep", "str")
     yield TableColumn("case", "1", "position in the case table", "int", "case")
@@ -104,7 +104,7 @@ def _fields(groups: Sequence[ArchiveGroup], *, deck: bool) -> Iterator[TableColu
 
 
 def varied(groups: Sequence[ArchiveGroup]) -> list[Stored]:
-    """What is varied in any of the groups: choices of structure, then numbers."""
+    """Variables that are varied in any of the groups: choices of structure, then numbers."""
     return list({v.name: v for role in ("choice", "coordinate") for group in groups for v in group.role(role)}.values())
 
 
@@ -125,7 +125,7 @@ def in_unit(variable: Stored, *, deck: bool) -> tuple[str, float]:
 
 
 def value_of(field: TableColumn, group: ArchiveGroup, position: int) -> object:
-    """What is varied, in one case; None where its structure does not have it."""
+    """The value of a varied parameter in one case; None where its structure does not have it."""
     [value] = _values(group, field, np.array([position]))
     return value
 

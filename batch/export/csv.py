@@ -28,7 +28,7 @@ from met.messages.visible import line
 from met.version import VERSION
 
 BEGINS = "=+-@\t\r\uff1d\uff0b\uff0d\uff20"
-"""With what a spreadsheet takes a cell for a formula; no name that a deck gives begins so."""
+"""Characters by which a spreadsheet takes a cell for a formula; no name that a deck gives begins so."""
 
 
 NUMBER = re.compile("[0-9]+(e[0-9]+)?")
@@ -42,7 +42,7 @@ def word(text: str) -> str:
 
 
 def _remark(text: str) -> str:
-    """What stands behind `#`: a spreadsheet cuts that into cells, too."""
+    """Text behind `#`, with an apostrophe where a spreadsheet, which cuts it into cells, would see a formula."""
     return re.sub(rf"([,;]\s*)(?=[{re.escape(BEGINS)}])", r"\1'", line(text))
 
 
@@ -97,7 +97,7 @@ def write_cases(file: ArchiveFile, table: CaseTable, output: Path) -> int:
 
 
 def _head(file: ArchiveFile, runs: Iterable[str], heads: Sequence[tuple[str, str]]) -> bytes:
-    """What it is of, the columns' units, their names."""
+    """The first lines: what the table is of, the columns' units, their names."""
     head = io.StringIO()
     lines = csv.writer(head, lineterminator="\n")
     about = _remark(f"{', '.join(runs)} of {' '.join(file.deck.split())}")

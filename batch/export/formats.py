@@ -28,7 +28,7 @@ FORMATS = {
 """The module of each format, by its name, which is also the ending of its files. The first is the default."""
 
 Rows = Literal["metrics", "histories"]
-"""What an export's rows are: a case with its metrics, or an instant of a case."""
+"""The rows of an export: a case with its metrics, or an instant of a case."""
 
 Option = Literal["units", "layout"]
 """An option of `met export` that only some formats take."""
@@ -36,7 +36,7 @@ Option = Literal["units", "layout"]
 
 @frozen
 class ExportRequest:
-    """What was asked of an export besides its file.
+    """The options of an export besides its file.
 
     table     what its rows are to be; None: not said
     signals   signals that were named; none: all
@@ -56,7 +56,7 @@ class ExportRequest:
 
 @frozen
 class WrittenExport:
-    """How many rows an export has, and the layout file written beside it, if any."""
+    """The number of rows of an export that was written, and the layout file beside it, if any."""
 
     rows: int
     layout: Path | None = None

@@ -25,11 +25,11 @@ GHOST = "55"
 """Opacity of the lines of every case but the first, as a colour's last two digits."""
 
 DISTANCE, GRID, AXES = 2.6, 4.0, 0.08
-"""Of the camera from the base, edge of the grid, length of a frame's axes; in the arm's size."""
+"""Distance of the camera from the base, edge of the grid, length of a frame's axes, each in sizes of the arm."""
 
 
 def beside(output: Path) -> Path:
-    """Where the layout of an export goes."""
+    """The path of an export's layout."""
     return output.with_suffix(ENDING)
 
 

@@ -128,7 +128,7 @@ def write(file: ArchiveFile, arms: Sequence[PosedArm], output: Path) -> int:
 
 
 def _about(writer: Writer, file: ArchiveFile, arms: Sequence[PosedArm]) -> None:
-    """What made the file, before all else: by it a later export knows that it may write over it."""
+    """Write what made the file, before all else: by it a later export knows that it may write over it."""
     told = {
         "archive": file.path.name,
         "deck": file.deck,

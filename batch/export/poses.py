@@ -24,7 +24,7 @@ from met.vectors import quaternion
 POSITION = "q"
 
 OF_FREE_BASE = (f"links.{BASE}.position", f"links.{BASE}.orientation")
-"""What is recorded of where a free base is."""
+"""Signals that give the pose of a free base."""
 
 INSTANT = 1e-6
 """Share of a step by which a row's time may be rounded below its instant."""
@@ -150,7 +150,7 @@ def _position(case: ExportedCase, joint: str, signals: Mapping[str, Stored]) -> 
 
 
 def lacking_help(*, free: bool) -> str:
-    """What to record. free: also of the base."""
+    """Help that names the signals to record. free: also those of the base."""
     more = ", ".join(("q", *OF_FREE_BASE)) if free else "q, ..."
     return f"`record = [{more}]` in the run keeps where its joints{' and its base' * free} are; then run it again"
 

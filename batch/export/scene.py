@@ -24,7 +24,7 @@ from met.plan import BASE, Joint, Link, Payload
 Vector = tuple[float, float, float]
 
 LINKS = COLOURS[:-1]
-"""Of links in turn; the last, black, is not seen before a dark background."""
+"""Colours of the links in turn; the last, black, is not seen before a dark background."""
 
 JOINTS = "#8a939c"
 GHOST = 0.22
@@ -39,14 +39,15 @@ SIZES = {
     "sphere": ("radius",),
     "box": ("size_x", "size_y", "size_z"),
 }
-"""Of the shapes that are drawn; a link of another one, which a later MET may know, is drawn as one without."""
+"""Parameters of the shapes that are drawn; a link of another shape, which a later MET may know, is drawn as one
+without."""
 
 LINE_PIXELS = 4.0
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
 def size(arms: Sequence[PosedArm]) -> float:
-    """How far, about, the arms reach from the base, m."""
+    """The reach of the arms from the base, m, about."""
     far = 0.0
     for arm in arms:
         for link in arm.experiment.structure.links:
@@ -94,12 +95,12 @@ def scene(arm: PosedArm, root: str, ghost: bool, size: float) -> Any:
 
 
 def head(link: Link | Payload) -> str:
-    """What the paths of a link's or payload's parameters begin with."""
+    """The beginning of the paths of a link's or payload's parameters."""
     return f"payloads.{link.name}" if isinstance(link, Payload) else f"links.{link.name}"
 
 
 def drawn(link: Link | Payload) -> bool:
-    """Whether a link has a shape that is drawn."""
+    """True if a link has a shape that is drawn."""
     return link.shape is not None and set(SIZES.get(link.shape[0], ("none",))) <= set(dict(link.shape[1]))
 
 
@@ -138,7 +139,7 @@ def _entity(scene: Any, frame: str, name: str) -> Any:
 
 
 def _middle(arm: PosedArm, link: Link | Payload, kind: str, numbers: Mapping[str, float]) -> Vector:
-    """Where the middle of a link's shape is in the link's frame."""
+    """The middle of a link's shape in the link's frame, m."""
     inertia = arm.experiment.parameters.get(f"{head(link)}.inertia.xx")
     if inertia is not None and inertia.origin.kind != "deck":
         return _numbers(arm, f"{head(link)}.com", "xyz")
@@ -189,7 +190,7 @@ def _cylinder(entity: Any, middle: Vector, axis: Vector, radius: float, length: 
 
 
 def _rails(arm: PosedArm, carried: Sequence[Joint]) -> list[tuple[Vector, Vector]]:
-    """Of the joints that slide on a link, from end to end, in the link's frame."""
+    """The ends of the rails of joints that slide on a link, in the link's frame, m."""
     out = []
     for joint in carried:
         if joint.name in arm.travel:
@@ -258,7 +259,7 @@ def _colour(hexadecimal: str, opacity: float) -> Any:
 
 
 def _at(arm: PosedArm, joint: Joint) -> Vector:
-    """Where a joint's frame is in its parent link's."""
+    """The position of a joint's frame in its parent link's, m."""
     return _numbers(arm, f"{joint.name}.at", "xyz")
 
 

@@ -17,7 +17,7 @@ from met.frozen import frozen
 
 PACKAGE = "met"
 DOUBLE, VARINT, LENGTH = 1, 0, 2
-"""How a field is written."""
+"""Protobuf's wire types: 8 bytes, a varint, bytes with their length before them."""
 
 Kind = Literal["double", "int64", "string"]
 
@@ -41,7 +41,7 @@ def tree(paths: Sequence[tuple[str, ...]]) -> tuple[MessageField, ...]:
 
 
 def schema(name: str, fields: Sequence[MessageField]) -> bytes:
-    """What tells any reader of such messages what is in them: a FileDescriptorSet with the message `met.<name>`."""
+    """A FileDescriptorSet with the message `met.<name>`, which tells any reader of such messages what is in them."""
     from google.protobuf.descriptor_pb2 import FileDescriptorSet
 
     out = FileDescriptorSet()

@@ -82,7 +82,7 @@ class Accessor(Generic[Data]):
 
     @told
     def frames(self, *links: str, case: Any = None) -> Data:
-        """Where links are in the world at each instant, of all links or of these; of all recorded cases, or as `sel`
+        """The poses of links in the world at each instant, of all links or of these; of all recorded cases, or as `sel`
         takes them.
 
         position     (recorded_case, time, link, axis), m: origin of the link's frame
@@ -171,7 +171,7 @@ class DatasetAccessor(Accessor[xarray.Dataset]):
 
 
 class TreeAccessor(Accessor[xarray.DataTree]):
-    """What is asked of a DataTree is asked of each run, sweep or structure in it."""
+    """`data.met` of a DataTree: each question is put to each run, sweep or structure in it."""
 
     def _parts(self) -> dict[str, xarray.Dataset]:
         found = {

@@ -37,7 +37,7 @@ ORIENTATION_TOLD = {
     "long_name": "unit quaternion of the link's frame",
     "frame": "from link axes to world axes, continuous from w >= 0",
 }
-"""What an archive says of the same where it is recorded."""
+"""Attributes of an orientation, as an archive has them where it is recorded."""
 
 
 def frames(
@@ -136,7 +136,7 @@ def _positions(data: xarray.Dataset, own: Experiment) -> tuple[xarray.DataArray,
 
 
 def _base(data: xarray.Dataset, own: Experiment, instants: xarray.DataArray, values: Mapping[str, Any]) -> Pose:
-    """Where the base is, by the instants' dimensions."""
+    """The pose of the base, by the instants' dimensions."""
     if own.structure.base is None:
         return HERE
     if own.structure.free:
@@ -163,7 +163,7 @@ def _position(data: xarray.Dataset, joint: str, unit: str) -> xarray.DataArray |
 
 
 def _of_joints(array: xarray.DataArray) -> bool:
-    """Whether a coordinate is of joints' names: a deck may vary `joint_1.servo.kp`, which is of numbers."""
+    """True if a coordinate holds joints' names: a deck may vary `joint_1.servo.kp`, which holds numbers."""
     name = str(array.name)
     return (name == "joint" or name.startswith("joint_of_")) and array.dtype.kind not in "iuf"
 

@@ -100,7 +100,7 @@ def _block(parts: Sequence[xarray.Dataset], name: str, dim: str, inner: Collecti
 
 
 def _columns(parts: Sequence[xarray.Dataset], dim: str) -> dict[str, xarray.DataArray]:
-    """What is varied, by path, over all cases; what a structure lacks is not-a-number in it, or no word."""
+    """Varied parameters, by path, over all cases; what a structure lacks is not-a-number in it, or no word."""
     tables = [varied(data, dim) for data in parts]
     out = {}
     for path in dict.fromkeys(path for table in tables for path in table):
@@ -116,7 +116,7 @@ def _columns(parts: Sequence[xarray.Dataset], dim: str) -> dict[str, xarray.Data
 
 
 def _held(data: xarray.Dataset, table: Mapping[str, xarray.DataArray], path: str) -> xarray.DataArray | None:
-    """What is varied of one Dataset; where nothing is repeated in it, its only repeat; None where it has no such."""
+    """A varied parameter of one Dataset, or the only repeat where nothing is repeated; None where it has no such."""
     return data[path] if path not in table and path == REPEAT and path in data.variables else table.get(path)
 
 

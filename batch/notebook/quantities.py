@@ -18,8 +18,8 @@ QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s
 
 
 def number(given: Any, name: str, unit: str) -> float:
-    """What was given for a variable, in its unit: a number is taken as it is, a text has a unit of its own. Raises
-    Problem E386."""
+    """A value that was given for a variable, in its unit: a number is taken as it is, a text has a unit of its own.
+    Raises Problem E386."""
     if isinstance(given, xarray.DataArray) and given.ndim == 0 and given.dtype.kind in "iuf":
         own, told = _measure(unit, name), str(given.attrs.get("units", unit))
         measure = _measure(told, name)

@@ -21,8 +21,8 @@ ZERO = 1e-14
 """The same of 0, relative to the largest of the values: -1 + 10 * 0.1 is 0 but for its rounding."""
 
 RUN, FAILED, MET, MISSED = "run", "failed", "met", "missed"
-"""What cases are asked for by, besides names of variables: the run or sweep; whether they did not reach their end;
-whether they met every requirement; whether they missed one."""
+"""Words by which cases are chosen besides names of variables: the run or sweep; True for those that did not reach their
+end, that met every requirement, that missed one."""
 
 NEAREST = 2
 """Values that are told where none is the one asked for."""
@@ -32,7 +32,7 @@ Parts = Mapping[str, xarray.Dataset]
 
 
 def selected(parts: Parts, wanted: Mapping[str, Any]) -> dict[str, xarray.Dataset]:
-    """What is left of Datasets when only cases are kept that are as wanted, by name of a variable or path in the deck.
+    """Keep the cases that are as wanted, by name of a variable or path in the deck.
 
     A name is of numbers (a number, a text with a unit, a list of these, or a slice, both ends in it), of words (one,
     or a list), or one of the words above. A Dataset without such cases is left out, unless it is the only one. One
@@ -161,7 +161,7 @@ def _ids(data: xarray.Dataset, dim: str) -> np.ndarray:
 
 
 def _ended(data: xarray.Dataset, dim: str, name: str, wanted: Any) -> np.ndarray:
-    """Which cases ended so. Raises Problem E385, E386."""
+    """True for each case that ended as wanted. Raises Problem E385, E386."""
     if not isinstance(wanted, bool | np.bool_):
         raise Problem(error("E386", f"`{name}` = {wanted!r}: it is True or False"))
     needed = "status" if name == FAILED else "met"
@@ -195,7 +195,7 @@ def _cut(data: xarray.Dataset, dim: str, mask: np.ndarray) -> xarray.Dataset:
 
 
 def _one(wanted: Mapping[str, Any]) -> bool:
-    """Whether one case is asked for by its name."""
+    """True if one case is asked for by its name."""
     return CASE in wanted and not isinstance(wanted[CASE], slice) and _single(wanted[CASE])
 
 
@@ -215,7 +215,7 @@ def _listed(wanted: Any) -> Sequence[Any]:
 
 
 def _item(given: Any) -> Any:
-    """What an array of no dimensions holds, and anything else as it is."""
+    """The value in an array of no dimensions, and anything else as it is."""
     return given.item() if isinstance(given, xarray.DataArray) and given.ndim == 0 else given
 
 

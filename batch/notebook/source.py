@@ -15,7 +15,7 @@ from batch.notebook.table import CASE, PREFIX, RECORDED, cases_of, name_of, posi
 from met.diagnostic import Problem, error
 
 SOURCE = "source"
-"""Where xarray keeps the name of the file in the encoding of what it has opened."""
+"""The key under which xarray keeps the name of the file in the encoding of what it has opened."""
 
 
 def file_of(data: xarray.Dataset | xarray.DataTree) -> Path:

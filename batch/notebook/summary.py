@@ -15,7 +15,7 @@ FEW = 5
 
 
 def summary(data: xarray.Dataset) -> str:
-    """What was run, how many cases are here, how they ended, what is varied in them."""
+    """Text about a Dataset: what was run, how many cases are here, how they ended, what is varied in them."""
     if not name_of(data):
         return "a Dataset that is of no archive of MET"
     deck = str(data.attrs.get("deck", "")).strip("<>")

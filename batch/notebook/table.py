@@ -13,7 +13,7 @@ from met.diagnostic import Problem, did_you_mean, error
 CASE, RECORDED = "case", "recorded_case"
 REPEAT = "repeat"
 PREFIX = "recorded."
-"""Of what is repeated along recorded_case."""
+"""Beginning of the names of variables that are repeated along recorded_case."""
 
 NO_HISTORIES = "no signals of these cases were kept: `met run ... --histories all` keeps them"
 
@@ -45,7 +45,8 @@ def path_of(name: str, attributes: Mapping[str, Any]) -> str:
 
 
 def along(data: xarray.Dataset, dim: str) -> dict[str, xarray.DataArray]:
-    """What each case has one of, by path; also by the variable's name where that is another. `case` is its position."""
+    """Variables with one value a case, by path; also by the variable's name where that is another. `case` is its
+    position."""
     out = {CASE: data[dim]}
     for name in map(str, data.variables):
         if data[name].dims == (dim,):
@@ -57,7 +58,7 @@ def along(data: xarray.Dataset, dim: str) -> dict[str, xarray.DataArray]:
 
 
 def varied(data: xarray.Dataset, dim: str) -> dict[str, xarray.DataArray]:
-    """What is varied, by path, along a dimension of cases, in the deck's order: choices, parameters, repeats."""
+    """Varied parameters, by path, along a dimension of cases, in the deck's order: choices, parameters, repeats."""
     if dim == RECORDED and CASE in data.dims:
         places = positions(data[CASE].values, data[RECORDED].values)
         if places is not None:
@@ -76,7 +77,7 @@ def varied(data: xarray.Dataset, dim: str) -> dict[str, xarray.DataArray]:
 
 
 def positions(values: np.ndarray, wanted: np.ndarray) -> np.ndarray | None:
-    """Where these are among rising values; None where one is not there."""
+    """The places of wanted values among rising ones; None where one is not there."""
     places = np.searchsorted(values, wanted)
     if len(values) == 0 or (places == len(values)).any():
         return None if len(wanted) else places
@@ -84,12 +85,12 @@ def positions(values: np.ndarray, wanted: np.ndarray) -> np.ndarray | None:
 
 
 def name_of(data: xarray.Dataset | xarray.DataTree) -> str:
-    """Of the run, sweep or structure that a Dataset is of; "" where it does not say."""
+    """The name of the run, sweep or structure that a Dataset is of; "" where it does not say."""
     return str(data.attrs.get("experiment", ""))
 
 
 def asked(data: xarray.Dataset) -> str:
-    """Of the run or sweep, by which a user asks for it."""
+    """The name of the run or sweep by which a user asks for it."""
     return str(data.attrs.get("sweep") or name_of(data))
 
 

@@ -44,8 +44,8 @@ class Beside:
         return {position: place for position, place in found.items() if place in kept}
 
     def columns(self, panel: Panel) -> list[int]:
-        """Where the other has each line of a panel, as `Panel.columns`; -1 where it has not. Raises Problem E393 where
-        it has it in another unit."""
+        """The other archive's column for each line of a panel, as `Panel.columns`; -1 where it has none. Raises Problem
+        E393 where it has it in another unit."""
         theirs = _channels(self.group, panel.variable)
         mine = {column: path for path, (column, _) in _channels(self.drawn, panel.variable).items()}
         out = []
@@ -84,14 +84,14 @@ def unlike(name: str, mine: str, theirs: str, beside: Beside) -> Problem:
 
 
 def lacking(name: str, beside: Beside, there: Sequence[str]) -> Problem:
-    """What is drawn is not in the other archive. there: what is."""
+    """The problem that something to be drawn is not in the other archive. there: what is."""
     helps = f"in {beside.name}: {', '.join(there)}" if there else _differ(beside.drawn.path, beside.group.path)
     return Problem(error("E393", f"no `{name}` in {beside.name} to draw against", help=helps))
 
 
 def beside(archive: ArchiveFile, groups: Sequence[ArchiveGroup], other: ArchiveFile) -> list[Beside | None]:
-    """Of each group the other archive's; none where that has not this structure. Raises Problem E393 where nothing is
-    the same in the two."""
+    """The other archive's group for each group; None where that has not this structure. Raises Problem E393 where
+    nothing is the same in the two."""
     names = file_names(archive.path, other.path)
     pairs = {id(mine): theirs for mine, theirs in matching.experiments(archive, other)[0]}
     found = [Beside(group, pairs[id(group)], names) if id(group) in pairs else None for group in groups]
@@ -108,7 +108,7 @@ def beside(archive: ArchiveFile, groups: Sequence[ArchiveGroup], other: ArchiveF
 
 
 def file_names(a: Path, b: Path) -> tuple[str, str]:
-    """What the two are called in a picture: names of files, with folders where these are the same."""
+    """The names of two archives in a picture: those of the files, with folders where these are the same."""
     one, other = (a.name, b.name) if a.name != b.name else (str(a), str(b))
     return _labelling(one), _labelling(other)
 

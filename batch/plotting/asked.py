@@ -74,7 +74,7 @@ def _is_signal(group: ArchiveGroup, name: str) -> bool:
 
 
 def _unknown(group: ArchiveGroup, name: str, metrics: Sequence[str]) -> Problem:
-    """What is said of a name that is neither: of signals what `panels` says."""
+    """The problem that a name is neither a metric nor a signal; of signals it is that of `panels`."""
     signals = [v.name for v in group.role("signal")]
     here = f"metrics here: {', '.join(dict.fromkeys(metrics))}"
     if signals and metrics:
@@ -93,8 +93,8 @@ def _unknown(group: ArchiveGroup, name: str, metrics: Sequence[str]) -> Problem:
 
 
 def over(archive: ArchiveFile, pool: Pool, names: Sequence[str]) -> tuple[CaseColumn, ...]:
-    """What metrics are drawn over: the parameters that are named; else two that make a grid of some size, or the one
-    with most values; none where nothing is varied. Raises Problem E390."""
+    """The parameters that metrics are drawn over: those that are named; else two that make a grid of some size, or the
+    one with most values; none where nothing is varied. Raises Problem E390."""
     varied = pool.varied()
     if not names:
         x, y = (*varied, None, None)[:2]
@@ -155,8 +155,8 @@ def _here(known: Sequence[str]) -> str:
 
 
 def coloured(pool: Pool, drawn: Sequence[CaseColumn]) -> CaseColumn | None:
-    """What tells points over one parameter apart by colour: of what else is varied that with most values, which does
-    not go in step with it."""
+    """The column that colours points over one parameter: of what else is varied that with most values, which does not
+    go in step with it."""
     for column in pool.varied():
         if all(column is not each for each in drawn) and free(column, drawn[0]):
             return column
@@ -164,6 +164,6 @@ def coloured(pool: Pool, drawn: Sequence[CaseColumn]) -> CaseColumn | None:
 
 
 def free(column: CaseColumn, other: CaseColumn) -> bool:
-    """Whether a column does not rise, or fall, wherever another one rises."""
+    """True if a column does not rise, or fall, wherever another one rises."""
     ranks, others = (np.searchsorted(levels(each.values), each.values) for each in (column, other))
     return not (np.array_equal(ranks, others) or np.array_equal(ranks, others.max(initial=0) - others))

@@ -32,7 +32,8 @@ SIGN_ROOM = 5.0
 
 @frozen
 class Picked:
-    """What the cells show, row by row from the lowest. there: that a case is in it; failed: one that failed."""
+    """The values of the cells, row by row from the lowest. there: True where a case is in the cell; failed: True where
+    one failed."""
 
     values: np.ndarray
     there: np.ndarray
@@ -62,7 +63,7 @@ def picked(
 
 
 def any_in(cases: np.ndarray, cells: np.ndarray, count: int) -> np.ndarray:
-    """Which cells hold some of these cases."""
+    """True for each cell that holds some of these cases."""
     out = np.zeros(count, bool)
     out[cells[cases & (cells >= 0)]] = True
     return out
@@ -121,7 +122,7 @@ def _lightness(colours: np.ndarray) -> np.ndarray:
 
 
 def _sign(ax: Any, shape: tuple[int, int]) -> tuple[float, tuple[int, int]]:
-    """How large a sign is, in points, and how many rows and columns of cells it needs for itself."""
+    """The size of a sign, in points, and how many rows and columns of cells it needs for itself."""
     width, height = ax.figure.get_size_inches() * 72
     columns, rows = ax.get_gridspec().ncols, ax.get_gridspec().nrows
     cell = (0.6 * height / rows / shape[0], 0.6 * width / columns / shape[1])
@@ -130,7 +131,7 @@ def _sign(ax: Any, shape: tuple[int, int]) -> tuple[float, tuple[int, int]]:
 
 
 def _spaced(which: np.ndarray, room: tuple[int, int]) -> np.ndarray:
-    """Of these cells one in each block of so many rows and columns: the one nearest to its middle."""
+    """Thin these cells to one in each block of so many rows and columns: the one nearest to its middle."""
     if room == (1, 1) or not which.any():
         return which
     up, across = np.nonzero(which)
@@ -162,7 +163,7 @@ def _signs(ax: Any, x: MapSide, y: MapSide, which: np.ndarray, room: tuple[int, 
 
 
 def _in_stretch(x: MapSide, which: np.ndarray, most: int) -> np.ndarray:
-    """Where a sign over each cell stands: in the middle of the stretch of neighbours, if these are at most so many."""
+    """The position of a sign over each cell: in the middle of its stretch of neighbours, if at most `most`."""
     place = np.arange(which.shape[1])
     beside = np.pad(which, ((0, 0), (1, 1)))
     first = np.maximum.accumulate(np.where(which & ~beside[:, :-2], place, 0), axis=1)

@@ -40,7 +40,7 @@ ON_ANOTHER: tuple[Any, ...] = ("-", (0, (6, 6)), (0, (3, 9)), (0, (1.5, 10.5)))
 """A line that lies on others has gaps, through which they are seen."""
 
 WIDER, PALE = 3.0, 0.35
-"""How another archive's lines are drawn: so much wider than the own ones, and so opaque."""
+"""Width, in widths of the own lines, and opacity of another archive's lines."""
 
 
 class Histories:
@@ -122,7 +122,7 @@ class Histories:
         return "; ".join(part for part in (below, self.left) if part)
 
     def _is_zero(self, row: Sequence[Cell | None]) -> bool:
-        """Whether nothing of a row is ever other than zero."""
+        """True if nothing of a row is ever other than zero."""
         cells = [cell for cell in row if cell is not None]
         return not any(
             np.any(history(self.group, cell.panel, position)[:, list(cell.lines)])
@@ -286,7 +286,7 @@ class Histories:
         layout.legend(figure, known | command | archives | cases, self.sheet, title)
 
     def _cases(self) -> dict[str, Any]:
-        """What the legend says of cases that are told apart by how faint they are."""
+        """Legend entries of cases that are told apart by how faint they are."""
         from matplotlib.lines import Line2D
 
         count = len(self.positions)
@@ -298,7 +298,7 @@ class Histories:
         }
 
     def _archives(self) -> dict[str, Any]:
-        """What the legend says of the two archives."""
+        """Legend entries of the two archives."""
         from matplotlib.lines import Line2D
 
         if self.other is None:
@@ -308,7 +308,7 @@ class Histories:
 
 
 def _dashes(line: int) -> str:
-    """Where there are more joints than colours."""
+    """The line style of the `line`th joint: dashed where there are more joints than colours."""
     return ("-", "--", ":", "-.")[line // len(COLOURS) % 4]
 
 
@@ -326,12 +326,12 @@ def _differing(group: ArchiveGroup) -> list[Stored]:
 
 
 def _faint(index: int, count: int) -> float:
-    """How opaque the lines of one of some cases are, that share their joints' colours."""
+    """The opacity of the lines of one of some cases that share their joints' colours."""
     return 1.0 - 0.75 * index / max(1, count - 1)
 
 
 def _case_words(group: ArchiveGroup, position: int) -> str:
-    """What differs, by name, for a legend without a title."""
+    """Varied parameters of a case, by name, for a legend without a title."""
     scales = {v.name: deck_unit(v) for v in _differing(group)}
     texts = [
         f"{name} = {number_text(group.values(name)[position] / scale)} {unit}".rstrip()
@@ -347,7 +347,7 @@ def _case_label(group: ArchiveGroup, position: int) -> str:
 
 
 def _case_title(group: ArchiveGroup) -> str:
-    """What the values in the legend are of, a line each."""
+    """The title of the legend: what its values are of, a line each."""
     return " ·\n".join(f"{v.name}  ({deck_unit(v)[1]})" if deck_unit(v)[1] else v.name for v in _differing(group))
 
 

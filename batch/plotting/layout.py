@@ -30,7 +30,7 @@ BESIDE, BESIDE_ON_PAPER = 1.0, 0.75
 """Inches of a panel's width that its numbers and its label take."""
 
 LINE = 1.45
-"""From line to line, against the letters' size."""
+"""Distance of two lines of text, in sizes of the letters."""
 
 TICK_INCHES = 0.5
 """On paper: of a number below a panel, with room around it."""
@@ -63,10 +63,10 @@ def figure(
 
 
 DRAWABLE = 1e300
-"""What is larger counts as infinite: the span of an axis would be no number."""
+"""The largest number that is drawn; a larger one counts as infinite, for the span of an axis would be no number."""
 
 MOST_PANELS = 40
-"""Under one another: more are no picture any more."""
+"""Panels under one another, at most: more are no picture any more."""
 
 
 def drawable(values: np.ndarray) -> np.ndarray:
@@ -86,12 +86,12 @@ def several(found: Sequence[T], asked: bool, what: str) -> tuple[Sequence[T], st
 
 
 def letters(sheet: PictureSheet, inches: float) -> int:
-    """How many letters of the small size stand side by side in a width."""
+    """The number of letters of the small size that stand side by side in a width."""
     return max(12, int(inches * 72 / (LETTER * sheet.small)))
 
 
 def head(ax: Any, text: str, sheet: PictureSheet, columns: int, colour: str = INK) -> None:
-    """What stands above a panel, in as many lines as its width asks for."""
+    """Write the text above a panel, in as many lines as its width asks for."""
     wide = letters(sheet, ax.figure.get_figwidth() / columns - (BESIDE_ON_PAPER if sheet.paper else BESIDE))
     parts = text.split(" · ") if len(text) > wide else [text]
     lines = [line for part in parts for line in textwrap.wrap(part, wide)]

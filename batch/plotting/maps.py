@@ -28,13 +28,13 @@ from met.frozen import frozen
 
 RISING, PARTING = "viridis", "RdBu_r"
 BELOW, ABOVE = "#8f7ff0", "#f4724d"
-"""Of values beyond the rising colours, and of the bar's pointed ends."""
+"""Colours of values below and above the range of colours, and of the colour bar's pointed ends."""
 
 NOWHERE = "#c9ced3"
 """Behind the cells of a difference, where white is no change."""
 
 RINGS = {STRIPES: "o", DOTTED: "s"}
-"""What is around a point in their stead."""
+"""Markers around a point that stand for the stripes and dots of a cell."""
 
 WIDEST = 2.6
 """Inches of a map on paper: where there is more room, maps stand beside one another."""
@@ -42,7 +42,7 @@ WIDEST = 2.6
 
 @frozen
 class MapLayout:
-    """What is drawn over what: x and y of all maps, of which each holds some of the cases; names of the archives."""
+    """The axes of all maps, x and y, of which each map holds some of the cases; names of the archives."""
 
     x: MapSide
     y: MapSide
@@ -102,7 +102,7 @@ def draw(
 
 
 def said(found: MapLayout, metrics: Sequence[Measured], third: CaseColumn | None) -> str:
-    """What a cell or a point is, and beside a third parameter what is required."""
+    """Say what a cell or a point is, and beside a third parameter what is required."""
     if not found.filled:
         text = "a point a case"
     elif found.several == 1:
@@ -128,7 +128,7 @@ def _about(each: Measured, found: MapLayout) -> str:
 
 
 def _lost(each: Measured) -> str:
-    """How many cases have no finite number."""
+    """Say how many cases have no finite number."""
     infinite, failed = int(np.isinf(each.values).sum()), int(each.failed.sum())
     lacking = int((np.isnan(each.values) & ~each.failed).sum())
     named = ((infinite, "infinite in {:,}"), (failed, "failed: {:,}"), (lacking, "no value in {:,}"))
@@ -144,7 +144,7 @@ def _shown(each: Measured, found: MapLayout) -> np.ndarray:
 
 @frozen
 class Tones:
-    """Which value has which colour; how far the colours reach, None where no value is finite."""
+    """The colour of each value; `reach`: how far the colours go, None where no value is finite."""
 
     norm: Any
     reach: Reach | None
@@ -282,7 +282,7 @@ def _sides(axes: Sequence[Sequence[Any]], found: MapLayout, sheet: PictureSheet)
 
 
 def _marks(metrics: Sequence[Measured], found: MapLayout) -> dict[str, Any]:
-    """What stripes, greys and signs stand for, of those that are there."""
+    """Legend entries of the stripes, greys and signs that are there."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -320,5 +320,5 @@ def _marks(metrics: Sequence[Measured], found: MapLayout) -> dict[str, Any]:
 
 
 def _lacking(shown: np.ndarray, each: Measured) -> bool:
-    """Whether a case that is there and did not fail has no value."""
+    """True if a case that is there and did not fail has no value."""
     return bool(np.isnan(shown[each.both & ~each.failed]).any())

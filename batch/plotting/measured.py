@@ -31,7 +31,7 @@ class Measured:
 
     @property
     def label(self) -> str:
-        """What to write on the axis: `settle  (s)`."""
+        """The label of the axis: `settle  (s)`."""
         return f"{self.column.label}  ({self.column.unit})" if self.column.unit else self.column.label
 
     @property
@@ -41,7 +41,7 @@ class Measured:
 
     @property
     def about(self) -> str:
-        """What it is, and how many cases miss what is required of it."""
+        """The metric's description, and how many cases miss what is required of it."""
         parts = [self.column.about] if self.column.about else []
         count = len(self.values)
         if self.column.limits:
@@ -92,7 +92,7 @@ def _both(pool: Pool, others: Mapping[int, Beside]) -> np.ndarray | bool:
 def _theirs(
     pool: Pool, name: str, others: Mapping[int, Beside], asked: bool
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """Of each case the metric in the other archive, in the own unit, and whether it misses what that requires."""
+    """The metric of each case in the other archive, in the own unit, and True where it misses what that requires."""
     if not others:
         return None, None
     out, missed, found = np.full(pool.count, np.nan), np.zeros(pool.count, bool), False

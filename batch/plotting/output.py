@@ -12,7 +12,7 @@ from met.outputs import cannot_write, check_overwrite, check_place, quoted
 
 SOFTWARE = "MET"
 MOST_DOTS = 200_000_000
-"""Of a PNG: each takes four bytes while it is drawn."""
+"""Dots of a PNG, at most: each takes four bytes while it is drawn."""
 
 HEAD_BYTES, TAIL_BYTES = 2000, 20_000
 
@@ -42,7 +42,7 @@ def check(output: Path) -> None:
 
 
 def own(output: Path) -> bool:
-    """Whether a picture says that MET drew it."""
+    """True if a picture says that MET drew it."""
     with open_regular(output) as file:
         text = file.read(HEAD_BYTES)
         file.seek(max(len(text), output.stat().st_size - TAIL_BYTES))

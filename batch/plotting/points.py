@@ -28,10 +28,10 @@ RASTERED = 2000
 BEHIND, PALE = 3.0, 0.3
 
 BAR = 0.7
-"""Of a picture's height, what a colour bar has at least."""
+"""Least height of a colour bar, in heights of the picture."""
 
 PANEL = 0.6
-"""Of a picture's width, what a panel beside a legend has at least."""
+"""Least width of a panel beside a legend, in widths of the picture."""
 
 
 @frozen
@@ -103,7 +103,7 @@ def _scale(by: CaseColumn) -> Any:
 
 
 def _curves(x: CaseColumn, by: CaseColumn) -> bool:
-    """Whether there is one case for each value of both, so that a curve goes through those of one colour."""
+    """True if there is one case for each value of both, so that a curve goes through those of one colour."""
     if x.role != "parameter" or not is_grid(x.values, by.values) or len(levels(by.values)) > MOST_LEVELS:
         return False
     pairs = np.unique(np.stack([x.values, by.values]), axis=1).shape[1] if len(x.values) <= MANY else 0
@@ -150,8 +150,8 @@ def _reach(ax: Any, x: np.ndarray) -> None:
 
 
 def _edge(ax: Any, values: np.ndarray, x: np.ndarray, size: float, *, hollow: bool = False) -> None:
-    """What is no number, within the panel at its edges: ▲ infinite, ▼ infinite below, × no value. hollow: of another
-    archive."""
+    """Draw values that are no number within the panel at its edges: ▲ infinite, ▼ infinite below, × no value. hollow:
+    of another archive."""
     from matplotlib.transforms import ScaledTranslation
 
     size = max(12.0, size)
@@ -180,7 +180,7 @@ def _edge(ax: Any, values: np.ndarray, x: np.ndarray, size: float, *, hollow: bo
 
 
 def lost(values: np.ndarray) -> str:
-    """What the marks on the edges say, in words."""
+    """Say in words what the marks on the edges stand for."""
     parts = []
     for there, text in ((np.isinf(values), "infinite in {} (▲)"), (np.isnan(values), "no value in {} (×)")):
         if there.any():
@@ -199,7 +199,7 @@ def _limits(ax: Any, each: Measured) -> None:
 
 
 def marker_scale(count: int) -> float:
-    """How much smaller than alone a marker is among so many; the legend's are not."""
+    """The size of a marker among so many, in sizes of one alone; the legend's are not smaller."""
     return 1.0 if count < 400 else 1.7 if count < 20_000 else 3.7
 
 
@@ -217,7 +217,7 @@ def _apart(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def legend_of(known: Mapping[str, Any], other: tuple[str, str] | None) -> dict[str, Any]:
-    """What is in the colours' legend, then the limit, then which archive is which."""
+    """Legend entries: the colours', then the limit, then which archive is which."""
     from matplotlib.lines import Line2D
 
     limit = {text: known[text] for text in ("limit",) if text in known}

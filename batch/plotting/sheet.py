@@ -55,7 +55,7 @@ _SIZE = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(?:[x×]\s*(\d+(?:\.\d*)?|\.\d+)
 
 @frozen
 class PictureSheet:
-    """What a picture is drawn on. width, height: inches; none: as the panels need it."""
+    """The sheet that a picture is drawn on. width, height: inches; None: as the panels need it."""
 
     width: float | None = None
     height: float | None = None
@@ -63,7 +63,7 @@ class PictureSheet:
 
     @property
     def paper(self) -> bool:
-        """Whether it is for a paper, whose caption says what it is of."""
+        """True if the picture is for a paper, whose caption says what it is of."""
         return self.width is not None
 
     @property

@@ -46,18 +46,18 @@ class MapSide:
 
     @property
     def centres(self) -> np.ndarray:
-        """Of the cells, on the axis."""
+        """The centres of the cells on the axis."""
         if self.scale == "log":
             return np.asarray(np.sqrt(self.edges[1:] * self.edges[:-1]))
         return np.asarray((self.edges[1:] + self.edges[:-1]) / 2)
 
     @property
     def at(self) -> np.ndarray:
-        """Where the values stand on the axis."""
+        """The positions of the levels on the axis."""
         return self.centres if self.scale == "place" else self.levels.values
 
     def of_cases(self) -> np.ndarray:
-        """Where the cases stand on the axis."""
+        """The positions of the cases on the axis."""
         return self.levels.places.astype(float) if self.scale == "place" else self.column.values
 
 
@@ -86,7 +86,7 @@ def line(column: CaseColumn) -> MapSide:
 
 
 def is_log(column: CaseColumn) -> bool:
-    """Whether a parameter has a logarithmic axis (`grids.is_log`)."""
+    """True if a parameter has a logarithmic axis (`grids.is_log`)."""
     return column.role == "parameter" and grids.is_log(levels(column.values))
 
 
@@ -133,7 +133,7 @@ def _even_numbers(low: float, high: float, inches: float, sheet: PictureSheet) -
 def _apart(
     values: Sequence[float], low: float, high: float, inches: float, sheet: PictureSheet, *, upright: bool
 ) -> bool:
-    """Whether the numbers stand clear of one another on a logarithmic axis."""
+    """True if the numbers stand clear of one another on a logarithmic axis."""
     if len(values) < 2 or not high > low:
         return True
     places = [inches * math.log(x / low) / math.log(high / low) for x in values]

@@ -107,7 +107,7 @@ def overlaid(
 
 
 def _shared(group: ArchiveGroup, command: CommandCurve, positions: Sequence[int]) -> tuple[bool, int]:
-    """Whether all cases are told the same, as far as they come, and the case that comes furthest."""
+    """True if all cases have the same command, as far as they come, and the case that comes furthest."""
     longest, best = positions[0], command.values(group, positions[0])
     for position in positions[1:]:
         values = command.values(group, position)

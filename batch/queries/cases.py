@@ -89,7 +89,7 @@ def table_across(pool: Pool, by: By, most: int | None = SHOWN_CASES) -> list[str
 
 
 def title(group: ArchiveGroup, most: int | None = None, *, by: By | None = None) -> str:
-    """What the order of the table is, or of its beginning."""
+    """The title of the table, which says how it is ordered."""
     if (found := ordering.within(group, by)) is not None:
         return found.title
     outcomes = requirements.outcomes(group)
@@ -150,7 +150,7 @@ def parameters(archive: ArchiveFile, group: ArchiveGroup, position: int) -> dict
 
 
 def varied_lines(archive: ArchiveFile, group: ArchiveGroup, position: int) -> list[str]:
-    """What is varied in a case, and every parameter that follows from it."""
+    """Lines about a case: what is varied in it, and every parameter that follows from it."""
     from ic.printing.columns import columns
 
     coordinates = group.role("coordinate")

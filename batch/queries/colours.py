@@ -23,7 +23,8 @@ MOST_OUT = 0.45
 
 APART = ((0.1, 10.0), (1.0, 100.0))
 SINGLE_APART = 30.0
-"""How far beyond a gap values are left out, against the range of all others: by their share, and a single one."""
+"""Width of the gap, in ranges of all other values, from which the values beyond it are left out: by their share of all
+values, and for a single one."""
 
 NOISE = 1e-6
 """Differences below this share of the values are no range to show in colours."""
@@ -35,14 +36,14 @@ DECADES = 1000.0
 """Largest value against the smallest, from which on colours may be logarithmic."""
 
 LOOKED_AT = 4096
-"""Of more values some are looked at; what is nearer to the range of these than the share below is in it too."""
+"""Most values from which the range is found; of more, one that lies within the share `NEAR` of it is in it too."""
 
 NEAR = 0.02
 
 
 @frozen
 class Reach:
-    """From where to where colours go. below, above: how many values lie beyond, and which is the furthest of them."""
+    """The range of the colours. below, above: how many values lie beyond, and which is the furthest of them."""
 
     low: float
     high: float
@@ -54,7 +55,7 @@ class Reach:
 
     @property
     def said(self) -> tuple[str, str]:
-        """What lies below and above in words; "" where nothing does."""
+        """Say what lies below and above; "" where nothing does."""
         return (
             f"{self.below:,} below, down to {number_text(self.least)}" if self.below else "",
             f"{self.above:,} above, up to {number_text(self.most)}" if self.above else "",
@@ -104,7 +105,7 @@ def _reach(finite: np.ndarray, limits: Sequence[float], *, parting: bool) -> tup
 
 
 def _thinned(finite: np.ndarray) -> np.ndarray:
-    """Of many sorted values some, the extremes among them."""
+    """Some of many sorted values, the extremes among them."""
     if len(finite) <= LOOKED_AT:
         return finite
     return np.asarray(finite[np.linspace(0, len(finite) - 1, LOOKED_AT).round().astype(int)])
@@ -160,5 +161,5 @@ def _told(part: np.ndarray) -> float:
 
 
 def _shows(part: np.ndarray) -> bool:
-    """Whether the values differ by more than roundings."""
+    """True if the values differ by more than roundings."""
     return bool(np.ptp(part) > NOISE * np.abs(part).max())

@@ -85,7 +85,7 @@ def _text(place: Place, texts: Mapping[str, list[str]]) -> str:
 
 
 def _scale(unit: str, si: str) -> float:
-    """How many of an SI unit one of this unit is; 0 where they are of different kinds."""
+    """One of this unit in an SI unit; 0 where they are of different kinds."""
     mine, theirs = _measure(unit), _measure(si)
     if mine is None or theirs is None or mine.dimension != theirs.dimension:
         return 0.0

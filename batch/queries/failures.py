@@ -36,7 +36,7 @@ class FailureGroup:
 
 
 def failures(status: np.ndarray, cause: np.ndarray, case: np.ndarray, case_id: np.ndarray) -> tuple[FailureGroup, ...]:
-    """What failed, by cause, in the order of their first cases. Causes are alike that differ in numbers alone.
+    """Group failed cases by cause, in the order of their first cases. Causes are alike that differ in numbers alone.
 
     status, cause, case, case_id   of failed cases, in order
     """

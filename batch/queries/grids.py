@@ -24,8 +24,8 @@ FULL = 0.5
 Scale = Literal["linear", "log", "place"]
 
 EVEN, EVEN_LOG = 0.05, 0.15
-"""How much steps may differ, against their mean, that values are said to rise evenly: 0.33, 0.67, 1 do; and of their
-logarithms: 1, 3, 10 do, 1, 2, 5, 10 do not."""
+"""How much steps may differ, against their mean, if values are to count as evenly spaced: 0.33, 0.67, 1 do; and steps
+of their logarithms: 1, 3, 10 do, 1, 2, 5, 10 do not."""
 
 SPAN, METRIC_SPAN = 100.0, 1000.0
 """Largest value against the smallest, from which on an axis of points is logarithmic: of a parameter, of a metric."""
@@ -37,7 +37,7 @@ ROUND = ((1, 2, 5), (1, 3), (1,))
 
 @frozen
 class Levels:
-    """Where cases lie along a side of a grid.
+    """One side of a grid of cases: its levels, and the level of each case.
 
     values  the different values, rising; of too many the edges of stretches of them, one more than `texts`
     texts   each level in words
@@ -52,7 +52,7 @@ class Levels:
 
     @property
     def stretches(self) -> bool:
-        """Whether a level is a stretch of values."""
+        """True if a level is a stretch of values."""
         return len(self.values) > len(self.texts)
 
 
@@ -62,7 +62,7 @@ def levels(values: np.ndarray) -> np.ndarray:
 
 
 def spacing(found: np.ndarray) -> Scale:
-    """How different, rising values follow one another: by equal steps, by equal factors, or neither."""
+    """The spacing of different, rising values: by equal steps, by equal factors, or neither."""
     if len(found) < 2:
         return "place"
     if _even(found, EVEN):
@@ -71,7 +71,7 @@ def spacing(found: np.ndarray) -> Scale:
 
 
 def is_log(found: np.ndarray) -> bool:
-    """Whether points at these different, rising values lie on a logarithmic axis: they rise by factors, or span so many
+    """True if points at these different, rising values lie on a logarithmic axis: they rise by factors, or span so many
     that the small ones would be one on another."""
     if len(found) < 3 or found[0] <= 0.0:
         return False
@@ -80,7 +80,7 @@ def is_log(found: np.ndarray) -> bool:
 
 
 def spans(values: np.ndarray, ratio: float) -> bool:
-    """Whether values are all above zero and the largest is so many times the smallest."""
+    """True if values are all above zero and the largest is so many times the smallest."""
     finite = values[np.isfinite(values)]
     low, high = finite.min(initial=np.inf), finite.max(initial=-np.inf)
     return bool(0.0 < low < np.inf and high / ratio >= low)
@@ -149,7 +149,7 @@ def _even(values: np.ndarray, share: float) -> bool:
 
 
 def is_grid(x: np.ndarray, y: np.ndarray) -> bool:
-    """Whether most of the combinations of two parameters' values are among the cases."""
+    """True if most of the combinations of two parameters' values are among the cases."""
     good = np.isfinite(x) & np.isfinite(y)
     x_levels, y_levels = levels(x), levels(y)
     if len(x_levels) < 2 or len(y_levels) < 2 or len(x_levels) * len(y_levels) > 2 * good.sum():
@@ -159,13 +159,13 @@ def is_grid(x: np.ndarray, y: np.ndarray) -> bool:
 
 
 def cells_of(across: Levels, up: Levels) -> np.ndarray:
-    """Of each case its cell, counted row by row from the lowest; -1 where it has none."""
+    """The cell of each case, counted row by row from the lowest; -1 where it has none."""
     there = (across.places >= 0) & (up.places >= 0)
     return np.where(there, up.places * len(across.texts) + across.places, -1)
 
 
 def standing(values: np.ndarray, cells: np.ndarray, count: int, worse: str) -> np.ndarray:
-    """Of each of `count` cells the case that stands for it; -1 where no case of it has a value.
+    """The case that stands for each of `count` cells; -1 where no case of it has a value.
 
     worse  `<`: a limit is above, and the largest value is the worst; `>`: the smallest is; "": there is no limit, and
            the middle one stands for them

@@ -20,7 +20,7 @@ LIMITED = {
     "motor_torque": "tau_max",
     "load_current": "i_max",
 }
-"""By the last word of a servo's, or a bed's, channel the parameter that it does not exceed, either way."""
+"""The parameter that limits a servo's or a bed's channel, either way, by the last word of the channel."""
 
 
 @frozen

@@ -14,11 +14,11 @@ from met.frozen import frozen
 
 REPEAT = "repeat"
 ROLES: tuple[Role, ...] = ("metric", "parameter", "repeat")
-"""Of columns that cases may be listed by."""
+"""Roles of variables that cases may be listed by."""
 
 
 WAYS = {"smallest": False, "largest": True}
-"""What may be said of a name, `settle:largest`, and whether the largest comes first then."""
+"""Words behind a name, `settle:largest`; True where the largest comes first."""
 
 
 @frozen
@@ -107,7 +107,7 @@ def _order(by: By, values: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def within(group: ArchiveGroup, by: By | None) -> By | None:
-    """Of what is asked for what the group has; None where it has none of it."""
+    """Keep of an order the names that the group has; None where it has none of them."""
     names = _names(group) if by is not None else {}
     return _joined([key for key in by.keys if key.name in names]) if by is not None else None
 
@@ -134,7 +134,7 @@ def ranking(group: ArchiveGroup) -> requirements.Ranking:
 
 
 def _far(group: ArchiveGroup) -> np.ndarray:
-    """How far each case is beyond the limit that it misses most."""
+    """The distance of each case beyond the limit that it misses most, relative to that limit."""
     worst = np.full(group.count, -np.inf)
     for each in requirements.required(group):
         far = requirements.beyond(group.values(each.metric), each.comparison, each.limit)
@@ -143,7 +143,7 @@ def _far(group: ArchiveGroup) -> np.ndarray:
 
 
 def _names(group: ArchiveGroup) -> dict[str, str]:
-    """What cases may be listed by, as users name it: the variable of each."""
+    """Names that cases may be listed by, as users write them: the variable of each."""
     found = {variable.path: variable.name for variable in (*group.role("metric"), *group.role("coordinate"))}
     if REPEAT in group.variables and group.values(REPEAT).any():
         found.setdefault(REPEAT, REPEAT)

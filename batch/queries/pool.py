@@ -22,7 +22,8 @@ Role = Literal["case", "choice", "parameter", "repeat", "metric", "change"]
 Ended = Literal["met", "missed", "unknown", "done", "failed", "timed out", "lost"]
 
 ENDED: tuple[Ended, ...] = ("met", "missed", "unknown", "done", "failed", "timed out", "lost")
-"""How a case came out; its number stands in an array of them. `done`: it reached its end and nothing was required."""
+"""The ways in which a case may come out; arrays hold places in this tuple. `done`: it reached its end and nothing was
+required."""
 
 
 @frozen
@@ -114,7 +115,7 @@ class Pool:
 
     @cached_property
     def ended(self) -> np.ndarray:
-        """Of each case its place in `content.ENDED`."""
+        """[case] how it came out: its place in `ENDED`."""
         out = np.full(self.count, ENDED.index("met" if self.requirements else "done"))
         out[(self.outcomes < 0).any(axis=1)] = ENDED.index("unknown")
         out[(self.outcomes == 0).any(axis=1)] = ENDED.index("missed")
@@ -159,7 +160,7 @@ class Pool:
 
     @cached_property
     def columns(self) -> tuple[CaseColumn, ...]:
-        """What may be drawn: choices, varied parameters, repeats, metrics; in the deck's units."""
+        """All columns that may be drawn: choices, varied parameters, repeats, metrics; in the deck's units."""
         out = [self._choice(variable) for variable in self._variables("choice")]
         out += [self._numbers(variable, "parameter") for variable in self._variables("coordinate")]
         repeats = self.gathered("repeat", 0.0)
@@ -171,7 +172,7 @@ class Pool:
         return tuple(column for column in self.columns if column.role == "metric")
 
     def varied(self) -> tuple[CaseColumn, ...]:
-        """What tells the cases apart, that with most values first."""
+        """The columns that tell the cases apart, that with most values first."""
         return tuple(
             sorted(
                 (c for c in self.columns if c.role != "metric" and len(levels(c.values)) > 1),
@@ -180,7 +181,7 @@ class Pool:
         )
 
     def _variables(self, role: str) -> list[Stored]:
-        """Of all groups, by name."""
+        """The variables of this role in all groups, each name once."""
         return list({v.name: v for group in reversed(self.groups) for v in group.role(role)}.values())
 
     def _numbers(self, variable: Stored, role: Role) -> CaseColumn:

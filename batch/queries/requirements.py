@@ -56,8 +56,8 @@ def outcomes(group: ArchiveGroup, positions: np.ndarray | None = None) -> np.nda
 
 
 def beyond(values: np.ndarray, comparison: str, limit: float) -> np.ndarray:
-    """How far a metric's values are beyond a limit, relative to it (to the largest value where it is 0); what is not a
-    number is infinitely."""
+    """How far a metric's values are beyond a limit, relative to it (to the largest value where it is 0); infinitely for
+    what is not a number."""
     finite = values[np.isfinite(values)]
     scale = abs(limit) or float(np.abs(finite).max(initial=0.0)) or 1.0
     far = (values - limit if comparison.startswith("<") else limit - values) / scale
@@ -77,7 +77,8 @@ class Ranking:
     tie: np.ndarray
 
     def equal(self, most: int) -> int:
-        """How many cases are as bad as the last of the first `most`, if not all of them are among these; else 0."""
+        """The number of cases that are as bad as the last of the first `most`, if not all of them are among these; else
+        0."""
         if not 0 < most < len(self.tie) or self.tie[most - 1] != self.tie[most]:
             return 0
         return int((self.tie == self.tie[most - 1]).sum())

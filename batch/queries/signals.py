@@ -43,7 +43,7 @@ class Panel:
 
     @property
     def axis(self) -> str:
-        """What to write on the axis: `qd  (rad/s)`."""
+        """The label of the axis: `qd  (rad/s)`."""
         return f"{self.name}  ({pretty_unit(self.unit)})" if self.unit not in ("", "1") else self.name
 
 
@@ -161,7 +161,8 @@ def number_text(value: float) -> str:
 
 
 def deck_unit(variable: Stored) -> tuple[float, str]:
-    """What to divide a variable's SI values by, and the unit they are then in, typeset; "" for a pure number."""
+    """The number that a variable's SI values are divided by, and the unit they are then in, typeset; "" for a pure
+    number."""
     unit = str(variable.attributes.get("deck_unit", variable.unit))
     return float(variable.attributes.get("deck_scale", 1.0)), "" if unit == "1" else pretty_unit(unit)
 
@@ -187,6 +188,6 @@ def case_text(group: ArchiveGroup, position: int, *, varied: bool = True) -> str
 
 
 def repeat_text(group: ArchiveGroup, position: int) -> list[str]:
-    """Which repeat a case is, where cases are repeated."""
+    """Say which repeat a case is, where cases are repeated."""
     repeats = group.values("repeat") if "repeat" in group.variables else np.zeros(0)
     return [f"repeat {int(repeats[position])}"] if repeats.any() else []

@@ -20,7 +20,7 @@ def structures(archive: ArchiveFile) -> Iterator[list[str]]:
 
 
 def _all_of(sweep: str, summaries: Sequence[Summary]) -> list[str]:
-    """How the sweep went as a whole: how many cases reached their end, and met each requirement."""
+    """Lines about the sweep as a whole: how many cases reached their end, and met each requirement."""
     cases, failed = (sum(getattr(each, name) for each in summaries) for name in ("cases", "failed"))
     out = [f"{sweep}: {cases - failed:,} of {cases:,} cases reached their end, of {len(summaries)} structures"]
     texts = list(dict.fromkeys(r.text for each in summaries for r in each.requirements))

@@ -60,7 +60,7 @@ class MetricSummary(MetricSpread):
 
 @frozen
 class RequirementSummary:
-    """How many cases meet a requirement, miss it, and leave it open.
+    """The numbers of cases that meet a requirement, miss it, and leave it open.
 
     unknown  because they failed, or because the metric has no value;  no_value  of these, the latter
     """
@@ -93,7 +93,7 @@ class Summary:
 
     @property
     def ok(self) -> bool:
-        """Whether every case reached its end and met every requirement."""
+        """True if every case reached its end and met every requirement."""
         return self.failed == 0 and all(r.met == self.cases for r in self.requirements)
 
 
@@ -150,7 +150,7 @@ def _metric(variable: Stored, values: np.ndarray) -> MetricSummary:
 
 
 def spread(values: np.ndarray) -> MetricSpread:
-    """How a metric's values lie: the one rule of tables, reports and comparisons."""
+    """The spread of a metric's values: the one rule of tables, reports and comparisons."""
     rising = np.sort(values[np.isfinite(values)])
     infinite, unknown = int(np.isinf(values).sum()), int(np.isnan(values).sum())
     if not len(rising):

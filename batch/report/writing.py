@@ -34,7 +34,7 @@ def check(output: Path) -> None:
 
 
 def is_report(path: Path) -> bool:
-    """Whether a file says that it is a page of ours."""
+    """True if a file says that it is a page of ours."""
     with open_regular(path) as file:
         return f'<meta name="generator" content="{GENERATOR}">'.encode() in file.read(HEAD_BYTES)
 

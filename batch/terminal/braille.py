@@ -13,7 +13,7 @@ DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
 """Bit of each dot of a character, by row and column (Unicode, "Braille Patterns")."""
 
 LARGEST = 1e300
-"""What is larger has no place on an axis: sums and ranges of such numbers are no numbers any more."""
+"""The largest number that has a place on an axis: sums and ranges of larger ones are no numbers any more."""
 
 SMALLEST = 1e-290
 """Ranges that are smaller are none: a tenth of them may be 0."""

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def program(asked: DumpRequest) -> Iterator[str]:
-    """What is computed when: control, then each straight piece, operation by operation; `%n` is what number n gives."""
+    """The listing of a program: control, then each straight piece by operations; `%n` is the result of number n."""
     from met.backends.reference.listing import lines
 
     for experiment, recording in _recorded(asked):

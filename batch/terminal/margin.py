@@ -94,7 +94,7 @@ def in_words(one: Margin) -> str:
 
 
 def remedy(one: Margin) -> str:
-    """What may make a joint stable that is not."""
+    """Help that may make an unstable joint stable."""
     if one.too_light:
         return "a lower gain of the servo's rate loop, a faster servo or a heavier arm"
     changed = "lower gains" if one.limit == 0.0 else "a lighter arm"

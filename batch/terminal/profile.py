@@ -68,7 +68,7 @@ def _row(name: str, parts: Sequence[WorkCost], whole: float, *, times: bool = Tr
 
 
 def _events(parts: Sequence[WorkCost]) -> str:
-    """How often friction made a block decide anew, and go back."""
+    """Say how often friction made a block decide anew, and go back."""
     rate = {part.work: part.calls for part in parts if part.event}
     decided, split = rate.get("friction decisions", 0.0), rate.get("friction splits", 0.0)
     if "friction decisions" not in rate:
@@ -86,7 +86,8 @@ def _kernel(found: RunProfile) -> Iterator[tuple[str, str]]:
 
 
 def _inputs(found: RunProfile) -> Iterator[tuple[str, ...]]:
-    """What a sweep varies, how much of its work is done before the first step, and how much each step has of it."""
+    """Lines about what a sweep varies, how much of its work is done before the first step, and how much each step has
+    of it."""
     yield "varied", "sets", "once", "kept", "taken by"
     for each in found.inputs:
         yield each.path, *(f"{number:,}" for number in (each.sets, each.hoisted, each.kept, each.read_by))

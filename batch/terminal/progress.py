@@ -12,7 +12,7 @@ from typing import TextIO
 from met.messages.visible import line
 
 FIRST_SECONDS = 0.3
-"""What is over sooner needs no bar."""
+"""Time, s, before the bar is first drawn: what is over sooner needs none."""
 
 BAR_SECONDS = 0.1
 LINE_SECONDS, SELDOM = 5.0, 60.0

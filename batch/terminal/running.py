@@ -256,7 +256,7 @@ def _complain(problem: Problem, json: bool) -> None:
 
 
 def _compared(again: Replay | None, unlike: Sequence[str]) -> list[str]:
-    """What a replay says of its archive."""
+    """Lines that compare a replay with its archive."""
     if again is None:
         return []
     if not unlike:

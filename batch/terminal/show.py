@@ -97,7 +97,7 @@ class _Lines:
 def _about(
     archive: ArchiveFile, group: ArchiveGroup, position: int | None, all_cases: bool, by: By | None, width: int
 ) -> list[str]:
-    """How the cases went, and which of them how; or one case: how it went, and what was varied in it."""
+    """Lines about how the cases went, and which of them how; or about one case, with what was varied in it."""
     if position is not None:
         varied = cases.varied_lines(archive, group, position)
         name = [case_text(group, position, varied=False)] if group.count > 1 else []
@@ -180,7 +180,7 @@ def picked(archive: ArchiveFile, names: Sequence[str], case: str | None) -> list
 
 
 def heading(group: ArchiveGroup, width: int) -> list[str]:
-    """What was run."""
+    """Lines that say what was run."""
     a = group.attributes
     count = f"{group.count:,} case{'s' if group.count != 1 else ''}"
     if group.count < a["cases_in_table"]:
@@ -208,7 +208,7 @@ def heading(group: ArchiveGroup, width: int) -> list[str]:
 
 
 def verdict(summary: Summary, width: int) -> list[str]:
-    """How it went: cases, metrics, requirements."""
+    """Lines that say how it went: cases, metrics, requirements."""
     out = [_counts(summary)]
     out += failure_lines(summary.failures, width)
     if summary.limited:
@@ -255,7 +255,7 @@ def _metric_table(summary: Summary) -> list[str]:
 
 
 def _metric_numbers(metric: MetricSummary, single: bool) -> tuple[str, ...]:
-    """Of the finite values; `_metric_words` says how many others there are."""
+    """The numbers of a metric's finite values, as texts; `_metric_words` says how many others there are."""
     if single:
         return ("inf" if metric.infinite else _text(metric.median, metric),)
     return tuple(_text(getattr(metric, column.field), metric) for column in SPREAD_COLUMNS)

@@ -32,7 +32,7 @@ MOST_GROUPS = 4
 
 
 def announcement(campaign: Campaign, verbose: bool = False, *, notes: bool = False) -> list[str]:
-    """What will run, and what will be kept. notes: those of the plan as well, which `met plan` prints."""
+    """Lines that say what will run, and what will be kept. notes: also those of the plan, which `met plan` prints."""
     out = []
     for part in campaign.parts:
         out += _part_lines(part, verbose)
@@ -45,7 +45,7 @@ def announcement(campaign: Campaign, verbose: bool = False, *, notes: bool = Fal
 
 
 def writing(campaign: Campaign) -> str:
-    """Where the archive will be, and how large: said once there is a kernel to fill it."""
+    """The line that says where the archive will be, and how large: printed once there is a kernel to fill it."""
     instead = ", in place of the one that is there" if campaign.output.exists() else ""
     return f"writing {campaign.output}, about {size_text(campaign.bytes)}{instead}"
 
@@ -91,7 +91,8 @@ class WorstCaseLines:
 
 
 def worst_cases(archive: ArchiveFile) -> tuple[WorstCaseLines, ...]:
-    """Of every experiment; none where there is one case, or nothing by which one would be worse than another."""
+    """The worst cases of every experiment; none where there is one case, or nothing by which one would be worse than
+    another."""
     from batch.queries import cases
 
     out = []

@@ -89,8 +89,8 @@ class Before:
         return np.where(self.there, before[self.place], np.nan)
 
     def history_of(self, number: int, position: int) -> tuple[ArchiveGroup, int] | None:
-        """Of a case of the pool's structure `number`, the other archive's group and its position in it, where it has
-        its history."""
+        """The other archive's group and its position in it, for a case of the pool's structure `number`; None where the
+        other has no history of it."""
         for mine, group, experiment in self.pairs:
             if mine == number:
                 found = np.flatnonzero(experiment.cases.b == position)
@@ -118,7 +118,7 @@ def change(column: CaseColumn) -> CaseColumn | None:
 
 
 def called(before: Path, now: Path) -> tuple[str, str]:
-    """What two archives are called in a page: by their names, or where these are the same by as much of their paths as
+    """The names of two archives in a page: those of their files, or where these are the same as much of their paths as
     tells them apart."""
     one, two = before.absolute().parts, now.absolute().parts
     for length in range(1, max(len(one), len(two)) + 1):
@@ -147,7 +147,7 @@ def named(found: Diff, before: str, now: str) -> Diff:
 
 
 def narrowed(found: Diff, groups: Sequence[ArchiveGroup]) -> Diff:
-    """What is found of these runs and sweeps of the second archive alone."""
+    """The differences of these runs and sweeps of the second archive alone."""
     names = {group.name for group in groups}
     experiments = tuple(each for each in found.experiments if each.name_b in names)
     only_b = tuple(name for name in found.only_b if name in names)

@@ -43,7 +43,7 @@ class RunChanges:
 
 @frozen
 class ArchiveChanges:
-    """What changed against another archive.
+    """The differences from another archive as a whole.
 
     before   what the other is called, and `now` this one
     origins  what they were made from and that differs

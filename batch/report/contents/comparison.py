@@ -30,7 +30,7 @@ KINDS = {
 
 
 def archive_changes(found: Diff) -> ArchiveChanges:
-    """What the two archives were made from, and what one of them has alone."""
+    """The differences of what the two archives were made from, and the runs that one of them has alone."""
     origins = tuple(
         OtherOrigin(KINDS[kind], lines[:MOST_LINES], max(0, len(lines) - MOST_LINES))
         for kind, lines in words.made(found)
@@ -72,7 +72,7 @@ def _run_changes(found: Diff, experiment: ExperimentDiff, several: bool) -> RunC
 
 
 def verdict(against: Against, pairs: Sequence[tuple[Pool, Before | None]]) -> Verdict:
-    """Of all cases together. pairs: what the page is about, with what it was before."""
+    """The verdict of the comparison, of all cases together. pairs: what the page is about, with what it was before."""
     found = against.found
     both = [(pool, before) for pool, before in pairs if before is not None]
     said = words.verdict(found).removeprefix(found.verdict).lstrip(",;: ")
@@ -102,7 +102,8 @@ def _parts(against: Against, pairs: Sequence[tuple[Pool, Before | None]]) -> tup
 
 
 def _figure(both: Sequence[tuple[Pool, Before]]) -> tuple[int, int, int] | None:
-    """How many cases meet all that is required, before and now, of how many in both; None where nothing is."""
+    """The number of cases that meet all that is required, before and now, and of all that are in both; None where
+    nothing is required."""
     judged = [(pool, before) for pool, before in both if pool.requirements and before.pool.requirements]
     total = sum(int(before.there.sum()) for _, before in judged)
     if total < 2:

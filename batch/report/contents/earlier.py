@@ -26,8 +26,8 @@ class Earlier:
         self._panels: dict[tuple[bool, str], dict[tuple[str, str], Panel]] = {}
 
     def of(self, case: int, number: int, position: int) -> tuple[History | None, History | None]:
-        """Of the case at a position of the pool's structure `number`: what was recorded of it, and this less that, at
-        the instants that both have; None where it has no history there."""
+        """The other archive's history of the case at a position of the pool's structure `number`, and this less that,
+        at the instants that both have; None where it has no history there."""
         there = self.before.history_of(number, position)
         if there is None:
             return None, None

@@ -26,7 +26,7 @@ from met.host.files import open_regular
 from met.plan import Experiment
 
 MOST_LINES, MOST_LETTERS = 2000, 200_000
-"""Of a file of the deck that are in a page."""
+"""Lines, and letters, of a file of the deck that are in a page, at most."""
 
 MOST_HASHED = 4 << 30
 """Bytes of an archive whose digest is looked for."""

@@ -33,7 +33,7 @@ MOST_PANELS = 32
 
 
 def signals(pool: Pool, values: int = MOST_VALUES, before: Before | None = None) -> Signals | None:
-    """Of the worst cases that have histories, and of the middle one; None where none has one.
+    """The histories of the worst cases that have some, and of the middle one; None where none has one.
 
     values  how many numbers there may be
     before  another archive to compare with: the cases that differ most from it come first, each with what it was there
@@ -105,7 +105,7 @@ def _kept(pool: Pool, before: Before | None = None) -> list[tuple[int, int]]:
 
 
 def _said(groups: Sequence[_Group], known: int, here: int, plots: int, points: int, compared: bool) -> tuple[str, ...]:
-    """What is not in the page. known, here: recorded cases, and those of them that are in it."""
+    """Say what is not in the page. known, here: the numbers of recorded cases, and of those of them that are in it."""
     out = []
     if here < known:
         which = "those that changed most and of the worst" if compared else "the worst"
@@ -122,14 +122,14 @@ def _said(groups: Sequence[_Group], known: int, here: int, plots: int, points: i
 
 
 def no_signals(pool: Pool) -> str:
-    """What to do where there are none."""
+    """Say how to record signals, where there are none."""
     if any(group.attributes.get("cases_in_table", 0) > 1 for group in pool.groups):
         return "No histories were kept. The commands of the table above run a case again, with its signals."
     return "No histories were kept: `--histories all` keeps them."
 
 
 class _Group:
-    """What was recorded of the cases of one structure, of which those at these positions are wanted."""
+    """The histories of the cases of one structure, of which those at these positions are wanted."""
 
     def __init__(self, group: ArchiveGroup, positions: Sequence[int]) -> None:
         self.group = group

@@ -27,7 +27,8 @@ BAD_CASE = "case"
 
 
 def overview(pool: Pool, before: Before | None = None) -> Overview | None:
-    """Of a sweep; none where there is one case, or no metric. before: its cases in the archive it is compared with."""
+    """The points of a sweep; None where there is one case, or no metric. before: its cases in the archive it is
+    compared with."""
     metrics, varied = pool.metrics(), pool.varied()
     if pool.count < 2 or not metrics:
         return None
@@ -75,7 +76,8 @@ def _at(column: CaseColumn, places: np.ndarray) -> CaseColumn:
 
 
 def _compared(pool: Pool, before: Before) -> tuple[CaseColumn, ...]:
-    """What a case is, compared with what it was: what `met diff` says of it, and whether it meets what is required."""
+    """Columns that compare each case with the other archive: the verdict of `met diff`, and whether it meets what is
+    required."""
     verdicts = (*VERDICTS[:3], "only now")
     how = np.where(before.there, before.how, len(verdicts) - 1).astype(float)
     yes, no = ("meets all", "does not") if pool.requirements else ("reaches its end", "does not")
@@ -129,14 +131,14 @@ def _drawn(
 
 
 def _on_dots(x: np.ndarray, y: np.ndarray, rank: np.ndarray, across: int, up: int) -> np.ndarray:
-    """Of the cases on each dot the one of lowest rank. What is not finite has dots of its own, beside the others."""
+    """The case of lowest rank on each dot. Values that are not finite have dots of their own, beside the others."""
     dots = _strips(x, across) * (up + 4) + _strips(y, up)
     order = np.argsort(rank, kind="stable")
     return order[np.unique(dots[order], return_index=True)[1]]
 
 
 def _strips(values: np.ndarray, count: int) -> np.ndarray:
-    """Of each value which of `count` equal stretches it lies in; then one each for inf, -inf and not a number."""
+    """The stretch, of `count` equal ones, that each value lies in; then one each for inf, -inf and not a number."""
     finite = np.isfinite(values)
     out = np.full(len(values), count + 3)
     low, high = values[finite].min(initial=np.inf), values[finite].max(initial=-np.inf)

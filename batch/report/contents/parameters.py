@@ -27,7 +27,7 @@ MOST_ROWS = 10_000
 
 
 def spot(place: Place | None) -> Spot | None:
-    """Where the deck's author should look."""
+    """The line of the deck that its author should look at."""
     if place is None:
         return None
     shown = shown_place(place)
@@ -35,7 +35,8 @@ def spot(place: Place | None) -> Spot | None:
 
 
 def parameters(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[ParameterRow, ...]:
-    """Of all structures: settings of the run, then parameters, each once where all structures have it alike."""
+    """The parameters of all structures: settings of the run, then parameters, each once where all structures have it
+    alike."""
     found: dict[str, dict[ParameterRow, list[str]]] = {}
     names = [group.name for group in pool.groups if group.name in experiments]
     for name in names:
@@ -99,7 +100,7 @@ def _value(quantity: Quantity, spans: Mapping[int, tuple[float, float]]) -> str:
 
 
 def varied(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[VariedParameter, ...]:
-    """What tells the cases apart, with its values."""
+    """The parameters and choices that tell the cases apart, with their values."""
     places: dict[str, tuple[Spot | None, tuple[str, ...]]] = {}
     for experiment in experiments.values():
         for choice in experiment.cases.choices:

@@ -270,8 +270,8 @@ class SignalPanel:
 
 @frozen
 class History:
-    """What was recorded of a case: for each panel (by place in `Signals.panels`) its lines, (time, line), at the times
-    numbered `clock`.
+    """The recorded signals of a case: for each panel (by place in `Signals.panels`) its lines, (time, line), at the
+    times numbered `clock`.
 
     before, change  what the other archive has of it, where one is compared with, and this less that
     """
@@ -331,7 +331,7 @@ class BedStability:
 
 @frozen
 class Stability:
-    """Of some cases, whether their beds are stable.
+    """The stability of the motor beds in some cases.
 
     columns  what r may be drawn against
     spans    whether one is unstable where the arm is too light, so that the beds' `stable_at` have two ends

@@ -25,7 +25,7 @@ MOST_LOOPS = 6
 def stability(
     pool: Pool, experiments: Mapping[str, Experiment], progress: Callable[[int], None] | None = None
 ) -> Stability | None:
-    """Of the structures that have a bed; None where none has."""
+    """The stability of the beds of all structures that have one; None where none has."""
     found: dict[int, tuple[Margin, ...]] = {}
     left = 0
     for number, group in enumerate(pool.groups):

@@ -64,7 +64,7 @@ def cell_text(column: CaseColumn, place: int) -> str:
 
 
 def _misses(pool: Pool, column: CaseColumn, place: int) -> bool:
-    """Whether a metric misses a requirement there."""
+    """True if a metric misses a requirement in this case."""
     return any(pool.outcomes[place, pool.requirements.index(limit.text)] == 0 for limit in column.limits)
 
 

@@ -20,7 +20,7 @@ def thin_clock(time: np.ndarray, points: int) -> np.ndarray:
 
 
 def thin(values: np.ndarray, points: int) -> np.ndarray:
-    """Of each stretch of rows the smallest and the largest value, in the order in which they come.
+    """The smallest and the largest value of each stretch of rows, in the order in which they come.
 
     values: (time, line). Values that are not finite are none; a stretch of nothing else is not a number.
     """

@@ -20,7 +20,8 @@ FEWEST = 8
 
 
 def verdict(pool: Pool, *, named: bool) -> Verdict:
-    """Whether all cases reached their end and met all that is required. named: whether to say of which run or sweep."""
+    """The verdict on a run or sweep: yes if all cases reached their end and met all that is required. named: True to
+    say of which run or sweep."""
     ended = np.bincount(pool.ended, minlength=len(ENDED))
     parts = tuple(OutcomeCount(word, int(n)) for word, n in zip(ENDED, ended, strict=True) if n)
     good = int(ended[ENDED.index("met")] + ended[ENDED.index("done")])
@@ -127,6 +128,6 @@ def _metric(column: CaseColumn, before: np.ndarray | None) -> MetricRow:
 
 
 def _counts(values: np.ndarray, low: float, high: float) -> tuple[int, ...]:
-    """How many lie in each of `BARS` equal stretches."""
+    """A histogram: the number of values in each of `BARS` equal stretches."""
     places = np.minimum(((values - low) / (high - low) * BARS).astype(int), BARS - 1)
     return tuple(np.bincount(places, minlength=BARS).tolist())

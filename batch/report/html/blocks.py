@@ -20,7 +20,7 @@ from batch.report.contents.parts import (
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
 
 Anchors = Mapping[str, tuple[int, int]]
-"""Of each file whose text is in the page: its number, and how many of its lines are there."""
+"""For each file whose text is in the page: its number, and how many of its lines are there."""
 
 WORDS = {"met": "meet all", "missed": "miss a requirement", "unknown": "not known", "done": "reached their end"}
 

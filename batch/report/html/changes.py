@@ -32,7 +32,7 @@ MOST_ENDED = 20
 
 
 def origins(found: ArchiveChanges) -> Html:
-    """What the two archives were made from and that differs, and what one of them has alone."""
+    """The section on what the two archives were made from, and on runs that one of them has alone."""
     rows = [el("div", el("dt", each.about), el("dd", _lines(each))) for each in found.origins]
     same = el("p", SAME[0].upper() + SAME[1:], ".", cls="said") if not rows else None
     return join([el("dl", rows, cls="facts made") if rows else None, same, _noted(found.alone)])
@@ -54,7 +54,7 @@ def _lines(found: OtherOrigin) -> list[Html]:
 
 
 def _line(said: str) -> Html:
-    """What is indented is a line of a deck."""
+    """A line about a change; an indented one is a line of a deck."""
     return el("p", said[2:], cls="text") if said.startswith("  ") else el("p", said)
 
 

@@ -10,7 +10,7 @@ from batch.report.html.markup import Child, Html, el, join, lines
 from batch.report.html.payload import script_json, section_data
 
 GENERATOR = "MET report"
-"""By which a page is known as one of ours, which may be written over."""
+"""The name in a page's `generator`, by which it is known as one of ours, which may be written over."""
 
 
 def page(report: Report) -> str:

@@ -20,7 +20,7 @@ PRECISE = 1e-6
 """Numbers are kept in four bytes where the error of that is smaller than this share of their range."""
 
 LEGIBLE = str.maketrans({c: f"\\u{ord(c):04x}" for c in "<>&\u2028\u2029"})
-"""What might end a script, or be markup in it, as JSON may write it too."""
+"""Escapes, which JSON allows too, for letters that might end a script or be markup in it."""
 
 
 def script_json(data: Any) -> Html:
@@ -133,7 +133,7 @@ def _ruler(found: Ruler) -> dict[str, Any]:
 
 
 def _reach(found: Reach | None) -> dict[str, Any] | None:
-    """How far colours reach, and how many values lie beyond."""
+    """The range of the colours, and how many values lie beyond, for the page's scripts."""
     if found is None:
         return None
     return {
