@@ -84,7 +84,7 @@ def run(
     from batch.executors.choose import choose
     from batch.export import from_run
 
-    archive, target = from_run.parted(output)
+    archive, target = from_run.archive_and_export(output)
     chosen = executor or choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
     campaign = prepare(
         _plan(plan), output=archive, experiments=experiments, cases=cases, histories=histories, float32=float32
@@ -93,7 +93,7 @@ def run(
         from_run.check(campaign, target, histories=histories != "default")
     performed = perform(campaign, executor=chosen, fresh=fresh, max_failures=max_failures, progress=progress)
     if target is not None:
-        from_run.written(campaign, target, histories=histories != "default")
+        from_run.export_run(campaign, target, histories=histories != "default")
     return look(campaign.output, (*campaign.notes, *performed.notes))
 
 

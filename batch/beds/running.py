@@ -16,7 +16,7 @@ from batch.campaigns.performing import perform
 from batch.queries.summary import summarise
 from batch.terminal.margin import in_words, remedy
 from batch.terminal.running import first_picture, read_plan
-from batch.terminal.verdict import announcement, told, worst_cases, writing
+from batch.terminal.verdict import announcement, result_lines, worst_cases, writing
 from hw.case import pace_of
 from hw.ports import check_model, in_lock_step, kind_of, ports_in_words
 from met.analysis.margin import margins
@@ -146,7 +146,7 @@ def run_and_tell(
     for line in timing_lines(executor):
         say(line)
     ok = all(summary.ok for summary in summaries)
-    say("\n".join(told(source, campaign, summaries, worst, picture, excuse, None, performed.seconds, ok, ())))
+    say("\n".join(result_lines(source, campaign, summaries, worst, picture, excuse, None, performed.seconds, ok, ())))
     return ok
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from batch.archive import layout as archive_layout
 from batch.campaigns import choosing
 from batch.campaigns.folder import Folder, beside
-from batch.campaigns.keep import CaseOutcomes, Keep, chosen, keep, known, listed
+from batch.campaigns.keep import CaseOutcomes, Keep, as_list, keep, kept_before, kept_by_outcome
 from batch.campaigns.output import check_output, check_room, default_output
 from batch.campaigns.tasks import CampaignSection
 from ic.printing.columns import size as size_text
@@ -151,14 +151,14 @@ def prepare(
     if selected is None:
         asked = choosing.experiments_named(plan, experiments)
         all_of = sum(experiment.cases.count for experiment in asked)
-        selected = choosing.selected(asked, cases)
+        selected = choosing.select_rows(asked, cases)
     selected = [(experiment, rows) for experiment, rows in selected if len(rows)]
     if not selected:
         raise Problem(error("E311", "there is no case to run", help="`met cases DECK` lists them"))
     named = [experiment for experiment, _ in selected]
     target = Path(output) if output is not None else default_output(plan, experiments, selected, all_of)
     wanted = keep(histories, named)
-    words = tuple(listed(histories))
+    words = tuple(as_list(histories))
     parts = _parts(selected, wanted, float32)
     if kept is not None:
         parts = tuple(replace(part, kept=np.searchsorted(part.rows, kept[part.experiment.name])) for part in parts)
@@ -183,7 +183,7 @@ def prepare(
 
 def _parts(selected: Sequence[tuple[Experiment, np.ndarray]], wanted: Keep, single: bool) -> tuple[CampaignPart, ...]:
     """The experiments with what is kept of them. Raises Problem E311, E312 for cases that are none."""
-    chosen = choosing.selected([experiment for experiment, _ in selected], wanted.cases) if wanted.cases else []
+    chosen = choosing.select_rows([experiment for experiment, _ in selected], wanted.cases) if wanted.cases else []
     named = {experiment.name: rows for experiment, rows in chosen}
     strays, run = set[int](), set[int]()
     for experiment, rows in selected:
@@ -197,7 +197,7 @@ def _parts(selected: Sequence[tuple[Experiment, np.ndarray]], wanted: Keep, sing
     parts = []
     for experiment, rows in selected:
         if experiment.structure.history_bytes:
-            kept = known(wanted, experiment, rows, named.get(experiment.name, np.empty(0, np.int64)))
+            kept = kept_before(wanted, experiment, rows, named.get(experiment.name, np.empty(0, np.int64)))
             parts.append(CampaignPart(experiment, rows, kept, wanted.at_most(len(rows)), single))
         else:
             parts.append(CampaignPart(experiment, rows, np.empty(0, np.int64)))
@@ -224,7 +224,7 @@ def histories_section(
         return None
     kept = part.kept
     if campaign.keep.later:
-        kept = distinct(np.concatenate([kept, chosen(campaign.keep, part.experiment, results())]))
+        kept = distinct(np.concatenate([kept, kept_by_outcome(campaign.keep, part.experiment, results())]))
     if not len(kept):
         return None
     number = len(campaign.parts) + values.number

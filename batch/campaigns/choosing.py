@@ -33,7 +33,7 @@ def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experime
     return tuple(found.values())
 
 
-def selected(
+def select_rows(
     experiments: Sequence[Experiment], cases: Sequence[int | str] | None
 ) -> list[tuple[Experiment, np.ndarray]]:
     """The rows of each experiment that some cases are, by position (`7`, `"#7"`) or the beginning of a case_id; all for

@@ -13,7 +13,7 @@ from typing import Protocol
 
 from batch.campaigns import shard, tasks
 from batch.campaigns.cutting import Cutter
-from batch.campaigns.folder import Folder, gaps
+from batch.campaigns.folder import Folder, uncovered
 from batch.campaigns.tasks import CampaignSection, Task
 from batch.executors import Executor, Outcome
 from met.run import LOST, TIMED_OUT
@@ -75,7 +75,7 @@ class Driver:
         """Count what is there of a section; the stretches that are missing."""
         kept, told = self.folder.sound(section)
         self.told += told
-        missing = gaps(kept, len(section.rows))
+        missing = uncovered(kept, len(section.rows))
         count = self.counts[section.number] = Count(len(section.rows) - sum(last - first for first, last in missing))
         for done in kept.values():
             count.failed += done.failed

@@ -176,7 +176,7 @@ class Folder:
                 }
             )
         data = {"schema": SCHEMA, "version": FORMAT, "met": VERSION, "deck": plan.deck, "sections": told, **about}
-        put(self.path / "campaign.json", data)
+        write_json(self.path / "campaign.json", data)
 
     def described(self) -> dict[str, Any]:
         """The campaign's description, campaign.json. Raises Problem where that is damaged, or of another version of
@@ -387,7 +387,7 @@ def beside(archive: Path) -> Path:
     return archive.with_name(archive.name + ENDING)
 
 
-def gaps(tasks: Iterable[Task], cases: int) -> list[tuple[int, int]]:
+def uncovered(tasks: Iterable[Task], cases: int) -> list[tuple[int, int]]:
     """Stretches of cases that no task covers; tasks by their first cases."""
     out, at = [], 0
     for task in tasks:
@@ -397,7 +397,7 @@ def gaps(tasks: Iterable[Task], cases: int) -> list[tuple[int, int]]:
     return [*out, (at, cases)] if at < cases else out
 
 
-def put(path: Path, data: Any) -> None:
+def write_json(path: Path, data: Any) -> None:
     """Write JSON whole, or not at all."""
     with whole_file(path) as file:
         file.write(json.dumps(data).encode())

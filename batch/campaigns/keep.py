@@ -46,7 +46,7 @@ class Keep:
         return min(cases, sum(count for count, _ in self.worst))
 
 
-def listed(words: str | int | Sequence[str | int]) -> list[str | int]:
+def as_list(words: str | int | Sequence[str | int]) -> list[str | int]:
     """One word or several, numbers of numpy's kind as Python's."""
     several: Sequence[Any] = [words] if isinstance(words, str) or not hasattr(words, "__iter__") else list(words)
     return [word if isinstance(word, str) else int(word) for word in several]
@@ -54,7 +54,7 @@ def listed(words: str | int | Sequence[str | int]) -> list[str | int]:
 
 def keep(words: str | int | Sequence[str | int], experiments: Sequence[Experiment]) -> Keep:
     """Read one or several words of `--histories` (`WORDS`). Raises Problem E351."""
-    given = listed(words)
+    given = as_list(words)
     found = Keep()
     for word in given:
         found = _with(found, word, experiments)
@@ -105,7 +105,7 @@ def _check_metric(metric: str, experiments: Sequence[Experiment]) -> None:
         raise Problem(error("E351", f"no metric `{metric}` by which cases could be the worst", help=helps))
 
 
-def known(found: Keep, experiment: Experiment, rows: np.ndarray, named: np.ndarray) -> np.ndarray:
+def kept_before(found: Keep, experiment: Experiment, rows: np.ndarray, named: np.ndarray) -> np.ndarray:
     """Places in `rows` of the cases whose histories are kept for what they are. named: rows of `found.cases`."""
     if found.everything:
         return np.arange(len(rows))
@@ -123,7 +123,7 @@ class CaseOutcomes:
     metrics: Mapping[str, np.ndarray]
 
 
-def chosen(found: Keep, experiment: Experiment, results: CaseOutcomes | Run) -> np.ndarray:
+def kept_by_outcome(found: Keep, experiment: Experiment, results: CaseOutcomes | Run) -> np.ndarray:
     """Places of the cases whose histories are kept for what became of them: results of all."""
     kept = np.zeros(len(results.status), dtype=bool)
     if found.failed:

@@ -61,7 +61,7 @@ def merge(
         waiting, first, held = [outputs[cases:]], first + cases, held - cases
         progress(first)
 
-    for at, found in pieces(folder, values):
+    for at, found in shards_in_order(folder, values):
         if found.history is not None:
             writer.put_signals(number, at, _results(values, at, found.outputs.copy(), found.history, dict(found.fates)))
         fates |= {at - first + case: fate for case, fate in found.fates.items()}
@@ -74,7 +74,7 @@ def merge(
     if histories is not None:
         again = np.concatenate(before)
         first_kept = 0
-        for at, found in pieces(folder, histories):
+        for at, found in shards_in_order(folder, histories):
             # a case that gave nothing then has no history either: it is what was found of it first that counts
             lost = {case - at: fate for case, fate in ended.items() if 0 <= case - at < len(found.outputs)}
             known = {**found.fates, **lost}
@@ -95,7 +95,7 @@ def without_history(folder: Folder, values: CampaignSection, histories: Campaign
 
 def _alone(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, str]]:
     """Rows that could not be run, and why; each has a shard of its own. One that a shard before it holds as well counts
-    as it is there, as in `pieces`: a worker that was thought dead may have come to its end."""
+    as it is there, as in `shards_in_order`: a worker that was thought dead may have come to its end."""
     at = 0
     for task in folder.named(section.number):
         if task.cases == 1 and task.first >= at:
@@ -108,7 +108,7 @@ def _alone(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, str]
 def results(folder: Folder, section: CampaignSection) -> CaseOutcomes:
     """Status and metrics of all cases of a section, by which histories are chosen."""
     status, metrics = np.empty(len(section.rows), np.int8), dict[str, np.ndarray]()
-    for at, found in pieces(folder, section):
+    for at, found in shards_in_order(folder, section):
         run = _results(section, at, found.outputs, None, dict(found.fates))
         status[at : at + len(run.status)] = run.status
         for name, values in run.metrics.items():
@@ -116,7 +116,7 @@ def results(folder: Folder, section: CampaignSection) -> CaseOutcomes:
     return CaseOutcomes(status, metrics)
 
 
-def pieces(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, shard.Shard]]:
+def shards_in_order(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, shard.Shard]]:
     """The shards of a section in order, less what was had before, each with the place of its first case."""
     at = 0
     for task in folder.named(section.number):

@@ -18,9 +18,9 @@ from batch.archive.sink import temporary_of
 from batch.campaigns import merge, resuming
 from batch.campaigns.campaign import Campaign, histories_section, values_sections
 from batch.campaigns.drive import Driver, Progress, Stopped, TooManyFailures
-from batch.campaigns.folder import Folder, FolderBusy, beside, gaps
+from batch.campaigns.folder import Folder, FolderBusy, beside, uncovered
 from batch.campaigns.output import busy, cannot_write, check_room, publish
-from batch.campaigns.status import Reporter, died
+from batch.campaigns.status import Reporter, died_lines
 from batch.campaigns.tasks import CampaignSection
 from batch.executors import Executor
 from batch.executors.threads import Threads
@@ -78,11 +78,11 @@ def perform(
     """
     values = resuming.as_begun(Folder(beside(campaign.output)), campaign, values_sections(campaign))
     key = resuming.campaign_key(values)
-    there = resuming.there(campaign, key)
+    there = resuming.finished_state(campaign, key)
     if there == resuming.WHOLE and not fresh:
-        resuming.tidy(Folder(beside(campaign.output)), key)
+        resuming.remove_leftovers(Folder(beside(campaign.output)), key)
         return Performed({}, whole=True)
-    if not there and not fresh and not together and not resuming.goes_on(Folder(beside(campaign.output)), key):
+    if not there and not fresh and not together and not resuming.is_begun(Folder(beside(campaign.output)), key):
         resuming.guard(campaign)
     check_room(campaign.output, campaign.bytes_missing)
     values[0].prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
@@ -93,7 +93,7 @@ def perform(
         raise Problem(busy(campaign.output)) from None
     except OSError as reason:
         raise Problem(cannot_write(campaign.output, reason)) from reason
-    if not fresh and there != resuming.WHOLE and resuming.there(campaign, key) == resuming.WHOLE:
+    if not fresh and there != resuming.WHOLE and resuming.finished_state(campaign, key) == resuming.WHOLE:
         folder.remove()  # another run has ended meanwhile
         return Performed({}, whole=True)
     if there == resuming.DAMAGED and not fresh:
@@ -154,7 +154,7 @@ class _CampaignWork:
         self.resumed = bool(self.folder.named(0)) and not fresh
         for note in resuming.take_up(self.folder, self.campaign, self.values, self.key, fresh):
             self._note(note)
-        for note in died(self.folder) if self.resumed else ():
+        for note in died_lines(self.folder) if self.resumed else ():
             self._note(note)
         self.ours = True
         self.folder.forget()
@@ -203,7 +203,7 @@ class _CampaignWork:
         left = sum(
             last - first
             for section in self.values
-            for first, last in gaps(self.folder.named(section.number), len(section.rows))
+            for first, last in uncovered(self.folder.named(section.number), len(section.rows))
         )
         done = self.campaign.cases - left
         return f"{done:,} of {self.campaign.cases:,} cases are kept in {self.folder.path}; the same command goes on"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
-from batch.terminal.show import chosen, picked
+from batch.terminal.show import cases_named, groups_named
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Experiment, Plan
@@ -43,15 +43,15 @@ def replay(
     with ArchiveFile(archive) as file:
         rows: dict[str, set[int]] = {}
         for case in cases:
-            for group, position in picked(file, names, case):
+            for group, position in cases_named(file, names, case):
                 if position is not None:
                     rows.setdefault(group.name, set()).add(_row(group, position))
         if failed:
-            for group in chosen(file, names):
+            for group in groups_named(file, names):
                 for position in np.flatnonzero(group.values("status") != 0).tolist():
                     rows.setdefault(group.name, set()).add(_row(group, position))
         positions: dict[str, np.ndarray] = {}
-        for group in chosen(file, names) if everything else ():
+        for group in groups_named(file, names) if everything else ():
             rows[group.name] = set(group.values("case").tolist())
             positions[group.name] = group.values("case")[group.recorded_positions]
         if not cases and not failed and not everything:

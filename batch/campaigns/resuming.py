@@ -61,11 +61,11 @@ def _begun_key(folder: Folder, campaign: Campaign) -> str:
 
 
 def proof(campaign: Campaign, key: str, archive: Path) -> dict[str, str]:
-    """Entries of a finished archive's sidecar by which `there` knows it again."""
+    """Entries of a finished archive's sidecar by which `finished_state` knows it again."""
     return {"campaign": key, "asked_sha256": _asked_sum(campaign), "archive_sha256": _file_sum(archive)}
 
 
-def there(campaign: Campaign, key: str) -> str:
+def finished_state(campaign: Campaign, key: str) -> str:
     """WHOLE where the archive is there, of this very campaign and plan, and as it was written; DAMAGED where it is not
     as it was written; else ""."""
     output = campaign.output
@@ -110,7 +110,7 @@ def _what(found: Sequence[str]) -> list[str]:
     ]
 
 
-def goes_on(folder: Folder, key: str) -> bool:
+def is_begun(folder: Folder, key: str) -> bool:
     """True if the folder holds this very campaign, begun."""
     try:
         return folder.exists() and folder.described()["key"] == key
@@ -118,7 +118,7 @@ def goes_on(folder: Folder, key: str) -> bool:
         return False
 
 
-def tidy(folder: Folder, key: str) -> None:
+def remove_leftovers(folder: Folder, key: str) -> None:
     """Remove what a run left that was killed after its archive had got its name; not what another campaign began."""
     folder.forget()
     if not folder.exists():

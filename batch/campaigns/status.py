@@ -11,7 +11,7 @@ from typing import Any
 
 from batch.archive.read import ArchiveFile
 from batch.campaigns.drive import Progress
-from batch.campaigns.folder import ENDING, Folder, beside, gaps, put
+from batch.campaigns.folder import ENDING, Folder, beside, uncovered, write_json
 from batch.campaigns.output import sidecar_path
 from batch.terminal.progress import duration
 from met.host.files import is_count, read_json
@@ -98,12 +98,12 @@ class Reporter:
         self._next = time.monotonic() + WRITE_SECONDS
         self._told["updated"] = time.time()
         try:
-            put(self._path, self._told)
+            write_json(self._path, self._told)
         except OSError:  # a full disk stops who writes results, and is told by them
             pass
 
 
-def told(folder: Folder) -> list[dict[str, Any]]:
+def status_records(folder: Folder) -> list[dict[str, Any]]:
     """The last status of each process that works or worked in a folder, the latest first."""
     found = []
     for path in folder.path.glob("status*.json"):
@@ -116,7 +116,7 @@ def told(folder: Folder) -> list[dict[str, Any]]:
     return sorted(found, key=lambda each: -each["updated"])
 
 
-def found(name: str) -> Folder | None:
+def find_folder(name: str) -> Folder | None:
     """The folder that a user means: its own name, or its archive's; None where there is none. Raises
     Problem for what is no sound archive."""
     path = Path(name)
@@ -131,12 +131,12 @@ def report(folder: Folder, now: float) -> dict[str, Any]:
     sections = []
     told_here = folder.described()
     for each in told_here["sections"]:
-        left = sum(last - first for first, last in gaps(folder.named(each["number"]), each["cases"]))
+        left = sum(last - first for first, last in uncovered(folder.named(each["number"]), each["cases"]))
         sections.append(
             {"name": each["name"], "cases": each["cases"], "done": each["cases"] - left, "again": each["again"]}
         )
     workers = []
-    for each in told(folder):
+    for each in status_records(folder):
         rate = None
         done = each["section_done"] - each["at_first"]
         seconds = each["updated"] - each["section_began"]
@@ -198,7 +198,7 @@ def lines(data: dict[str, Any]) -> list[str]:
     return out
 
 
-def whole(archive: Path) -> dict[str, Any] | None:
+def finished_archive(archive: Path) -> dict[str, Any] | None:
     """Data about a finished archive from its sidecar: its cases, and when it was begun; None where there is none.
     Raises Problem for what is no sound archive."""
     try:
@@ -213,7 +213,7 @@ def whole(archive: Path) -> dict[str, Any] | None:
         return {"archive": str(archive), "cases": sum(group.count for group in file.groups), "began": "unknown"}
 
 
-def here(folder: Path) -> list[str]:
+def unfinished_in(folder: Path) -> list[str]:
     """Campaigns in a folder that are not finished."""
     return sorted(path.name for path in folder.glob(f"*{ENDING}") if Folder(path).exists())
 
@@ -221,9 +221,9 @@ def here(folder: Path) -> list[str]:
 AT_WORK = ("starting", "running", "merging")
 
 
-def died(folder: Folder) -> Iterator[str]:
+def died_lines(folder: Folder) -> Iterator[str]:
     """Lines about an earlier run that ended without a word."""
-    for each in told(folder):
+    for each in status_records(folder):
         if not each["name"] and each["state"] in AT_WORK and not alive(each, time.time()):
             alone = "thread" in each["workers"] and not each["workers"].startswith("Dask")
             remedy = "; if a case did it, `--processes 2` finds out which" if alone else ""

@@ -41,14 +41,14 @@ def diff(a: str, b: str, tolerances: tuple[str, ...], require: str, distribution
     from batch.differences.campaigns import diff
     from batch.differences.compare import EQUIVALENT, VERDICTS
     from batch.differences.data import as_data
-    from batch.differences.told import Cut, told
+    from batch.differences.told import Shortening, diff_lines
     from batch.differences.tolerance import tolerances as read
     from met.outputs import quoted
 
     found = diff(a, b, read(tolerances), distributions=distributions)
     options = [*(f"--tol {quoted(each)}" for each in tolerances), *(["--distributions"] if distributions else [])]
-    cut = Cut(every, f"`{' '.join(['met diff', quoted(a), quoted(b), *options, '--all'])}`")
-    say(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(map(line, told(found, cut))))
+    cut = Shortening(every, f"`{' '.join(['met diff', quoted(a), quoted(b), *options, '--all'])}`")
+    say(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(map(line, diff_lines(found, cut))))
     enough = VERDICTS.index(found.verdict) <= VERDICTS.index(require)
     if form != "json" and found.verdict == EQUIVALENT and not enough:
         click.echo("exit 1: `--require identical` asks for the same bits")

@@ -159,14 +159,14 @@ def status(where: str, form: str) -> int:
     import time
     from pathlib import Path
 
-    from batch.campaigns.status import found, here, lines, report, whole
+    from batch.campaigns.status import find_folder, finished_archive, lines, report, unfinished_in
     from met.diagnostic import Problem, error
     from met.outputs import quoted
 
-    folder = found(where)
+    folder = find_folder(where)
     if folder is None:
-        if (data := whole(Path(where.removesuffix(".campaign")))) is None:
-            others = here(Path(where).parent)
+        if (data := finished_archive(Path(where.removesuffix(".campaign")))) is None:
+            others = unfinished_in(Path(where).parent)
             helps = ["campaigns here: " + ", ".join(others)] if others else []
             archives = sorted(path.name for path in Path(where).parent.glob(f"{glob.escape(Path(where).stem)}*.h5"))
             if archives and not where.endswith(".h5"):

@@ -97,12 +97,12 @@ def profile(
     Operations, flops and time of each part of a step, the share of what the core can do, what is folded into the code
     and what is an input, and how the kernel was made. Nothing is written but the cache.
     """
-    from batch.terminal.profile import told
+    from batch.terminal.profile import profile_lines
     from met.analysis.profile import as_data
     from met.analysis.profile import profile as measured
 
     found = [(measured(each), each) for each in _asked_for(source, names, defines, include_dirs, settings, form)]
-    _say(form, [as_data(each) for each, _ in found], [told(*each) for each in found])
+    _say(form, [as_data(each) for each, _ in found], [profile_lines(*each) for each in found])
     return YES
 
 
@@ -124,7 +124,7 @@ def margin(
     The loop of bed, servo and law is taken round once by the functions that run it, and its eigenvalues are looked at.
     Exit status: 0 all joints are stable in all cases; 1 one is not; 2 the input is wrong, or no joint is on a bed.
     """
-    from batch.terminal.margin import as_data, told
+    from batch.terminal.margin import as_data, margin_lines
     from met.analysis.margin import margins
     from met.diagnostic import Problem, error
 
@@ -134,7 +134,7 @@ def margin(
         helps = ("a run says so: `substitute JOINT { }`", "name the run or sweep that does, if it is another one")
         raise Problem(error("E333", "no joint is on a bed here", help=helps))
     found = [(each, margins(each)) for each in asked]
-    _say(form, [as_data(*each) for each in found], [told(*each) for each in found])
+    _say(form, [as_data(*each) for each in found], [margin_lines(*each) for each in found])
     return YES if all(one.stable for _, cases in found for case in cases for one in case) else NO
 
 

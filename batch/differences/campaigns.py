@@ -10,14 +10,14 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.differences import matching
-from batch.differences.changed import changed
+from batch.differences.changed import provenance_changes
 from batch.differences.compare import (
     DIFFERENT,
     EQUIVALENT,
     IDENTICAL,
     VERDICTS,
     Difference,
-    Passed,
+    SampledCourse,
     compare,
     compare_cases,
     magnitude,
@@ -25,7 +25,7 @@ from batch.differences.compare import (
     unlike_bits,
 )
 from batch.differences.demands import compare_requirements
-from batch.differences.found import Diff, DiffPlace, EndingDiff, ExperimentDiff, Ranked, SignalDiff
+from batch.differences.found import Diff, DiffPlace, EndingDiff, ExperimentDiff, RankedCase, SignalDiff
 from batch.differences.matching import MatchedCases
 from batch.differences.samples import samples
 from batch.differences.tolerance import SignalTolerance, Tolerances, check, fits, of_deck
@@ -51,7 +51,7 @@ def diff(a: str | Path, b: str | Path, given: Tolerances | None = None, *, distr
     """Compare two archives. given: tolerances, besides and instead of those of b's deck. distributions: compare metrics
     as samples even where the seeds are the same. Raises Problem."""
     with ArchiveFile(a) as file_a, ArchiveFile(b) as file_b:
-        pairs, only_a, only_b = matching.experiments(file_a, file_b)
+        pairs, only_a, only_b = matching.match_experiments(file_a, file_b)
         allowed = given or Tolerances()
         _check(allowed, [*file_a.groups, *file_b.groups])
         plans = [_plan(file) for file in (file_a, file_b)]
@@ -60,7 +60,7 @@ def diff(a: str | Path, b: str | Path, given: Tolerances | None = None, *, distr
             Path(a),
             Path(b),
             allowed,
-            changed(file_a, file_b, pairs, plans),
+            provenance_changes(file_a, file_b, pairs, plans),
             found,
             tuple(group.name for group in only_a),
             tuple(group.name for group in only_b),
@@ -106,7 +106,7 @@ def _experiment(
     known = {} if isinstance(plan, str) else {experiment.name: experiment for experiment in plan.experiments}
     given = given.within(_known(a)).within(_known(b))
     allowed = given.over(of_deck(known[b.name], b) if b.name in known else Tolerances())
-    matched = matching.cases(a, b)
+    matched = matching.match_cases(a, b)
     out = ExperimentDiff(a.name, b.name, matched, allowed)
     if isinstance(plan, str) and not given.alone:
         out.notes.append("what its deck allows is not known, for the plan cannot be read")
@@ -208,7 +208,7 @@ class _Scores:
 
     def ranked(
         self, a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, signals: Sequence[SignalDiff]
-    ) -> list[Ranked]:
+    ) -> list[RankedCase]:
         by_name = {signal.name: signal for signal in signals}
         places = sorted(self.where, key=lambda each: (-self.score[each], each))[:WORST]
         if not places:
@@ -216,7 +216,7 @@ class _Scores:
         case_a, case_b = a.at("case", matched.a[places]), b.at("case", matched.b[places])
         ids = b.at("case_id", matched.b[places])
         return [
-            Ranked(
+            RankedCase(
                 int(case_a[i]),
                 int(case_b[i]),
                 str(ids[i]),
@@ -328,7 +328,7 @@ def _signals(
         return
     places, ia, ib = _recorded(a, b, matched, about)
     time_a, time_b = (group.values("time") if "time" in group.variables else np.empty(0) for group in (a, b))
-    rows_a, rows_b = matching.instants(time_a, time_b, allowed.time or 0.0)
+    rows_a, rows_b = matching.match_instants(time_a, time_b, allowed.time or 0.0)
     if len(rows_a) < max(len(time_a), len(time_b)) and len(time_a) and len(time_b):
         of = f"of {len(time_a):,} and {len(time_b):,}"
         about.notes.append(f"signals are compared at the {len(rows_a):,} instants that both have, {of}")
@@ -366,7 +366,7 @@ def _signals(
                 low, high = spans(values_a[:, at_a])
                 out.low, out.high = min(out.low, float(low.min())), max(out.high, float(high.max()))
                 if which.any():
-                    passed = Passed(time_b[rows_b], time_a, values_a[which])
+                    passed = SampledCourse(time_b[rows_b], time_a, values_a[which])
                     values_b = values_b[which][:, at_b]
                     worst += _cases(
                         out,
@@ -409,7 +409,7 @@ def _absolute(group: ArchiveGroup, signal: Stored, found: SignalDiff) -> np.ndar
 
 def _cases(
     out: SignalDiff,
-    passed: Passed,
+    passed: SampledCourse,
     b: np.ndarray,
     rows: np.ndarray,
     labels: Sequence[str],

@@ -37,7 +37,7 @@ class ProvenanceChanges:
     results: tuple[tuple[str, str], ...] = ()
 
 
-def changed(
+def provenance_changes(
     a: ArchiveFile, b: ArchiveFile, pairs: Sequence[tuple[ArchiveGroup, ArchiveGroup]], plans: Sequence[Plan | str]
 ) -> ProvenanceChanges:
     """Compare what two archives were made from. plans: of each, or why it cannot be read here."""

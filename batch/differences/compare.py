@@ -60,11 +60,13 @@ def compare(
 ) -> Difference | None:
     """None where all bits are the same. time: s of each row, where `allowed` has a tolerance of time; absolute: of each
     column, where `allowed.absolute` is not for all."""
-    return compare_cases(a[None], b[None], allowed, None if time is None else Passed(time, time, a[None]), absolute)[0]
+    return compare_cases(
+        a[None], b[None], allowed, None if time is None else SampledCourse(time, time, a[None]), absolute
+    )[0]
 
 
 @frozen
-class Passed:
+class SampledCourse:
     """The course of a between its rows: `values`, [case, row, column], at `times` s, which may be more than what is
     compared.
 
@@ -104,7 +106,7 @@ def compare_cases(
     a: np.ndarray,
     b: np.ndarray,
     allowed: SignalTolerance,
-    passed: Passed | None = None,
+    passed: SampledCourse | None = None,
     absolute: np.ndarray | None = None,
 ) -> list[Difference | None]:
     """As `compare`, of several cases at once, [case, row, column]: one result a case. passed: where `allowed` has a
@@ -164,7 +166,7 @@ def compare_cases(
     return [Difference(*row) if some else None for some, row in zip(unlike.any(axis=1).tolist(), rows, strict=True)]
 
 
-def _outside(passed: Passed, b: np.ndarray, early: float) -> np.ndarray:
+def _outside(passed: SampledCourse, b: np.ndarray, early: float) -> np.ndarray:
     """The distance of each value of b from the range that a passes through within `early` s of its instant; a is taken
     as straight between its rows, and an infinite value is none. [case, row, column]"""
     shape = b.shape

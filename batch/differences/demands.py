@@ -7,7 +7,7 @@ import numpy as np
 from batch.archive.read import ArchiveGroup
 from batch.differences.found import ExperimentDiff, RequirementDiff
 from batch.differences.matching import MatchedCases
-from batch.differences.words import apart
+from batch.differences.words import distinct_texts
 from batch.queries import requirements
 from batch.queries.signals import deck_unit
 
@@ -16,7 +16,7 @@ def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases
     """Count the matched cases that meet each requirement in a and in b; one whose limit is another is taken for the
     same. Requirements of one archive alone are noted."""
     met_a, met_b = _met(a, matched.a), _met(b, matched.b)
-    known_a, known_b = ({each.text: each for each in requirements.required(group)} for group in (a, b))
+    known_a, known_b = ({each.text: each for each in requirements.group_requirements(group)} for group in (a, b))
     now = {text: text for text in met_a if text in met_b}
     for mine in known_a.values():
         alike = [
@@ -59,7 +59,7 @@ def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases
 
 def _met(group: ArchiveGroup, cases: np.ndarray) -> dict[str, np.ndarray]:
     """By requirement whether each of these cases meets it."""
-    texts = requirements.texts(group)
+    texts = requirements.requirement_texts(group)
     if not len(cases):
         return {text: np.empty(0, bool) for text in texts}
     met = requirements.outcomes(group, cases) == 1
@@ -78,5 +78,5 @@ def _limits(
     if one is None or other is None or one.limit == other.limit:
         return "", ""
     scale, unit = deck_unit(group.variables[other.metric])
-    before, now = (f"{text} {unit}".rstrip() for text in apart(one.limit / scale, other.limit / scale))
+    before, now = (f"{text} {unit}".rstrip() for text in distinct_texts(one.limit / scale, other.limit / scale))
     return before, now

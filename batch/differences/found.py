@@ -102,7 +102,7 @@ class EndingDiff:
 
 
 @frozen
-class Ranked:
+class RankedCase:
     """One of the worst cases: positions in both case tables, id in b, the signal that differs most, by which share of
     its span (or of its tolerance, where one is given), and where."""
 
@@ -158,7 +158,7 @@ class ExperimentDiff:
     ended: list[EndingDiff] = field(default_factory=list)
     requirements: list[RequirementDiff] = field(default_factory=list)
     required_in_one: list[str] = field(default_factory=list)
-    worst: list[Ranked] = field(default_factory=list)
+    worst: list[RankedCase] = field(default_factory=list)
     samples: list[MetricSamples] = field(default_factory=list)
     only_a: list[int] = field(default_factory=list)
     only_b: list[int] = field(default_factory=list)

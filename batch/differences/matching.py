@@ -31,7 +31,7 @@ class MatchedCases:
         return len(self.a)
 
 
-def experiments(
+def match_experiments(
     a: ArchiveFile, b: ArchiveFile
 ) -> tuple[list[tuple[ArchiveGroup, ArchiveGroup]], list[ArchiveGroup], list[ArchiveGroup]]:
     """Matched groups, and those that one archive has alone."""
@@ -47,7 +47,7 @@ def experiments(
     )
 
 
-def cases(a: ArchiveGroup, b: ArchiveGroup) -> MatchedCases:
+def match_cases(a: ArchiveGroup, b: ArchiveGroup) -> MatchedCases:
     """Match by case_key. Cases that share one are taken in order."""
     keys_a, keys_b = _keys(a), _keys(b)
     if np.array_equal(keys_a, keys_b):
@@ -83,7 +83,7 @@ def _nth(keys: np.ndarray) -> np.ndarray:
     return out
 
 
-def instants(a: np.ndarray, b: np.ndarray, early: float) -> tuple[np.ndarray, np.ndarray]:
+def match_instants(a: np.ndarray, b: np.ndarray, early: float) -> tuple[np.ndarray, np.ndarray]:
     """Rows of two time axes that belong to the same instants, within `early` s: each is the nearest of the other."""
     if len(a) == len(b) and np.array_equal(a, b):
         return np.arange(len(a)), np.arange(len(b))

@@ -19,7 +19,7 @@ LONGEST = 120
 
 
 @frozen
-class Cut:
+class Shortening:
     """The shortening of a long text. every: True to leave nothing out; remedy: the command that shows all."""
 
     every: bool = False
@@ -31,19 +31,19 @@ class Cut:
         return [*lines[: len(lines) - left], *([f"{indent}and {left:,} more: {self.remedy}"] if left else [])]
 
 
-def told(found: Diff, cut: Cut | None = None) -> list[str]:
+def diff_lines(found: Diff, cut: Shortening | None = None) -> list[str]:
     """All of it, for people; what is cut says how to see it."""
-    cut = cut or Cut()
+    cut = cut or Shortening()
     out = [f"a  {found.a}", f"b  {found.b}", *_changed(found, cut)]
-    for line in words.alone(found):
+    for line in words.unmatched_runs(found):
         out += ["", line]
     for experiment in found.experiments:
         out += ["", *_experiment(found, experiment, cut)]
     return [*out, "", words.verdict(found)]
 
 
-def _changed(found: Diff, cut: Cut) -> Iterator[str]:
-    made = words.made(found)
+def _changed(found: Diff, cut: Shortening) -> Iterator[str]:
+    made = words.provenance_lines(found)
     yield ""
     if not made:
         yield words.SAME
@@ -53,19 +53,19 @@ def _changed(found: Diff, cut: Cut) -> Iterator[str]:
             yield f"  {'' if line.startswith(' ') else kind:<10} {line}"
 
 
-def _experiment(found: Diff, experiment: ExperimentDiff, cut: Cut) -> list[str]:
-    out = [words.heading(experiment), *(f"  {line}" for line in words.missing(found, experiment))]
+def _experiment(found: Diff, experiment: ExperimentDiff, cut: Shortening) -> list[str]:
+    out = [words.heading(experiment), *(f"  {line}" for line in words.unmatched_cases(found, experiment))]
     out += _ended(experiment, cut)
     out += [f"  note: {note}" for note in experiment.notes]
-    out += [f"  {line}" for line in words.allowed(found, experiment)]
-    out += [f"  {line}" for line in words.requirements(experiment)]
+    out += [f"  {line}" for line in words.tolerance_lines(found, experiment)]
+    out += [f"  {line}" for line in words.requirement_lines(experiment)]
     out += _signals(experiment.signals)
     out += _samples(experiment)
     out += _worst(found, experiment, cut)
     return out
 
 
-def _ended(experiment: ExperimentDiff, cut: Cut) -> Iterator[str]:
+def _ended(experiment: ExperimentDiff, cut: Shortening) -> Iterator[str]:
     """Cases that end otherwise, in kinds."""
     for ending in words.endings(experiment):
         yield f"  {ending.text}: {ending.cases}"
@@ -96,11 +96,11 @@ def _samples(experiment: ExperimentDiff) -> list[str]:
     rows = [[head for head, _ in words.DISTRIBUTION_HEADS]]
     rows += [list(words.distribution(each).cells) for each in experiment.samples]
     rows = [[f"  {first}", *others] for first, *others in rows]
-    note = words.starred(experiment)
+    note = words.star_note(experiment)
     return ["", *columns(rows, right=range(1, 7)), *([f"  {note}"] if note else [])]
 
 
-def _worst(found: Diff, experiment: ExperimentDiff, cut: Cut) -> list[str]:
+def _worst(found: Diff, experiment: ExperimentDiff, cut: Shortening) -> list[str]:
     if not experiment.worst:
         return []
     out = []

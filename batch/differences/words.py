@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE
-from batch.differences.found import Diff, EndingDiff, ExperimentDiff, Ranked, RequirementDiff, SignalDiff
+from batch.differences.found import Diff, EndingDiff, ExperimentDiff, RankedCase, RequirementDiff, SignalDiff
 from batch.differences.samples import LEVEL, MetricSamples
 from batch.queries.failures import STATUS, ranges
 from batch.queries.signals import number_text
@@ -18,7 +18,7 @@ from met.outputs import quoted
 SAME = "made from the same: deck, parameters, models and versions"
 
 
-def made(found: Diff) -> list[tuple[str, tuple[str, ...]]]:
+def provenance_lines(found: Diff) -> list[tuple[str, tuple[str, ...]]]:
     """Differences of what the two were made from: kind and lines of each, causes before what follows from them. An
     indented line belongs to the one above."""
     changed = found.changed
@@ -41,7 +41,7 @@ def made(found: Diff) -> list[tuple[str, tuple[str, ...]]]:
     return [(kind, tuple(map(visible, lines))) for kind, lines in said if lines]
 
 
-def alone(found: Diff) -> list[str]:
+def unmatched_runs(found: Diff) -> list[str]:
     """Runs and sweeps that one archive has alone."""
     both = ((found.only_a, found.a), (found.only_b, found.b))
     return [f"`{name}` is only in {where}" for names, where in both for name in names]
@@ -56,7 +56,7 @@ def heading(experiment: ExperimentDiff) -> str:
     return f"{' and '.join(names)}: {count:,} case{'s' if count != 1 else ''} in both, {how}"
 
 
-def missing(found: Diff, experiment: ExperimentDiff) -> list[str]:
+def unmatched_cases(found: Diff, experiment: ExperimentDiff) -> list[str]:
     """Cases that one archive has alone."""
     return [
         f"{len(cases):,} case{'s' if len(cases) > 1 else ''} only in {where}: {ranges(cases)}"
@@ -65,31 +65,31 @@ def missing(found: Diff, experiment: ExperimentDiff) -> list[str]:
     ]
 
 
-def allowed(found: Diff, experiment: ExperimentDiff) -> list[str]:
+def tolerance_lines(found: Diff, experiment: ExperimentDiff) -> list[str]:
     """The tolerances, and who gives them."""
     mine, every = set(found.tolerances.words()), experiment.tolerances.words()
     both = (("the deck of b", [each for each in every if each not in mine]), ("--tol", sorted(mine & set(every))))
     return [f"{who} allows {', '.join(what)}" for who, what in both if what]
 
 
-def requirements(experiment: ExperimentDiff) -> list[str]:
+def requirement_lines(experiment: ExperimentDiff) -> list[str]:
     """Lines about requirements that are others, or are met by another number of cases."""
     count = experiment.cases.count
     return [
-        f"require {required(each)}  {requirement(each.met_before, each.met_now, count)}"
+        f"require {requirement_text(each)}  {met_by_text(each.met_before, each.met_now, count)}"
         for each in experiment.requirements
         if each.told
     ]
 
 
-def required(each: RequirementDiff) -> str:
+def requirement_text(each: RequirementDiff) -> str:
     """A requirement, and what it was before where it is another."""
     before, now = each.limits
     text = each.now if each.before == each.now else f"{each.now} (before: {each.before})"
     return f"{text} (limit before: {before}, now: {now})" if now else text
 
 
-def requirement(before: int, now: int, of: int) -> str:
+def met_by_text(before: int, now: int, of: int) -> str:
     """By how many of the cases in both a requirement is met."""
     return f"met by {before:,}, now by {now:,} of {of:,}"
 
@@ -289,7 +289,7 @@ def distribution(each: MetricSamples) -> Distribution:
     return Distribution(each.name, (cases[0], cases[1]), (medians[0], medians[1]), f"{each.distance:.3g}", chance)
 
 
-def starred(experiment: ExperimentDiff) -> str:
+def star_note(experiment: ExperimentDiff) -> str:
     """A note on what a star means, where there is one."""
     if not any(each.unlike for each in experiment.samples):
         return ""
@@ -324,13 +324,13 @@ def worst_cases(found: Diff, experiment: ExperimentDiff) -> list[WorstCase]:
     for each in experiment.worst:
         where = f" of {each.place.label}" if each.place.label else ""
         when = f" at {each.place.time:g} s" if each.place.time == each.place.time else ""
-        before, now = apart(each.place.before / each.deck_scale, each.place.after / each.deck_scale)
+        before, now = distinct_texts(each.place.before / each.deck_scale, each.place.after / each.deck_scale)
         what, commands = f"{each.signal}{where}{when}", _replays(found, experiment, each)
         out.append(WorstCase(each.case_b, each.case_id[:8], what, before, now, each.deck_unit, commands))
     return out
 
 
-def _replays(found: Diff, experiment: ExperimentDiff, each: Ranked) -> tuple[str, str]:
+def _replays(found: Diff, experiment: ExperimentDiff, each: RankedCase) -> tuple[str, str]:
     """The commands that run a case of both archives again."""
     several = len(found.experiments) + len(found.only_a) + len(found.only_b) > 1
     return (
@@ -343,7 +343,7 @@ def _again(path: Path, name: str, case: int) -> str:
     return f"met run {quoted(path)}{f' {quoted(name)}' if name else ''} --case '#{case}'"
 
 
-def apart(before: float, after: float) -> tuple[str, str]:
+def distinct_texts(before: float, after: float) -> tuple[str, str]:
     """Two numbers in as few digits as tell them apart, but four at least."""
     for digits in range(4, 18):
         texts = f"{before:.{digits}g}", f"{after:.{digits}g}"

@@ -20,7 +20,7 @@ from typing import Any
 from batch.campaigns.folder import Folder
 from batch.campaigns.tasks import CampaignSection, Done, Task
 from batch.executors import Outcome
-from batch.executors.dask_connection import check, connected
+from batch.executors.dask_connection import check, dask_client
 from met.diagnostic import Problem, error
 from met.version import VERSION
 
@@ -107,7 +107,7 @@ class Dask:
 
         self._folder, self._sections, self._tell = folder.path.resolve(), sections, tell
         with ExitStack() as opened:
-            self._client = opened.enter_context(connected(self._dask, self._threads))
+            self._client = opened.enter_context(dask_client(self._dask, self._threads))
             opened.callback(self._tell_all, dismiss)
             token = self._folder / self._token
             token.touch()

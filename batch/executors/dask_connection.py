@@ -41,7 +41,7 @@ def check(dask: object) -> None:
 
 
 @contextmanager
-def connected(dask: object, threads: int) -> Iterator[Any]:
+def dask_client(dask: object, threads: int) -> Iterator[Any]:
     """The client. What is made for it here is closed afterwards: a client that the user made is not.
 
     threads   cores of this machine that each worker of a local cluster is for
@@ -57,12 +57,12 @@ def connected(dask: object, threads: int) -> Iterator[Any]:
         yield dask
         return
     assert isinstance(dask, str | os.PathLike)
-    with quiet(), _started(threads) if dask == LOCAL else _reached(_address(os.fspath(dask))) as client:
+    with silenced_dask(), _started(threads) if dask == LOCAL else _reached(_address(os.fspath(dask))) as client:
         yield client
 
 
 @contextmanager
-def quiet() -> Iterator[None]:
+def silenced_dask() -> Iterator[None]:
     """Inside, Dask prints nothing of what happens to connections and workers: what matters of it is an outcome."""
     import distributed  # noqa: F401 - it sets the levels of its loggers when it is imported
 

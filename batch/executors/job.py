@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from batch.campaigns.drive import Count, Driver, Stopped
-from batch.campaigns.folder import Folder, FolderBusy, gaps
+from batch.campaigns.folder import Folder, FolderBusy, uncovered
 from batch.campaigns.performing import perform
 from batch.campaigns.resuming import described
 from batch.campaigns.status import Reporter
@@ -104,24 +104,24 @@ def _left(wanted: Sequence[Task], there: Sequence[Task]) -> list[tuple[int, int]
             for t in there
             if t.first < task.last and t.last > task.first
         ]
-        out += [(task.first + first, task.first + last) for first, last in gaps(inside, task.cases)]
+        out += [(task.first + first, task.first + last) for first, last in uncovered(inside, task.cases)]
     return out
 
 
-def together(path: Path) -> int:
+def merge_campaign(path: Path) -> int:
     """Merge a campaign whose cases are all done. Exit status 1 where cases failed or are missing."""
     from batch import look
-    from batch.terminal.verdict import brief
+    from batch.terminal.verdict import short_result_lines
 
     if not Folder(path).exists():
         archive = look(path.with_name(path.name.removesuffix(".campaign")))  # somebody else was first
-        say("\n".join(brief(archive)))
+        say("\n".join(short_result_lines(archive)))
         return 0 if archive.ok else 1
     campaign = described(Folder(path))
     threads = cores()
     performed = perform(campaign, executor=Threads(threads), together=True, say=say)
     archive = look(campaign.output, performed.notes)
-    say("\n".join(brief(archive)))
+    say("\n".join(short_result_lines(archive)))
     return 0 if archive.ok else 1
 
 
@@ -130,7 +130,7 @@ def main(arguments: Sequence[str]) -> int:
     path, verb, *rest = arguments
     try:
         with terminable():
-            return share(Path(path), int(rest[0]), Path(rest[1])) if verb == "share" else together(Path(path))
+            return share(Path(path), int(rest[0]), Path(rest[1])) if verb == "share" else merge_campaign(Path(path))
     except Terminated:
         say("met: terminated; what is done is kept", err=True)
         return TERMINATED

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from batch.campaigns import resuming
 from batch.campaigns.campaign import Campaign, values_sections
-from batch.campaigns.folder import Folder, FolderBusy, beside, gaps, put
+from batch.campaigns.folder import Folder, FolderBusy, beside, uncovered, write_json
 from batch.campaigns.output import busy, cannot_write, check_room
 from batch.campaigns.tasks import GRANULE, Task
 from met.diagnostic import Problem, error
@@ -55,9 +55,9 @@ def submit(
         raise Problem(error("E358", "there is no `sbatch` here", help=helps))
     values = values_sections(campaign)
     key = resuming.campaign_key(values)
-    if not fresh and resuming.there(campaign, key) == resuming.WHOLE:
+    if not fresh and resuming.finished_state(campaign, key) == resuming.WHOLE:
         return None
-    if not fresh and not resuming.goes_on(Folder(beside(campaign.output)), key):
+    if not fresh and not resuming.is_begun(Folder(beside(campaign.output)), key):
         resuming.guard(campaign)
     check_room(campaign.output, campaign.bytes_missing)
     folder = Folder(beside(campaign.output))
@@ -72,14 +72,14 @@ def submit(
             kept, told = folder.sound(section)
             for note in told:
                 say(note)
-            missing += [Task(section.number, *gap) for gap in gaps(kept, len(section.rows))]
+            missing += [Task(section.number, *gap) for gap in uncovered(kept, len(section.rows))]
         cases = sum(task.cases for task in missing)
         if cases < campaign.cases:
             say(f"goes on: {campaign.cases - cases:,} of {campaign.cases:,} cases are done")
         count = min(jobs or JOBS, max(1, -(-cases // GRANULE)))
         tasks = folder.path / "jobs.json"
         dealt = [[[t.section, t.first, t.last] for t in each] for each in shares(missing, count)]
-        put(tasks, {"shares": dealt, "timeout": timeout})
+        write_json(tasks, {"shares": dealt, "timeout": timeout})
     except FolderBusy:
         raise Problem(busy(campaign.output)) from None
     except OSError as reason:

@@ -82,7 +82,7 @@ def export(
     from batch.export.output import check
     from batch.export.picking import pick
 
-    form, target = settled(archive, output, form)
+    form, target = format_and_target(archive, output, form)
     writer = find(form)
     request = ExportRequest(table, tuple(signals), units, layout, force, named=bool(cases))
     writer.check_request(request, target)
@@ -101,9 +101,9 @@ def export(
 
 def _row(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: Sequence[str]) -> Rows:
     """The rows of a table where nobody names them: cases if there are several, else instants."""
-    from batch.terminal.show import chosen
+    from batch.terminal.show import groups_named
 
-    groups = chosen(file, tuple(runs) or (file.groups[0].sweep or file.groups[0].name,))
+    groups = groups_named(file, tuple(runs) or (file.groups[0].sweep or file.groups[0].name,))
     several = sum(group.count for group in groups) > 1
     return "metrics" if several and not cases and not signals else "histories"
 
@@ -116,7 +116,7 @@ def summary(done: Exported) -> str:
     return f": histories of {cases}, {done.rows:,} row{'s' if done.rows != 1 else ''}"
 
 
-def settled(
+def format_and_target(
     archive: str | os.PathLike[str], output: str | os.PathLike[str] | None, form: str | None
 ) -> tuple[str, Path]:
     """The format and the file, of which one may follow from the other. Raises Problem E371."""

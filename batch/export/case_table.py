@@ -11,7 +11,7 @@ from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.export.picking import rank
 from batch.queries import requirements
 from batch.queries.failures import STATUS
-from batch.terminal.show import chosen, picked
+from batch.terminal.show import cases_named, groups_named
 from met.frozen import frozen
 
 BLOCK = 10_000
@@ -66,10 +66,12 @@ def table(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], *, deck:
     """The cases of these runs and sweeps (none: of the first), in the order they are asked for (none: all, by their
     positions). deck: numbers in the deck's units. Raises Problem E325, E328."""
     names = tuple(runs) or (file.groups[0].sweep or file.groups[0].name,)
-    groups = chosen(file, names)
+    groups = groups_named(file, names)
     if cases:
         wanted = dict.fromkeys(
-            (groups.index(group), int(position or 0)) for case in cases for group, position in picked(file, names, case)
+            (groups.index(group), int(position or 0))
+            for case in cases
+            for group, position in cases_named(file, names, case)
         )
         group_of, positions = np.array(list(wanted), np.int64).T
     else:
@@ -97,7 +99,7 @@ def _fields(groups: Sequence[ArchiveGroup], *, deck: bool) -> Iterator[TableColu
     for variable in {v.name: v for group in groups for v in group.role("metric")}.values():
         unit, scale = in_unit(variable, deck=deck)
         yield TableColumn(variable.name, unit, variable.long_name, "float", variable.name, scale)
-    for text in dict.fromkeys(text for group in groups for text in requirements.texts(group)):
+    for text in dict.fromkeys(text for group in groups for text in requirements.requirement_texts(group)):
         yield TableColumn(f"require {text}", "", "met, missed, or empty where that is not known", "str")
     if any((group.values("status") != 0).any() for group in groups):
         yield TableColumn("cause", "", "why it failed", "str", "cause")
@@ -148,7 +150,7 @@ def _values(group: ArchiveGroup, field: TableColumn, positions: np.ndarray) -> l
 
 
 def _outcomes(group: ArchiveGroup, text: str, positions: np.ndarray) -> list[object]:
-    texts = requirements.texts(group)
+    texts = requirements.requirement_texts(group)
     if text not in texts:
         return [None] * len(positions)
     found = requirements.outcomes(group, positions)[:, texts.index(text)]

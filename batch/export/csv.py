@@ -35,7 +35,7 @@ NUMBER = re.compile("[0-9]+(e[0-9]+)?")
 """A case_id, of sixteen digits from 0 to f, that a reader takes for a number: one in a thousand is."""
 
 
-def word(text: str) -> str:
+def safe_word(text: str) -> str:
     """A word that no spreadsheet takes for a formula: what begins as one gets an apostrophe before it. What begins with
     an apostrophe gets one, too, so that who takes the first away has the word again."""
     return f"'{text}" if text[:1] in (*BEGINS, "'") else text
@@ -51,11 +51,11 @@ def _cell(text: str) -> str:
     if text.isalnum():
         return text
     out = io.StringIO()
-    csv.writer(out, lineterminator="").writerow([word(text)])
+    csv.writer(out, lineterminator="").writerow([safe_word(text)])
     return out.getvalue()
 
 
-def united(cases: Sequence[ExportedCase]) -> list[SignalColumn]:
+def all_columns(cases: Sequence[ExportedCase]) -> list[SignalColumn]:
     """The columns of all the cases: those of one structure may lack some of another's."""
     return list({column.path: column for case in cases for column in case.columns}.values())
 
@@ -63,7 +63,7 @@ def united(cases: Sequence[ExportedCase]) -> list[SignalColumn]:
 def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, deck: bool = False) -> int:
     """Write the cases' histories and return the number of rows. deck: varied parameters in the deck's units. Raises
     Problem E305."""
-    columns, groups = united(cases), list({case.group.name: case.group for case in cases}.values())
+    columns, groups = all_columns(cases), list({case.group.name: case.group for case in cases}.values())
     runs = dict.fromkeys(case.asked for case in cases)
     fields = [of_varied(variable, deck=deck) for variable in varied(groups)]
     numbered = len(cases) > 1 or bool(fields)
@@ -76,7 +76,7 @@ def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, dec
             begin: list[object] = [case.asked] if len(runs) > 1 else []
             begin += [case.number] if numbered else []
             begin += [value_of(field, case.group, case.position) for field in fields]
-            cells = [texts(case.time), *_cells(case, columns)]
+            cells = [number_texts(case.time), *_cells(case, columns)]
             same = _line(begin)
             rows = "".join(",".join((*same, *row)) + "\n" for row in zip(*cells, strict=True))
             sink.write(memoryview(rows.encode("utf-8", "replace")))
@@ -102,8 +102,8 @@ def _head(file: ArchiveFile, runs: Iterable[str], heads: Sequence[tuple[str, str
     lines = csv.writer(head, lineterminator="\n")
     about = _remark(f"{', '.join(runs)} of {' '.join(file.deck.split())}")
     head.write(f"# MET {VERSION}: {about}\n# units: ")
-    lines.writerow([word(line(unit)) for _, unit in heads])
-    lines.writerow([word(name) for name, _ in heads])
+    lines.writerow([safe_word(line(unit)) for _, unit in heads])
+    lines.writerow([safe_word(name) for name, _ in heads])
     return head.getvalue().encode("utf-8", "replace")
 
 
@@ -125,14 +125,14 @@ def _cells(case: ExportedCase, columns: Sequence[SignalColumn]) -> list[list[str
     mine = {column.path: column for column in case.columns}
     signals = {name: case.signal(name) for name in dict.fromkeys(column.variable for column in case.columns)}
     return [
-        texts(signals[mine[column.path].variable][:, mine[column.path].place])
+        number_texts(signals[mine[column.path].variable][:, mine[column.path].place])
         if column.path in mine
         else [""] * len(case.time)
         for column in columns
     ]
 
 
-def texts(values: np.ndarray) -> list[str]:
+def number_texts(values: np.ndarray) -> list[str]:
     """The shortest text of each number that gives its bits again."""
     if values.dtype == np.float32:
         return [str(value) for value in values]

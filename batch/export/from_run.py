@@ -13,7 +13,7 @@ from met.diagnostic import Problem, error
 from met.outputs import quoted
 
 
-def parted(output: str | os.PathLike[str] | None) -> tuple[Path | None, Path | None]:
+def archive_and_export(output: str | os.PathLike[str] | None) -> tuple[Path | None, Path | None]:
     """The archive and the export that an output names; None for what it does not."""
     target = None if output is None else Path(output)
     if target is None or format_of(target) is None:
@@ -36,13 +36,13 @@ def check(campaign: Campaign, target: Path, *, histories: bool) -> None:
     check_place(target, campaign.output, writer.is_own, force=None)
 
 
-def later(campaign: Campaign, target: Path, *, histories: bool) -> str:
+def export_command(campaign: Campaign, target: Path, *, histories: bool) -> str:
     """The command that makes the export of an archive that is whole."""
     runs = campaign.asked
     named = "".join(f" --run {quoted(name)}" for name in runs) if len(runs) > 1 else ""
     return f"met export {quoted(campaign.output)}{named}{' --histories' * histories} -o {quoted(target)}"
 
 
-def written(campaign: Campaign, target: Path, *, histories: bool) -> Exported:
+def export_run(campaign: Campaign, target: Path, *, histories: bool) -> Exported:
     """Export all that was run. Raises Problem."""
     return export(campaign.output, target, runs=campaign.asked, table="histories" if histories else None)

@@ -19,7 +19,7 @@ from batch.archive.read import ArchiveFile
 from batch.archive.sink import temporary_of
 from batch.campaigns.campaign import Campaign
 from batch.export.case_table import CaseTable, TableColumn, of_varied, value_of, varied
-from batch.export.csv import united
+from batch.export.csv import all_columns
 from batch.export.formats import ExportFormat, ExportRequest, WrittenExport
 from batch.export.output import whole
 from batch.export.picking import ExportedCase, SignalColumn
@@ -38,7 +38,7 @@ def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, dec
     """Write the cases' histories and return the number of rows. deck: varied parameters in the deck's units. Raises
     Problem E305, and E373 where there is no pyarrow."""
     arrow, parquet = pyarrow_here()
-    columns, runs = united(cases), dict.fromkeys(case.asked for case in cases)
+    columns, runs = all_columns(cases), dict.fromkeys(case.asked for case in cases)
     fields = [of_varied(variable, deck=deck) for variable in varied([case.group for case in _one_each(cases)])]
     schema = _schema(arrow, cases, fields, columns).with_metadata(_about(file, runs))
     with whole(output) as sink:

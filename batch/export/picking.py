@@ -9,7 +9,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.queries.signals import panels
-from batch.terminal.show import chosen, picked
+from batch.terminal.show import cases_named, groups_named
 from met.diagnostic import Problem
 from met.frozen import frozen
 from met.plan.channel import channel_paths
@@ -62,10 +62,10 @@ def pick(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: 
     """The cases of these runs and sweeps (none: of the first), in the order they are asked for (none: all that have
     histories, by their positions), with these signals. Raises Problem E321-E325, E328."""
     names = tuple(runs) or (file.groups[0].sweep or file.groups[0].name,)
-    groups = chosen(file, names)
+    groups = groups_named(file, names)
     columns = _columns(groups, signals)
     wanted = dict.fromkeys(
-        (group, group.recorded_position(case)) for case in cases for group, _ in picked(file, names, case)
+        (group, group.recorded_position(case)) for case in cases for group, _ in cases_named(file, names, case)
     )
     for group, _ in wanted:
         if group.name not in columns:

@@ -51,13 +51,13 @@ class PosedArm:
     values: Mapping[str, float]
     first: Mapping[str, float]
     parents: Mapping[str, str]
-    poses: Mapping[str, Moved]
+    poses: Mapping[str, PoseVariables]
     place: Mapping[str, np.ndarray]
     travel: Mapping[str, tuple[float, float]]
 
 
 @frozen
-class Moved:
+class PoseVariables:
     """A frame in another: origin (row, 3), m; unit quaternion (row, 4) of w, x, y, z."""
 
     position: np.ndarray
@@ -93,9 +93,11 @@ def arm_of(plan: Plan, case: ExportedCase, prefix: str) -> PosedArm:
             if payload.flies and told.issuperset(names):
                 world[payload.name] = free_pose(*(case.signal(name).astype(np.float64) for name in names))
         within = {name: compose(inverse(world.get(parents[name], HERE)), pose) for name, pose in world.items()}
-        poses = {name: moved(pose, len(case.time)) for name, pose in within.items()}
+        poses = {name: pose_variables(pose, len(case.time)) for name, pose in within.items()}
         links = [link.name for link in experiment.structure.links]
-        place = {name: moved(Pose(IDENTITY, sub(world[name].p, base.p)), len(case.time)).position for name in links}
+        place = {
+            name: pose_variables(Pose(IDENTITY, sub(world[name].p, base.p)), len(case.time)).position for name in links
+        }
     start = {name: rows[0] if len(rows) else np.zeros(3) for name, rows in place.items()}
     travel = {
         joint.name: (float(rows.min(initial=0.0)), float(rows.max(initial=0.0)))
@@ -180,16 +182,16 @@ def world_poses(
     return {name: motion.pose for name, motion in found.items()}
 
 
-def moved(pose: Pose, rows: int | tuple[int, ...], time: int | None = 0) -> Moved:
+def pose_variables(pose: Pose, rows: int | tuple[int, ...], time: int | None = 0) -> PoseVariables:
     """A pose with its numbers by row, or by whatever these are the sizes of. time: along which axis of these its
     orientation is without a jump; None: along none, each with w >= 0."""
     rotation = tuple(tuple(np.broadcast_to(np.asarray(entry, np.float64), rows) for entry in row) for row in pose.R)
     parts = quaternion(rotation)  # type: ignore[arg-type]
     turn = _rows(parts, rows)
-    return Moved(_rows(pose.p, rows), turn if time is None else unbroken(turn, time))
+    return PoseVariables(_rows(pose.p, rows), turn if time is None else without_sign_jumps(turn, time))
 
 
-def unbroken(q: np.ndarray, axis: int) -> np.ndarray:
+def without_sign_jumps(q: np.ndarray, axis: int) -> np.ndarray:
     """Unit quaternions (..., 4) of which each has the sign by which it is nearer the one before it along an axis, as in
     what is recorded (`met.program.orientations`); rows that are not-a-number are passed over."""
     rows = np.moveaxis(q, axis, 0)

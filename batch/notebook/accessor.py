@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 import xarray
 
 from batch.notebook import grid, quantities, selection, source
-from batch.notebook.table import CASE, cases_of, missing, name_of
+from batch.notebook.table import CASE, cases_of, name_of, unknown_name
 from met.diagnostic import Problem, error
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 
-def told(function: Callable[P, T]) -> Callable[P, T]:
+def without_internals(function: Callable[P, T]) -> Callable[P, T]:
     """The same, whose Problems say nothing of where inside of MET they were noticed."""
 
     @wraps(function)
@@ -44,7 +44,7 @@ class Accessor(Generic[Data]):
     def __init__(self, data: Data) -> None:
         self._data: Data = data
 
-    @told
+    @without_internals
     def sel(self, wanted: Mapping[str, Any] | None = None, /, **more: Any) -> Data:
         """The cases that are as wanted in every respect, and of their histories those that are kept.
 
@@ -68,7 +68,7 @@ class Accessor(Generic[Data]):
         """
         return self._whole(selection.selected(self._parts(), {**(wanted or {}), **more}))
 
-    @told
+    @without_internals
     def grid(self, *names: str | Sequence[str]) -> Any:
         """Metrics, or other variables over cases, as a block with a dimension for each parameter that is varied.
 
@@ -77,10 +77,10 @@ class Accessor(Generic[Data]):
         not-a-number.
         """
         wanted = [each for name in names for each in ([name] if isinstance(name, str) else name)]
-        block = grid.unfolded(list(self._parts().values()), wanted)
+        block = grid.to_grid(list(self._parts().values()), wanted)
         return block[names[0]] if len(names) == 1 and isinstance(names[0], str) else block
 
-    @told
+    @without_internals
     def frames(self, *links: str, case: Any = None) -> Data:
         """The poses of links in the world at each instant, of all links or of these; of all recorded cases, or as `sel`
         takes them.
@@ -96,7 +96,7 @@ class Accessor(Generic[Data]):
         parts = self._parts() if case is None else selection.selected(self._parts(), {CASE: case})
         return self._whole(frames(path, parts, links, whole=case is not None))
 
-    @told
+    @without_internals
     def in_units(self, wanted: Mapping[str, str] | None = None, /, **more: str) -> Data:
         """Variables in other units, `in_units(qd="deg/s")`; none given: parameters and metrics as the deck writes
         them. `units` of each says so. `sel`, `grid` and `frames` go on working."""
@@ -105,7 +105,9 @@ class Accessor(Generic[Data]):
         known = {name: [each for each in units if quantities.named(data, each)] for name, data in parts.items()}
         for each in units:
             if not any(each in names for names in known.values()):
-                raise missing(list(parts.values()), each, "no variable", [str(v) for d in parts.values() for v in d])
+                raise unknown_name(
+                    list(parts.values()), each, "no variable", [str(v) for d in parts.values() for v in d]
+                )
         return self._whole(
             {
                 name: quantities.in_units(data, {each: units[each] for each in known[name]} if units else None)
@@ -113,7 +115,7 @@ class Accessor(Generic[Data]):
             }
         )
 
-    @told
+    @without_internals
     def parameters(self, case: Any = None) -> Any:
         """All parameters of a case as a pandas.DataFrame by path: value (SI), unit, whether it varies, who wrote it
         and where. case: as `sel` takes it; None where there is only one."""
@@ -128,14 +130,14 @@ class Accessor(Generic[Data]):
         return table(path, *cases[0])
 
     @property
-    @told
+    @without_internals
     def plan(self) -> Plan:
         """The plan that was run, whole: what the deck means."""
         with source.archive(source.file_of(self._data), self._parts()) as file:
             return file.plan()
 
     @property
-    @told
+    @without_internals
     def sources(self) -> dict[str, str]:
         """The deck's files as they were read, by name; the deck itself first."""
         with source.archive(source.file_of(self._data), self._parts()) as file:

@@ -15,14 +15,14 @@ from batch.export.poses import (
     POSITION,
     free_pose,
     lacking_help,
-    moved,
     parameters,
+    pose_variables,
     prescribed_pose,
     world_poses,
 )
 from batch.notebook.quantities import number
 from batch.notebook.source import experiment, places
-from batch.notebook.table import CASE, NO_HISTORIES, RECORDED, asked, missing, path_of
+from batch.notebook.table import CASE, NO_HISTORIES, RECORDED, path_of, run_name, unknown_name
 from met.diagnostic import Problem, error
 from met.dynamics.spatial import HERE, Pose
 from met.plan import Experiment
@@ -59,7 +59,7 @@ def frames(
                 out[name] = _frames(path, data, group, own, chosen)
     for link in links:
         if link not in known:
-            raise missing(list(parts.values()), link, "no link", known)
+            raise unknown_name(list(parts.values()), link, "no link", known)
     return out
 
 
@@ -78,7 +78,7 @@ def _frames(
     world = world_poses(own, values, rows, base)
     unknown = np.isnan(sum((*rows, *base.p), np.zeros(shape)))
     along = dims.index("time") if "time" in dims else None
-    poses = [moved(world[link], shape, along) for link in links]
+    poses = [pose_variables(world[link], shape, along) for link in links]
     kept: dict[str, Any] = {}
     for name, array in instants.coords.items():
         if name in OWN:
@@ -125,7 +125,7 @@ def _positions(data: xarray.Dataset, own: Experiment) -> tuple[xarray.DataArray,
     if lacking or of_base:
         every = lacking and len(lacking) == len(found)
         which = ", ".join([*([POSITION] if every else [f"{joint}.{POSITION}" for joint in lacking]), *of_base])
-        message = f"the links of `{asked(data)}` cannot be placed: {which} is not in this Dataset"
+        message = f"the links of `{run_name(data)}` cannot be placed: {which} is not in this Dataset"
         recorded = {channel for each in own.structure.record for channel in each.channels}
         helps = lacking_help(free=bool(of_base))
         if recorded.issuperset(f"{joint}.{POSITION}" for joint in lacking) and RECORDED not in data.coords:

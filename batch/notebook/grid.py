@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 
 from batch.notebook.quantities import in_deck_unit, same_units
-from batch.notebook.table import CASE, RECORDED, REPEAT, asked, missing, name_of, varied
+from batch.notebook.table import CASE, RECORDED, REPEAT, name_of, run_name, unknown_name, varied
 from met.diagnostic import Problem, error
 from met.distinct import distinct
 from met.frozen import frozen
@@ -29,11 +29,11 @@ class GridAxis:
     beside: Mapping[str, np.ndarray]
 
 
-def unfolded(parts: Sequence[xarray.Dataset], names: Sequence[str]) -> xarray.Dataset:
+def to_grid(parts: Sequence[xarray.Dataset], names: Sequence[str]) -> xarray.Dataset:
     """Variables that lie along cases, over what is varied; none: all metrics. Parameters that are varied in step share
     a dimension, and one that is the same in all cases is a coordinate without one. Where there is no case it is
     not-a-number. Raises Problem E385, E388."""
-    sweeps = list(dict.fromkeys(asked(data) for data in parts))
+    sweeps = list(dict.fromkeys(run_name(data) for data in parts))
     if len(sweeps) > 1:
         helps = f"of one of them: `data.met.sel(run={sweeps[0]!r}).met.grid(...)`"
         raise Problem(error("E388", f"these are the cases of several: {', '.join(sweeps)}", help=helps))
@@ -44,7 +44,7 @@ def unfolded(parts: Sequence[xarray.Dataset], names: Sequence[str]) -> xarray.Da
     for name in names or [""]:
         having = [data for data in parts if name in data]
         if not having or not {CASE, RECORDED} & set(having[0][name].dims):
-            raise missing(parts, name, "no variable of cases", known)
+            raise unknown_name(parts, name, "no variable of cases", known)
         dims[name] = CASE if CASE in having[0][name].dims else RECORDED
         if dims[name] == RECORDED and len(parts) > 1:
             helps = "of one structure: `data[NAME].met.grid(...)`"

@@ -10,7 +10,17 @@ import xarray
 
 from batch.archive.read import found_cases
 from batch.notebook.quantities import in_deck_unit, number, same_units
-from batch.notebook.table import CASE, PREFIX, RECORDED, along, asked, dimension, missing, name_of, varied
+from batch.notebook.table import (
+    CASE,
+    PREFIX,
+    RECORDED,
+    case_variables,
+    dimension,
+    name_of,
+    run_name,
+    unknown_name,
+    varied,
+)
 from met.diagnostic import Problem, did_you_mean, error
 from met.distinct import distinct
 
@@ -42,7 +52,7 @@ def selected(parts: Parts, wanted: Mapping[str, Any]) -> dict[str, xarray.Datase
         parts = _of_runs(parts, wanted[RUN])
         wanted = {name: value for name, value in wanted.items() if name != RUN}
     dims = {path: dimension(data) for path, data in parts.items()}
-    known = {path: along(data, dims[path]) for path, data in parts.items()}
+    known = {path: case_variables(data, dims[path]) for path, data in parts.items()}
     masks = {path: np.ones(data.sizes[dims[path]], bool) for path, data in parts.items()}
     for name, value in wanted.items():
         for path, mask in _masks(parts, dims, known, name, value).items():
@@ -65,7 +75,7 @@ def _masks(
     out = {path: np.zeros(data.sizes[dims[path]], bool) for path, data in parts.items()}
     if not found:
         names = [each for path, data in parts.items() for each in _names(data, dims[path])]
-        raise missing(list(parts.values()), name, "no parameter or metric", names)
+        raise unknown_name(list(parts.values()), name, "no parameter or metric", names)
     same_units(found, name)
     arrays = list(found.values())
     values = np.concatenate([array.values for array in arrays])
@@ -143,7 +153,7 @@ def _named(parts: Parts, dims: Mapping[str, str], wanted: Any) -> dict[str, np.n
     ids = [_ids(data, dims[path]) for path, data in parts.items()]
     every, every_id = np.concatenate(list(rows.values())), np.concatenate(ids)
     out = np.zeros(len(every), bool)
-    where = ", ".join(dict.fromkeys(map(asked, parts.values())))
+    where = ", ".join(dict.fromkeys(map(run_name, parts.values())))
     for each in map(_item, _listed(wanted)):
         each = int(each) if isinstance(each, float) and each.is_integer() else each  # as idxmin gives positions
         text = f"#{int(each)}" if isinstance(each, int | np.integer) and not isinstance(each, bool) else each
@@ -180,10 +190,10 @@ def _of_runs(parts: Parts, wanted: Any) -> dict[str, xarray.Dataset]:
     """The Datasets of these runs and sweeps. Raises Problem E325."""
     names = _listed(wanted)
     for name in names:
-        if all(name not in (name_of(data), asked(data)) for data in parts.values()):
-            known = ", ".join(dict.fromkeys(map(asked, parts.values())))
+        if all(name not in (name_of(data), run_name(data)) for data in parts.values()):
+            known = ", ".join(dict.fromkeys(map(run_name, parts.values())))
             raise Problem(error("E325", f"no run or sweep `{name}` here", help=f"there are: {known}"))
-    return {path: data for path, data in parts.items() if {name_of(data), asked(data)} & set(names)}
+    return {path: data for path, data in parts.items() if {name_of(data), run_name(data)} & set(names)}
 
 
 def _cut(data: xarray.Dataset, dim: str, mask: np.ndarray) -> xarray.Dataset:

@@ -44,7 +44,7 @@ def path_of(name: str, attributes: Mapping[str, Any]) -> str:
     return str(attributes.get("path", name))
 
 
-def along(data: xarray.Dataset, dim: str) -> dict[str, xarray.DataArray]:
+def case_variables(data: xarray.Dataset, dim: str) -> dict[str, xarray.DataArray]:
     """Variables with one value a case, by path; also by the variable's name where that is another. `case` is its
     position."""
     out = {CASE: data[dim]}
@@ -89,12 +89,12 @@ def name_of(data: xarray.Dataset | xarray.DataTree) -> str:
     return str(data.attrs.get("experiment", ""))
 
 
-def asked(data: xarray.Dataset) -> str:
+def run_name(data: xarray.Dataset) -> str:
     """The name of the run or sweep by which a user asks for it."""
     return str(data.attrs.get("sweep") or name_of(data))
 
 
-def missing(parts: Sequence[xarray.Dataset], name: str, what: str, known: Iterable[str]) -> Problem:
+def unknown_name(parts: Sequence[xarray.Dataset], name: str, what: str, known: Iterable[str]) -> Problem:
     """E385: something is asked for by a name that nothing here has. what: `no link`, `nothing`."""
     names = list(dict.fromkeys(known))
     some = ", ".join(names[:MOST_NAMES]) + (" ..." if len(names) > MOST_NAMES else "")
@@ -103,5 +103,5 @@ def missing(parts: Sequence[xarray.Dataset], name: str, what: str, known: Iterab
         helps.insert(0, f"`{name}` is a dimension: `data.sel({name}=...)`")
     if not any(RECORDED in data.coords for data in parts):
         helps.append(NO_HISTORIES)
-    where = ", ".join(dict.fromkeys(f"`{asked(data)}`" for data in parts if asked(data)))
+    where = ", ".join(dict.fromkeys(f"`{run_name(data)}`" for data in parts if run_name(data)))
     return Problem(error("E385", f"{what} `{name}`" + (f" in {where}" if where else ""), help=helps))

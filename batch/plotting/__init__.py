@@ -3,7 +3,7 @@
     batch.plotting.plot("two_link.h5")                                       # -> two_link.png
     batch.plotting.plot("a.h5", "fig3.svg", ["settle"], over=["gearbox.kp", "gearbox.ki"], size="8.5cm")
 
-`asked` says whether signals or metrics are meant; `histories`, `points` and `maps` draw them, over `layout`.
+`plot_request` says whether signals or metrics are meant; `histories`, `points` and `maps` draw them, over `layout`.
 """
 
 from __future__ import annotations
@@ -74,17 +74,17 @@ def draw(
     from batch.plotting import histories, metrics
     from batch.plotting import output as place
     from batch.plotting.against import beside
-    from batch.plotting.asked import asked
+    from batch.plotting.asked import plot_request
     from batch.plotting.sheet import PictureSheet
     from batch.queries.pool import pools
-    from batch.terminal.show import chosen
+    from batch.terminal.show import groups_named
 
     target, sheet = Path(output), sheet or PictureSheet()
-    groups = chosen(archive, (run,) if run else ())
+    groups = groups_named(archive, (run,) if run else ())
     group = _with_case(groups, cases[0]) if cases else groups[0]
     place.check(target)
     [pool] = [pool for pool in pools(groups) if group in pool.groups]
-    wanted = asked(group, pool, names, cases, over)
+    wanted = plot_request(group, pool, names, cases, over)
     matplotlib = _matplotlib()
     with matplotlib.rc_context():
         matplotlib.rcdefaults()  # a matplotlibrc of the working folder decides nothing: it may have TeX run

@@ -20,7 +20,7 @@ LONGEST = 40
 """Letters of a file's name in a picture: of more, those in the middle are left out."""
 
 
-class Beside:
+class OtherGroup:
     """The group of another archive that is matched with one that is drawn.
 
     places  of each case of the drawn group its position in the other; -1 where it is not there
@@ -29,7 +29,7 @@ class Beside:
     def __init__(self, drawn: ArchiveGroup, group: ArchiveGroup, names: tuple[str, str]) -> None:
         self.drawn, self.group = drawn, group
         self.own, self.name = names
-        found = matching.cases(drawn, group)
+        found = matching.match_cases(drawn, group)
         self.places = np.full(drawn.count, -1)
         self.places[found.a] = found.b
 
@@ -52,7 +52,7 @@ class Beside:
         for column in panel.columns:
             place, unit = theirs.get(mine[column], (-1, panel.si))
             if unit != panel.si:
-                raise unlike(mine[column], panel.si, unit, self)
+                raise other_unit(mine[column], panel.si, unit, self)
             out.append(place)
         return out
 
@@ -76,25 +76,25 @@ def _channels(group: ArchiveGroup, name: str) -> dict[str, tuple[int, str]]:
     return {path: (column, units[column // width if joints else 0]) for column, path in enumerate(paths)}
 
 
-def unlike(name: str, mine: str, theirs: str, beside: Beside) -> Problem:
+def other_unit(name: str, mine: str, theirs: str, beside: OtherGroup) -> Problem:
     units = [pretty_unit(unit) if unit not in ("", "1") else "no unit" for unit in (mine, theirs)]
     message = f"`{name}` is in {units[0]} in {beside.own}, and in {units[1]} in {beside.name}"
     helps = ("name what is alike in both", _differ(beside.drawn.path, beside.group.path))
     return Problem(error("E393", message, help=helps))
 
 
-def lacking(name: str, beside: Beside, there: Sequence[str]) -> Problem:
+def not_in_other(name: str, beside: OtherGroup, there: Sequence[str]) -> Problem:
     """The problem that something to be drawn is not in the other archive. there: what is."""
     helps = f"in {beside.name}: {', '.join(there)}" if there else _differ(beside.drawn.path, beside.group.path)
     return Problem(error("E393", f"no `{name}` in {beside.name} to draw against", help=helps))
 
 
-def beside(archive: ArchiveFile, groups: Sequence[ArchiveGroup], other: ArchiveFile) -> list[Beside | None]:
+def beside(archive: ArchiveFile, groups: Sequence[ArchiveGroup], other: ArchiveFile) -> list[OtherGroup | None]:
     """The other archive's group for each group; None where that has not this structure. Raises Problem E393 where
     nothing is the same in the two."""
     names = file_names(archive.path, other.path)
-    pairs = {id(mine): theirs for mine, theirs in matching.experiments(archive, other)[0]}
-    found = [Beside(group, pairs[id(group)], names) if id(group) in pairs else None for group in groups]
+    pairs = {id(mine): theirs for mine, theirs in matching.match_experiments(archive, other)[0]}
+    found = [OtherGroup(group, pairs[id(group)], names) if id(group) in pairs else None for group in groups]
     if not any(found):
         asked = groups[0].sweep or groups[0].name
         known = dict.fromkeys(group.sweep or group.name for group in other.groups)

@@ -31,7 +31,7 @@ class PlotRequest:
     histories: bool = True
 
 
-def asked(
+def plot_request(
     group: ArchiveGroup, pool: Pool, names: Sequence[str], cases: Sequence[str], over: Sequence[str]
 ) -> PlotRequest:
     """Signals or metrics, by what the names are, and by the other options. Raises Problem E323, E324, E391."""
@@ -92,7 +92,7 @@ def _unknown(group: ArchiveGroup, name: str, metrics: Sequence[str]) -> Problem:
 # Over what
 
 
-def over(archive: ArchiveFile, pool: Pool, names: Sequence[str]) -> tuple[CaseColumn, ...]:
+def map_axes(archive: ArchiveFile, pool: Pool, names: Sequence[str]) -> tuple[CaseColumn, ...]:
     """The parameters that metrics are drawn over: those that are named; else two that make a grid of some size, or the
     one with most values; none where nothing is varied. Raises Problem E390."""
     varied = pool.varied()
@@ -154,16 +154,16 @@ def _here(known: Sequence[str]) -> str:
     return f"varied here: {', '.join(known)}" if known else "nothing is varied here"
 
 
-def coloured(pool: Pool, drawn: Sequence[CaseColumn]) -> CaseColumn | None:
+def colour_column(pool: Pool, drawn: Sequence[CaseColumn]) -> CaseColumn | None:
     """The column that colours points over one parameter: of what else is varied that with most values, which does not
     go in step with it."""
     for column in pool.varied():
-        if all(column is not each for each in drawn) and free(column, drawn[0]):
+        if all(column is not each for each in drawn) and is_independent(column, drawn[0]):
             return column
     return None
 
 
-def free(column: CaseColumn, other: CaseColumn) -> bool:
+def is_independent(column: CaseColumn, other: CaseColumn) -> bool:
     """True if a column does not rise, or fall, wherever another one rises."""
     ranks, others = (np.searchsorted(levels(each.values), each.values) for each in (column, other))
     return not (np.array_equal(ranks, others) or np.array_equal(ranks, others.max(initial=0) - others))

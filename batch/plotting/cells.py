@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from batch.plotting.measured import Measured
+from batch.plotting.measured import MapMetric
 from batch.plotting.sheet import INK, PictureSheet
 from batch.plotting.sides import MapSide
-from batch.queries.grids import standing
+from batch.queries.grids import cell_cases
 from met.frozen import frozen
 
 INFINITE, FAILED, LACKING = "#c9ced3", "#828c95", "#e9ecee"
@@ -31,7 +31,7 @@ SIGN_ROOM = 5.0
 
 
 @frozen
-class Picked:
+class CellValues:
     """The values of the cells, row by row from the lowest. there: True where a case is in the cell; failed: True where
     one failed."""
 
@@ -41,20 +41,20 @@ class Picked:
     striped: tuple[tuple[np.ndarray, str], ...]
 
 
-def picked(
+def cell_values(
     shown: np.ndarray,
     worse: str,
-    each: Measured,
+    each: MapMetric,
     cells: np.ndarray,
     count: int,
     striped: list[tuple[np.ndarray, str]],
     *,
     differs: bool,
-) -> Picked:
+) -> CellValues:
     """The case that stands for each cell. cells: of each case its cell, -1 for none; differs: changes are shown."""
-    chosen = standing(np.abs(shown) if differs else shown, cells, count, "<" if differs else worse)
+    chosen = cell_cases(np.abs(shown) if differs else shown, cells, count, "<" if differs else worse)
     values = np.where(chosen >= 0, shown[chosen], np.nan)
-    return Picked(
+    return CellValues(
         values,
         any_in(cells >= 0, cells, count),
         any_in(each.failed, cells, count),
@@ -69,7 +69,7 @@ def any_in(cases: np.ndarray, cells: np.ndarray, count: int) -> np.ndarray:
     return out
 
 
-def draw(ax: Any, found: Picked, x: MapSide, y: MapSide, colours: Any, norm: Any, sheet: PictureSheet) -> Any:
+def draw(ax: Any, found: CellValues, x: MapSide, y: MapSide, colours: Any, norm: Any, sheet: PictureSheet) -> Any:
     """Colours, greys, stripes and signs. Gives what a colour bar is of."""
     shape = (len(y.levels.texts), len(x.levels.texts))
     values = found.values

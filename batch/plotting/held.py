@@ -10,7 +10,7 @@ import numpy as np
 
 from batch.plotting.layout import BESIDE, LETTER, letters
 from batch.plotting.sheet import PictureSheet
-from batch.queries.limits import Mark
+from batch.queries.limits import LimitMark
 
 TONE = "#a33a0a"
 DOTS: dict[str, Any] = {"color": TONE, "linewidth": 0.8, "linestyle": (0, (1, 1.6)), "zorder": 1.6, "label": "_limit"}
@@ -18,7 +18,7 @@ PLACES = (0.995, 0.005, 0.5, 0.75, 0.25)
 """Along a limit's line, where its name may stand."""
 
 
-def draw(ax: Any, marks: Sequence[Mark], time: np.ndarray, sheet: PictureSheet, columns: int) -> None:
+def draw(ax: Any, marks: Sequence[LimitMark], time: np.ndarray, sheet: PictureSheet, columns: int) -> None:
     """The limits of what is drawn in a panel already. Those that would squeeze it are named alone."""
     values = [mark for mark in dict.fromkeys(marks) if not mark.time]
     low, high = ax.dataLim.intervaly
@@ -42,7 +42,7 @@ def draw(ax: Any, marks: Sequence[Mark], time: np.ndarray, sheet: PictureSheet, 
         _write(ax, mark.value, 0.03, text, ax.get_xaxis_transform(), sheet, ha="right" if late else "left", va="bottom")
 
 
-def above(ax: Any, marks: Sequence[Mark], sheet: PictureSheet, columns: int) -> None:
+def write_limits(ax: Any, marks: Sequence[LimitMark], sheet: PictureSheet, columns: int) -> None:
     """Names of the limits that no line is drawn of, right of what stands above the panel, where there is room."""
     lines = {float(line.get_ydata()[0]) for line in ax.lines if line.get_label() == DOTS["label"]}
     inside = {mark.text for mark in marks if mark.time or mark.value in lines}

@@ -13,11 +13,11 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.plotting import held, layout
-from batch.plotting.against import Beside, lacking
+from batch.plotting.against import OtherGroup, not_in_other
 from batch.plotting.sheet import COLOURS, FAINT, INK, PictureSheet, sequence
-from batch.queries.arrange import Cell, CommandCurve, arranged, joints_of, overlaid, spread
+from batch.queries.arrange import Cell, CommandCurve, command_curves, fan_cases, joints_of, panel_grid
 from batch.queries.deck_units import DeckUnits
-from batch.queries.limits import Mark, limits_of
+from batch.queries.limits import LimitMark, limits_of
 from batch.queries.signals import Panel, case_text, deck_unit, history, number_text, panels
 from met.diagnostic import Problem, error
 from met.distinct import distinct
@@ -53,7 +53,7 @@ class Histories:
         signals: Sequence[str],
         cases: Sequence[str],
         sheet: PictureSheet,
-        other: Beside | None,
+        other: OtherGroup | None,
     ) -> None:
         self.archive, self.group, self.sheet, self.other = archive, group, sheet, other
         panels(group)  # refuses an archive without histories
@@ -64,11 +64,11 @@ class Histories:
         self.single, self.fan = len(self.positions) == 1, len(self.positions) > OVERLAID
         self.time = group.values("time")
         self.joints = joints_of(group)
-        self.commands = overlaid(group, found, self.positions, apart=not self.single and not self.fan)
+        self.commands = command_curves(group, found, self.positions, apart=not self.single and not self.fan)
         if not signals:  # a command that is drawn where it belongs needs no panel of its own
             drawn = {(command.variable, command.column) for command in self.commands.values()}
             found = [panel for panel in found if not drawn.issuperset((panel.variable, c) for c in panel.columns)]
-        self.panels, self.left = layout.several(found, bool(signals), "signals")
+        self.panels, self.left = layout.as_many_as_fit(found, bool(signals), "signals")
         self.pairs, self.theirs = self._against(bool(signals))
 
     def _against(self, asked: bool) -> tuple[dict[int, int], dict[int, list[int]]]:
@@ -87,11 +87,11 @@ class Histories:
         columns = {number: other.columns(panel) for number, panel in enumerate(self.panels)}
         for number, places in columns.items():
             if asked and max(places) < 0:
-                raise lacking(self.panels[number].name, other, [each.name for each in other.group.role("signal")])
+                raise not_in_other(self.panels[number].name, other, [each.name for each in other.group.role("signal")])
         return pairs, columns
 
     def draw(self) -> Any:
-        rows = arranged(self.group, self.panels)
+        rows = panel_grid(self.group, self.panels)
         most = MOST_COLUMNS if not self.sheet.width else max(1, int(self.sheet.width / LEAST_COLUMN))
         by_joint = self.single or len(rows[0]) > most
         if by_joint:
@@ -102,11 +102,11 @@ class Histories:
             for cell, ax in zip(cells, row, strict=True):
                 if cell is not None:
                     self._cell(ax, cell, by_joint, len(cells))
-        dress(axes, rows, self.sheet)
+        label_axes(axes, rows, self.sheet)
         for cells, row in zip(rows, axes, strict=True):
             for cell, ax in zip(cells, row, strict=True):
                 if cell is not None:
-                    held.above(ax, self._marks(cell), self.sheet, len(cells))
+                    held.write_limits(ax, self._marks(cell), self.sheet, len(cells))
         self._legend(figure, axes, rows, flat, by_joint)
         layout.title(figure, self.archive, self.group.name, self._below(), self.sheet)
         return figure
@@ -143,7 +143,7 @@ class Histories:
                     self.time,
                     y,
                     color=colour,
-                    label=layout.named(panel.lines[line]),
+                    label=layout.legend_label(panel.lines[line]),
                     linestyle=ON_ANOTHER[above[line]] if above.get(line) else _dashes(line),
                 )
             elif self.fan:
@@ -167,7 +167,7 @@ class Histories:
             out[line] = min(int((same.mean(axis=0) > NEARLY_ALWAYS).sum()), len(ON_ANOTHER) - 1)
         return out
 
-    def _marks(self, cell: Cell) -> list[Mark]:
+    def _marks(self, cell: Cell) -> list[LimitMark]:
         """The limits of a panel's lines, each once."""
         if self.units.experiment is None:
             return []
@@ -184,7 +184,7 @@ class Histories:
     def _fan(self, ax: Any, panel: Panel, line: int, colour: str) -> None:
         """Median, nine in ten, all."""
         values = layout.drawable(
-            np.stack([history(self.group, panel, position)[:, line] for position in spread(self.positions)])
+            np.stack([history(self.group, panel, position)[:, line] for position in fan_cases(self.positions)])
         )
         good = np.isfinite(values).any(axis=0)
         time, values = self.time[good], values[:, good]
@@ -193,7 +193,7 @@ class Histories:
         low, five, middle, ninety_five, high = np.nanpercentile(values, (0, 5, 50, 95, 100), axis=0)
         ax.fill_between(time, low, high, color=colour, alpha=0.15, linewidth=0)
         ax.fill_between(time, five, ninety_five, color=colour, alpha=0.30, linewidth=0)
-        ax.plot(time, middle, color=colour, label=layout.named(panel.lines[line]))
+        ax.plot(time, middle, color=colour, label=layout.legend_label(panel.lines[line]))
 
     def _overlay(self, ax: Any, panel: Panel, line: int, colour: str | None) -> None:
         """A line a case; where joints share the panel they have the colours, and cases are told apart by how faint."""
@@ -201,7 +201,7 @@ class Histories:
         for index, position in enumerate(self.positions):
             y = layout.drawable(history(self.group, panel, position)[:, line])
             if colour is not None:
-                label = layout.named(panel.lines[line]) if index == 0 else None
+                label = layout.legend_label(panel.lines[line]) if index == 0 else None
                 _line(ax, self.time, y, color=colour, alpha=_faint(index, count), label=label)
             else:
                 _line(ax, self.time, y, color=sequence(index, count), label=_case_label(self.group, position))
@@ -215,7 +215,7 @@ class Histories:
         if self.fan:
             places = list(self.pairs.values())
             values = layout.drawable(
-                np.stack([other.history(panel, columns, place)[:, line] for place in spread(places)])
+                np.stack([other.history(panel, columns, place)[:, line] for place in fan_cases(places)])
             )
             good = np.isfinite(values).any(axis=0)
             if good.any():
@@ -272,7 +272,7 @@ class Histories:
                     last, since = labels, 1
             layout.legend(figure, self._cases(), self.sheet, below=True)
             return
-        known = layout.labelled(
+        known = layout.legend_entries(
             [
                 [ax for cell, ax in zip(cells, row, strict=True) if cell is not None]
                 for cells, row in zip(rows, axes, strict=True)
@@ -337,7 +337,7 @@ def _case_words(group: ArchiveGroup, position: int) -> str:
         f"{name} = {number_text(group.values(name)[position] / scale)} {unit}".rstrip()
         for name, (scale, unit) in scales.items()
     ]
-    return layout.named(", ".join(texts)) or f"case #{group.values('case')[position]}"
+    return layout.legend_label(", ".join(texts)) or f"case #{group.values('case')[position]}"
 
 
 def _case_label(group: ArchiveGroup, position: int) -> str:
@@ -373,14 +373,14 @@ def grid(
     return figure, axes
 
 
-def dress(axes: list[list[Any]], rows: Sequence[Sequence[Cell | None]], sheet: PictureSheet) -> None:
+def label_axes(axes: list[list[Any]], rows: Sequence[Sequence[Cell | None]], sheet: PictureSheet) -> None:
     """Labels of the axes, once where neighbours share them, and above each panel what it shows."""
     for number, (cells, row) in enumerate(zip(rows, axes, strict=True)):
         before = None
         for column, (cell, ax) in enumerate(zip(cells, row, strict=True)):
             if cell is not None:
                 alike = before is not None and before.axis == cell.axis
-                ax.set_ylabel("" if alike else layout.broken(cell.axis))
+                ax.set_ylabel("" if alike else layout.two_lines(cell.axis))
                 ax.tick_params(labelleft=not alike)
                 text = cell.title.partition(" · ")[0] if sheet.narrow and len(cells) > 1 else cell.title
                 layout.head(ax, text, sheet, len(cells), INK if len(cells) > 1 or sheet.paper else FAINT)

@@ -74,7 +74,7 @@ def drawable(values: np.ndarray) -> np.ndarray:
     return np.where(np.abs(values) > DRAWABLE, np.copysign(np.inf, values), values)
 
 
-def several(found: Sequence[T], asked: bool, what: str) -> tuple[Sequence[T], str]:
+def as_many_as_fit(found: Sequence[T], asked: bool, what: str) -> tuple[Sequence[T], str]:
     """As many panels as a picture has room for, and what to say of the others. asked: whether they were named. Raises
     Problem E391."""
     if len(found) <= MOST_PANELS:
@@ -106,7 +106,7 @@ def _grow(figure: Any, sheet: PictureSheet, lines: float) -> None:
         figure.set_figheight(figure.get_figheight() + lines * LINE * sheet.small / 72)
 
 
-def broken(label: str, most: int = 16) -> str:
+def two_lines(label: str, most: int = 16) -> str:
     """A long label in two lines: name, unit."""
     return label.replace("  (", "\n(") if len(label) > most else label
 
@@ -132,12 +132,12 @@ def legend(
     figure.legend(found.values(), found.keys(), title=title, **style)
 
 
-def named(text: str) -> str | None:
+def legend_label(text: str) -> str | None:
     """A line's label: matplotlib leaves out of a legend what begins with `_`, and draws a thin space as nothing."""
     return f"\N{THIN SPACE}{text}" if text.startswith("_") else text or None
 
 
-def labelled(axes: Sequence[Sequence[Any]]) -> dict[str, Any]:
+def legend_entries(axes: Sequence[Sequence[Any]]) -> dict[str, Any]:
     """All that has a label in these panels: handle by text, each text once."""
     known: dict[str, Any] = {}
     for ax in (ax for row in axes for ax in row):

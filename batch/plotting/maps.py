@@ -16,12 +16,12 @@ import numpy as np
 
 from batch.plotting import cells, layout, sides
 from batch.plotting.cells import DOTTED, STRIPES, infinity
-from batch.plotting.measured import Measured
+from batch.plotting.measured import MapMetric
 from batch.plotting.points import RASTERED
 from batch.plotting.sheet import FAINT, INK, PictureSheet
 from batch.plotting.sides import MapSide
 from batch.queries.colours import Reach, reach
-from batch.queries.grids import FULL, cells_of, levelled
+from batch.queries.grids import FULL, cells_of, column_levels
 from batch.queries.pool import CaseColumn
 from met.distinct import distinct
 from met.frozen import frozen
@@ -64,7 +64,7 @@ def plan(x: CaseColumn, y: CaseColumn, third: CaseColumn | None, other: tuple[st
     cells = cells_of(across.levels, up.levels)
     there = cells[cells >= 0]
     filled = len(distinct(there)) > FULL * len(across.levels.texts) * len(up.levels.texts)
-    apart = there if third is None else there * 1000 + levelled(third.values).places[cells >= 0]
+    apart = there if third is None else there * 1000 + column_levels(third.values).places[cells >= 0]
     several = int(np.unique(apart, return_counts=True)[1].max(initial=0))
     if not filled:
         across, up = sides.line(x), sides.line(y)
@@ -72,7 +72,7 @@ def plan(x: CaseColumn, y: CaseColumn, third: CaseColumn | None, other: tuple[st
 
 
 def draw(
-    sheet: PictureSheet, found: MapLayout, metrics: Sequence[Measured], third: CaseColumn | None
+    sheet: PictureSheet, found: MapLayout, metrics: Sequence[MapMetric], third: CaseColumn | None
 ) -> tuple[Any, list[list[Any]]]:
     """The figure and its axes; what is written above it is left to the caller."""
     every = np.ones(len(found.cells), bool)
@@ -101,7 +101,7 @@ def draw(
     return figure, axes
 
 
-def said(found: MapLayout, metrics: Sequence[Measured], third: CaseColumn | None) -> str:
+def description(found: MapLayout, metrics: Sequence[MapMetric], third: CaseColumn | None) -> str:
     """Say what a cell or a point is, and beside a third parameter what is required."""
     if not found.filled:
         text = "a point a case"
@@ -113,7 +113,7 @@ def said(found: MapLayout, metrics: Sequence[Measured], third: CaseColumn | None
     return "; ".join([text, *(required if third is not None else [])])
 
 
-def _stands(metrics: Sequence[Measured], found: MapLayout) -> str:
+def _stands(metrics: Sequence[MapMetric], found: MapLayout) -> str:
     if found.other is not None:
         return "the one that differs most"
     judged = {bool(each.column.limits) for each in metrics}
@@ -121,13 +121,13 @@ def _stands(metrics: Sequence[Measured], found: MapLayout) -> str:
     return worst if judged == {True} else middle if judged == {False} else f"{worst}, or {middle} where nothing is"
 
 
-def _about(each: Measured, found: MapLayout) -> str:
+def _about(each: MapMetric, found: MapLayout) -> str:
     if found.other is not None:
         return each.column.about or each.column.label
     return " · ".join(part for part in (each.about, _lost(each)) if part)
 
 
-def _lost(each: Measured) -> str:
+def _lost(each: MapMetric) -> str:
     """Say how many cases have no finite number."""
     infinite, failed = int(np.isinf(each.values).sum()), int(each.failed.sum())
     lacking = int((np.isnan(each.values) & ~each.failed).sum())
@@ -138,29 +138,29 @@ def _lost(each: Measured) -> str:
 # Colours
 
 
-def _shown(each: Measured, found: MapLayout) -> np.ndarray:
+def _shown(each: MapMetric, found: MapLayout) -> np.ndarray:
     return each.values if found.other is None else each.difference
 
 
 @frozen
-class Tones:
+class ColourScale:
     """The colour of each value; `reach`: how far the colours go, None where no value is finite."""
 
     norm: Any
     reach: Reach | None
 
 
-def _tones(each: Measured, found: MapLayout, values: np.ndarray) -> Tones:
+def _tones(each: MapMetric, found: MapLayout, values: np.ndarray) -> ColourScale:
     from matplotlib.colors import LogNorm, Normalize
 
     limits = [limit.value for limit in each.column.limits] if found.other is None else []
     far = reach(values, limits, parting=found.other is not None)
     if far is None:
-        return Tones(Normalize(0.0, 1.0), None)
+        return ColourScale(Normalize(0.0, 1.0), None)
     if far.low == far.high:
         room = 0.05 * (abs(far.low) or 1.0)
-        return Tones(Normalize(far.low - room, far.high + room), far)
-    return Tones((LogNorm if far.log else Normalize)(far.low, far.high), far)
+        return ColourScale(Normalize(far.low - room, far.high + room), far)
+    return ColourScale((LogNorm if far.log else Normalize)(far.low, far.high), far)
 
 
 def _colours(found: MapLayout) -> Any:
@@ -172,7 +172,13 @@ def _colours(found: MapLayout) -> Any:
 
 
 def _bar(
-    figure: Any, mapped: Any, axes: Sequence[Any], each: Measured, found: MapLayout, sheet: PictureSheet, tones: Tones
+    figure: Any,
+    mapped: Any,
+    axes: Sequence[Any],
+    each: MapMetric,
+    found: MapLayout,
+    sheet: PictureSheet,
+    tones: ColourScale,
 ) -> None:
     """The colour bar; pointed where values lie beyond it, and how many."""
     far = tones.reach
@@ -185,7 +191,7 @@ def _bar(
     if found.other is not None:
         unit = f"  ({each.column.unit})" if each.column.unit else ""
         label = f"{each.column.label}: {found.other[0]} − {found.other[1]}{unit}"
-    lines = [layout.broken(label, 26), *(text for text in reversed(far.said) if text)]
+    lines = [layout.two_lines(label, 26), *(text for text in reversed(far.said) if text)]
     bar.set_label("\n".join(lines), fontsize=sheet.small)
     bar.outline.set_visible(False)
     if found.other is None:
@@ -199,14 +205,19 @@ def _bar(
 
 
 def _maps(
-    figure: Any, axes: Sequence[Any], each: Measured, found: MapLayout, parts: Sequence[np.ndarray], sheet: PictureSheet
+    figure: Any,
+    axes: Sequence[Any],
+    each: MapMetric,
+    found: MapLayout,
+    parts: Sequence[np.ndarray],
+    sheet: PictureSheet,
 ) -> None:
     """A map for each of some parts of the cases, in the same colours."""
     shown, count = _shown(each, found), found.shape[0] * found.shape[1]
     striped = _striped(each, found)
     if found.filled:
         picked = [
-            cells.picked(
+            cells.cell_values(
                 shown,
                 each.worse,
                 each,
@@ -236,14 +247,14 @@ def _maps(
     _bar(figure, mapped, axes, each, found, sheet, tones)
 
 
-def _striped(each: Measured, found: MapLayout) -> list[tuple[np.ndarray, str]]:
+def _striped(each: MapMetric, found: MapLayout) -> list[tuple[np.ndarray, str]]:
     if found.other is None or each.theirs_missed is None:
         return [(each.missed, STRIPES)]
     both = each.both
     return [(both & each.missed & ~each.theirs_missed, STRIPES), (both & ~each.missed & each.theirs_missed, DOTTED)]
 
 
-def _points(ax: Any, each: Measured, found: MapLayout, here: np.ndarray, norm: Any) -> Any:
+def _points(ax: Any, each: MapMetric, found: MapLayout, here: np.ndarray, norm: Any) -> Any:
     shown = _shown(each, found)
     x, y = found.x.of_cases(), found.y.of_cases()
     finite = here & np.isfinite(shown)
@@ -278,10 +289,10 @@ def _sides(axes: Sequence[Sequence[Any]], found: MapLayout, sheet: PictureSheet)
             last = all(not later[column].get_visible() for later in axes[number + 1 :])
             ax.set_xlabel(found.x.label if last else "")
             ax.tick_params(labelbottom=last, labelleft=column == 0, top=False, right=False)
-            ax.set_ylabel(layout.broken(found.y.label, 22) if column == 0 else "")
+            ax.set_ylabel(layout.two_lines(found.y.label, 22) if column == 0 else "")
 
 
-def _marks(metrics: Sequence[Measured], found: MapLayout) -> dict[str, Any]:
+def _marks(metrics: Sequence[MapMetric], found: MapLayout) -> dict[str, Any]:
     """Legend entries of the stripes, greys and signs that are there."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -319,6 +330,6 @@ def _marks(metrics: Sequence[Measured], found: MapLayout) -> dict[str, Any]:
     return out
 
 
-def _lacking(shown: np.ndarray, each: Measured) -> bool:
+def _lacking(shown: np.ndarray, each: MapMetric) -> bool:
     """True if a case that is there and did not fail has no value."""
     return bool(np.isnan(shown[each.both & ~each.failed]).any())

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from batch.plotting.against import Beside, lacking, unlike
+from batch.plotting.against import OtherGroup, not_in_other, other_unit
 from batch.plotting.layout import drawable
 from batch.queries import requirements
 from batch.queries.pool import CaseColumn, Pool
@@ -16,7 +16,7 @@ from met.run import DONE
 
 
 @frozen
-class Measured:
+class MapMetric:
     """values, theirs: of each case, theirs of the same case in another archive, none where there is no other; missed,
     theirs_missed: whether a requirement of the metric is, of each archive its own; both: whether a case is in both,
     True where there is no other."""
@@ -36,7 +36,7 @@ class Measured:
 
     @property
     def worse(self) -> str:
-        """As `grids.standing` has it."""
+        """The sense of its first limit, as `grids.cell_cases` takes it."""
         return self.column.limits[0].sense if self.column.limits else ""
 
     @property
@@ -59,7 +59,7 @@ class Measured:
             return np.where(same, 0.0, self.values - self.theirs)
 
 
-def measured(pool: Pool, names: Sequence[str], others: Mapping[int, Beside]) -> list[Measured]:
+def map_metrics(pool: Pool, names: Sequence[str], others: Mapping[int, OtherGroup]) -> list[MapMetric]:
     """The metrics of these names, all for none. others: by number of a group that of another archive. Raises Problem
     E393 for a metric that it has in another unit, or which is named and not there."""
     failed, both = pool.status != DONE, _both(pool, others)
@@ -71,7 +71,7 @@ def measured(pool: Pool, names: Sequence[str], others: Mapping[int, Beside]) -> 
             for limit in column.limits:
                 missed |= pool.outcomes[:, pool.requirements.index(limit.text)] == 0
             theirs, theirs_missed = _theirs(pool, name, others, bool(names))
-            out.append(Measured(column, drawable(column.values), missed, failed, theirs, theirs_missed, both))
+            out.append(MapMetric(column, drawable(column.values), missed, failed, theirs, theirs_missed, both))
     return sorted(out, key=lambda each: _place(names, each.column.key.partition(":")[2]))
 
 
@@ -79,7 +79,7 @@ def _place(names: Sequence[str], name: str) -> int:
     return list(names).index(name) if name in names else 0
 
 
-def _both(pool: Pool, others: Mapping[int, Beside]) -> np.ndarray | bool:
+def _both(pool: Pool, others: Mapping[int, OtherGroup]) -> np.ndarray | bool:
     if not others:
         return True
     out = np.zeros(pool.count, bool)
@@ -90,7 +90,7 @@ def _both(pool: Pool, others: Mapping[int, Beside]) -> np.ndarray | bool:
 
 
 def _theirs(
-    pool: Pool, name: str, others: Mapping[int, Beside], asked: bool
+    pool: Pool, name: str, others: Mapping[int, OtherGroup], asked: bool
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """The metric of each case in the other archive, in the own unit, and True where it misses what that requires."""
     if not others:
@@ -103,15 +103,15 @@ def _theirs(
             continue
         if variable is None or variable.role != "metric":
             if asked:
-                raise lacking(name, other, [each.name for each in other.group.role("metric")])
+                raise not_in_other(name, other, [each.name for each in other.group.role("metric")])
             continue
         if variable.unit != mine.unit:
-            raise unlike(name, mine.unit, variable.unit, other)
+            raise other_unit(name, mine.unit, variable.unit, other)
         found = True
         here = np.flatnonzero(pool.group_of == number)
         places = other.places[pool.position_of[here]]
         here, places = here[places >= 0], places[places >= 0]
         out[here] = drawable(other.group.values(name)[places] / deck_unit(mine)[0])
-        columns = [each.place for each in requirements.required(other.group) if each.metric == name]
+        columns = [each.place for each in requirements.group_requirements(other.group) if each.metric == name]
         missed[here] = (requirements.outcomes(other.group)[places][:, columns] == 0).any(axis=1)
     return (out, missed) if found else (None, None)

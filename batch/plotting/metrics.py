@@ -9,9 +9,9 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile
 from batch.plotting import layout, maps, points
-from batch.plotting.against import Beside, file_names
-from batch.plotting.asked import coloured, free, over
-from batch.plotting.measured import Measured, measured
+from batch.plotting.against import OtherGroup, file_names
+from batch.plotting.asked import colour_column, is_independent, map_axes
+from batch.plotting.measured import MapMetric, map_metrics
 from batch.plotting.sheet import PictureSheet
 from batch.queries.pool import CaseColumn, Pool
 from met.diagnostic import Problem, error
@@ -24,12 +24,12 @@ def draw(
     names: Sequence[str],
     parameters: Sequence[str],
     sheet: PictureSheet,
-    others: Mapping[int, Beside],
+    others: Mapping[int, OtherGroup],
     other: ArchiveFile | None,
 ) -> Any:
     """The figure. names: of metrics, all for none; parameters: what they are drawn over, none: as is best. others: by
     number of a group of the pool that of the other archive. Raises Problem E327, E390, E393."""
-    found = over(archive, pool, parameters)
+    found = map_axes(archive, pool, parameters)
     if not pool.metrics():
         helps = "`--histories all` keeps histories; a `metric` in the deck gives a number a case"
         message = f"nothing to draw in `{pool.name}`: it has neither histories nor metrics"
@@ -37,17 +37,17 @@ def draw(
     if pool.count < 2:
         message = f"nothing to draw in `{pool.name}`: the metrics of one case are single numbers"
         raise Problem(error("E327", message, help=f"`met show {quoted(archive.path)}` tells them"))
-    metrics, left = layout.several(measured(pool, names, others), bool(names), "metrics")
+    metrics, left = layout.as_many_as_fit(map_metrics(pool, names, others), bool(names), "metrics")
     files = file_names(archive.path, other.path) if other is not None else None
     count = f"{pool.count:,} cases"
     matched = sum(int((each.places >= 0).sum()) for each in others.values())
     if files is not None and matched < pool.count:
         count += f", {matched:,} of them also in {files[1]}"
     if len(found) < 2:
-        by = coloured(pool, found) if found else None
+        by = colour_column(pool, found) if found else None
         figure = _points(pool, metrics, found[0] if found else None, by, sheet, files)
         drawn = {each.key for each in (*found, by) if each is not None}
-        besides = [each.label for each in pool.varied() if each.key not in drawn and free(each, found[0])]
+        besides = [each.label for each in pool.varied() if each.key not in drawn and is_independent(each, found[0])]
         below = f"{count}; {' and '.join(besides)} varied too" if besides else count
     else:
         if files is not None:
@@ -55,7 +55,7 @@ def draw(
         third = found[2] if len(found) > 2 else None
         planned = maps.plan(found[0], found[1], third, files)
         figure, _ = maps.draw(sheet, planned, metrics, third)
-        below = f"{count}: {maps.said(planned, metrics, third)}"
+        below = f"{count}: {maps.description(planned, metrics, third)}"
     below = f"{below}; {left}" if left else below
     layout.title(figure, archive, pool.groups[0].name if len(pool.groups) == 1 else pool.name, below, sheet)
     return figure
@@ -63,7 +63,7 @@ def draw(
 
 def _points(
     pool: Pool,
-    metrics: Sequence[Measured],
+    metrics: Sequence[MapMetric],
     x: CaseColumn | None,
     by: CaseColumn | None,
     sheet: PictureSheet,
@@ -75,12 +75,12 @@ def _points(
     mapped = None
     for each, [ax] in zip(metrics, axes, strict=True):
         mapped = points.scatter(ax, each, x, by, sheet)
-        text = " · ".join(part for part in (each.about, points.lost(each.values)) if part)
+        text = " · ".join(part for part in (each.about, points.edge_words(each.values)) if part)
         layout.head(ax, text, sheet, 1)
-        ax.set_ylabel(layout.broken(each.label))
-        points.below(ax, x, sheet)
+        ax.set_ylabel(layout.two_lines(each.label))
+        points.varied_axis(ax, x, sheet)
     axes[-1][0].set_xlabel(f"{x.label}  ({x.unit})" if x.unit else x.label)
     if mapped is not None and by is not None:
         points.bar(figure, mapped, [ax for [ax] in axes], by, sheet)
-    layout.legend(figure, points.legend_of(layout.labelled(axes), files), sheet)
+    layout.legend(figure, points.legend_of(layout.legend_entries(axes), files), sheet)
     return figure

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from batch.plotting import layout
-from batch.plotting.measured import Measured
+from batch.plotting.measured import MapMetric
 from batch.plotting.sheet import COLOURS, FAINT, INK, PictureSheet, sequence
 from batch.plotting.sides import is_log, line, write_log
-from batch.queries.grids import MOST_LEVELS, is_grid, levelled, levels
+from batch.queries.grids import MOST_LEVELS, column_levels, is_grid, levels
 from batch.queries.pool import CaseColumn
 from met.frozen import frozen
 
@@ -44,7 +44,7 @@ class Set:
     joined: bool
 
 
-def scatter(ax: Any, each: Measured, x: CaseColumn, by: CaseColumn | None, sheet: PictureSheet) -> Any:
+def scatter(ax: Any, each: MapMetric, x: CaseColumn, by: CaseColumn | None, sheet: PictureSheet) -> Any:
     """One metric over x, by the levels of another column. Gives what a colour bar is of, if there is to be one."""
     finite = np.isfinite(each.values)
     drawn = _apart(x.values, np.where(finite, each.values, np.nan))
@@ -63,7 +63,7 @@ def scatter(ax: Any, each: Measured, x: CaseColumn, by: CaseColumn | None, sheet
             order = one.places[np.argsort(x.values[one.places])]
             y = np.where(np.isfinite(each.values[order]), each.values[order], np.nan)
             ax.plot(x.values[order], y, color=one.colour, linewidth=1.0)
-        ax.scatter(x.values[here], each.values[here], color=one.colour, label=layout.named(one.text), **style)
+        ax.scatter(x.values[here], each.values[here], color=one.colour, label=layout.legend_label(one.text), **style)
     if each.theirs is not None:
         _theirs(ax, each, x, sets, by)
         _edge(ax, np.where(each.both, each.theirs, 0.0), x.values, 4.0 * max(12.0, size), hollow=True)
@@ -78,7 +78,7 @@ def _sets(x: CaseColumn, by: CaseColumn | None) -> list[Set]:
     if by is None:
         every = np.arange(len(x.values))
         return [Set(every, COLOURS[0], "", x.role == "parameter" and len(levels(x.values)) == len(every) < 200)]
-    found = levelled(by.values, by.words)
+    found = column_levels(by.values, by.words)
     count = len(found.texts)
     if found.stretches or (count > NAMED and not _curves(x, by)):
         return []
@@ -110,7 +110,7 @@ def _curves(x: CaseColumn, by: CaseColumn) -> bool:
     return pairs == len(x.values)
 
 
-def _theirs(ax: Any, each: Measured, x: CaseColumn, sets: list[Set], by: CaseColumn | None) -> None:
+def _theirs(ax: Any, each: MapMetric, x: CaseColumn, sets: list[Set], by: CaseColumn | None) -> None:
     """The other archive's cases: hollow, under the own ones, with wide pale curves."""
     assert each.theirs is not None
     y = np.where(np.isfinite(each.theirs), each.theirs, np.nan)
@@ -179,7 +179,7 @@ def _edge(ax: Any, values: np.ndarray, x: np.ndarray, size: float, *, hollow: bo
             )
 
 
-def lost(values: np.ndarray) -> str:
+def edge_words(values: np.ndarray) -> str:
     """Say in words what the marks on the edges stand for."""
     parts = []
     for there, text in ((np.isinf(values), "infinite in {} (▲)"), (np.isnan(values), "no value in {} (×)")):
@@ -188,7 +188,7 @@ def lost(values: np.ndarray) -> str:
     return ", ".join(parts)
 
 
-def _limits(ax: Any, each: Measured) -> None:
+def _limits(ax: Any, each: MapMetric) -> None:
     """Lines at the limits that lie near enough to the points."""
     shown = each.values if each.theirs is None else np.concatenate([each.values, each.theirs])
     finite = shown[np.isfinite(shown)]
@@ -242,7 +242,7 @@ def bar(figure: Any, mapped: Any, axes: list[Any], by: CaseColumn, sheet: Pictur
     drawn.outline.set_visible(False)
 
 
-def below(ax: Any, x: CaseColumn, sheet: PictureSheet) -> None:
+def varied_axis(ax: Any, x: CaseColumn, sheet: PictureSheet) -> None:
     """The axis of what is varied: a choice's words at their places, whole numbers of cases, orders of magnitude."""
     if is_log(x):
         found, wide = line(x), ax.figure.get_figwidth()

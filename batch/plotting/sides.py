@@ -12,7 +12,7 @@ import numpy as np
 from batch.plotting.layout import LETTER
 from batch.plotting.sheet import PictureSheet
 from batch.queries import grids
-from batch.queries.grids import ROUND, Levels, Scale, edges_of, levelled, levels, round_numbers
+from batch.queries.grids import ROUND, Levels, Scale, column_levels, edges_of, levels, round_numbers
 from batch.queries.pool import CaseColumn
 from batch.queries.signals import number_text
 from met.frozen import frozen
@@ -63,7 +63,7 @@ class MapSide:
 
 def side(column: CaseColumn) -> MapSide:
     """The side of a map of cells."""
-    found = levelled(column.values, column.words, MOST_CELLS)
+    found = column_levels(column.values, column.words, MOST_CELLS)
     if found.scale == "place":
         edges = np.arange(len(found.texts) + 1) - 0.5
     else:
@@ -73,7 +73,7 @@ def side(column: CaseColumn) -> MapSide:
 
 def line(column: CaseColumn) -> MapSide:
     """The side of points, which lie by their values whatever these are; words, at their places."""
-    found = levelled(column.values, column.words)
+    found = column_levels(column.values, column.words)
     if column.words:
         return side(column)
     values = levels(column.values)

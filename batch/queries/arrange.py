@@ -25,7 +25,7 @@ class Cell:
     title: str
 
 
-def arranged(group: ArchiveGroup, found: Sequence[Panel]) -> list[list[Cell | None]]:
+def panel_grid(group: ArchiveGroup, found: Sequence[Panel]) -> list[list[Cell | None]]:
     """A row a quantity, a column a joint: `q` of metres and of radians stand beside one another, each with its axis,
     and `elbow.servo.voltage` under the elbow. None where a joint has no such quantity. What is no joint's fills rows of
     its own, components side by side."""
@@ -77,7 +77,7 @@ class CommandCurve:
         return (values if values.ndim == 1 else values[:, self.column]) / self.scale
 
 
-def overlaid(
+def command_curves(
     group: ArchiveGroup, found: Sequence[Panel], positions: Sequence[int], *, apart: bool
 ) -> dict[tuple[str, str, int], CommandCurve]:
     """The recorded commands that are of the same kind as a line of q, qd or tau, by panel (name, unit) and line.
@@ -98,7 +98,7 @@ def overlaid(
         for line, name in enumerate(panel.joints):
             command = commands.get((name, panel.si))
             if panel.variable.rpartition(".")[2] in ("q", "qd", "tau") and command is not None:
-                shared, longest = _shared(group, CommandCurve(*command), spread(positions))
+                shared, longest = _shared(group, CommandCurve(*command), fan_cases(positions))
                 if shared or apart:
                     out[panel.name, panel.unit, line] = CommandCurve(
                         *command, shared=shared, longest=longest, scale=panel.scale
@@ -118,7 +118,7 @@ def _shared(group: ArchiveGroup, command: CommandCurve, positions: Sequence[int]
     return True, longest
 
 
-def spread(positions: Sequence[int]) -> Sequence[int]:
+def fan_cases(positions: Sequence[int]) -> Sequence[int]:
     """So many of the cases as a fan shows, spread over all."""
     if len(positions) <= SPREAD:
         return positions

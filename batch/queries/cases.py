@@ -10,7 +10,7 @@ import numpy as np
 from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.queries import ordering, requirements
 from batch.queries.failures import STATUS
-from batch.queries.ordering import By
+from batch.queries.ordering import CaseOrder
 from batch.queries.pool import ENDED, Pool
 from batch.queries.signals import deck_unit, number_text, value_text
 from batch.queries.summary import finite
@@ -22,7 +22,9 @@ SHOWN_CASES = 20
 MISSES = "\N{BALLOT X}"
 
 
-def table(group: ArchiveGroup, most: int | None = SHOWN_CASES, *, by: By | None = None, hint: bool = True) -> list[str]:
+def table(
+    group: ArchiveGroup, most: int | None = SHOWN_CASES, *, by: CaseOrder | None = None, hint: bool = True
+) -> list[str]:
     """The cases as lines, worst first or `by` what is asked for, in the deck's units; a metric that misses a
     requirement bears a cross.
 
@@ -58,11 +60,11 @@ def table(group: ArchiveGroup, most: int | None = SHOWN_CASES, *, by: By | None 
     return [*out, f"  ... {left:,} more; --all-cases prints them"] if left and hint else out
 
 
-def table_across(pool: Pool, by: By, most: int | None = SHOWN_CASES) -> list[str]:
+def table_across(pool: Pool, by: CaseOrder, most: int | None = SHOWN_CASES) -> list[str]:
     """The cases of all structures of a sweep as lines, `by` what is asked for, with what tells the structures apart."""
     from ic.printing.columns import columns
 
-    places = ordering.across(pool, by)
+    places = ordering.positions_in_pool(pool, by)
     left = 0 if most is None else max(0, len(places) - most)
     places = places[: len(places) - left]
     cells = [["", "", *(f"#{case}" for case in pool.cases[places])]]
@@ -88,9 +90,9 @@ def table_across(pool: Pool, by: By, most: int | None = SHOWN_CASES) -> list[str
     return [*out, f"  ... {left:,} more; --all-cases prints them"] if left else out
 
 
-def title(group: ArchiveGroup, most: int | None = None, *, by: By | None = None) -> str:
+def title(group: ArchiveGroup, most: int | None = None, *, by: CaseOrder | None = None) -> str:
     """The title of the table, which says how it is ordered."""
-    if (found := ordering.within(group, by)) is not None:
+    if (found := ordering.order_of_group(group, by)) is not None:
         return found.title
     outcomes = requirements.outcomes(group)
     number = f"{min(most, group.count)} " if most is not None else ""
@@ -108,7 +110,7 @@ def rows_json(
     group: ArchiveGroup,
     most: int | None = SHOWN_CASES,
     *,
-    by: By | None = None,
+    by: CaseOrder | None = None,
     positions: Sequence[int] | np.ndarray | None = None,
 ) -> list[dict[str, Any]]:
     """The same for programs, in SI, of these cases or of the worst: what a case is, how it ended, its metrics (null
@@ -117,7 +119,7 @@ def rows_json(
     numbers = [variable.name for variable in (*group.role("coordinate"), *group.role("metric"))]
     repeats = {"repeat": group.at("repeat", positions)} if "repeat" in group.variables else {}
     values = {name: group.at(name, positions) for name in ("case", "case_id", "status", "cause", *numbers)}
-    texts = requirements.texts(group)
+    texts = requirements.requirement_texts(group)
     outcomes = requirements.outcomes(group, positions)
     return [
         {
@@ -183,6 +185,6 @@ def _outcome(status: int, outcomes: np.ndarray) -> str:
 def _marks(group: ArchiveGroup, outcomes: np.ndarray) -> dict[str, np.ndarray]:
     """By metric that has requirements: which of the cases miss one."""
     out: dict[str, np.ndarray] = {}
-    for each in requirements.required(group):
+    for each in requirements.group_requirements(group):
         out[each.metric] = out.get(each.metric, False) | (outcomes[:, each.place] == 0)
     return out

@@ -86,7 +86,7 @@ def spans(values: np.ndarray, ratio: float) -> bool:
     return bool(0.0 < low < np.inf and high / ratio >= low)
 
 
-def levelled(values: np.ndarray, words: Sequence[str] = (), most: int = MOST_LEVELS) -> Levels:
+def column_levels(values: np.ndarray, words: Sequence[str] = (), most: int = MOST_LEVELS) -> Levels:
     """The levels of a column.
 
     words  of a choice, what its numbers stand for
@@ -164,7 +164,7 @@ def cells_of(across: Levels, up: Levels) -> np.ndarray:
     return np.where(there, up.places * len(across.texts) + across.places, -1)
 
 
-def standing(values: np.ndarray, cells: np.ndarray, count: int, worse: str) -> np.ndarray:
+def cell_cases(values: np.ndarray, cells: np.ndarray, count: int, worse: str) -> np.ndarray:
     """The case that stands for each of `count` cells; -1 where no case of it has a value.
 
     worse  `<`: a limit is above, and the largest value is the worst; `>`: the smallest is; "": there is no limit, and

@@ -24,7 +24,7 @@ LIMITED = {
 
 
 @frozen
-class Mark:
+class LimitMark:
     """A limit: what it is called, and where it stands. time: it is an instant, and no value."""
 
     text: str
@@ -32,7 +32,7 @@ class Mark:
     time: bool = False
 
 
-def limits_of(experiment: Experiment, panel: Panel, line: int) -> tuple[Mark, ...]:
+def limits_of(experiment: Experiment, panel: Panel, line: int) -> tuple[LimitMark, ...]:
     """The limits of one line of a panel, in the panel's unit; those that are finite, and the same in all cases."""
     joint = panel.joints[line]
     channel = panel.name if panel.name.startswith(f"{joint}.") or not joint else f"{joint}.{panel.name}"
@@ -41,19 +41,19 @@ def limits_of(experiment: Experiment, panel: Panel, line: int) -> tuple[Mark, ..
     return tuple(dict.fromkeys(mark for mark in marks if math.isfinite(mark.value)))
 
 
-def _required(experiment: Experiment, channel: str, panel: Panel) -> Iterator[Mark]:
+def _required(experiment: Experiment, channel: str, panel: Panel) -> Iterator[LimitMark]:
     watched = {metric.name: metric for metric in experiment.structure.metrics}
     for each in experiment.requirements:
         metric = watched.get(each.metric)
         if metric is None or metric.of != channel:
             continue
         if metric.model == "settling_time":
-            yield Mark(each.text, each.limit, time=True)
+            yield LimitMark(each.text, each.limit, time=True)
         for sign in POINTWISE.get(metric.model, ()):
-            yield Mark(each.text, sign * each.limit / panel.scale)
+            yield LimitMark(each.text, sign * each.limit / panel.scale)
 
 
-def _stops(experiment: Experiment, joint: str, panel: Panel) -> Iterator[Mark]:
+def _stops(experiment: Experiment, joint: str, panel: Panel) -> Iterator[LimitMark]:
     if not joint or panel.variable.rpartition(".")[2] != "q":
         return
     for use in experiment.structure.environment:
@@ -64,7 +64,7 @@ def _stops(experiment: Experiment, joint: str, panel: Panel) -> Iterator[Mark]:
                     yield _mark(f"{use.name}.{end}", value / panel.scale, panel)
 
 
-def _servo(experiment: Experiment, channel: str, panel: Panel) -> Iterator[Mark]:
+def _servo(experiment: Experiment, channel: str, panel: Panel) -> Iterator[LimitMark]:
     owner, _, member = channel.rpartition(".")
     if member in LIMITED and owner.rpartition(".")[2] in ("servo", "bed"):
         value = _number(experiment, f"{owner}.{LIMITED[member]}")
@@ -83,6 +83,6 @@ def _number(experiment: Experiment, path: str) -> float | str | None:
     return float(found.value) if isinstance(found.value, (int, float)) else None
 
 
-def _mark(name: str, value: float, panel: Panel) -> Mark:
+def _mark(name: str, value: float, panel: Panel) -> LimitMark:
     unit = "" if panel.unit in ("", "1") else pretty_unit(panel.unit)
-    return Mark(f"{name} {number_text(value)} {unit}".rstrip(), value)
+    return LimitMark(f"{name} {number_text(value)} {unit}".rstrip(), value)

@@ -22,16 +22,16 @@ WAYS = {"smallest": False, "largest": True}
 
 
 @frozen
-class By:
+class CaseOrder:
     """A metric's name, a varied parameter's path, or `repeat`; smallest first, unless `largest`. then: by what those
     are listed that are equal in this."""
 
     name: str
     largest: bool = False
-    then: tuple[By, ...] = ()
+    then: tuple[CaseOrder, ...] = ()
 
     @property
-    def keys(self) -> tuple[By, ...]:
+    def keys(self) -> tuple[CaseOrder, ...]:
         return (self, *self.then)
 
     @property
@@ -40,10 +40,10 @@ class By:
         return f"cases by {'; then by '.join(words)}:"
 
 
-def by_names(names: Sequence[str], *, reverse: bool = False) -> By | None:
+def by_names(names: Sequence[str], *, reverse: bool = False) -> CaseOrder | None:
     """In the order of these names, each `NAME`, `NAME:largest` or `NAME:smallest`; None where there are none. reverse:
     largest first of all that do not say it themselves. Raises Problem E329."""
-    keys: list[By] = []
+    keys: list[CaseOrder] = []
     for each in names:
         name, colon, way = (each, "", "") if "," in each else each.partition(":")  # `check` tells of several in one
         if colon and way not in WAYS:
@@ -53,15 +53,15 @@ def by_names(names: Sequence[str], *, reverse: bool = False) -> By | None:
             )
         if name in [key.name for key in keys]:
             raise Problem(error("E329", f"cases are to be listed by `{name}` twice", help="leave one out"))
-        keys.append(By(name, WAYS[way] if colon else reverse))
+        keys.append(CaseOrder(name, WAYS[way] if colon else reverse))
     return _joined(keys)
 
 
-def _joined(keys: Sequence[By]) -> By | None:
-    return By(keys[0].name, keys[0].largest, tuple(keys[1:])) if keys else None
+def _joined(keys: Sequence[CaseOrder]) -> CaseOrder | None:
+    return CaseOrder(keys[0].name, keys[0].largest, tuple(keys[1:])) if keys else None
 
 
-def check(groups: Sequence[ArchiveGroup], by: By | None) -> None:
+def check(groups: Sequence[ArchiveGroup], by: CaseOrder | None) -> None:
     """Raises Problem E329 where none of the groups has what cases are to be listed by, or each is of one case."""
     if by is None:
         return
@@ -84,29 +84,29 @@ def check(groups: Sequence[ArchiveGroup], by: By | None) -> None:
         )
 
 
-def positions(group: ArchiveGroup, by: By | None = None) -> np.ndarray:
+def positions(group: ArchiveGroup, by: CaseOrder | None = None) -> np.ndarray:
     """Positions of the cases, by what is asked for, equal ones and those that have no value, which are last, in the
     order of the case table; worst first where nothing is asked for, or the group does not have it."""
-    by = within(group, by)
+    by = order_of_group(group, by)
     if by is None:
         return worst_first(group)
     names = _names(group)
     return _order(by, [np.asarray(group.values(names[key.name]), np.float64) for key in by.keys])
 
 
-def across(pool: Pool, by: By) -> np.ndarray:
+def positions_in_pool(pool: Pool, by: CaseOrder) -> np.ndarray:
     """The same of the cases of all structures of a sweep, one of which has it: those of others are last."""
     columns = {column.label: column for column in pool.columns if column.role in ROLES}
     return _order(by, [columns[key.name].values for key in by.keys])
 
 
-def _order(by: By, values: Sequence[np.ndarray]) -> np.ndarray:
+def _order(by: CaseOrder, values: Sequence[np.ndarray]) -> np.ndarray:
     """Places by the first of the values, equal ones by the next; not-a-number last in each."""
     keys = [-each if key.largest else each for key, each in zip(by.keys, values, strict=True)]
     return np.lexsort(keys[::-1])
 
 
-def within(group: ArchiveGroup, by: By | None) -> By | None:
+def order_of_group(group: ArchiveGroup, by: CaseOrder | None) -> CaseOrder | None:
     """Keep of an order the names that the group has; None where it has none of them."""
     names = _names(group) if by is not None else {}
     return _joined([key for key in by.keys if key.name in names]) if by is not None else None
@@ -136,7 +136,7 @@ def ranking(group: ArchiveGroup) -> requirements.Ranking:
 def _far(group: ArchiveGroup) -> np.ndarray:
     """The distance of each case beyond the limit that it misses most, relative to that limit."""
     worst = np.full(group.count, -np.inf)
-    for each in requirements.required(group):
+    for each in requirements.group_requirements(group):
         far = requirements.beyond(group.values(each.metric), each.comparison, each.limit)
         worst = np.maximum(worst, far)
     return worst

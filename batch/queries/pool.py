@@ -99,7 +99,7 @@ class Pool:
     @cached_property
     def requirements(self) -> tuple[str, ...]:
         """Texts of the requirements of all groups."""
-        return tuple(dict.fromkeys(text for group in self.groups for text in requirements.texts(group)))
+        return tuple(dict.fromkeys(text for group in self.groups for text in requirements.requirement_texts(group)))
 
     @cached_property
     def outcomes(self) -> np.ndarray:
@@ -109,7 +109,7 @@ class Pool:
             here = self.group_of == number
             if "met" in group.variables:
                 found = group.values("met")[self.position_of[here]]
-                for column, text in enumerate(requirements.texts(group)):
+                for column, text in enumerate(requirements.requirement_texts(group)):
                     out[here, self.requirements.index(text)] = found[:, column]
         return out
 
@@ -130,7 +130,7 @@ class Pool:
         """By metric's variable: its requirements, limits in SI."""
         out: dict[str, dict[str, RequirementLimit]] = {}
         for group in self.groups:
-            for each in requirements.required(group):
+            for each in requirements.group_requirements(group):
                 out.setdefault(each.metric, {})[each.text] = RequirementLimit(
                     each.text, each.limit, each.comparison[:1]
                 )
@@ -213,7 +213,7 @@ class Pool:
         return CaseColumn(f"choice:{variable.name}", variable.path, "", "choice", values, tuple(words))
 
 
-def shown(value: float) -> str:
+def page_number(value: float) -> str:
     """A number as a page shows it."""
     if np.isnan(value):
         return "–"

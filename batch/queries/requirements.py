@@ -25,14 +25,14 @@ class GroupRequirement:
     limit: float
 
 
-def texts(group: ArchiveGroup) -> list[str]:
+def requirement_texts(group: ArchiveGroup) -> list[str]:
     """The requirements as the deck wrote them."""
     return [str(text) for text in group.values("requirement")] if "requirement" in group.variables else []
 
 
-def required(group: ArchiveGroup) -> list[GroupRequirement]:
+def group_requirements(group: ArchiveGroup) -> list[GroupRequirement]:
     """The requirements of which the archive says all of this; none in an archive that does not say."""
-    known = texts(group)
+    known = requirement_texts(group)
     if not known:
         return []
     told = group.variables["requirement"].attributes

@@ -37,11 +37,11 @@ def report(
     from contextlib import ExitStack
 
     from batch.archive.read import ArchiveFile
-    from batch.report.contents.against import Against, called, named
+    from batch.report.contents.against import ComparedArchive, display_names, rename_archives
     from batch.report.contents.gathering import gather
     from batch.report.html.page import page
     from batch.report.writing import check, default, write
-    from batch.terminal.show import chosen
+    from batch.terminal.show import groups_named
 
     if tolerances and against is None:
         raise ValueError("tolerances are for a comparison: against which archive?")
@@ -54,9 +54,11 @@ def report(
         if against is not None:
             from batch import diff
 
-            chosen(file, experiments)
-            found = named(diff(against, archive, tolerances=tolerances), *called(Path(against), archive))
-            other = Against(stack.enter_context(ArchiveFile(Path(against))), found)
+            groups_named(file, experiments)
+            found = rename_archives(
+                diff(against, archive, tolerances=tolerances), *display_names(Path(against), archive)
+            )
+            other = ComparedArchive(stack.enter_context(ArchiveFile(Path(against))), found)
         text = page(gather(file, experiments, title, progress, other))
     write(target, text)
     return target

@@ -11,7 +11,7 @@ from met.analysis.margin import HEAVIEST, Margin
 from met.plan import Experiment
 
 
-def told(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> Iterator[str]:
+def margin_lines(experiment: Experiment, found: Sequence[Sequence[Margin]]) -> Iterator[str]:
     """The margins in lines: of one case each joint, of several the tightest of each joint."""
     cases = f", {count(len(found), 'case')}" if len(found) > 1 else ""
     yield f"{experiment.name}: {count(len(found[0]), 'joint')} on a bed{cases}"

@@ -12,7 +12,7 @@ from met.plan import Experiment
 EVENTS = "friction events"
 
 
-def told(found: RunProfile, experiment: Experiment) -> Iterator[str]:
+def profile_lines(found: RunProfile, experiment: Experiment) -> Iterator[str]:
     """The profile in lines."""
     schedule = experiment.structure.schedule
     yield (

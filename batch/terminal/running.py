@@ -16,11 +16,11 @@ from batch.campaigns.rehearsal import rehearse
 from batch.campaigns.replaying import Replay, differences, replay
 from batch.executors.choose import choose
 from batch.executors.threads import Threads
-from batch.export.from_run import check, later, parted, written
+from batch.export.from_run import archive_and_export, check, export_command, export_run
 from batch.queries.structures import structures
 from batch.queries.summary import summarise
 from batch.terminal.progress import Bar
-from batch.terminal.verdict import announcement, told, verdict_json, worst_cases, writing
+from batch.terminal.verdict import announcement, result_lines, verdict_json, worst_cases, writing
 from met.diagnostic import Problem, error
 from met.host.sources import names_archive, names_plan
 from met.messages import visible
@@ -68,7 +68,7 @@ def run_and_tell(
             include_dirs=include_dirs,
             settings=settings,
         )
-    archive, target = parted(output)
+    archive, target = archive_and_export(output)
     again = None
     if names_archive(source):
         again = replay(source, names, cases, failed, everything)
@@ -133,14 +133,15 @@ def run_and_tell(
     exported = None
     refused: list[str] = []
     try:
-        exported = None if target is None else written(campaign, target, histories=of_histories)
+        exported = None if target is None else export_run(campaign, target, histories=of_histories)
     except Problem as problem:
         refused = [each.message for each in problem.diagnostics]
         if not json:
             _complain(problem, json)
     except KeyboardInterrupt as interrupt:
         if target is not None:
-            say(f"{campaign.output} is whole; {target} is missing: `{later(campaign, target, histories=of_histories)}`")
+            command = export_command(campaign, target, histories=of_histories)
+            say(f"{campaign.output} is whole; {target} is missing: `{command}`")
         raise type(interrupt) from None
     ok = all(summary.ok for summary in summaries)
     missing = target is not None and exported is None
@@ -162,13 +163,15 @@ def run_and_tell(
     else:
         say(
             "\n".join(
-                told(source, campaign, summaries, worst, picture, excuse, exported, performed.seconds, ok, tables)
+                result_lines(
+                    source, campaign, summaries, worst, picture, excuse, exported, performed.seconds, ok, tables
+                )
             )
         )
         for line in _compared(again, unlike):
             say(line)
         if missing and target is not None:
-            say(f"exit 1: {target} is missing: `{later(campaign, target, histories=of_histories)}`")
+            say(f"exit 1: {target} is missing: `{export_command(campaign, target, histories=of_histories)}`")
     return ok and not unlike and not missing
 
 

@@ -12,7 +12,7 @@ from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries import cases, ordering
 from batch.queries.deck_units import DeckUnits
 from batch.queries.failures import failure_lines
-from batch.queries.ordering import By
+from batch.queries.ordering import CaseOrder
 from batch.queries.pool import pools
 from batch.queries.signals import case_text, history, number_text, panels, pretty_unit
 from batch.queries.structures import structures
@@ -41,7 +41,7 @@ def show(
     experiments: Sequence[str] = (),
     case: str | None = None,
     all_cases: bool = False,
-    by: By | None = None,
+    by: CaseOrder | None = None,
     width: int = 100,
     colour: bool = False,
     plots: bool = True,
@@ -55,7 +55,7 @@ def show(
     """
     out = _Lines()
     out += [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
-    shown = picked(archive, experiments, case)
+    shown = cases_named(archive, experiments, case)
     ordering.check([group for group, _ in shown], by)
     if not experiments and case is None and not signals:
         out += [row for table in structures(archive) for row in ("", *table)]
@@ -95,7 +95,7 @@ class _Lines:
 
 
 def _about(
-    archive: ArchiveFile, group: ArchiveGroup, position: int | None, all_cases: bool, by: By | None, width: int
+    archive: ArchiveFile, group: ArchiveGroup, position: int | None, all_cases: bool, by: CaseOrder | None, width: int
 ) -> list[str]:
     """Lines about how the cases went, and which of them how; or about one case, with what was varied in it."""
     if position is not None:
@@ -115,7 +115,7 @@ def as_json(
     *,
     case: str | None = None,
     all_cases: bool = False,
-    by: By | None = None,
+    by: CaseOrder | None = None,
 ) -> str:
     """The same for programs: outcome, cases, variables and attributes, without the signals' values.
 
@@ -127,7 +127,7 @@ def as_json(
     from batch.queries import summary as outcomes
 
     groups = []
-    shown = picked(archive, experiments, case)
+    shown = cases_named(archive, experiments, case)
     ordering.check([group for group, _ in shown], by)
     for group, position in shown:
         if position is None:
@@ -151,7 +151,7 @@ def as_json(
     return json.dumps(data, indent=1, allow_nan=False)
 
 
-def chosen(archive: ArchiveFile, names: Sequence[str]) -> tuple[ArchiveGroup, ...]:
+def groups_named(archive: ArchiveFile, names: Sequence[str]) -> tuple[ArchiveGroup, ...]:
     """The experiments of these names, all where none is given."""
     known = [*dict.fromkeys(group.sweep or group.name for group in archive.groups)]
     for name in names:
@@ -162,9 +162,9 @@ def chosen(archive: ArchiveFile, names: Sequence[str]) -> tuple[ArchiveGroup, ..
     return tuple(dict.fromkeys(found)) if names else archive.groups
 
 
-def picked(archive: ArchiveFile, names: Sequence[str], case: str | None) -> list[tuple[ArchiveGroup, int | None]]:
+def cases_named(archive: ArchiveFile, names: Sequence[str], case: str | None) -> list[tuple[ArchiveGroup, int | None]]:
     """The experiments of these names; where a case is asked for, those that have it, and its position in each."""
-    groups = chosen(archive, names)
+    groups = groups_named(archive, names)
     if case is None:
         return [(group, None) for group in groups]
     found: list[tuple[ArchiveGroup, int | None]] = []

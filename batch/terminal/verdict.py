@@ -104,7 +104,7 @@ def worst_cases(archive: ArchiveFile) -> tuple[WorstCaseLines, ...]:
     return tuple(out)
 
 
-def told(
+def result_lines(
     source: str,
     campaign: Campaign,
     summaries: tuple[Summary, ...],
@@ -164,7 +164,7 @@ def _why_not(summaries: tuple[Summary, ...]) -> str:
     return "; ".join(parts)
 
 
-def brief(archive: Archive) -> list[str]:
+def short_result_lines(archive: Archive) -> list[str]:
     """The verdict of an archive alone: for the log of a job."""
     out: list[str] = []
     for summary in archive.summaries:

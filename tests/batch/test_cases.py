@@ -12,7 +12,7 @@ import pytest
 import batch
 from batch.archive.read import ArchiveFile
 from batch.queries import cases, ordering
-from batch.queries.ordering import By, by_names
+from batch.queries.ordering import CaseOrder, by_names
 from batch.terminal.running import run_and_tell
 from batch.terminal.show import as_json, show
 from met.cli import main
@@ -101,11 +101,11 @@ def test_by_a_metric_or_what_is_varied_and_without_a_value_last(
     monkeypatch.setattr(run, "run", partial(plans.answer, fails=frozenset({7, 12})))
     with made(plans.gains(20)) as file:
         group = file.groups[0]
-        order = ordering.positions(group, By(name, largest)).tolist()
+        order = ordering.positions(group, CaseOrder(name, largest)).tolist()
         [variable] = [v for v in (*group.role("metric"), *group.role("coordinate")) if v.path == name]
         values = group.values(variable.name)
-        said = json.loads(as_json(file, by=By(name, largest), all_cases=True))["experiments"][0]["case_table"]
-        lines = show(file, plots=False, by=By(name, largest)).splitlines()
+        said = json.loads(as_json(file, by=CaseOrder(name, largest), all_cases=True))["experiments"][0]["case_table"]
+        lines = show(file, plots=False, by=CaseOrder(name, largest)).splitlines()
     assert sorted(order) == list(range(20)) == sorted(each["row"] for each in said)
     assert [each["row"] for each in said] == order
     known = [row for row in order if not np.isnan(values[row])]

@@ -273,7 +273,7 @@ def listening() -> set[str]:
 class TestInThisProcess:
     def test_a_local_one_can_be_reached_by_nobody_else(self) -> None:
         before = listening()
-        with dask_connection.connected("local", threads=1) as client:
+        with dask_connection.dask_client("local", threads=1) as client:
             assert client.scheduler.address.startswith("inproc://") and client.submit(abs, -1).result() == 1
             assert listening() == before
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from batch.queries.grids import MOST_LEVELS, Scale, is_log, levelled, levels, spacing
+from batch.queries.grids import MOST_LEVELS, Scale, column_levels, is_log, levels, spacing
 
 DENSE = (2 * np.geomspace(1e-4, 3.0, 300) / 2 * 180 / np.pi).tolist()
 """As numbers come from a deck, through SI and back."""
@@ -55,7 +55,7 @@ def test_points_lie_on_a_logarithmic_axis_where_small_values_need_it(values: lis
 @pytest.mark.parametrize("space", [np.linspace, np.geomspace])
 def test_many_values_of_a_grid_share_cells_of_which_none_is_empty(space: type[np.linspace], count: int) -> None:
     values = np.repeat(space(0.3, 70.0, count), 2)
-    found = levelled(values)
+    found = column_levels(values)
     assert len(found.texts) == MOST_LEVELS and found.stretches
     assert np.bincount(found.places, minlength=MOST_LEVELS).min() > 0
     assert found.scale == ("log" if space is np.geomspace else "linear")
@@ -66,13 +66,16 @@ def test_many_values_of_a_grid_share_cells_of_which_none_is_empty(space: type[np
 
 def test_irregular_values_of_a_grid_share_cells_of_one_width() -> None:
     values = np.repeat([*np.linspace(0.0, 1.0, 40), *np.linspace(100.0, 101.0, 40)], 3)
-    found = levelled(values)
+    found = column_levels(values)
     assert found.scale == "place" and np.bincount(found.places, minlength=MOST_LEVELS).min() > 0
 
 
 def test_samples_share_stretches_that_are_as_wide_by_factors_where_they_span_many() -> None:
     rng = np.random.default_rng(1)
-    even, wide = levelled(rng.uniform(5.0, 9.0, 5000), most=300), levelled(10 ** rng.uniform(-3.0, 2.0, 5000), most=300)
+    even, wide = (
+        column_levels(rng.uniform(5.0, 9.0, 5000), most=300),
+        column_levels(10 ** rng.uniform(-3.0, 2.0, 5000), most=300),
+    )
     assert (even.scale, wide.scale) == ("linear", "log")
     assert len(even.texts) == len(wide.texts) == MOST_LEVELS
     np.testing.assert_allclose(np.diff(even.values), np.diff(even.values)[0])
@@ -80,5 +83,5 @@ def test_samples_share_stretches_that_are_as_wide_by_factors_where_they_span_man
 
 
 def test_what_is_no_number_has_no_level() -> None:
-    found = levelled(np.array([np.nan, 1.0, np.inf, 2.0, 1.0]))
+    found = column_levels(np.array([np.nan, 1.0, np.inf, 2.0, 1.0]))
     assert found.places.tolist() == [-1, 0, -1, 1, 0] and levels(np.array([np.nan])).size == 0

@@ -366,15 +366,15 @@ def test_the_commit_of_an_archive_is_mets_own(here: Path, monkeypatch: pytest.Mo
 
 
 def test_what_another_run_has_ended_meanwhile_is_not_run_again(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    look = resuming.there
+    look = resuming.finished_state
 
     def late(*words: Any) -> str:
         before = look(*words)
-        monkeypatch.setattr(resuming, "there", look)
+        monkeypatch.setattr(resuming, "finished_state", look)
         batch.run(plan(), output="a.h5")
         return before
 
-    monkeypatch.setattr(resuming, "there", late)
+    monkeypatch.setattr(resuming, "finished_state", late)
     executor = whole.Watched()
     batch.run(plan(), output="a.h5", executor=executor)
     assert executor.cases == 0

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import ic
-from batch.terminal.profile import told
+from batch.terminal.profile import profile_lines
 from ic.find import standard_decks
 from met.analysis.profile import Input, RunProfile, WorkCost
 from met.cli import main
@@ -82,7 +82,7 @@ run brief like nominal { servos { shoulder = smooth; elbow = smooth; } duration 
 
 
 def test_a_profile_is_shown_in_columns() -> None:
-    assert "\n".join(told(MADE_UP, plans.gains(36))) == SHOWN
+    assert "\n".join(profile_lines(MADE_UP, plans.gains(36))) == SHOWN
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from batch.campaigns.folder import Folder, beside, gaps
+from batch.campaigns.folder import Folder, beside, uncovered
 from batch.campaigns.tasks import CampaignSection, Task
 from batch.executors import Executor, Outcome
 from batch.executors.threads import Threads
@@ -137,7 +137,7 @@ def shards(archive: Path) -> dict[str, tuple[int, int]]:
 
 def done(archive: Path, cases: int, section: int = 0) -> int:
     """Cases of a section that have a shard."""
-    return cases - sum(last - first for first, last in gaps(folder_of(archive).named(section), cases))
+    return cases - sum(last - first for first, last in uncovered(folder_of(archive).named(section), cases))
 
 
 def run_twice(archive: Path, section: int = 0) -> list[tuple[Task, Task]]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from batch.terminal.margin import as_data, in_words, remedy, told, verdict
+from batch.terminal.margin import as_data, in_words, margin_lines, remedy, verdict
 from met.analysis.margin import HEAVIEST, LIGHTEST, Margin, margins
 from met.cli import main
 from met.plan import Experiment
@@ -56,7 +56,7 @@ def _one(**more: float | None) -> Margin:
 def _margin(servo: str, law: str = "velocity_tracking", bed: str = "emulated") -> tuple[Margin, str]:
     experiment = compiled(deck(law=law, bed=bed, duration=0.1, servo={"shoulder": f"told {{ {servo} }}"}), "on_bench")
     found = margins(experiment)
-    return found[0][0], "\n".join(told(experiment, found))
+    return found[0][0], "\n".join(margin_lines(experiment, found))
 
 
 @pytest.mark.slow
@@ -129,7 +129,7 @@ def test_more_gain_of_the_servo_takes_away_from_below_and_not_all_at_once() -> N
 def test_where_the_arm_is_too_light_the_table_says_from_where_it_would_not_be() -> None:
     experiment, _ = _stiff(0.08, [0.08, 0.4])
     found = margins(experiment)
-    assert list(told(experiment, found)) == [
+    assert list(margin_lines(experiment, found)) == [
         "arms: 1 joint on a bed, 2 cases",
         "",
         "  joint  law                       servo  delay     r    stable at r  margin",

@@ -20,13 +20,13 @@ GOOD = (ENDED.index("met"), ENDED.index("done"))
 
 
 @frozen
-class Against:
+class ComparedArchive:
     """The other archive, which is before, and what differs from it, in which both have the names that a page uses."""
 
     file: ArchiveFile
     found: Diff
 
-    def of(self, pool: Pool) -> Before | None:
+    def of(self, pool: Pool) -> EarlierCases | None:
         """The cases that are those of a pool; None where there is no such run or sweep."""
         groups = {group.name: group for group in self.file.groups}
         by_name = {experiment.name_b: experiment for experiment in self.found.experiments}
@@ -35,10 +35,10 @@ class Against:
             for number, group in enumerate(pool.groups)
             if group.name in by_name
         ]
-        return Before(pool, pairs) if pairs else None
+        return EarlierCases(pool, pairs) if pairs else None
 
 
-class Before:
+class EarlierCases:
     """The cases of the other archive that are those of a pool, in the pool's order.
 
     pool   theirs;  pairs  of each structure in both: which of the first pool's it is, theirs, and how they differ
@@ -117,7 +117,7 @@ def change(column: CaseColumn) -> CaseColumn | None:
     return CaseColumn(f"change:{column.key}", f"change of {column.label}", column.unit, "change", values)
 
 
-def called(before: Path, now: Path) -> tuple[str, str]:
+def display_names(before: Path, now: Path) -> tuple[str, str]:
     """The names of two archives in a page: those of their files, or where these are the same as much of their paths as
     tells them apart."""
     one, two = before.absolute().parts, now.absolute().parts
@@ -127,7 +127,7 @@ def called(before: Path, now: Path) -> tuple[str, str]:
     return before.name, now.name
 
 
-def named(found: Diff, before: str, now: str) -> Diff:
+def rename_archives(found: Diff, before: str, now: str) -> Diff:
     """The same, with these names for the two archives in all that is said of them."""
     names = {str(found.b): now, str(found.a): before}
     either = re.compile("|".join(re.escape(path) for path in sorted(names, key=len, reverse=True)))
@@ -146,7 +146,7 @@ def named(found: Diff, before: str, now: str) -> Diff:
     return replace(found, a=Path(before), b=Path(now), experiments=experiments)
 
 
-def narrowed(found: Diff, groups: Sequence[ArchiveGroup]) -> Diff:
+def of_groups(found: Diff, groups: Sequence[ArchiveGroup]) -> Diff:
     """The differences of these runs and sweeps of the second archive alone."""
     names = {group.name for group in groups}
     experiments = tuple(each for each in found.experiments if each.name_b in names)

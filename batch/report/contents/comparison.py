@@ -11,9 +11,9 @@ from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, VERDICTS
 from batch.differences.found import Diff, ExperimentDiff
 from batch.queries.failures import ranges
 from batch.queries.pool import Pool
-from batch.report.contents.against import GOOD, Against, Before
+from batch.report.contents.against import GOOD, ComparedArchive, EarlierCases
 from batch.report.contents.changes import ArchiveChanges, OtherOrigin, RunChanges
-from batch.report.contents.parts import Flow, OutcomeCount, Verdict
+from batch.report.contents.parts import OutcomeCount, RequirementFlow, Verdict
 
 MOST_LINES = 200
 """Lines of one kind of change that are in a page."""
@@ -33,12 +33,12 @@ def archive_changes(found: Diff) -> ArchiveChanges:
     """The differences of what the two archives were made from, and the runs that one of them has alone."""
     origins = tuple(
         OtherOrigin(KINDS[kind], lines[:MOST_LINES], max(0, len(lines) - MOST_LINES))
-        for kind, lines in words.made(found)
+        for kind, lines in words.provenance_lines(found)
     )
-    return ArchiveChanges(str(found.a), str(found.b), origins, tuple(words.alone(found)))
+    return ArchiveChanges(str(found.a), str(found.b), origins, tuple(words.unmatched_runs(found)))
 
 
-def run_changes(found: Diff, before: Before | None) -> tuple[RunChanges, ...]:
+def run_changes(found: Diff, before: EarlierCases | None) -> tuple[RunChanges, ...]:
     """The changes of each of a section's structures that both archives have."""
     if before is None:
         return ()
@@ -49,10 +49,12 @@ def run_changes(found: Diff, before: Before | None) -> tuple[RunChanges, ...]:
 def _run_changes(found: Diff, experiment: ExperimentDiff, several: bool) -> RunChanges:
     """The changes of one structure. several: True where there are others, so that its requirements are listed here: the
     verdict has those of all structures together."""
-    alone = words.missing(found, experiment)
+    alone = words.unmatched_cases(found, experiment)
     if several:
-        alone += words.requirements(experiment)
-    allowed = (line.replace("the deck of b ", f"the deck of {found.b} ") for line in words.allowed(found, experiment))
+        alone += words.requirement_lines(experiment)
+    allowed = (
+        line.replace("the deck of b ", f"the deck of {found.b} ") for line in words.tolerance_lines(found, experiment)
+    )
     return RunChanges(
         heading=words.heading(experiment),
         word=experiment.verdict,
@@ -62,7 +64,7 @@ def _run_changes(found: Diff, experiment: ExperimentDiff, several: bool) -> RunC
         allowed=tuple(allowed),
         signals=tuple(map(words.signal_row, experiment.signals)),
         samples=tuple(map(words.distribution, experiment.samples)),
-        starred=words.starred(experiment),
+        starred=words.star_note(experiment),
         worst=tuple(words.worst_cases(found, experiment)),
         left=max(0, experiment.cases_different - len(experiment.worst)),
     )
@@ -71,7 +73,7 @@ def _run_changes(found: Diff, experiment: ExperimentDiff, several: bool) -> RunC
 # The verdict
 
 
-def verdict(against: Against, pairs: Sequence[tuple[Pool, Before | None]]) -> Verdict:
+def verdict(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases | None]]) -> Verdict:
     """The verdict of the comparison, of all cases together. pairs: what the page is about, with what it was before."""
     found = against.found
     both = [(pool, before) for pool, before in pairs if before is not None]
@@ -90,7 +92,7 @@ def verdict(against: Against, pairs: Sequence[tuple[Pool, Before | None]]) -> Ve
     )
 
 
-def _parts(against: Against, pairs: Sequence[tuple[Pool, Before | None]]) -> tuple[OutcomeCount, ...]:
+def _parts(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases | None]]) -> tuple[OutcomeCount, ...]:
     found = against.found
     how = np.concatenate([np.zeros(0, np.int8), *(each.how for each in found.experiments)])
     counts = {word: int((how == VERDICTS.index(word)).sum()) for word in (IDENTICAL, EQUIVALENT, DIFFERENT)}
@@ -101,7 +103,7 @@ def _parts(against: Against, pairs: Sequence[tuple[Pool, Before | None]]) -> tup
     return tuple(OutcomeCount(word, count) for word, count in counts.items() if count)
 
 
-def _figure(both: Sequence[tuple[Pool, Before]]) -> tuple[int, int, int] | None:
+def _figure(both: Sequence[tuple[Pool, EarlierCases]]) -> tuple[int, int, int] | None:
     """The number of cases that meet all that is required, before and now, and of all that are in both; None where
     nothing is required."""
     judged = [(pool, before) for pool, before in both if pool.requirements and before.pool.requirements]
@@ -113,7 +115,7 @@ def _figure(both: Sequence[tuple[Pool, Before]]) -> tuple[int, int, int] | None:
     return was, now, total
 
 
-def _flows(pool: Pool, before: Before, *, named: bool) -> list[Flow]:
+def _flows(pool: Pool, before: EarlierCases, *, named: bool) -> list[RequirementFlow]:
     """By requirement of both: which cases meet it now, and which no longer. named: whether to say of which run."""
     out = []
     pairs = {each.now: each for _, _, experiment in before.pairs for each in experiment.requirements}
@@ -123,8 +125,8 @@ def _flows(pool: Pool, before: Before, *, named: bool) -> list[Flow]:
         column = before.pool.requirements.index(pairs[text].before)
         was = before.there & (before.pool.outcomes[before.place, column] == 1)
         now = before.there & (pool.outcomes[:, place] == 1)
-        met = words.requirement(int(was.sum()), int(now.sum()), int(before.there.sum()))
-        said = words.required(pairs[text])
+        met = words.met_by_text(int(was.sum()), int(now.sum()), int(before.there.sum()))
+        said = words.requirement_text(pairs[text])
         gained, lost = (ranges(pool.cases[which].tolist()) for which in (now & ~was, was & ~now))
-        out.append(Flow(f"{pool.name}: {said}" if named else said, met, gained, lost))
+        out.append(RequirementFlow(f"{pool.name}: {said}" if named else said, met, gained, lost))
     return out

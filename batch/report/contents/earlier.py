@@ -7,21 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from batch.archive.read import ArchiveGroup
-from batch.differences.matching import instants
+from batch.differences.matching import match_instants
 from batch.queries.signals import Panel, history, panels
-from batch.report.contents.against import Before
+from batch.report.contents.against import EarlierCases
 from batch.report.contents.parts import History, SignalPanel
 from batch.report.contents.thinning import thin, thin_clock
 
 
-class Earlier:
+class EarlierHistories:
     """Histories of the other archive, in the panels of a page.
 
     found   the page's panels;  points  of a line at most
     clocks  the page's times, to which those of the other archive are added
     """
 
-    def __init__(self, before: Before, found: Sequence[SignalPanel], clocks: list[np.ndarray], points: int) -> None:
+    def __init__(
+        self, before: EarlierCases, found: Sequence[SignalPanel], clocks: list[np.ndarray], points: int
+    ) -> None:
         self.before, self.found, self.clocks, self.points = before, found, clocks, points
         self._panels: dict[tuple[bool, str], dict[tuple[str, str], Panel]] = {}
 
@@ -33,7 +35,7 @@ class Earlier:
             return None, None
         (other, place), group = there, self.before.now.groups[number]
         time, was_time = group.values("time"), other.values("time")
-        rows, was_rows = instants(time, was_time, 0.0)
+        rows, was_rows = match_instants(time, was_time, 0.0)
         was_values, changes = {}, {}
         for n, panel in enumerate(self.found):
             key = panel.name, panel.unit

@@ -11,7 +11,7 @@ from typing import Any
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.pool import Pool, pools
 from batch.report.contents import comparison
-from batch.report.contents.against import Against, Before, narrowed
+from batch.report.contents.against import ComparedArchive, EarlierCases, of_groups
 from batch.report.contents.histories import MOST_VALUES, no_signals, signals
 from batch.report.contents.overview import overview
 from batch.report.contents.parameters import parameters, varied
@@ -19,7 +19,7 @@ from batch.report.contents.parts import Fact, Report, ReportSection, SourceListi
 from batch.report.contents.stability import stability
 from batch.report.contents.tables import replay, structures, worst
 from batch.report.contents.verdicts import metric_rows, verdict
-from batch.terminal.show import chosen
+from batch.terminal.show import groups_named
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem
 from met.host.files import open_regular
@@ -40,19 +40,19 @@ def gather(
     names: Sequence[str] = (),
     title: str = "",
     progress: Callable[[int], None] | None = None,
-    against: Against | None = None,
+    against: ComparedArchive | None = None,
 ) -> Report:
     """All that a page says of an archive, or of these runs and sweeps of it. Raises Problem E325 for another name.
 
     progress  called with the number of cases whose margin is known, where motors are on beds
     against   another archive to compare with
     """
-    groups = chosen(archive, names)
+    groups = groups_named(archive, names)
     found = pools(groups)
     several = len({group.sweep or group.name for group in archive.groups}) > 1
     experiments, trouble = _experiments(archive)
     if against is not None and names:
-        against = replace(against, found=narrowed(against.found, groups))
+        against = replace(against, found=of_groups(against.found, groups))
     name = archive.path.name if against is None else str(against.found.b)
     share = MOST_VALUES // max(1, len(found))
     befores = [None if against is None else against.of(pool) for pool in found]
@@ -99,7 +99,7 @@ def _section(
     trouble: str,
     values: int,
     progress: Callable[[int], None] | None,
-    before: Before | None,
+    before: EarlierCases | None,
 ) -> ReportSection:
     own = {group.name: experiments[group.name] for group in pool.groups if group.name in experiments}
     beds: Stability | None = None
@@ -223,7 +223,7 @@ def _provenance(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> tuple[F
     return tuple(facts)
 
 
-def _compared_with(against: Against) -> tuple[Fact, ...]:
+def _compared_with(against: ComparedArchive) -> tuple[Fact, ...]:
     path, name = against.file.path, str(against.found.a)
     size = path.stat().st_size
     digest = _digest(path) if size <= MOST_HASHED else "not computed: it is large"

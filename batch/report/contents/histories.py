@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from batch.archive.read import ArchiveGroup
-from batch.queries.arrange import joints_of, overlaid
+from batch.queries.arrange import command_curves, joints_of
 from batch.queries.pool import Pool
 from batch.queries.signals import Panel, history, panels
-from batch.report.contents.against import Before
-from batch.report.contents.earlier import Earlier
+from batch.report.contents.against import EarlierCases
+from batch.report.contents.earlier import EarlierHistories
 from batch.report.contents.parts import History, PanelLine, SignalPanel, Signals
 from batch.report.contents.thinning import stretch, thin, thin_clock
 
@@ -32,7 +32,7 @@ MOST_PANELS = 32
 """Plots under one another."""
 
 
-def signals(pool: Pool, values: int = MOST_VALUES, before: Before | None = None) -> Signals | None:
+def signals(pool: Pool, values: int = MOST_VALUES, before: EarlierCases | None = None) -> Signals | None:
     """The histories of the worst cases that have some, and of the middle one; None where none has one.
 
     values  how many numbers there may be
@@ -66,7 +66,7 @@ def signals(pool: Pool, values: int = MOST_VALUES, before: Before | None = None)
         middle = known[len(known) // 2]
         wanted = wanted if middle in wanted else [*wanted[:-1], middle]
     numbers = {each: int(pool.groups[each[0]].at("case", [each[1]])[0]) for each in wanted}
-    was = None if before is None else Earlier(before, found, clocks, points)
+    was = None if before is None else EarlierHistories(before, found, clocks, points)
     histories = tuple(
         History(
             numbers[n, position],
@@ -88,7 +88,7 @@ def signals(pool: Pool, values: int = MOST_VALUES, before: Before | None = None)
     return Signals(found, joints, tuple(clocks), histories, tuple(shown), compared, said, changed, worst)
 
 
-def _kept(pool: Pool, before: Before | None = None) -> list[tuple[int, int]]:
+def _kept(pool: Pool, before: EarlierCases | None = None) -> list[tuple[int, int]]:
     """Group and position of the cases that have histories, worst first. Where there is a `before`, those that differ
     most from it come first, and the worst of all in the second place."""
     kept = [set(group.recorded_positions.tolist()) if group.role("signal") else set() for group in pool.groups]
@@ -139,7 +139,7 @@ class _Group:
             return
         found = panels(group)
         self.rows = int(group.values("time").shape[0])
-        commands = overlaid(group, found, positions[:COMPARED], apart=True)
+        commands = command_curves(group, found, positions[:COMPARED], apart=True)
         drawn = {(command.variable, command.column) for command in commands.values()}
         self.panels = tuple(p for p in found if not drawn.issuperset((p.variable, column) for column in p.columns))
         self.commands = {

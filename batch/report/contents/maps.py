@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from batch.queries.colours import reach
-from batch.queries.grids import ROUND, Levels, cells_of, edges_of, is_grid, levelled, round_numbers, standing
+from batch.queries.grids import ROUND, Levels, cell_cases, cells_of, column_levels, edges_of, is_grid, round_numbers
 from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import number_text
 from batch.report.contents.parts import Map, Ruler
@@ -31,13 +31,13 @@ def maps(pool: Pool, varied: Sequence[CaseColumn], metrics: Sequence[CaseColumn]
 
 
 def _map(pool: Pool, x: CaseColumn, y: CaseColumn, metrics: Sequence[CaseColumn]) -> Map:
-    across, up = levelled(x.values, x.words), levelled(y.values, y.words)
+    across, up = column_levels(x.values, x.words), column_levels(y.values, y.words)
     shape = (len(up.texts), len(across.texts))
     cells = cells_of(across, up)
     there, done = cells >= 0, pool.status == DONE
     values, cases, missed, reaches = {}, {}, {}, {}
     for column in metrics:
-        chosen = standing(column.values, cells, shape[0] * shape[1], column.limits[0].sense if column.limits else "")
+        chosen = cell_cases(column.values, cells, shape[0] * shape[1], column.limits[0].sense if column.limits else "")
         has = chosen >= 0
         values[column.key] = np.where(has, column.values[chosen], np.nan).reshape(shape)
         limits = [limit.value for limit in column.limits]

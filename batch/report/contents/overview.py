@@ -8,7 +8,7 @@ import numpy as np
 
 from batch.differences.compare import VERDICTS
 from batch.queries.pool import ENDED, CaseColumn, Pool
-from batch.report.contents.against import GOOD, Before, change
+from batch.report.contents.against import GOOD, EarlierCases, change
 from batch.report.contents.maps import maps
 from batch.report.contents.parts import Overview
 from met.distinct import distinct
@@ -26,7 +26,7 @@ KEPT = 200
 BAD_CASE = "case"
 
 
-def overview(pool: Pool, before: Before | None = None) -> Overview | None:
+def overview(pool: Pool, before: EarlierCases | None = None) -> Overview | None:
     """The points of a sweep; None where there is one case, or no metric. before: its cases in the archive it is
     compared with."""
     metrics, varied = pool.metrics(), pool.varied()
@@ -75,7 +75,7 @@ def _at(column: CaseColumn, places: np.ndarray) -> CaseColumn:
     return replace(column, values=column.values[places], before=before)
 
 
-def _compared(pool: Pool, before: Before) -> tuple[CaseColumn, ...]:
+def _compared(pool: Pool, before: EarlierCases) -> tuple[CaseColumn, ...]:
     """Columns that compare each case with the other archive: the verdict of `met diff`, and whether it meets what is
     required."""
     verdicts = (*VERDICTS[:3], "only now")
@@ -91,7 +91,7 @@ def _compared(pool: Pool, before: Before) -> tuple[CaseColumn, ...]:
     )
 
 
-def _noted(pool: Pool, before: Before | None, changes: tuple[CaseColumn, ...]) -> np.ndarray:
+def _noted(pool: Pool, before: EarlierCases | None, changes: tuple[CaseColumn, ...]) -> np.ndarray:
     """Places of the cases that are drawn since they changed: those that changed most, and in each metric the extremes;
     and of those that came to miss a requirement, or to meet it, the first."""
     if before is None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from batch.queries.grids import levels
-from batch.queries.pool import Pool, shown
+from batch.queries.pool import Pool, page_number
 from batch.queries.signals import pretty_unit
 from batch.report.contents.parts import ParameterRow, Spot, VariedParameter
 from ic.printing.columns import number
@@ -112,7 +112,7 @@ def varied(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[VariedPar
         if column.role == "metric":
             continue
         where, sets = places.get(column.label, (None, ()))
-        texts: Sequence[str] = column.words or [shown(float(value)) for value in levels(column.values)]
+        texts: Sequence[str] = column.words or [page_number(float(value)) for value in levels(column.values)]
         few = ", ".join(texts) if len(texts) <= MOST_LISTED else ""
         many = f"{len(texts):,} values from {texts[0]} to {texts[-1]}" if texts else ""
         out.append(

@@ -44,7 +44,7 @@ class OutcomeCount:
 
 
 @frozen
-class Demand:
+class RequirementCounts:
     """A requirement: by how many of the cases it is met and missed, of how many that is not known, and the value that
     is furthest beyond the limit, or nearest to it, with its case."""
 
@@ -58,7 +58,7 @@ class Demand:
 
 
 @frozen
-class Failing:
+class FailureRow:
     """Cases that failed alike: how they ended, why, how many, which, and the first."""
 
     status: str
@@ -69,7 +69,7 @@ class Failing:
 
 
 @frozen
-class Flow:
+class RequirementFlow:
     """A requirement in two archives: by how many of the cases in both it is met, in words, and which of these it is met
     in now, or missed now, and was not before."""
 
@@ -95,12 +95,12 @@ class Verdict:
     ok: bool
     headline: str
     parts: tuple[OutcomeCount, ...]
-    demands: tuple[Demand, ...] = ()
-    failing: tuple[Failing, ...] = ()
+    demands: tuple[RequirementCounts, ...] = ()
+    failing: tuple[FailureRow, ...] = ()
     notes: tuple[str, ...] = ()
     word: str = ""
     figure: tuple[int, int, int] | None = None
-    flows: tuple[Flow, ...] = ()
+    flows: tuple[RequirementFlow, ...] = ()
 
     @property
     def cases(self) -> int:

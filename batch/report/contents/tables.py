@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from batch.queries.pool import ENDED, CaseColumn, Pool, shown
+from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
 from batch.queries.summary import median_text
-from batch.report.contents.against import GOOD, Before
+from batch.report.contents.against import GOOD, EarlierCases
 from batch.report.contents.parts import TextTable, WorstCaseTable
 from met.distinct import distinct
 from met.outputs import quoted
@@ -17,7 +17,7 @@ MOST_CASES = 20
 MISSES = "\N{BALLOT X}"
 
 
-def worst(pool: Pool, archive: str, only: str, before: Before | None = None) -> WorstCaseTable | None:
+def worst(pool: Pool, archive: str, only: str, before: EarlierCases | None = None) -> WorstCaseTable | None:
     """The worst cases, failed ones first. only: the run or sweep to be named in commands; "" where there is one.
     before: how they came out in another archive."""
     if pool.count < 2:
@@ -34,7 +34,7 @@ def worst(pool: Pool, archive: str, only: str, before: Before | None = None) -> 
                 marked.add((number, at + 2))
                 text = f"{text} {MISSES}"
             cells.append(text)
-        was = ENDED[before.ended[place]] if before is not None and before.there[place] else shown(np.nan)
+        was = ENDED[before.ended[place]] if before is not None and before.there[place] else page_number(np.nan)
         rows.append((*cells, *([was] if before is not None else []), ENDED[pool.ended[place]]))
     ends = ("before", "now") if before is not None else ("came out",)
     table = TextTable(
@@ -60,7 +60,7 @@ def cell_text(column: CaseColumn, place: int) -> str:
     value = float(column.values[place])
     if column.words:
         return column.words[int(value)] if np.isfinite(value) else ""
-    return shown(value)
+    return page_number(value)
 
 
 def _misses(pool: Pool, column: CaseColumn, place: int) -> bool:
@@ -79,7 +79,7 @@ def _title(pool: Pool, shown: int) -> str:
     return "Cases, closest to a limit first" if every else f"Cases closest to a limit{many}"
 
 
-def structures(pool: Pool, before: Before | None = None) -> TextTable | None:
+def structures(pool: Pool, before: EarlierCases | None = None) -> TextTable | None:
     """A row a structure: what is chosen, cases, how many meet all, those in another archive before, and the median of
     each metric."""
     if len(pool.groups) < 2:
@@ -94,8 +94,8 @@ def structures(pool: Pool, before: Before | None = None) -> TextTable | None:
         counts = [_good(pool.ended[here])]
         if before is not None:
             both = here[before.there[here]]
-            counts.append(_good(before.ended[both]) if len(both) else shown(np.nan))
-        medians = (median_text(column.values[here], infinite="∞", none=shown(np.nan)) for column in metrics)
+            counts.append(_good(before.ended[both]) if len(both) else page_number(np.nan))
+        medians = (median_text(column.values[here], infinite="∞", none=page_number(np.nan)) for column in metrics)
         rows.append((*chosen, f"{len(here):,}", *counts, *medians))
     heads = (*(c.label for c in choices), "cases", "meet all" if judged else "reached their end")
     heads += ("before",) if before is not None else ()

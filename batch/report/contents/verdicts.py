@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from batch.queries.failures import failures, ranges
-from batch.queries.pool import ENDED, CaseColumn, Pool, shown
+from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
 from batch.queries.summary import spread
-from batch.report.contents.against import Before
-from batch.report.contents.parts import Demand, Failing, MetricRow, OutcomeCount, Verdict
+from batch.report.contents.against import EarlierCases
+from batch.report.contents.parts import FailureRow, MetricRow, OutcomeCount, RequirementCounts, Verdict
 from ic.printing.columns import count as counted
 from met.run import DONE
 
@@ -54,7 +54,7 @@ def _headline(pool: Pool, good: int) -> str:
     return f"{who} {verb} {'every requirement' if several else 'the requirement'}"
 
 
-def _demand(pool: Pool, place: int, text: str) -> Demand:
+def _demand(pool: Pool, place: int, text: str) -> RequirementCounts:
     outcomes = pool.outcomes[:, place]
     met, missed, unknown = (int((outcomes == value).sum()) for value in (1, 0, -1))
     furthest, case = "", None
@@ -63,19 +63,21 @@ def _demand(pool: Pool, place: int, text: str) -> Demand:
             values = np.where(np.isnan(column.values), -np.inf if limit.sense == "<" else np.inf, column.values)
             worst = int(values.argmax() if limit.sense == "<" else values.argmin())
             if not np.isnan(column.values[worst]):
-                furthest = f"{shown(float(column.values[worst]))} {column.unit}".rstrip()
+                furthest = f"{page_number(float(column.values[worst]))} {column.unit}".rstrip()
                 case = int(pool.cases[worst])
-    return Demand(text, met, missed, unknown, pool.count, furthest, case)
+    return RequirementCounts(text, met, missed, unknown, pool.count, furthest, case)
 
 
-def _failing(pool: Pool) -> tuple[Failing, ...]:
+def _failing(pool: Pool) -> tuple[FailureRow, ...]:
     failed = np.flatnonzero(pool.status != DONE)
     if not len(failed):
         return ()
     causes, ids = (np.array(pool.texts(name, failed), dtype=object) for name in ("cause", "case_id"))
     found = failures(pool.status[failed], causes, pool.cases[failed], ids)
     return tuple(
-        Failing(each.status, each.cause.removeprefix(f"{each.status}: "), len(each.cases), ranges(each.cases), each.row)
+        FailureRow(
+            each.status, each.cause.removeprefix(f"{each.status}: "), len(each.cases), ranges(each.cases), each.row
+        )
         for each in found
     )
 
@@ -88,7 +90,7 @@ def _notes(pool: Pool) -> tuple[str, ...]:
     return (f"The load motor of a bed was at its limit{of}: there the run is not what the joint would do.",)
 
 
-def metric_rows(pool: Pool, before: Before | None = None) -> tuple[MetricRow, ...]:
+def metric_rows(pool: Pool, before: EarlierCases | None = None) -> tuple[MetricRow, ...]:
     """before: the cases of another archive to compare with."""
     return tuple(_metric(column, None if before is None else before.values(column)) for column in pool.metrics())
 
@@ -97,7 +99,7 @@ def _metric(column: CaseColumn, before: np.ndarray | None) -> MetricRow:
     """Spread of the finite values; of how many there are others is said. before: the values of the other archive."""
     found, finite = spread(column.values), column.values[np.isfinite(column.values)]
     was = np.zeros(0) if before is None else np.sort(before[np.isfinite(before)])
-    was_text = "" if before is None else shown(spread(was).median)
+    was_text = "" if before is None else page_number(spread(was).median)
     said = [f"infinite in {counted(found.infinite, 'case')}"] if found.infinite else []
     said += [f"no value in {counted(found.unknown, 'case')}"] if found.unknown else []
     if not len(finite):

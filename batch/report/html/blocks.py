@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from batch.queries.pool import shown
+from batch.queries.pool import page_number
 from batch.queries.summary import SPREAD_COLUMNS
 from batch.report.contents.parts import (
-    Demand,
     Fact,
-    Failing,
-    Flow,
+    FailureRow,
     MetricRow,
     ReportSection,
+    RequirementCounts,
+    RequirementFlow,
     Spot,
     VariedParameter,
     Verdict,
@@ -138,7 +138,7 @@ def _comparison(found: Verdict) -> Html:
     return el("div", answer, el("div", evidence, cls="evidence"), cls="verdict against")
 
 
-def _flows(found: Sequence[Flow]) -> Html | None:
+def _flows(found: Sequence[RequirementFlow]) -> Html | None:
     if not found:
         return None
     gained, lost = any(each.gained for each in found), any(each.lost for each in found)
@@ -194,7 +194,7 @@ def _demands(found: Verdict) -> Html | None:
     return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "Requirements")
 
 
-def _demand(each: Demand, single: bool, missed: bool, unknown: bool) -> list[Html | None]:
+def _demand(each: RequirementCounts, single: bool, missed: bool, unknown: bool) -> list[Html | None]:
     name = el("th", el("code", breaking(each.text)), scope="row")
     if single:
         word = "met" if each.met else "missed" if each.missed else "not known"
@@ -223,7 +223,7 @@ def case_link(case: int) -> Html:
     return el("button", f"#{case}", type="button", cls="case", data_case=case, title=f"Choose case #{case}")
 
 
-def _failing(found: Sequence[Failing], of: int) -> Html:
+def _failing(found: Sequence[FailureRow], of: int) -> Html:
     """The causes, the cases of each, and what they have in common once."""
     rows = []
     for each in found:
@@ -302,8 +302,8 @@ def metrics(section: ReportSection) -> Html | None:
 
 def _metric(each: MetricRow, single: bool, remarks: bool, compared: bool) -> list[Html]:
     before = [each.before] if compared else []
-    spread = [shown(getattr(each.spread, column.field)) for column in SPREAD_COLUMNS]
-    values = [*before, shown(each.spread.median)] if single else [*spread, *before]
+    spread = [page_number(getattr(each.spread, column.field)) for column in SPREAD_COLUMNS]
+    values = [*before, page_number(each.spread.median)] if single else [*spread, *before]
     cells = [el("th", el("code", breaking(each.name)), el("span", each.about, cls="under"), scope="row")]
     cells += [el("td", value, cls="right") for value in values]
     cells.append(el("td", each.unit))
@@ -338,7 +338,7 @@ def histogram(each: MetricRow) -> Html | None:
         y = f"{26 - 24 * count / top:.2f}"
         before += f"{'L' if n else 'M'}{n * wide:.2f} {y}H{(n + 1) * wide - 0.6 * (n + 1 == len(each.bars)):.2f}"
     outline = el("path", d=before, cls="before") if before else None
-    low, high, middle = (shown(value) for value in (each.spread.minimum, each.spread.maximum, each.spread.median))
+    low, high, middle = (page_number(value) for value in (each.spread.minimum, each.spread.maximum, each.spread.median))
     words = f"{each.name} from {low} to {high} {each.unit}, median {middle}"
     floor = el("line", x1=0, x2=160, y1=26.5, y2=26.5, cls="floor")
     return el("svg", bars, floor, outline, limits, cls="histogram", viewBox="-1 0 162 28", role="img", aria_label=words)

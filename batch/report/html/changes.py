@@ -17,7 +17,7 @@ from batch.differences.words import (
     cause,
     signal_columns,
 )
-from batch.queries.pool import shown
+from batch.queries.pool import page_number
 from batch.report.contents.changes import ArchiveChanges, OtherOrigin, RunChanges
 from batch.report.contents.parts import TextTable
 from batch.report.html.blocks import case_link, likeness, scrolling
@@ -128,7 +128,7 @@ def _samples(found: RunChanges) -> Html | None:
 
 def _number(text: str) -> str:
     """A number as other tables of the page have it where there is none."""
-    return shown(math.nan) if text == "nan" else text
+    return page_number(math.nan) if text == "nan" else text
 
 
 def _where(each: SignalRow) -> Child:

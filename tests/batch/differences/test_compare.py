@@ -10,7 +10,7 @@ import pytest
 
 from batch.differences import campaigns
 from batch.differences.campaigns import diff
-from batch.differences.compare import Difference, Passed, compare, compare_cases
+from batch.differences.compare import Difference, SampledCourse, compare, compare_cases
 from batch.differences.data import as_data
 from batch.differences.tolerance import SignalTolerance, tolerances
 from met.diagnostic import Problem
@@ -69,7 +69,7 @@ def test_cases_at_once_are_what_each_is_by_itself_and_by_hand(seed: int) -> None
         later = SignalTolerance(allowed.absolute, allowed.relative, early)
         for absolute in (None, np.array([0.1, 2.0])):
             each = [compare(before, after, later, TIME, absolute) for before, after in zip(a, b, strict=True)]
-            assert repr(compare_cases(a, b, later, Passed(TIME, TIME, a), absolute)) == repr(each)
+            assert repr(compare_cases(a, b, later, SampledCourse(TIME, TIME, a), absolute)) == repr(each)
     for before, after, found in zip(a, b, compare_cases(a, b, allowed), strict=True):
         expected = by_hand(before, after, allowed)
         if found is None:

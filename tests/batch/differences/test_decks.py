@@ -9,9 +9,9 @@ import pytest
 
 import ic
 from batch.differences import words
-from batch.differences.changed import changed
+from batch.differences.changed import provenance_changes
 from batch.differences.decks import MOST_COMPARED, decks
-from batch.differences.told import Cut, _changed
+from batch.differences.told import Shortening, _changed
 
 ARM = """\
 let fore_l  = 3 m;
@@ -66,8 +66,8 @@ def said(folder: Path, *changes: tuple[str, str], select: str = "nominal", now: 
 
 
 def told(a: SimpleNamespace, b: SimpleNamespace) -> list[str]:
-    found = changed(a, b, [(a.group, b.group)], [a.plan, b.plan])  # type: ignore[arg-type]
-    lines = words.made(SimpleNamespace(changed=found))  # type: ignore[arg-type]
+    found = provenance_changes(a, b, [(a.group, b.group)], [a.plan, b.plan])  # type: ignore[arg-type]
+    lines = words.provenance_lines(SimpleNamespace(changed=found))  # type: ignore[arg-type]
     return [f"{kind}: {line}" for kind, each in lines for line in each if kind != "deck"]
 
 
@@ -76,8 +76,8 @@ PAGE = (Path(__file__).parents[3] / "docs" / "diff.md").read_text(encoding="utf-
 
 def test_a_let_is_told_before_the_parameters_that_follow_from_it(here: Path) -> None:
     a, b = made(Path(), arm=ARM), made(Path(), arm=ARM.replace("3 m;", "3.4 m;"))
-    found = changed(a, b, [(a.group, b.group)], [a.plan, b.plan])  # type: ignore[arg-type]
-    lines = list(_changed(SimpleNamespace(changed=found), Cut()))  # type: ignore[arg-type]
+    found = provenance_changes(a, b, [(a.group, b.group)], [a.plan, b.plan])  # type: ignore[arg-type]
+    lines = list(_changed(SimpleNamespace(changed=found), Shortening()))  # type: ignore[arg-type]
     assert "\n".join(lines[1:]) in PAGE
     assert lines == [
         "",
@@ -244,9 +244,9 @@ def test_more_than_a_screen_is_cut_with_the_command_that_shows_it() -> None:
             results=(),
         )
     )
-    short = list(_changed(found, Cut(remedy="`met diff a.h5 b.h5 --all`")))  # type: ignore[arg-type]
+    short = list(_changed(found, Shortening(remedy="`met diff a.h5 b.h5 --all`")))  # type: ignore[arg-type]
     assert short[-1] == "  follows    and 3 more: `met diff a.h5 b.h5 --all`" and len(short) == 9
-    assert len(list(_changed(found, Cut(every=True)))) == 11  # type: ignore[arg-type]
+    assert len(list(_changed(found, Shortening(every=True)))) == 11  # type: ignore[arg-type]
 
 
 # Files
@@ -321,7 +321,7 @@ def test_a_deck_that_is_none_is_no_traceback(text: str) -> None:
 
 def test_what_cannot_be_seen_is_made_visible() -> None:
     found = decks({"d.ic": "a\n"}, {"d.ic": "\x1b[31mred\n"})
-    lines = words.made(
+    lines = words.provenance_lines(
         SimpleNamespace(
             changed=SimpleNamespace(  # type: ignore[arg-type]
                 versions=(), decks=found.files, meaning=(), follows=(), defaults=(), structure=(), code=(), results=()

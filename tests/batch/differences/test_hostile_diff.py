@@ -22,9 +22,9 @@ from batch.differences.compare import compare
 from batch.differences.data import as_data
 from batch.differences.decks import decks
 from batch.differences.found import Diff, ExperimentDiff, RequirementDiff, SignalDiff
-from batch.differences.told import told
+from batch.differences.told import diff_lines
 from batch.differences.tolerance import SignalTolerance, tolerances
-from batch.differences.words import heading, requirements, verdict
+from batch.differences.words import heading, requirement_lines, verdict
 from met import cli
 from met.diagnostic import Problem
 from tests.batch import plans
@@ -136,7 +136,7 @@ def test_histories_in_one_alone_are_not_identical(two: Callable[..., tuple[Path,
     batch.run(plans.plan(plans.gains(CASES)), output="few.h5", histories=["#2"])
     found = diff("whole.h5", "few.h5")
     assert found.verdict == "equivalent"
-    assert told(found)[-1] == "equivalent: identical, to the bit, in what both have"
+    assert diff_lines(found)[-1] == "equivalent: identical, to the bit, in what both have"
 
 
 def test_no_histories_in_the_second(ran: Callable[..., Path]) -> None:
@@ -170,7 +170,7 @@ def test_of_one_joint_nothing_is_allowed(two: Callable[..., tuple[Path, Path]]) 
 def test_each_instant_is_compared_once() -> None:
     fast, slow = np.arange(11) / 1000.0, np.arange(6) / 500.0
     for a, b in ((fast, slow), (slow, fast)):
-        rows_a, rows_b = matching.instants(a, b, 1e-3)
+        rows_a, rows_b = matching.match_instants(a, b, 1e-3)
         assert a[rows_a].tolist() == b[rows_b].tolist() == slow.tolist()
 
 
@@ -215,7 +215,7 @@ def test_of_a_tolerance_of_time_no_share_is_told(two: Callable[..., tuple[Path, 
         file["qd"][1, 1:] = file["qd"][1, :-1]
         file["volts"][1] += 1.0
 
-    lines = told(diff(*two(plant), tolerances(["time=40ms"])))
+    lines = diff_lines(diff(*two(plant), tolerances(["time=40ms"])))
     [qd] = [line for line in lines if line.startswith("  qd ")]
     assert qd.endswith("time 0.04 s")
     [volts] = [line for line in lines if line.startswith("  volts ")]
@@ -313,7 +313,7 @@ def test_a_requirement_whose_limit_is_another_is_a_difference(ran: Callable[...,
         found.requirements == [RequirementDiff("top < 5 rad/s", "top < 0.5 rad/s", 1, 0, 0, 1, True)]
         and not found.notes
     )
-    assert requirements(found) == ["require top < 0.5 rad/s (before: top < 5 rad/s)  met by 1, now by 0 of 1"]
+    assert requirement_lines(found) == ["require top < 0.5 rad/s (before: top < 5 rad/s)  met by 1, now by 0 of 1"]
     assert (whole.verdict, whole.of_values, found.how.tolist()) == ("different", "identical", [0])
     assert heading(found) == "bounded and strict: 1 case in both, identical, with other requirements"
     assert verdict(whole) == (
@@ -325,7 +325,7 @@ def test_a_requirement_whose_limit_is_another_is_a_difference(ran: Callable[...,
 def test_a_limit_that_a_name_stands_for_is_compared_too(ran: Callable[..., Path]) -> None:
     a = ran("a.h5", "lettered")
     whole = diff(a, ran("b.h5", "lettered", change=("let fastest = 0.5 rad/s", "let fastest = 9 rad/s")))
-    assert requirements(only(whole)) == [
+    assert requirement_lines(only(whole)) == [
         "require top < fastest (limit before: 0.5 rad/s, now: 9 rad/s)  met by 0, now by 1 of 1"
     ]
     assert verdict(whole).startswith(
@@ -336,7 +336,9 @@ def test_a_limit_that_a_name_stands_for_is_compared_too(ran: Callable[..., Path]
 def test_a_limit_in_another_unit_is_no_difference(ran: Callable[..., Path]) -> None:
     whole = diff(ran("a.h5", "bounded"), ran("b.h5", "milli"))
     assert (whole.verdict, verdict(whole)) == ("identical", "identical, to the bit")
-    assert requirements(only(whole)) == ["require top < 5000 mrad/s (before: top < 5 rad/s)  met by 1, now by 1 of 1"]
+    assert requirement_lines(only(whole)) == [
+        "require top < 5000 mrad/s (before: top < 5 rad/s)  met by 1, now by 1 of 1"
+    ]
 
 
 def test_a_requirement_in_one_alone_is_a_difference(ran: Callable[..., Path]) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from batch.differences.changed import changed
+from batch.differences.changed import provenance_changes
 from met.plan import Plan
 
 ONE, OTHER = f"2:{'0' * 64}", f"2:{'1' * 64}"
@@ -28,7 +28,7 @@ def said(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[tuple[str, ...], t
 
     group_a, group_b = side(a), side(b)
     files: Any = [SimpleNamespace(provenance={}, sources=dict) for _ in range(2)]
-    found = changed(*files, [(group_a, group_b)], [Plan("d.ic", ()), Plan("d.ic", ())])
+    found = provenance_changes(*files, [(group_a, group_b)], [Plan("d.ic", ()), Plan("d.ic", ())])
     return found.code, found.results
 
 

@@ -92,7 +92,7 @@ def test_not_a_number(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def test_a_case_that_fails_now_is_the_headline(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    from batch.differences.told import told
+    from batch.differences.told import diff_lines
 
     def plant(run: Run, place: dict[int, int]) -> None:
         if 123 in place:
@@ -107,7 +107,7 @@ def test_a_case_that_fails_now_is_the_headline(monkeypatch: pytest.MonkeyPatch, 
     found = diff(*two(monkeypatch, tmp_path, mixed, plant))
     [ended] = found.experiments[0].ended
     assert (ended.case, ended.before, ended.after, ended.rows_after) == (mixed.index(123), 0, 1, 20)
-    lines = told(found)
+    lines = diff_lines(found)
     at = next(i for i, line in enumerate(lines) if line.startswith("gains: "))
     assert lines[at + 1] == f"  1 case fails that did not: #{mixed.index(123)}"
     assert lines[at + 2].endswith("t = 0.8 s: joint elbow: it broke")

@@ -15,7 +15,7 @@ import ic
 from batch.differences.campaigns import diff
 from batch.differences.data import as_data
 from batch.differences.found import Diff, SignalDiff
-from batch.differences.told import told
+from batch.differences.told import diff_lines
 from batch.differences.tolerance import Tolerances, check, tolerances
 from met.diagnostic import Problem
 from met.plan import Experiment, Tolerance
@@ -53,7 +53,7 @@ def counts(found: Diff) -> tuple[int, int, int]:
 
 def test_nothing_is_allowed_unless_it_is_said(archives: Callable[..., tuple[Path, Path]]) -> None:
     found = diff(*archives())
-    assert counts(found) == (CASES - 2, 0, 2) and told(found)[-1] == "different; no tolerance was given"
+    assert counts(found) == (CASES - 2, 0, 2) and diff_lines(found)[-1] == "different; no tolerance was given"
 
 
 @pytest.mark.slow
@@ -61,7 +61,7 @@ def test_the_deck_of_the_second_says_it(archives: Callable[..., tuple[Path, Path
     a, b = archives(q=5e-6)
     assert counts(diff(a, b)) == (CASES - 2, 1, 1)
     assert counts(diff(b, a)) == (CASES - 2, 0, 2)  # that of a, which allows nothing
-    lines = told(diff(a, b))
+    lines = diff_lines(diff(a, b))
     assert "  changed    tolerances.q: none -> 5e-06 SI" in lines
     assert "  the deck of b allows q 5e-06 SI" in lines and lines[-1] == "different"
     assert any(line.endswith("5e-06 SI, 200 times that") for line in lines)
@@ -76,7 +76,7 @@ def test_of_one_joint_alone(archives: Callable[..., tuple[Path, Path]]) -> None:
     both = diff(a, b, tolerances(["q=3e-6 rad"]))
     assert counts(both) == (CASES - 2, 2, 0) and both.verdict == "equivalent"
     assert q_of(both).used == pytest.approx(2 / 3, rel=1e-6)  # the shoulder's, of the two
-    assert any(line.endswith("(3e-6 rad, elbow 0.002 SI), 66.7 % used") for line in told(both))
+    assert any(line.endswith("(3e-6 rad, elbow 0.002 SI), 66.7 % used") for line in diff_lines(both))
 
 
 @pytest.mark.slow
@@ -85,9 +85,9 @@ def test_the_command_line_has_its_way(archives: Callable[..., tuple[Path, Path]]
     assert diff(a, b).verdict == "equivalent"
     tighter = diff(a, b, tolerances(["q=5e-6rad", "rel=0", "time=0s"]))
     assert counts(tighter) == (CASES - 2, 1, 1)
-    assert "  --tol allows q 5e-6 rad, rel 0, time 0 s" in told(tighter)
+    assert "  --tol allows q 5e-6 rad, rel 0, time 0 s" in diff_lines(tighter)
     alone = diff(a, b, tolerances(["none"]))
-    assert counts(alone) == (CASES - 2, 0, 2) and told(alone)[-1] == "different; no tolerance was given"
+    assert counts(alone) == (CASES - 2, 0, 2) and diff_lines(alone)[-1] == "different; no tolerance was given"
 
 
 @pytest.mark.slow
@@ -127,10 +127,10 @@ def test_a_deck_that_cannot_be_read_is_told(
         raise Problem(error("E303", "it was written by a newer MET"))
 
     monkeypatch.setattr(ArchiveFile, "plan", refuse)
-    lines = told(diff(a, b))
+    lines = diff_lines(diff(a, b))
     assert "  changed    the plan cannot be read here: it was written by a newer MET" in lines
     assert "  note: what its deck allows is not known, for the plan cannot be read" in lines
-    assert not any("not known" in line for line in told(diff(a, b, tolerances(["none"]))))
+    assert not any("not known" in line for line in diff_lines(diff(a, b, tolerances(["none"]))))
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from batch.differences import words
 from batch.differences.campaigns import diff
 from batch.differences.found import EndingDiff
-from batch.differences.told import told
+from batch.differences.told import diff_lines
 from batch.differences.tolerance import tolerances
 from met.run import Run
 from tests.batch import plans
@@ -61,7 +61,7 @@ def test_a_command_names_the_run_where_there_are_several(
             ["a.h5", experiment.name_a],
             ["b.h5", experiment.name_b],
         ]
-        assert f"      {'; '.join(commands)}" in told(found)
+        assert f"      {'; '.join(commands)}" in diff_lines(found)
 
 
 @pytest.mark.parametrize(

@@ -148,7 +148,7 @@ def test_an_export_that_fails_leaves_the_archive_and_says_so(
     def full(*_: object, **options: object) -> None:
         raise Problem(error("E305", "cannot write x.mcap: no space left on device"))
 
-    monkeypatch.setattr(running, "written", full)
+    monkeypatch.setattr(running, "export_run", full)
     assert met("brief", "-o", "x.mcap") == cli.NO
     told = capsys.readouterr()
     assert "error[E305]: cannot write x.mcap: no space left on device" in told.err

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from batch.archive.read import ArchiveFile
-from batch.export.csv import BEGINS, word
+from batch.export.csv import BEGINS, safe_word
 from tests.batch.foreign.archives import changed, met
 
 EVIL = ("=1+2", "+cmd|' /C calc'!A0", "-2+3", "@SUM(1)", "'=1")
@@ -53,7 +53,13 @@ def test_numbers_below_0_stay_numbers(archive: Path, here: Path) -> None:
 
 def test_taking_an_apostrophe_away_gives_every_name_again() -> None:
     for name in ("", "q", "shoulder.q", "'q", "''q", "=1", "-", "%", "1/s", *EVIL):
-        cell = word(name)
+        cell = safe_word(name)
         assert (cell[1:] if cell[:1] == "'" else cell) == name
         assert cell[:1] not in tuple(BEGINS)
-    assert [word(name) for name in ("q", "shoulder.q", "rad/s", "1", "%")] == ["q", "shoulder.q", "rad/s", "1", "%"]
+    assert [safe_word(name) for name in ("q", "shoulder.q", "rad/s", "1", "%")] == [
+        "q",
+        "shoulder.q",
+        "rad/s",
+        "1",
+        "%",
+    ]

@@ -128,7 +128,7 @@ def test_whatever_it_says_the_campaign_goes_on_or_says_why_not(
         (campaign / name).write_text(json.dumps(data), encoding="utf-8")
         said = met("status", "a.h5")
         assert not wrong(said, ()), (seed, did, said.text)
-        for ask in (lambda: job.together(campaign), lambda: batch.run(campaigns_plan(), output="a.h5")):
+        for ask in (lambda: job.merge_campaign(campaign), lambda: batch.run(campaigns_plan(), output="a.h5")):
             try:
                 ask()
             except Problem as problem:

@@ -236,7 +236,7 @@ def test_rows_that_are_unknown_do_not_break_an_orientation() -> None:
     closed = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=-1)
     given = np.where(closed[:, :1] < 0.0, -closed, closed)
     given[[0, 1, 11, 12, 39]] = np.nan
-    found = poses.unbroken(np.stack([given, -given], axis=1), 0)
+    found = poses.without_sign_jumps(np.stack([given, -given], axis=1), 0)
     known = np.isfinite(given[:, 0])
     np.testing.assert_array_equal(found[known, 0], closed[known])
     np.testing.assert_array_equal(found[known, 1], -closed[known])

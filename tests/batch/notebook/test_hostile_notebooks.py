@@ -207,7 +207,7 @@ class TestStraightFromARun:
     def test_an_export_that_fails_is_told_to_programs_in_one_document(
         self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        monkeypatch.setattr(running, "written", full)
+        monkeypatch.setattr(running, "export_run", full)
         assert cli.main(["run", "deck.ic", "brief", "-o", "x.mcap", "--format", "json"]) == cli.NO
         told = json.loads(capsys.readouterr().out)
         assert told["export"] is None and "cannot write x.mcap: no space left on device" in told["notes"]
@@ -216,7 +216,7 @@ class TestStraightFromARun:
     def test_what_is_said_to_make_a_missing_export_makes_all_of_it(
         self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        monkeypatch.setattr(running, "written", full)
+        monkeypatch.setattr(running, "export_run", full)
         assert cli.main(["run", "deck.ic", "brief", "backs", "-o", "x.csv"]) == cli.NO
         assert "`met export x.h5 --run brief --run backs -o x.csv`" in capsys.readouterr().out
 
@@ -227,7 +227,7 @@ class TestStraightFromARun:
         def stopped(*_: object, **__: object) -> None:
             raise KeyboardInterrupt
 
-        monkeypatch.setattr(running, "written", stopped)
+        monkeypatch.setattr(running, "export_run", stopped)
         cli.main(["run", "deck.ic", "brief", "-o", "x.csv"])
         assert "x.h5 is whole; x.csv is missing: `met export x.h5 -o x.csv`" in capsys.readouterr().out
 

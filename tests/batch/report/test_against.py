@@ -13,7 +13,7 @@ import pytest
 
 import batch
 from batch.archive.read import ArchiveFile
-from batch.differences.told import told
+from batch.differences.told import diff_lines
 from batch.queries.pool import CaseColumn
 from batch.report import report
 from batch.report.contents import against as sides
@@ -59,9 +59,9 @@ def planted(here: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, Path]:
 
 
 def gathered(before: Path, now: Path, tolerances: str | tuple[str, ...] = (), names: tuple[str, ...] = ()) -> Report:
-    found = sides.named(batch.diff(before, now, tolerances=tolerances), *sides.called(before, now))
+    found = sides.rename_archives(batch.diff(before, now, tolerances=tolerances), *sides.display_names(before, now))
     with ArchiveFile(now) as file, ArchiveFile(before) as other:
-        return gather(file, names, against=sides.Against(other, found))
+        return gather(file, names, against=sides.ComparedArchive(other, found))
 
 
 def words(source: str) -> str:
@@ -127,7 +127,7 @@ class TestThePage:
     def all_told(self, before: Path, now: Path, tolerances: str | tuple[str, ...] = ()) -> None:
         """Every piece of every line of `met diff` is on the page."""
         source = squeezed(words(page(gathered(before, now, tolerances))))
-        *lines, last = told(batch.diff(before, now, tolerances=tolerances))
+        *lines, last = diff_lines(batch.diff(before, now, tolerances=tolerances))
         for line in lines:
             said = re.sub(r"^(a|b)  |^  require |\bnan\b|:$", "", line).strip()
             for piece in re.split(r"\s{2,}|: |; |,? now\b", said):
@@ -361,7 +361,7 @@ class TestNames:
         ],
     )
     def test_tell_the_two_apart(self, before: str, now: str, said: tuple[str, str]) -> None:
-        assert sides.called(Path(before), Path(now)) == said
+        assert sides.display_names(Path(before), Path(now)) == said
 
     def test_stand_in_all_that_is_said(self, here: Path, engine: None) -> None:
         for folder in ("v1", "v2"):

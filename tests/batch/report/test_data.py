@@ -11,7 +11,7 @@ import pytest
 import batch
 from batch.archive.read import ArchiveFile
 from batch.queries import ordering
-from batch.queries.grids import levelled
+from batch.queries.grids import column_levels
 from batch.queries.pool import ENDED, CaseColumn, Pool, pools
 from batch.report.contents import histories, overview, stability
 from batch.report.contents.gathering import gather
@@ -176,11 +176,11 @@ class TestMaps:
         assert map_.counts.shape == (3, 48) and map_.counts.sum() == 300
 
     def test_of_many_values_have_round_numbers_where_these_lie(self) -> None:
-        steps = ruler(levelled(np.linspace(0.0, 70.0, 71)))
+        steps = ruler(column_levels(np.linspace(0.0, 70.0, 71)))
         assert len(steps.edges) == 49 and (steps.edges[0], steps.edges[-1]) == (0.0, 1.0)
         assert [text for _, text in steps.ticks[0]] == ["0", "10", "20", "30", "40", "50", "60", "70"]
         assert [at for at, _ in steps.ticks[0]] == pytest.approx([(x + 0.5) / 71 for x in range(0, 71, 10)])
-        factors = ruler(levelled(np.geomspace(0.01, 100.0, 81)))
+        factors = ruler(column_levels(np.geomspace(0.01, 100.0, 81)))
         assert [text for _, text in factors.ticks[0]] == [
             "0.01",
             "0.02",
@@ -197,7 +197,7 @@ class TestMaps:
             "100",
         ]
         assert {text: at for at, text in factors.ticks[0]}["1"] == pytest.approx(0.5)
-        few = ruler(levelled(np.array([1.0, 10.0, 100.0])))
+        few = ruler(column_levels(np.array([1.0, 10.0, 100.0])))
         assert [text for _, text in few.ticks[0]] == ["1", "10", "100"]
         assert [at for at, _ in few.ticks[0]] == pytest.approx([1 / 6, 1 / 2, 5 / 6])
 

@@ -87,7 +87,7 @@ def die(*_, **__):
     os.kill(os.getpid(), signal.SIGKILL)
 """
 DEATHS = {
-    "while shards are read": "merge.pieces = die",
+    "while shards are read": "merge.shards_in_order = die",
     "before the archive has its name": "performing.publish = die",
     "before its sidecar has its name": "replace = output.Path.replace\n"
     "output.Path.replace = lambda old, new: replace(old, new) if new.name != 'a.h5.run.json' else die()",

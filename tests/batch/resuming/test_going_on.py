@@ -210,7 +210,7 @@ def test_a_damaged_status_file_is_harmless(archive: Path, undisturbed: bytes, te
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"updated": null}', '{"updated": "now"}', "\0\xff"])
 def test_a_damaged_status_file_tells_nothing(tmp_path: Path, text: str) -> None:
     (tmp_path / "status.json").write_text(text, encoding="latin-1")
-    assert status_files.told(Folder(tmp_path)) == []
+    assert status_files.status_records(Folder(tmp_path)) == []
 
 
 def damaged(data: bytes) -> Iterator[tuple[str, bytes]]:
