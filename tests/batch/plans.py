@@ -170,6 +170,9 @@ class Answering:
         columns = sum(len(recorded.channels) for recorded in experiment.structure.record)
         self.program = SimpleNamespace(outputs=("failure",), columns=columns)
 
+    def is_work(self, key: str) -> bool:
+        return key == self.work_key
+
 
 def computed(
     prepared: Answering, rows: np.ndarray, *, threads: Any = None, record: bool = True, progress: Any = None
