@@ -17,7 +17,7 @@ from met.frozen import frozen
 
 if TYPE_CHECKING:
     from batch.campaigns.drive import Progress
-    from batch.differences.found import Diff
+    from batch.differences.result import Diff
     from batch.executors import Executor
     from batch.queries.summary import Summary
     from met.plan import Plan

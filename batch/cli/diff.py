@@ -41,7 +41,7 @@ def diff(a: str, b: str, tolerances: tuple[str, ...], require: str, distribution
     from batch.differences.campaigns import diff
     from batch.differences.compare import EQUIVALENT, VERDICTS
     from batch.differences.data import as_data
-    from batch.differences.told import Shortening, diff_lines
+    from batch.differences.text import Shortening, diff_lines
     from batch.differences.tolerance import tolerances as read
     from met.outputs import quoted
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.differences import matching
-from batch.differences.changed import provenance_changes
 from batch.differences.compare import (
     DIFFERENT,
     EQUIVALENT,
@@ -25,8 +24,9 @@ from batch.differences.compare import (
     unlike_bits,
 )
 from batch.differences.demands import compare_requirements
-from batch.differences.found import Diff, DiffPlace, EndingDiff, ExperimentDiff, RankedCase, SignalDiff
 from batch.differences.matching import MatchedCases
+from batch.differences.provenance import provenance_changes
+from batch.differences.result import Diff, DiffPlace, EndingDiff, ExperimentDiff, RankedCase, SignalDiff
 from batch.differences.samples import samples
 from batch.differences.tolerance import SignalTolerance, Tolerances, check, fits, of_deck
 from batch.queries.signals import deck_unit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from batch.differences.found import Diff, ExperimentDiff, SignalDiff
+from batch.differences.result import Diff, ExperimentDiff, SignalDiff
 from batch.queries.summary import finite
 
 SCHEMA, VERSION = "met.diff", 2

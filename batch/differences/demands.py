@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from batch.archive.read import ArchiveGroup
-from batch.differences.found import ExperimentDiff, RequirementDiff
 from batch.differences.matching import MatchedCases
+from batch.differences.result import ExperimentDiff, RequirementDiff
 from batch.differences.words import distinct_texts
 from batch.queries import requirements
 from batch.queries.signals import deck_unit

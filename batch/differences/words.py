@@ -1,4 +1,4 @@
-"""What a difference is in words, part by part, as plain data: `told` sets them in lines, a report in a page."""
+"""What a difference is in words, part by part, as plain data: `text` sets them in lines, a report in a page."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE
-from batch.differences.found import Diff, EndingDiff, ExperimentDiff, RankedCase, RequirementDiff, SignalDiff
+from batch.differences.result import Diff, EndingDiff, ExperimentDiff, RankedCase, RequirementDiff, SignalDiff
 from batch.differences.samples import LEVEL, MetricSamples
 from batch.queries.failures import STATUS, ranges
 from batch.queries.signals import number_text

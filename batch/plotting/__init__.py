@@ -74,7 +74,7 @@ def draw(
     from batch.plotting import histories, metrics
     from batch.plotting import output as place
     from batch.plotting.against import beside
-    from batch.plotting.asked import plot_request
+    from batch.plotting.requests import plot_request
     from batch.plotting.sheet import PictureSheet
     from batch.queries.pool import pools
     from batch.terminal.show import groups_named

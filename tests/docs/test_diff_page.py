@@ -30,7 +30,7 @@ def test_the_mended_servo_stops_at_once(folder: Path) -> None:
     import numpy as np
 
     import batch
-    from batch.differences.found import RequirementDiff
+    from batch.differences.result import RequirementDiff
 
     found = batch.diff(folder / "before.h5", folder / "after.h5")
     assert found.verdict == "different" and not found.changed.meaning and not found.changed.decks

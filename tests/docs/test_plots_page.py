@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from batch.plotting import asked, histories, output, points, sheet, sides
+from batch.plotting import histories, output, points, requests, sheet, sides
 from batch.queries import grids
 from met import cli
 from tests.batch.plotting import figures
@@ -32,10 +32,10 @@ def test_the_options_are_those_of_the_command(capsys: pytest.CaptureFixture[str]
 
 
 def test_the_limits_are_those_of_the_code() -> None:
-    assert (asked.MAPPED, asked.MOST_BESIDE, histories.OVERLAID) == (5, 6, 8)
+    assert (requests.MAPPED, requests.MOST_BESIDE, histories.OVERLAID) == (5, 6, 8)
     for said in (
         f"than {sides.MOST_CELLS} values", f"than {grids.MOST_LEVELS} values",
-        f"up to {asked.MOST_BESIDE} values", f"than {points.RASTERED:,} points",
+        f"up to {requests.MOST_BESIDE} values", f"than {points.RASTERED:,} points",
         f"{sheet.SCREEN_DPI}, with `--size` {sheet.PAPER_DPI}",
     ):  # fmt: skip
         assert said in PAGE

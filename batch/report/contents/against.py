@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
-from batch.differences.found import Diff, ExperimentDiff
+from batch.differences.result import Diff, ExperimentDiff
 from batch.queries.pool import ENDED, CaseColumn, Pool
 from batch.queries.signals import deck_unit
 from met.frozen import frozen

@@ -8,7 +8,7 @@ import numpy as np
 
 from batch.differences import words
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, VERDICTS
-from batch.differences.found import Diff, ExperimentDiff
+from batch.differences.result import Diff, ExperimentDiff
 from batch.queries.failures import ranges
 from batch.queries.pool import Pool
 from batch.report.contents.against import GOOD, ComparedArchive, EarlierCases

@@ -9,9 +9,9 @@ import pytest
 
 import ic
 from batch.differences import words
-from batch.differences.changed import provenance_changes
 from batch.differences.decks import MOST_COMPARED, decks
-from batch.differences.told import Shortening, _changed
+from batch.differences.provenance import provenance_changes
+from batch.differences.text import Shortening, _changed
 
 ARM = """\
 let fore_l  = 3 m;

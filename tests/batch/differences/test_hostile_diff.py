@@ -21,8 +21,8 @@ from batch.differences.campaigns import diff
 from batch.differences.compare import compare
 from batch.differences.data import as_data
 from batch.differences.decks import decks
-from batch.differences.found import Diff, ExperimentDiff, RequirementDiff, SignalDiff
-from batch.differences.told import diff_lines
+from batch.differences.result import Diff, ExperimentDiff, RequirementDiff, SignalDiff
+from batch.differences.text import diff_lines
 from batch.differences.tolerance import SignalTolerance, tolerances
 from batch.differences.words import heading, requirement_lines, verdict
 from met import cli

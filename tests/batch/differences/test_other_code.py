@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from batch.differences.changed import provenance_changes
+from batch.differences.provenance import provenance_changes
 from met.plan import Plan
 
 ONE, OTHER = f"2:{'0' * 64}", f"2:{'1' * 64}"

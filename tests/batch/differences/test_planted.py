@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from batch.differences.campaigns import diff
-from batch.differences.found import Diff, SignalDiff
+from batch.differences.result import Diff, SignalDiff
 from batch.differences.tolerance import tolerances
 from met.plan import Experiment, Origin, Quantity
 from met.run import Run
@@ -92,7 +92,7 @@ def test_not_a_number(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def test_a_case_that_fails_now_is_the_headline(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    from batch.differences.told import diff_lines
+    from batch.differences.text import diff_lines
 
     def plant(run: Run, place: dict[int, int]) -> None:
         if 123 in place:

@@ -14,8 +14,8 @@ import batch
 import ic
 from batch.differences.campaigns import diff
 from batch.differences.data import as_data
-from batch.differences.found import Diff, SignalDiff
-from batch.differences.told import diff_lines
+from batch.differences.result import Diff, SignalDiff
+from batch.differences.text import diff_lines
 from batch.differences.tolerance import Tolerances, check, tolerances
 from met.diagnostic import Problem
 from met.plan import Experiment, Tolerance

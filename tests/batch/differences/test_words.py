@@ -11,8 +11,8 @@ import pytest
 
 from batch.differences import words
 from batch.differences.campaigns import diff
-from batch.differences.found import EndingDiff
-from batch.differences.told import diff_lines
+from batch.differences.result import EndingDiff
+from batch.differences.text import diff_lines
 from batch.differences.tolerance import tolerances
 from met.run import Run
 from tests.batch import plans

@@ -13,7 +13,7 @@ import pytest
 
 import batch
 from batch.archive.read import ArchiveFile
-from batch.differences.told import diff_lines
+from batch.differences.text import diff_lines
 from batch.queries.pool import CaseColumn
 from batch.report import report
 from batch.report.contents import against as sides

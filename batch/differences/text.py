@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from batch.differences import words
-from batch.differences.found import Diff, ExperimentDiff, SignalDiff
+from batch.differences.result import Diff, ExperimentDiff, SignalDiff
 from ic.printing.columns import columns
 from met.frozen import frozen
 

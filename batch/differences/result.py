@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from batch.differences.changed import ProvenanceChanges
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE, VERDICTS
 from batch.differences.matching import MatchedCases
+from batch.differences.provenance import ProvenanceChanges
 from batch.differences.samples import MetricSamples
 from batch.differences.tolerance import SignalTolerance, Tolerances
 from met.frozen import frozen
