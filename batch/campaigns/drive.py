@@ -73,7 +73,7 @@ class Driver:
 
     def find(self, section: CampaignSection) -> list[tuple[int, int]]:
         """Count what is there of a section; the stretches that are missing."""
-        kept, told = self.folder.sound(section)
+        kept, told = self.folder.sound_tasks(section)
         self.told += told
         missing = uncovered(kept, len(section.rows))
         count = self.counts[section.number] = Count(len(section.rows) - sum(last - first for first, last in missing))

@@ -135,10 +135,10 @@ class Folder:
                 pass
             except OSError:  # a name that would be too long
                 shutil.rmtree(self.path, ignore_errors=True)
-        self.forget()
+        self.finish_removal()
         self.close()
 
-    def forget(self) -> None:
+    def finish_removal(self) -> None:
         """Take away what was on its way out, now or in a run that was killed over it."""
         for leaving in self.path.parent.glob(f".{glob.escape(self.path.name)}.*.leaving"):
             shutil.rmtree(leaving, ignore_errors=True)
@@ -232,7 +232,7 @@ class Folder:
 
     # What is done
 
-    def named(self, number: int) -> list[Task]:
+    def named_tasks(self, number: int) -> list[Task]:
         """The tasks of a section that have a file, sound or not, by their first cases."""
         found = []
         for name in os.listdir(self.shards) if self.shards.is_dir() else ():
@@ -253,13 +253,13 @@ class Folder:
             raise shard.UnsoundShard("holds other outputs than the program has")
         return found
 
-    def sound(self, section: CampaignSection) -> tuple[dict[Task, Done], list[str]]:
+    def sound_tasks(self, section: CampaignSection) -> tuple[dict[Task, Done], list[str]]:
         """The tasks of a section whose shards count, and what is told of those that do not, which are removed: their
         cases are run again."""
         kept: dict[Task, Done] = {}
         told = []
         at = 0
-        for task in self.named(section.number):
+        for task in self.named_tasks(section.number):
             try:
                 found = self.read(section, task)
             except (shard.UnsoundShard, OSError) as reason:
@@ -289,7 +289,7 @@ class Folder:
                 break
         return total
 
-    def sweep(self) -> None:
+    def remove_partial_shards(self) -> None:
         """Remove what workers that were killed had begun to write; there are none at work."""
         for path in self.shards.glob(".*.tmp"):
             path.unlink(missing_ok=True)

@@ -97,7 +97,7 @@ def _alone(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, str]
     """Rows that could not be run, and why; each has a shard of its own. One that a shard before it holds as well counts
     as it is there, as in `shards_in_order`: a worker that was thought dead may have come to its end."""
     at = 0
-    for task in folder.named(section.number):
+    for task in folder.named_tasks(section.number):
         if task.cases == 1 and task.first >= at:
             with contextlib.suppress(shard.UnsoundShard, OSError):  # `pieces` comes upon it, too
                 for _, why in folder.read(section, task).fates.values():
@@ -119,7 +119,7 @@ def results(folder: Folder, section: CampaignSection) -> CaseOutcomes:
 def shards_in_order(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, shard.Shard]]:
     """The shards of a section in order, less what was had before, each with the place of its first case."""
     at = 0
-    for task in folder.named(section.number):
+    for task in folder.named_tasks(section.number):
         if task.last <= at:
             continue
         if task.first > at:

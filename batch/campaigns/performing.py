@@ -151,15 +151,15 @@ class _CampaignWork:
 
     def begin(self, fresh: bool) -> None:
         """Make the folder, or take up the one that is there. Raises Problem E353 where it is of another campaign."""
-        self.resumed = bool(self.folder.named(0)) and not fresh
+        self.resumed = bool(self.folder.named_tasks(0)) and not fresh
         for note in resuming.take_up(self.folder, self.campaign, self.values, self.key, fresh):
             self._note(note)
         for note in died_lines(self.folder) if self.resumed else ():
             self._note(note)
         self.ours = True
-        self.folder.forget()
+        self.folder.finish_removal()
         resuming.describe(self.folder, self.campaign, self.values, self.key)
-        self.folder.sweep()
+        self.folder.remove_partial_shards()
 
     def run(self, executor: Executor, together: bool) -> Performed:
         driver = self.driver = Driver(self.folder, executor, self.reporter, self.max_failures, len(self.values))
@@ -193,7 +193,7 @@ class _CampaignWork:
         """Give up, for now. What is worth keeping stays; in words how much and where, else "" and nothing stays."""
         if not self.ours:
             return ""
-        self.folder.sweep()
+        self.folder.remove_partial_shards()
         worth = self.resumed or self.folder.submitted or self.folder.recorded
         worth = worth or self.folder.seconds(WORTH_SECONDS) >= WORTH_SECONDS
         if not worth:
@@ -203,7 +203,7 @@ class _CampaignWork:
         left = sum(
             last - first
             for section in self.values
-            for first, last in uncovered(self.folder.named(section.number), len(section.rows))
+            for first, last in uncovered(self.folder.named_tasks(section.number), len(section.rows))
         )
         done = self.campaign.cases - left
         return f"{done:,} of {self.campaign.cases:,} cases are kept in {self.folder.path}; the same command goes on"

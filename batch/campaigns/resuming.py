@@ -120,7 +120,7 @@ def is_begun(folder: Folder, key: str) -> bool:
 
 def remove_leftovers(folder: Folder, key: str) -> None:
     """Remove what a run left that was killed after its archive had got its name; not what another campaign began."""
-    folder.forget()
+    folder.finish_removal()
     if not folder.exists():
         return
     with contextlib.suppress(FolderBusy, Problem):
@@ -138,7 +138,7 @@ def take_up(
     """See to what is in the folder, which is locked; what is to be told. Raises Problem E350, E353."""
     if not folder.exists():
         return
-    held = sum(task.cases for number in range(len(values)) for task in folder.named(number))
+    held = sum(task.cases for number in range(len(values)) for task in folder.named_tasks(number))
     if fresh:
         folder.empty()
         yield f"starts over: {held:,} cases that were done before are removed"
@@ -182,7 +182,7 @@ def described(folder: Folder) -> Campaign:
 
 
 def _of_another(folder: Folder, campaign: Campaign, values: Sequence[CampaignSection], told: dict[str, Any]) -> Any:
-    done = sum(task.cases for number in range(len(told["sections"])) for task in folder.named(number))
+    done = sum(task.cases for number in range(len(told["sections"])) for task in folder.named_tasks(number))
     try:
         found = changes(folder.plan(), campaign.plan)
     except Problem:

@@ -131,7 +131,7 @@ def report(folder: Folder, now: float) -> dict[str, Any]:
     sections = []
     told_here = folder.described()
     for each in told_here["sections"]:
-        left = sum(last - first for first, last in uncovered(folder.named(each["number"]), each["cases"]))
+        left = sum(last - first for first, last in uncovered(folder.named_tasks(each["number"]), each["cases"]))
         sections.append(
             {"name": each["name"], "cases": each["cases"], "done": each["cases"] - left, "again": each["again"]}
         )

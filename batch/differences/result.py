@@ -138,7 +138,7 @@ class RequirementDiff:
     limits: tuple[str, str] = ("", "")
 
     @property
-    def told(self) -> bool:
+    def has_changed(self) -> bool:
         """True if the requirement is another, or is met by another number of cases."""
         return self.other or self.before != self.now or self.met_before != self.met_now
 

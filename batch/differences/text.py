@@ -25,7 +25,7 @@ class Shortening:
     every: bool = False
     remedy: str = "`met diff ... --all`"
 
-    def few(self, lines: Sequence[str], most: int, indent: str) -> list[str]:
+    def cut(self, lines: Sequence[str], most: int, indent: str) -> list[str]:
         """The first of the lines, and how many more there are."""
         left = 0 if self.every else max(0, len(lines) - most)
         return [*lines[: len(lines) - left], *([f"{indent}and {left:,} more: {self.remedy}"] if left else [])]
@@ -49,7 +49,7 @@ def _changed(found: Diff, cut: Shortening) -> Iterator[str]:
         yield words.SAME
     for kind, lines in made:
         short = [line if cut.every or len(line) <= LONGEST else f"{line[:LONGEST]} ..." for line in lines]
-        for line in cut.few(short, OF_KIND.get(kind, MOST_LINES), ""):
+        for line in cut.cut(short, OF_KIND.get(kind, MOST_LINES), ""):
             yield f"  {'' if line.startswith(' ') else kind:<10} {line}"
 
 
@@ -70,7 +70,7 @@ def _ended(experiment: ExperimentDiff, cut: Shortening) -> Iterator[str]:
     for ending in words.endings(experiment):
         yield f"  {ending.text}: {ending.cases}"
         each = [f"    #{case.case} {case.case_id[:8]}  {words.cause(case)}" for case in ending.each]
-        yield from cut.few(each, SHOWN_ENDED, "    ")
+        yield from cut.cut(each, SHOWN_ENDED, "    ")
 
 
 def _signals(signals: Sequence[SignalDiff]) -> list[str]:
@@ -108,5 +108,5 @@ def _worst(found: Diff, experiment: ExperimentDiff, cut: Shortening) -> list[str
         now = f"{each.now} {each.unit}".rstrip()
         first = f"    #{each.case} {each.id}  {each.what}: {each.before}, now {now}"
         out.append(f"{first}\n      {'; '.join(each.commands)}")
-    few = cut.few(out, SHOWN_WORST, "    ")
+    few = cut.cut(out, SHOWN_WORST, "    ")
     return ["", f"  {words.WORST}:", *(line for each in few for line in each.split("\n"))]

@@ -78,7 +78,7 @@ def requirement_lines(experiment: ExperimentDiff) -> list[str]:
     return [
         f"require {requirement_text(each)}  {met_by_text(each.met_before, each.met_now, count)}"
         for each in experiment.requirements
-        if each.told
+        if each.has_changed
     ]
 
 

@@ -71,7 +71,7 @@ def share(path: Path, number: int, tasks_file: Path, command: Sequence[str] = CO
     try:
         for section in sections.values():
             wanted = [task for task in mine if task.section == section.number]
-            left = _left(wanted, folder.named(section.number))
+            left = _left(wanted, folder.named_tasks(section.number))
             own = sum(task.cases for task in wanted)
             driver.counts[section.number] = Count(own - sum(last - first for first, last in left))
             driver.run(section, left, own)

@@ -66,10 +66,10 @@ def submit(
         for note in resuming.take_up(folder, campaign, values, key, fresh):
             say(note)
         resuming.describe(folder, campaign, values, key)
-        folder.sweep()
+        folder.remove_partial_shards()
         missing = []
         for section in values:
-            kept, told = folder.sound(section)
+            kept, told = folder.sound_tasks(section)
             for note in told:
                 say(note)
             missing += [Task(section.number, *gap) for gap in uncovered(kept, len(section.rows))]

@@ -137,12 +137,12 @@ def shards(archive: Path) -> dict[str, tuple[int, int]]:
 
 def done(archive: Path, cases: int, section: int = 0) -> int:
     """Cases of a section that have a shard."""
-    return cases - sum(last - first for first, last in uncovered(folder_of(archive).named(section), cases))
+    return cases - sum(last - first for first, last in uncovered(folder_of(archive).named_tasks(section), cases))
 
 
 def run_twice(archive: Path, section: int = 0) -> list[tuple[Task, Task]]:
     """Shards that share cases."""
-    found = folder_of(archive).named(section)
+    found = folder_of(archive).named_tasks(section)
     return [(a, b) for a, b in pairwise(found) if b.first < a.last]
 
 

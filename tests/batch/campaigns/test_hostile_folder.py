@@ -15,7 +15,7 @@ from met.host import entry_points, interpreter
 from met.plan import file as plan_file
 from tests.batch import plans
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 MET = "import sys\nfrom met.cli import main\nsys.exit(main())\n"
 """The script that an installer writes for `met`."""

@@ -24,7 +24,7 @@ from tests.batch import plans
 
 pytestmark = pytest.mark.usefixtures("engine")
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 ENGINES = ("h5netcdf", pytest.param("netcdf4", marks=pytest.mark.oracle))
 
 
@@ -535,7 +535,7 @@ for trial in range(150):
         signal.setitimer(signal.ITIMER_REAL, 0.0)
 print("done")
 """
-    surroundings = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
+    surroundings = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])}
     said = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, env=surroundings, timeout=120
     )

@@ -17,7 +17,7 @@ from met.plan import file as plan_file
 from tests.batch import plans
 from tests.batch.refusals import refused
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.mark.usefixtures("engine")

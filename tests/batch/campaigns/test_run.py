@@ -124,7 +124,7 @@ class TestTheRealEngine:
     def test_a_coordinate_and_a_metric_of_the_engines_own_names(self, here: Path, name: str) -> None:
 
         from met import run
-        from tests.batch.test_archive import renamed
+        from tests.batch.archive.test_archive import renamed
 
         experiment = renamed(plans.gains(3), "gearbox.kp", name)
         uses = (replace(experiment.structure.metrics[0], name="kp"),)
