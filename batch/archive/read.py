@@ -113,7 +113,7 @@ class ArchiveGroup:
             return np.asarray(dataset[first:last])
 
     def digests(self, name: str, first: int, last: int) -> np.ndarray:
-        """The same of digests, as whole numbers of 64 bits."""
+        """Digests of some cases as whole numbers of 64 bits."""
         with reading(self.path):
             words = np.asarray(self._node[name][first:last]).astype("S")
             try:

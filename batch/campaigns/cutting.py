@@ -26,7 +26,7 @@ class Cutter:
         self._seconds, self._cases = 0.0, 0.0
 
     def learn(self, cases: int, seconds: float) -> None:
-        """So many cases took a worker so long."""
+        """Note that a worker took so long for so many cases."""
         if cases >= GRANULE:  # fewer take as long as a whole block
             self._seconds, self._cases = 0.5 * self._seconds + seconds, 0.5 * self._cases + cases
 

@@ -37,7 +37,7 @@ class Progress(Protocol):
 
 
 class Stopped(Exception):
-    """It cannot go on, and why; what is done is kept."""
+    """A campaign cannot go on; the message says why. What is done is kept."""
 
 
 class TooManyFailures(Stopped):
@@ -105,7 +105,7 @@ class Driver:
             self.progress.advance(count.done + self.executor.under_way, count.failed)
 
     def check(self) -> None:
-        """Raises TooManyFailures."""
+        """Stop where too many cases have failed. Raises TooManyFailures."""
         failed = sum(
             count.failed for number, count in self.counts.items() if self.sections is None or number < self.sections
         )

@@ -110,7 +110,7 @@ def differences(before: str | Path, after: str | Path) -> list[str]:
 
 
 def _signals(old: ArchiveGroup, new: ArchiveGroup, places: np.ndarray, ran: np.ndarray) -> list[str]:
-    """The same of signals, of the cases whose histories both archives have. places: of new's cases in old."""
+    """Lines about signals that differ, in cases whose histories both archives have. places: of new's cases in old."""
     out = []
     for variable in new.role("signal"):
         if variable.name not in old.variables or old.variables[variable.name].role != "signal":

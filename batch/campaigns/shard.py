@@ -64,7 +64,7 @@ class Shard:
         return self.failed_from(0)
 
     def failed_from(self, first: int) -> int:
-        """The same of its cases from the `first` one on."""
+        """The number of cases, from the `first` one on, that did not reach their end."""
         first = max(first, 0)
         return int(np.count_nonzero(self.outputs[first:, 0])) + sum(case >= first for case in self.fates)
 
@@ -140,7 +140,7 @@ def _made(head: Any, data: bytearray, at: int) -> Shard:
 
 
 def cannot_keep(folder: Path, reason: OSError) -> str:
-    """In words, why a shard cannot be written."""
+    """Say why a shard cannot be written."""
     return f"cannot keep what was computed in {folder}: {(reason.strerror or str(reason)).lower()}"
 
 

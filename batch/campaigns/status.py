@@ -166,7 +166,7 @@ def report(folder: Folder, now: float) -> dict[str, Any]:
 
 
 def lines(data: dict[str, Any]) -> list[str]:
-    """The same for people."""
+    """The progress of a campaign in lines, for people."""
     from ic.printing.columns import columns
 
     first = [each for each in data["sections"] if not each["again"]]

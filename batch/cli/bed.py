@@ -18,7 +18,7 @@ class Hertz(click.ParamType):
     name = "rate"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """In Hz."""
+        """Read a rate as Hz."""
         try:
             hz = measured(value, "Hz")
         except ValueError:
@@ -37,7 +37,7 @@ class Amount(click.ParamType):
         self._unit = unit
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """In SI."""
+        """Read an amount with its unit as SI."""
         try:
             found = measured(value, self._unit)
         except (ValueError, Problem):

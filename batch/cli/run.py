@@ -21,7 +21,7 @@ class Seconds(click.ParamType):
     name = "time"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """In seconds."""
+        """Read a time as seconds."""
         try:
             seconds = measured(value, "s")
         except ValueError:

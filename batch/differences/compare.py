@@ -109,8 +109,8 @@ def compare_cases(
     passed: SampledCourse | None = None,
     absolute: np.ndarray | None = None,
 ) -> list[Difference | None]:
-    """As `compare`, of several cases at once, [case, row, column]: one result a case. passed: where `allowed` has a
-    tolerance of time."""
+    """Compare several cases at once, [case, row, column], as `compare` does: one result a case. passed: where `allowed`
+    has a tolerance of time."""
     shape = a.shape
     a, b = (_flat(np.ascontiguousarray(array, dtype=np.float64)) for array in (a, b))
     unlike = a.view(np.int64) != b.view(np.int64)

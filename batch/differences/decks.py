@@ -215,5 +215,5 @@ def _of_file(name: str, text: str) -> Iterator[tuple[int, str, str]]:
 
 
 def _text(tokens: Sequence[Any]) -> str:
-    """As it was written, without comments and with single spaces."""
+    """The text of a line as it was written, without comments and with single spaces."""
     return " ".join("".join(each.text for each in tokens).split())

@@ -58,7 +58,7 @@ def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases
 
 
 def _met(group: ArchiveGroup, cases: np.ndarray) -> dict[str, np.ndarray]:
-    """By requirement whether each of these cases meets it."""
+    """For each requirement, whether each of these cases meets it."""
     texts = requirements.requirement_texts(group)
     if not len(cases):
         return {text: np.empty(0, bool) for text in texts}

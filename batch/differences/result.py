@@ -210,7 +210,7 @@ class Diff:
 
     @property
     def of_values(self) -> str:
-        """The same, whatever is required."""
+        """The verdict on all but requirements."""
         found = [experiment.of_values for experiment in self.experiments]
         if not found:
             return INCOMPARABLE

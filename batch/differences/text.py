@@ -32,7 +32,7 @@ class Shortening:
 
 
 def diff_lines(found: Diff, cut: Shortening | None = None) -> list[str]:
-    """All of it, for people; what is cut says how to see it."""
+    """The whole comparison in lines, for people; a line about what is left out says how to see it."""
     cut = cut or Shortening()
     out = [f"a  {found.a}", f"b  {found.b}", *_changed(found, cut)]
     for line in words.unmatched_runs(found):

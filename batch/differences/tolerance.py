@@ -58,7 +58,7 @@ class Tolerances:
         return SignalTolerance(self.absolute.get(name, (0.0, ""))[0], self.relative or 0.0, self.time or 0.0)
 
     def over(self, deck: Tolerances) -> Tolerances:
-        """With what a deck says besides."""
+        """These tolerances, and for all that they leave open those of a deck."""
         if self.alone:
             return self
         relative = deck.relative if self.relative is None else self.relative
@@ -75,7 +75,7 @@ class Tolerances:
         return {called: self.absolute[name][1] for called, name in names.items() if name in self.absolute}
 
     def words(self) -> list[str]:
-        """Each in words."""
+        """Each tolerance in words."""
         of_all = (("rel", self.relative, ""), ("time", self.time, " s"))
         return [
             *(f"{name} {text}" for name, (_, text) in self.absolute.items()),

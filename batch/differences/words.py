@@ -90,7 +90,7 @@ def requirement_text(each: RequirementDiff) -> str:
 
 
 def met_by_text(before: int, now: int, of: int) -> str:
-    """By how many of the cases in both a requirement is met."""
+    """Say by how many of the cases in both a requirement is met."""
     return f"met by {before:,}, now by {now:,} of {of:,}"
 
 

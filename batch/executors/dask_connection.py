@@ -63,7 +63,7 @@ def dask_client(dask: object, threads: int) -> Iterator[Any]:
 
 @contextmanager
 def silenced_dask() -> Iterator[None]:
-    """Inside, Dask prints nothing of what happens to connections and workers: what matters of it is an outcome."""
+    """A block in which Dask prints nothing about connections and workers: what matters of it is an outcome."""
     import distributed  # noqa: F401 - it sets the levels of its loggers when it is imported
 
     names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in ("distributed", "tornado")]

@@ -15,7 +15,7 @@ TELL_SECONDS = 0.1
 
 
 class Processes:
-    """As many processes as asked for, each with its share of the cores."""
+    """An executor with as many processes as asked for, each with its share of the cores."""
 
     def __init__(
         self,

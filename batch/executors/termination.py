@@ -18,7 +18,8 @@ class Terminated(KeyboardInterrupt):
 
 @contextmanager
 def terminable() -> Iterator[None]:
-    """Inside, SIGTERM raises Terminated, once: what follows it is cleaning up, which a second one does not disturb."""
+    """A block in which SIGTERM raises Terminated, once: what follows it is cleaning up, which a second one does not
+    disturb."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -130,7 +130,7 @@ def _columns_of(group: ArchiveGroup, variable: Stored) -> list[SignalColumn]:
 
 
 def _ordered(columns: Sequence[SignalColumn]) -> tuple[SignalColumn, ...]:
-    """Each once: signals as they were asked for, and the numbers of each as they lie in it."""
+    """The columns, each once: signals as they were asked for, and the numbers of each as they lie in it."""
     signals = list(dict.fromkeys(column.variable for column in columns))
     once = {column.path: column for column in columns}
     return tuple(sorted(once.values(), key=lambda column: (signals.index(column.variable), column.place)))

@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 
 def without_internals(function: Callable[P, T]) -> Callable[P, T]:
-    """The same, whose Problems say nothing of where inside of MET they were noticed."""
+    """Wrap a method so that its Problems have no traceback into MET."""
 
     @wraps(function)
     def outer(*args: P.args, **named: P.kwargs) -> T:

@@ -66,7 +66,7 @@ def selected(parts: Parts, wanted: Mapping[str, Any]) -> dict[str, xarray.Datase
 def _masks(
     parts: Parts, dims: Mapping[str, str], known: Mapping[str, Mapping[str, xarray.DataArray]], name: str, value: Any
 ) -> dict[str, np.ndarray]:
-    """By Dataset: which of its cases are as one name wants them."""
+    """For each Dataset, which of its cases are as one name wants them."""
     if name == CASE and not isinstance(value, slice):
         return _named(parts, dims, value)
     found = {path: variables[name] for path, variables in known.items() if name in variables}
@@ -88,7 +88,7 @@ def _masks(
 
 
 def _names(data: xarray.Dataset, dim: str) -> list[str]:
-    """By what cases are chosen most of the time."""
+    """Names by which cases are chosen most of the time."""
     metrics = [str(name) for name in data if data[name].attrs.get("role") == "metric"] if dim == CASE else []
     return [*varied(data, dim), *metrics, CASE, *((FAILED, MET, MISSED) if dim == CASE else ())]
 
@@ -148,7 +148,7 @@ def _no_such(values: np.ndarray, value: float, given: Any, name: str, attributes
 
 
 def _named(parts: Parts, dims: Mapping[str, str], wanted: Any) -> dict[str, np.ndarray]:
-    """By Dataset: which of its cases have these names, as `--case` takes them, or these positions."""
+    """For each Dataset, which of its cases have these names, as `--case` takes them, or these positions."""
     rows = {path: data[dims[path]].values for path, data in parts.items()}
     ids = [_ids(data, dims[path]) for path, data in parts.items()]
     every, every_id = np.concatenate(list(rows.values())), np.concatenate(ids)

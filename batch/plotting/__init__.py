@@ -70,7 +70,7 @@ def draw(
     against: ArchiveFile | None = None,
     sheet: PictureSheet | None = None,
 ) -> Path:
-    """The same of archives that are open."""
+    """Draw a picture of archives that are open, as `plot` does."""
     from batch.plotting import histories, metrics
     from batch.plotting import output as place
     from batch.plotting.against import beside

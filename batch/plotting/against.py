@@ -38,7 +38,7 @@ class OtherGroup:
         return self.group.values("time")
 
     def recorded(self, positions: Sequence[int]) -> dict[int, int]:
-        """By position of a drawn case the position of the same in the other, where its history was kept."""
+        """The position of each drawn case in the other archive, by its position here, where its history was kept."""
         kept = set(self.group.recorded_positions.tolist())
         found = {position: int(self.places[position]) for position in positions}
         return {position: place for position, place in found.items() if place in kept}
@@ -65,7 +65,7 @@ class OtherGroup:
 
 
 def _channels(group: ArchiveGroup, name: str) -> dict[str, tuple[int, str]]:
-    """By channel: where it lies among a signal's columns, and its unit."""
+    """For each channel, its place among a signal's columns, and its unit."""
     variable = group.variables.get(name)
     if variable is None or variable.role != "signal":
         return {}

@@ -174,7 +174,7 @@ def _in_stretch(x: MapSide, which: np.ndarray, most: int) -> np.ndarray:
 
 
 def infinity(text: str = "∞") -> Any:
-    """A marker."""
+    """The marker of an infinite value."""
     from matplotlib.textpath import TextPath
     from matplotlib.transforms import Affine2D
 

@@ -72,7 +72,7 @@ class Histories:
         self.pairs, self.theirs = self._against(bool(signals))
 
     def _against(self, asked: bool) -> tuple[dict[int, int], dict[int, list[int]]]:
-        """By position of a case that of the other archive's, and by number of a panel where its lines are there."""
+        """The other archive's position of each case, and its lines of each panel."""
         other = self.other
         if other is None:
             return {}, {}
@@ -156,7 +156,7 @@ class Histories:
         held.draw(ax, self._marks(cell), self.time, self.sheet, columns)
 
     def _above(self, cell: Cell) -> dict[int, int]:
-        """By line on how many others it lies."""
+        """For each line, on how many others it lies."""
         values = layout.drawable(history(self.group, cell.panel, self.positions[0]))[:, list(cell.lines)]
         finite = values[np.isfinite(values)]
         near = ON * float(np.ptp(finite)) if len(finite) else 0.0

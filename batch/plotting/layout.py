@@ -75,7 +75,7 @@ def drawable(values: np.ndarray) -> np.ndarray:
 
 
 def as_many_as_fit(found: Sequence[T], asked: bool, what: str) -> tuple[Sequence[T], str]:
-    """As many panels as a picture has room for, and what to say of the others. asked: whether they were named. Raises
+    """The panels that a picture has room for, and what to say of the others. asked: True where they were named. Raises
     Problem E391."""
     if len(found) <= MOST_PANELS:
         return found, ""
@@ -101,7 +101,7 @@ def head(ax: Any, text: str, sheet: PictureSheet, columns: int, colour: str = IN
 
 
 def _grow(figure: Any, sheet: PictureSheet, lines: float) -> None:
-    """On paper, room for so many lines more, unless the height is given."""
+    """Make room on paper for so many lines more, unless the height is given."""
     if sheet.paper and sheet.height is None:
         figure.set_figheight(figure.get_figheight() + lines * LINE * sheet.small / 72)
 
@@ -138,7 +138,7 @@ def legend_label(text: str) -> str | None:
 
 
 def legend_entries(axes: Sequence[Sequence[Any]]) -> dict[str, Any]:
-    """All that has a label in these panels: handle by text, each text once."""
+    """The handle of each label in these panels, each text once."""
     known: dict[str, Any] = {}
     for ax in (ax for row in axes for ax in row):
         handles, labels = ax.get_legend_handles_labels()
@@ -147,7 +147,7 @@ def legend_entries(axes: Sequence[Sequence[Any]]) -> dict[str, Any]:
 
 
 def title(figure: Any, archive: ArchiveFile, name: str, below: str, sheet: PictureSheet) -> None:
-    """On a screen deck and run, and `below` what is shown of it; on paper the latter alone."""
+    """Write the title: on a screen deck and run, and `below` what is shown of it; on paper the latter alone."""
     if sheet.paper:
         if below:
             text = textwrap.fill(below, letters(sheet, figure.get_figwidth() - 0.1))

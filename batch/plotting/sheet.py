@@ -85,7 +85,7 @@ class PictureSheet:
 
     @property
     def style(self) -> dict[str, Any]:
-        """matplotlib's settings."""
+        """The settings of matplotlib for this sheet."""
         thin = {"lines.linewidth": 1.1, "axes.linewidth": 0.6, "grid.linewidth": 0.5} if self.paper else {}
         dots = {"figure.dpi": self.resolution, "savefig.dpi": self.resolution}
         return {**STYLE, "font.size": self.normal, **thin, **dots}

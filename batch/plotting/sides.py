@@ -106,8 +106,8 @@ def write(axis: Any, found: MapSide, inches: float, sheet: PictureSheet, *, upri
 
 
 def write_log(axis: Any, found: MapSide, inches: float, sheet: PictureSheet, *, upright: bool = False) -> None:
-    """On a logarithmic axis of this length the values, where they are few and short, else round numbers, as many as
-    have room; no others."""
+    """Write on a logarithmic axis of this length the values, where they are few and short, else round numbers, as many
+    as have room; no others."""
     from matplotlib.ticker import NullLocator
 
     axis.set_minor_locator(NullLocator())

@@ -119,7 +119,7 @@ def _shared(group: ArchiveGroup, command: CommandCurve, positions: Sequence[int]
 
 
 def fan_cases(positions: Sequence[int]) -> Sequence[int]:
-    """So many of the cases as a fan shows, spread over all."""
+    """The cases that a fan draws, spread evenly over all."""
     if len(positions) <= SPREAD:
         return positions
     return [positions[i] for i in np.linspace(0, len(positions) - 1, SPREAD).astype(int)]

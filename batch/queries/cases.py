@@ -113,8 +113,8 @@ def rows_json(
     by: CaseOrder | None = None,
     positions: Sequence[int] | np.ndarray | None = None,
 ) -> list[dict[str, Any]]:
-    """The same for programs, in SI, of these cases or of the worst: what a case is, how it ended, its metrics (null
-    where not finite), and whether it meets each requirement (null where that is not known)."""
+    """The table of cases for programs, in SI, of these cases or of the worst: what a case is, how it ended, its metrics
+    (null where not finite), and whether it meets each requirement."""
     positions = ordering.positions(group, by)[:most] if positions is None else np.asarray(positions)
     numbers = [variable.name for variable in (*group.role("coordinate"), *group.role("metric"))]
     repeats = {"repeat": group.at("repeat", positions)} if "repeat" in group.variables else {}
@@ -183,7 +183,7 @@ def _outcome(status: int, outcomes: np.ndarray) -> str:
 
 
 def _marks(group: ArchiveGroup, outcomes: np.ndarray) -> dict[str, np.ndarray]:
-    """By metric that has requirements: which of the cases miss one."""
+    """For each metric that has requirements, which of the cases miss one."""
     out: dict[str, np.ndarray] = {}
     for each in requirements.group_requirements(group):
         out[each.metric] = out.get(each.metric, False) | (outcomes[:, each.place] == 0)

@@ -21,7 +21,8 @@ WRITTEN = re.compile(r"[\d.\])]\s*([A-Za-z%][\w*/^()]*)\s*$")
 
 
 class DeckUnits:
-    """By SI unit that of the deck: of a signal what a requirement of it is in, else what most of its values are in.
+    """The deck's unit for each SI unit: of a signal what a requirement of it is in, else what most of its values are
+    in.
 
     experiment  what was run, as the plan has it; None where the plan cannot be read here: units are SI then
     """
@@ -48,7 +49,7 @@ class DeckUnits:
         return replace(panel, unit=unit, scale=scale, in_si=panel.unit) if scale not in (0.0, 1.0) else panel
 
     def _of_metrics(self) -> dict[str, list[str]]:
-        """By signal the units of requirements of it; a joint's speaks for all of its signal."""
+        """For each signal, the units of requirements of it; a joint's speaks for all of its signal."""
         out: dict[str, list[str]] = {}
         if self.experiment is None:
             return out

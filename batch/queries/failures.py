@@ -55,7 +55,7 @@ def failures(status: np.ndarray, cause: np.ndarray, case: np.ndarray, case_id: n
 
 
 def failure_lines(found: Sequence[FailureGroup], width: int) -> list[str]:
-    """Each cause with its cases, wrapped."""
+    """Lines with each cause and its cases, wrapped."""
     out = []
     width = max(width, 40)
     for failure in found:

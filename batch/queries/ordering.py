@@ -95,7 +95,7 @@ def positions(group: ArchiveGroup, by: CaseOrder | None = None) -> np.ndarray:
 
 
 def positions_in_pool(pool: Pool, by: CaseOrder) -> np.ndarray:
-    """The same of the cases of all structures of a sweep, one of which has it: those of others are last."""
+    """The order of the cases of all structures of a sweep, one of which has the name: those of others are last."""
     columns = {column.label: column for column in pool.columns if column.role in ROLES}
     return _order(by, [columns[key.name].values for key in by.keys])
 

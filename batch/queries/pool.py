@@ -127,7 +127,7 @@ class Pool:
 
     @cached_property
     def limits(self) -> dict[str, tuple[RequirementLimit, ...]]:
-        """By metric's variable: its requirements, limits in SI."""
+        """For each metric's variable, its requirements, limits in SI."""
         out: dict[str, dict[str, RequirementLimit]] = {}
         for group in self.groups:
             for each in requirements.group_requirements(group):
@@ -203,7 +203,7 @@ class Pool:
         )
 
     def _choice(self, variable: Stored) -> CaseColumn:
-        """Its values number the words, in the order in which groups have them."""
+        """The column of a choice: its values number the words, in the order in which groups have them."""
         words: dict[str, int] = {}
         values = np.full(self.count, np.nan)
         for number, group in enumerate(self.groups):

@@ -80,7 +80,7 @@ class SignalSelection:
 
 
 def _choices(group: ArchiveGroup, signals: dict[str, Stored]) -> dict[str, tuple[SignalSelection, ...]]:
-    """By name: whole signals, one joint's, one component's, and what a family's name stands for."""
+    """The selections that each name stands for: whole signals, one joint's, one component's, a family's."""
     found: dict[str, tuple[SignalSelection, ...]] = {}
     for variable in signals.values():
         joints, components = group.joints(variable), group.components(variable)
@@ -137,7 +137,7 @@ def history(group: ArchiveGroup, panel: Panel, position: int) -> np.ndarray:
 
 
 def pretty_unit(unit: str) -> str:
-    """`N*m*s^2` -> `N·m·s²`."""
+    """A unit as it is typeset: `N*m*s^2` -> `N·m·s²`."""
     out, rest = "", unit.replace("*", "·")
     while "^" in rest:
         before, _, rest = rest.partition("^")

@@ -180,7 +180,7 @@ def _named_first(metric: dict[str, Any]) -> dict[str, Any]:
 
 
 def finite(value: Any) -> Any:
-    """The same with null for every number that JSON has no word for."""
+    """Plain data with null for every number that JSON has no word for."""
     if isinstance(value, Mapping):
         return {key: finite(part) for key, part in value.items()}
     if isinstance(value, list | tuple):

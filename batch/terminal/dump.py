@@ -38,7 +38,7 @@ def assembly(asked: DumpRequest) -> Iterator[str]:
 
 
 def _recorded(asked: DumpRequest) -> Iterator[tuple[Experiment, Recording]]:
-    """Each run of the plan with its recorded program."""
+    """Record each run of the plan, and give it with its program."""
     from met.program.build import build
     from met.trace.recorder import record
 

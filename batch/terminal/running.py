@@ -248,8 +248,8 @@ def _of_deck(
 
 
 def _complain(problem: Problem, json: bool) -> None:
-    """For people on stderr, for programs as JSON."""
-    from met.messages import render
+    """Print a problem: for people on stderr, for programs as JSON."""
+    from met import render
 
     if json:
         print(render.to_json(problem.diagnostics))

@@ -117,7 +117,7 @@ def as_json(
     all_cases: bool = False,
     by: CaseOrder | None = None,
 ) -> str:
-    """The same for programs: outcome, cases, variables and attributes, without the signals' values.
+    """An archive for programs: outcome, cases, variables and attributes, without the signals' values.
 
     `case_table` holds the cases as `show` lists them, the first of many unless `all_cases`; where one `case` is asked
     for, the outcome is its own, and `case` holds it with all its parameters.

@@ -100,7 +100,7 @@ class EarlierCases:
 
 
 def _places(pool: Pool, number: int) -> np.ndarray:
-    """By position in one of a pool's groups: which of its cases that is."""
+    """For each position in one of a pool's groups, which of the pool's cases that is."""
     here = np.flatnonzero(pool.group_of == number)
     out = np.empty(len(here), np.int64)
     out[pool.position_of[here]] = here
@@ -128,7 +128,7 @@ def display_names(before: Path, now: Path) -> tuple[str, str]:
 
 
 def rename_archives(found: Diff, before: str, now: str) -> Diff:
-    """The same, with these names for the two archives in all that is said of them."""
+    """The same differences, with these names for the two archives in all that is said of them."""
     names = {str(found.b): now, str(found.a): before}
     either = re.compile("|".join(re.escape(path) for path in sorted(names, key=len, reverse=True)))
 

@@ -116,7 +116,7 @@ def _figure(both: Sequence[tuple[Pool, EarlierCases]]) -> tuple[int, int, int] |
 
 
 def _flows(pool: Pool, before: EarlierCases, *, named: bool) -> list[RequirementFlow]:
-    """By requirement of both: which cases meet it now, and which no longer. named: whether to say of which run."""
+    """For each requirement of both, which cases meet it now, and which no longer. named: True to say of which run."""
     out = []
     pairs = {each.now: each for _, _, experiment in before.pairs for each in experiment.requirements}
     for place, text in enumerate(pool.requirements):

@@ -42,7 +42,8 @@ def gather(
     progress: Callable[[int], None] | None = None,
     against: ComparedArchive | None = None,
 ) -> Report:
-    """All that a page says of an archive, or of these runs and sweeps of it. Raises Problem E325 for another name.
+    """Gather all that a page says of an archive, or of these runs and sweeps of it. Raises Problem E325 for another
+    name.
 
     progress  called with the number of cases whose margin is known, where motors are on beds
     against   another archive to compare with

@@ -162,7 +162,8 @@ class _Group:
         return SignalPanel(panel.name, panel.about, panel.unit, tuple(lines))
 
     def thinned(self, found: Sequence[SignalPanel], position: int, points: int) -> dict[int, np.ndarray]:
-        """By place among the page's panels: (point, line of that panel), not a number where this structure has none."""
+        """The lines of each of the page's panels, by its place: (point, line of that panel), not a number where this
+        structure has none."""
         out = {}
         for panel in self.panels:
             key = panel.name, panel.unit

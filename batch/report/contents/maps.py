@@ -56,7 +56,8 @@ def _map(pool: Pool, x: CaseColumn, y: CaseColumn, metrics: Sequence[CaseColumn]
 
 
 def ruler(found: Levels) -> Ruler:
-    """By the values' steps or factors, as in `met plot`: of stretches of values round numbers are written."""
+    """The positions of values along an axis, by their steps or factors, as in `met plot`: of stretches of values round
+    numbers are written."""
     count = len(found.texts)
     if found.scale == "place":
         edges = np.linspace(0.0, 1.0, count + 1)

@@ -65,7 +65,7 @@ def overview(pool: Pool, before: EarlierCases | None = None) -> Overview | None:
 
 
 def _interest(pool: Pool, column: CaseColumn) -> tuple[bool, int]:
-    """By which a metric is drawn first: that it has a requirement, and that cases do not meet it."""
+    """The rank of a metric to be drawn first: it has a requirement, and cases do not meet it."""
     outcomes = [pool.outcomes[:, pool.requirements.index(limit.text)] for limit in column.limits]
     return bool(outcomes), max((int((each == 0).sum()) for each in outcomes), default=0)
 

@@ -55,7 +55,7 @@ def parameters(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[Param
 
 
 def _spans(experiment: Experiment) -> dict[int, tuple[float, float]]:
-    """By output of the formulas: the smallest and the largest value, over as many cases as are looked at."""
+    """For each output of the formulas, the smallest and the largest value, over as many cases as are looked at."""
     count = experiment.cases.count
     rows = distinct(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(int))
     inputs = {coordinate.path: coordinate.values[rows] for coordinate in experiment.cases.coordinates}

@@ -37,7 +37,7 @@ class Spot:
 
 @frozen
 class OutcomeCount:
-    """So many of all cases came out so."""
+    """The number of cases that came out in one way."""
 
     word: str
     count: int

@@ -275,7 +275,7 @@ def _sets(paths: Sequence[str]) -> list[Child]:
 
 
 def metrics(section: ReportSection) -> Html | None:
-    """Each metric with its spread, and the shape of it."""
+    """The table of metrics, each with its spread, and the shape of it."""
     if not section.metrics:
         return None
     compared = any(each.before for each in section.metrics)

@@ -116,7 +116,7 @@ def _cell(row: SignalRow, column: DiffColumn) -> Html:
 
 
 def _samples(found: RunChanges) -> Html | None:
-    """Metrics as distributions."""
+    """The table of metrics as distributions."""
     if not found.samples:
         return None
     heads = tuple(head for _, head in DISTRIBUTION_HEADS)
@@ -132,7 +132,7 @@ def _number(text: str) -> str:
 
 
 def _where(each: SignalRow) -> Child:
-    """Its case to be chosen."""
+    """The text about the place, with its case as a button that chooses it."""
     number = f"#{each.case}"
     before, found, after = each.where.rpartition(number) if each.case is not None else ("", "", each.where)
     return [before, case_link(each.case), after] if found and each.case is not None else each.where

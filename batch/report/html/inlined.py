@@ -42,5 +42,5 @@ def _read(name: str) -> str:
 
 
 def digest(text: str) -> str:
-    """As a Content-Security-Policy names an inline style or script: `'sha256-...'`."""
+    """The name of an inline style or script in a Content-Security-Policy: `'sha256-...'`."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode('utf-8')).digest()).decode('ascii')}'"

@@ -29,7 +29,7 @@ def script_json(data: Any) -> Html:
 
 
 def section_data(section: ReportSection, replay: str, changes: ArchiveChanges | None = None) -> dict[str, Any]:
-    """All that the plots of a section need. replay: the command that runs a case again, with `#CASE` for which."""
+    """The data that the plots of a section need. replay: the command that runs a case again, with `#CASE` for which."""
     return {
         "name": visible(section.name),
         "against": None if changes is None else [visible(changes.before), visible(changes.now)],
