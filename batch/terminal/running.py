@@ -249,7 +249,7 @@ def _of_deck(
 
 def _complain(problem: Problem, json: bool) -> None:
     """Print a problem: for people on stderr, for programs as JSON."""
-    from met import render
+    from met.messages import render
 
     if json:
         print(render.to_json(problem.diagnostics))

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import ic
-from batch.beds.identifying import check, digits, sheet_of, with_kt_load_error
+from batch.beds.identifying import check, digits, sheet_of, widened
 from hw import records
 from hw.bed import About, Capability, Limits, Scales
 from hw.beds import emulated
@@ -221,7 +221,7 @@ def test_a_bed_that_is_no_motor_bed(settled: bool, message: str) -> None:
 
 def test_a_given_constant_that_is_not_sure_widens_what_is_measured_by_it() -> None:
     found = {name: Estimate(2.0, 2.0 / 1.01, 2.0 * 1.01, name != "kt_load") for name in (*TRUTH, "kt_load")}
-    wide = with_kt_load_error(found, 0.05)
+    wide = widened(found, 0.05)
     assert wide["kt"] == found["kt"] and wide["f_cut"] == found["f_cut"]
     assert all(wide[name].high > 2.1 for name in ("resistance", "tau_max", "f_c", "f_v", "inertia", "kt_load"))
 

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from batch.beds.jitter import drift_text, duration, histogram, lines
+from batch.beds.jitter import duration, histogram, lines, off
 from hw import loop
 from hw.bed import About, BedDriver, BedSample, BedState, Fault
 from hw.jitter import jitter_result
@@ -271,7 +271,7 @@ def test_times_in_three_digits() -> None:
 
 
 def test_how_far_a_clock_is_off() -> None:
-    assert [drift_text(each) for each in (5e-5, -1e-15, -9.9e-3, -0.5, 1.0, math.nan)] == [
+    assert [off(each) for each in (5e-5, -1e-15, -9.9e-3, -0.5, 1.0, math.nan)] == [
         "+50 ppm",
         "+0 ppm",
         "-9,900 ppm",

@@ -6,11 +6,11 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.met.test_plan_guides import DECK
 
 from ic.printing.plan import print_plan
 from met import cli
 from tests.ic.small_decks import check, messages
+from tests.met.plan.test_plan_guides import DECK
 
 
 def test_a_plan_shows_guides_with_their_joints_and_paths(tmp_path: Path) -> None:
