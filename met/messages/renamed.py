@@ -40,7 +40,8 @@ def old_fields(**names: str) -> Callable[[C], C]:
 
         cls.__init__ = __init__  # type: ignore[misc]
         for old, new in names.items():
-            setattr(cls, old, property(functools.partial(_read, old=old, new=new)))
+            read = functools.partial(_read, old=old, new=new)
+            setattr(cls, old, property(read, doc=f"The old name of `{new}`."))
         return cls
 
     return decorate
