@@ -26,6 +26,9 @@ MOST_LISTED = 2_000  # names that a "did you mean" compares with
 MOST_SEEN = 20_000  # files and folders looked at for them
 MOST_NAMED = 8  # files named in a message
 
+HDF5 = b"\x89HDF\r\n\x1a\n"
+"""The bytes that an HDF5 file begins with."""
+
 _NOT_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
 
@@ -178,10 +181,13 @@ def _read_bytes(file: FoundFile, kind: str, most: int) -> bytes:
             raise Problem(error("D001", f"`{file.name}` is a directory, not a {kind}", help=help))
         if not stat.S_ISREG(about.st_mode):
             raise Problem(error("D001", f"`{file.name}` is not a regular file", help="copy what it gives to a file"))
-        if about.st_size > most:
-            raise Problem(_too_large(file, kind, f"{about.st_size / 2**20:.1f} MiB", most))
         with open_regular(file.path) as stream:
-            data = stream.read(most + 1)
+            data = stream.read(len(HDF5))
+            if data == HDF5:
+                raise Problem(_archive(file, kind))
+            if about.st_size > most:
+                raise Problem(_too_large(file, kind, f"{about.st_size / 2**20:.1f} MiB", most))
+            data += stream.read(most + 1 - len(data))
         if len(data) > most:  # a file that does not say its size, or grows
             raise Problem(_too_large(file, kind, "no end", most))
         return data
@@ -189,6 +195,14 @@ def _read_bytes(file: FoundFile, kind: str, most: int) -> bytes:
         why = getattr(reason, "strerror", None) or str(reason)
         help = "look at the name, and at who may read the file"
         raise Problem(error("D001", f"cannot read `{file.name}`: {why}", help=help)) from None
+
+
+def _archive(file: FoundFile, kind: str) -> Diagnostic:
+    helps = [
+        f"`met show {file.name}` and `met report {file.name}` show what is in it",
+        f"its decks, and the parameters of a case: `batch.open({file.name!r}).met.sources`, `.met.parameters('#0')`",
+    ]
+    return error("D002", f"`{file.name}` is an archive (HDF5), not a {kind}", help=helps)
 
 
 def _too_large(file: FoundFile, kind: str, size: str, most: int) -> Diagnostic:

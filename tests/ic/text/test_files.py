@@ -373,3 +373,10 @@ def test_a_plan_holds_the_text_and_the_hash_of_every_file_that_was_read(desk: De
     assert kept["mine.ic"].text == mine
     for name in ("two_link.ic", "servos/rigid_gearbox.ic"):
         assert kept[f"<{name}>"].sha256 == hashlib.sha256((library / name).read_bytes()).hexdigest()
+
+
+def test_an_archive_in_the_place_of_a_deck_is_told_with_the_commands_that_show_it(desk: Desk) -> None:
+    archive = b"\x89HDF\r\n\x1a\n" + bytes(4 << 20)  # larger than a deck may be
+    text = desk.told('#include "a.h5"\n', (), {"a.h5": archive})
+    assert "error[D002]: `a.h5` is an archive (HDF5), not a deck\n" in text
+    assert "`met show a.h5` and `met report a.h5` show what is in it" in text
