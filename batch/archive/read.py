@@ -18,8 +18,8 @@ import numpy as np
 from batch.archive import plain, sound
 from batch.archive.hdf5 import SIGNATURE, h5py
 from batch.archive.layout import SCHEMA, VERSION
+from batch.archive.rows import row_of
 from batch.archive.sound import Unlike, of_joints
-from batch.queries.rows import row_of
 from met.diagnostic import Problem, error
 from met.distinct import distinct
 from met.frozen import frozen

@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 
 from batch.campaigns.choosing import experiments_named
-from batch.terminal.running import read_plan
+from batch.campaigns.plans import read_plan
 from hw.ports import check_model, kind_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen

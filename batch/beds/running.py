@@ -13,9 +13,10 @@ from batch.beds.executor import OnBeds, Ports
 from batch.campaigns.campaign import Campaign, Wires, prepare
 from batch.campaigns.output import sidecar_path
 from batch.campaigns.performing import perform
+from batch.campaigns.plans import read_plan
 from batch.queries.summary import summarise
 from batch.terminal.margin import in_words, remedy
-from batch.terminal.running import first_picture, read_plan
+from batch.terminal.running import first_picture
 from batch.terminal.verdict import announcement, result_lines, worst_cases, writing
 from hw.case import pace_of
 from hw.ports import check_model, in_lock_step, kind_of, ports_in_words

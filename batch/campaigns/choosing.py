@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from batch.queries.rows import row_of
+from batch.archive.rows import row_of
 from met.diagnostic import Problem, error
 from met.plan import Experiment, Plan, keys
 

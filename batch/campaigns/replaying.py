@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
-from batch.terminal.show import cases_named, groups_named
+from batch.queries.groups import cases_named, groups_named
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Experiment, Plan

@@ -15,8 +15,8 @@ from batch.campaigns.campaign import Campaign, prepare
 from batch.campaigns.changes import changes
 from batch.campaigns.folder import Folder, FolderBusy, beside
 from batch.campaigns.output import sidecar_path
+from batch.campaigns.status import duration
 from batch.campaigns.tasks import CampaignSection
-from batch.terminal.progress import duration
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, read_json
 from met.plan import file as plan_file

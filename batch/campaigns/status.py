@@ -13,7 +13,6 @@ from batch.archive.read import ArchiveFile
 from batch.campaigns.drive import Progress
 from batch.campaigns.folder import ENDING, Folder, beside, uncovered, write_json
 from batch.campaigns.output import sidecar_path
-from batch.terminal.progress import duration
 from met.host.files import is_count, read_json
 
 WRITE_SECONDS = 1.0
@@ -237,3 +236,15 @@ def alive(told: dict[str, Any], now: float) -> bool:
     if told["host"] == socket.gethostname():
         return Path(f"/proc/{told['pid']}").exists()
     return bool(now - told["updated"] < STALE_SECONDS)
+
+
+def duration(seconds: float) -> str:
+    """95 -> `1 min 35 s`."""
+    if seconds < 10:
+        return f"{seconds:.1f} s"
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest} s"
+    return f"{minutes // 60} h {minutes % 60} min"

@@ -148,7 +148,7 @@ def _asked_for(
 ) -> Sequence[Experiment]:
     """The runs and sweeps of a deck or plan that a command is asked about; what the compiler says goes to people."""
     from batch.campaigns.choosing import experiments_named
-    from batch.terminal.running import read_plan
+    from batch.campaigns.plans import read_plan
 
     check_options(source, names, defines=defines, include_dirs=include_dirs, settings=settings)
     plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=form == "json")

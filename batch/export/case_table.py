@@ -11,7 +11,7 @@ from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.export.picking import rank
 from batch.queries import requirements
 from batch.queries.failures import STATUS
-from batch.terminal.show import cases_named, groups_named
+from batch.queries.groups import cases_named, groups_named
 from met.frozen import frozen
 
 BLOCK = 10_000

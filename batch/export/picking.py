@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
+from batch.queries.groups import cases_named, groups_named
 from batch.queries.signals import panels
-from batch.terminal.show import cases_named, groups_named
 from met.diagnostic import Problem
 from met.frozen import frozen
 from met.plan.channel import channel_paths

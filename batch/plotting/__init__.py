@@ -76,8 +76,8 @@ def draw(
     from batch.plotting.against import beside
     from batch.plotting.requests import plot_request
     from batch.plotting.sheet import PictureSheet
+    from batch.queries.groups import groups_named
     from batch.queries.pool import pools
-    from batch.terminal.show import groups_named
 
     target, sheet = Path(output), sheet or PictureSheet()
     groups = groups_named(archive, (run,) if run else ())

@@ -37,11 +37,11 @@ def report(
     from contextlib import ExitStack
 
     from batch.archive.read import ArchiveFile
+    from batch.queries.groups import groups_named
     from batch.report.contents.against import ComparedArchive, display_names, rename_archives
     from batch.report.contents.gathering import gather
     from batch.report.html.page import page
     from batch.report.writing import check, default, write
-    from batch.terminal.show import groups_named
 
     if tolerances and against is None:
         raise ValueError("tolerances are for a comparison: against which archive?")

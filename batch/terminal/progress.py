@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TextIO
 
+from batch.campaigns.status import duration
 from met.messages.visible import line
 
 FIRST_SECONDS = 0.3
@@ -106,15 +107,3 @@ def status(
         text += f"  {rate:,.3g} cases/s" if rate < 1000 else f"  {rate:,.0f} cases/s"
         text += f"  {duration((cases - done) / rate)} left"
     return f"{text}  {workers}" if workers else text
-
-
-def duration(seconds: float) -> str:
-    """95 -> `1 min 35 s`."""
-    if seconds < 10:
-        return f"{seconds:.1f} s"
-    if seconds < 60:
-        return f"{seconds:.0f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    if minutes < 60:
-        return f"{minutes} min {rest} s"
-    return f"{minutes // 60} h {minutes % 60} min"

@@ -7,11 +7,11 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, prepare
 from batch.campaigns.performing import TooMany, perform
+from batch.campaigns.plans import read_plan
 from batch.campaigns.rehearsal import rehearse
 from batch.campaigns.replaying import Replay, differences, replay
 from batch.executors.choose import choose
@@ -25,7 +25,6 @@ from met.diagnostic import Problem, error
 from met.host.sources import names_archive, names_plan
 from met.messages import visible
 from met.outputs import quoted
-from met.plan import Plan
 
 
 def run_and_tell(
@@ -265,37 +264,6 @@ def _compared(again: Replay | None, unlike: Sequence[str]) -> list[str]:
     if not unlike:
         return [f"the same bits as in {again.archive}"]
     return [f"not the same as in {again.archive}:", *(f"  {line}" for line in unlike)]
-
-
-def read_plan(
-    source: str,
-    names: tuple[str, ...] = (),
-    *,
-    everything: bool = False,
-    defines: tuple[str, ...] = (),
-    include_dirs: tuple[str, ...] = (),
-    settings: tuple[str, ...] = (),
-    quiet: bool = False,
-) -> Plan:
-    """The plan of a deck, or in a plan file. Warnings go to stderr; errors are a Problem."""
-    if names_plan(source):
-        from met.plan import file as plan_file
-
-        return plan_file.read(source)
-    import ic
-    from ic.find import find
-
-    select: Any = "all" if everything else names or None
-    find(source, include_dirs)  # a misspelt name is told with the one that was probably meant
-    compiled = ic.check(source, include_dirs=include_dirs, defines=defines, set=settings, select=select)
-    if compiled.plan is None:
-        raise Problem(compiled.diagnostics, compiled.sources)
-    if compiled.diagnostics and not quiet:
-        from met.messages import render
-
-        colour = render.wants_colour(sys.stderr)
-        print(render.render(compiled.diagnostics, compiled.sources, colour=colour), file=sys.stderr)
-    return compiled.plan
 
 
 def first_picture(archive: ArchiveFile) -> tuple[Path | None, str]:

@@ -12,6 +12,7 @@ from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries import cases, ordering
 from batch.queries.deck_units import DeckUnits
 from batch.queries.failures import failure_lines
+from batch.queries.groups import cases_named
 from batch.queries.ordering import CaseOrder
 from batch.queries.pool import pools
 from batch.queries.signals import case_text, history, number_text, panels, pretty_unit
@@ -19,7 +20,6 @@ from batch.queries.structures import structures
 from batch.queries.summary import SPREAD_COLUMNS, MetricSummary, Summary, summary_of
 from batch.terminal import braille
 from ic.printing.columns import size as size_text
-from met.diagnostic import Problem, error
 from met.distinct import distinct
 from met.messages.visible import line
 from met.outputs import quoted
@@ -149,34 +149,6 @@ def as_json(
     provenance = outcomes.finite(archive.provenance)
     data = {"archive": str(archive.path), "deck": archive.deck, "provenance": provenance, "experiments": groups}
     return json.dumps(data, indent=1, allow_nan=False)
-
-
-def groups_named(archive: ArchiveFile, names: Sequence[str]) -> tuple[ArchiveGroup, ...]:
-    """The experiments of these names, all where none is given."""
-    known = [*dict.fromkeys(group.sweep or group.name for group in archive.groups)]
-    for name in names:
-        if all(name not in (group.name, group.sweep) for group in archive.groups):
-            helps = f"in it: {', '.join(known)}"
-            raise Problem(error("E325", f"no run or sweep `{name}` in {archive.path}", help=helps))
-    found = [group for name in names for group in archive.groups if name in (group.name, group.sweep)]
-    return tuple(dict.fromkeys(found)) if names else archive.groups
-
-
-def cases_named(archive: ArchiveFile, names: Sequence[str], case: str | None) -> list[tuple[ArchiveGroup, int | None]]:
-    """The experiments of these names; where a case is asked for, those that have it, and its position in each."""
-    groups = groups_named(archive, names)
-    if case is None:
-        return [(group, None) for group in groups]
-    found: list[tuple[ArchiveGroup, int | None]] = []
-    problems = []
-    for group in groups:
-        try:
-            found.append((group, group.find_case(case)))
-        except Problem as problem:
-            problems.append(problem)
-    if not found:
-        raise Problem([d for problem in problems for d in problem.diagnostics])
-    return found
 
 
 def heading(group: ArchiveGroup, width: int) -> list[str]:

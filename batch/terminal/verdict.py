@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, CampaignPart
+from batch.campaigns.status import duration
 from batch.queries.failures import failure_lines
 from batch.queries.summary import Summary, as_json
-from batch.terminal.progress import duration
 from batch.terminal.show import verdict
 from ic.printing.columns import size as size_text
 from met.frozen import frozen

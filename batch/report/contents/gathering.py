@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.queries.groups import groups_named
 from batch.queries.pool import Pool, pools
 from batch.report.contents import comparison
 from batch.report.contents.against import ComparedArchive, EarlierCases, of_groups
@@ -19,7 +20,6 @@ from batch.report.contents.parts import Fact, Report, ReportSection, SourceListi
 from batch.report.contents.stability import stability
 from batch.report.contents.tables import replay, structures, worst
 from batch.report.contents.verdicts import metric_rows, verdict
-from batch.terminal.show import groups_named
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem
 from met.host.files import open_regular

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from batch.terminal.progress import Bar, duration, status
+from batch.campaigns.status import duration
+from batch.terminal.progress import Bar, status
 from batch.terminal.running import run_and_tell
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem

@@ -1,0 +1,36 @@
+"""Runs, sweeps and cases of an archive by the names that a command gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from met.diagnostic import Problem, error
+
+
+def groups_named(archive: ArchiveFile, names: Sequence[str]) -> tuple[ArchiveGroup, ...]:
+    """The experiments of these names, all where none is given."""
+    known = [*dict.fromkeys(group.sweep or group.name for group in archive.groups)]
+    for name in names:
+        if all(name not in (group.name, group.sweep) for group in archive.groups):
+            helps = f"in it: {', '.join(known)}"
+            raise Problem(error("E325", f"no run or sweep `{name}` in {archive.path}", help=helps))
+    found = [group for name in names for group in archive.groups if name in (group.name, group.sweep)]
+    return tuple(dict.fromkeys(found)) if names else archive.groups
+
+
+def cases_named(archive: ArchiveFile, names: Sequence[str], case: str | None) -> list[tuple[ArchiveGroup, int | None]]:
+    """The experiments of these names; where a case is asked for, those that have it, and its position in each."""
+    groups = groups_named(archive, names)
+    if case is None:
+        return [(group, None) for group in groups]
+    found: list[tuple[ArchiveGroup, int | None]] = []
+    problems = []
+    for group in groups:
+        try:
+            found.append((group, group.find_case(case)))
+        except Problem as problem:
+            problems.append(problem)
+    if not found:
+        raise Problem([d for problem in problems for d in problem.diagnostics])
+    return found
