@@ -325,12 +325,12 @@ def worst_cases(found: Diff, experiment: ExperimentDiff) -> list[WorstCase]:
         where = f" of {each.place.label}" if each.place.label else ""
         when = f" at {each.place.time:g} s" if each.place.time == each.place.time else ""
         before, now = distinct_texts(each.place.before / each.deck_scale, each.place.after / each.deck_scale)
-        what, commands = f"{each.signal}{where}{when}", _replays(found, experiment, each)
+        what, commands = f"{each.signal}{where}{when}", replay_commands(found, experiment, each)
         out.append(WorstCase(each.case_b, each.case_id[:8], what, before, now, each.deck_unit, commands))
     return out
 
 
-def _replays(found: Diff, experiment: ExperimentDiff, each: RankedCase) -> tuple[str, str]:
+def replay_commands(found: Diff, experiment: ExperimentDiff, each: RankedCase) -> tuple[str, str]:
     """The commands that run a case of both archives again."""
     several = len(found.experiments) + len(found.only_a) + len(found.only_b) > 1
     return (

@@ -56,7 +56,7 @@ def test_a_command_names_the_run_where_there_are_several(
     archives.made(here / "b.h5", plans.nominal(), plans.gains(3))
     found = diff("a.h5", "b.h5")
     for experiment in found.experiments:
-        commands = words.again(found, experiment, experiment.worst[0])
+        commands = words.replay_commands(found, experiment, experiment.worst[0])
         assert [shlex.split(each)[2:4] for each in commands] == [
             ["a.h5", experiment.name_a],
             ["b.h5", experiment.name_b],

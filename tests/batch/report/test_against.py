@@ -103,7 +103,7 @@ class TestTheVerdict:
         assert (verdict.word, verdict.ok, verdict.headline) == ("identical", True, "To the bit")
         assert [(part.word, part.count) for part in verdict.parts] == [("identical", CASES)]
         [section] = found.sections
-        assert section.compared[0].worst == () and section.compared[0].word == "identical"
+        assert section.changes[0].worst == () and section.changes[0].word == "identical"
 
     @pytest.mark.slow
     def test_of_what_has_nothing_in_common_says_so(self, here: Path, engine: None) -> None:
