@@ -102,6 +102,9 @@ class ExportFormat:
             helps = "; ".join(filter(None, ("`-o FILE.csv` writes one", self.metrics_in)))
             message = f"{target} would hold histories: {self.title} is no table of metrics"
             raise Problem(error("E376", message, help=helps))
+        if "histories" not in self.tables and (request.table == "histories" or request.signals):
+            message = f"{target} would be a table of metrics: {self.title} holds no histories"
+            raise Problem(error("E376", message, help="`-o FILE.csv` and `-o FILE.mcap` hold them"))
         if request.units != "si" and "units" not in self.options:
             message = f"{target} would be in SI: {self.title} has no other units"
             raise Problem(error("E376", message, help="`-o FILE.csv` can be in the deck's"))

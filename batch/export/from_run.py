@@ -7,7 +7,7 @@ from pathlib import Path
 
 from batch.campaigns.campaign import Campaign
 from batch.export import Exported, export
-from batch.export.formats import find, format_of
+from batch.export.formats import ExportRequest, find, format_of
 from batch.export.output import check as check_place
 from met.diagnostic import Problem, error
 from met.outputs import quoted
@@ -23,10 +23,12 @@ def archive_and_export(output: str | os.PathLike[str] | None) -> tuple[Path | No
 
 def check(campaign: Campaign, target: Path, *, histories: bool) -> None:
     """Refuse what could not be exported in the end, before anything runs. histories: whether they were asked for.
-    Raises Problem E305, E323, E370-E374."""
+    Raises Problem E305, E323, E370-E376."""
     writer = find(str(format_of(target)))
     kept = sum(len(part.kept) for part in campaign.parts)
-    if not kept and not campaign.keep.later and ("metrics" not in writer.tables or histories or campaign.cases == 1):
+    writer.check_request(ExportRequest("histories" if histories else None), target)
+    takes_histories = "metrics" not in writer.tables or ("histories" in writer.tables and campaign.cases == 1)
+    if not kept and not campaign.keep.later and (takes_histories or histories):
         message = f"{target} would be empty: no histories are kept"
         helps = ["`--histories all` keeps them, and `--histories '#0'` those of a case"]
         if not any(part.experiment.structure.record for part in campaign.parts):

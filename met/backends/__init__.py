@@ -1,7 +1,7 @@
 """Back ends: what a recorded program becomes so that a computer can carry it out.
 
 A back end is a folder here, and a line in `HOMES`; `met.backends.backend` says what it offers. All of them give the
-same bits for the same recording, but the reference, which is for debugging.
+same bits for the same recording, among them the reference, which is for debugging.
 """
 
 from __future__ import annotations

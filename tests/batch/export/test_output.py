@@ -13,6 +13,7 @@ import pytest
 import batch
 from batch.archive.sink import Sink, temporary_of
 from batch.export import export
+from batch.export.formats import ExportFormat, ExportRequest
 from met.diagnostic import Problem
 from tests.batch import plans
 from tests.batch.export.decks import Mcap, said
@@ -210,3 +211,16 @@ def test_an_archive_that_is_damaged_within_leaves_nothing(archive: Path) -> None
     with pytest.raises(Problem, match="E302"):
         export(archive, "a.csv")
     assert sorted(path.name for path in Path().iterdir()) == ["a.h5", "a.h5.run.json"]
+
+
+class MetricsAlone(ExportFormat):
+    """A format that another version of MET may have: a row a case, and nothing else."""
+
+    title = "a file of lines"
+    tables = ("metrics",)
+
+
+@pytest.mark.parametrize("request_", [ExportRequest(table="histories"), ExportRequest(signals=("qd",))])
+def test_a_format_without_histories_refuses_what_asks_for_them(request_: ExportRequest) -> None:
+    with pytest.raises(Problem, match=r"a\.lines would be a table of metrics: a file of lines holds no histories"):
+        MetricsAlone().check_request(request_, Path("a.lines"))
