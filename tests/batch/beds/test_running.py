@@ -250,6 +250,7 @@ def test_killed_midway_everything_up_to_then_is_in_the_archive(here: Path) -> No
     assert np.array_equal(data.q.values[0, :rows], batch.open("sim.h5").q.values[0, :rows])
 
 
+@pytest.mark.slow
 def test_a_file_that_holds_no_records_is_told(
     bed: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

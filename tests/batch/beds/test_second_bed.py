@@ -65,6 +65,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]
     models.available.cache_clear()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("installed")
 def test_a_second_bed_model_at_a_port_is_its_simulation_to_the_counts_of_the_wire(
     met_bed: Callable[..., tuple[int, str, str]],

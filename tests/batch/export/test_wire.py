@@ -82,6 +82,7 @@ ALL = (
     st.lists(st.text()),
     st.lists(st.fixed_dictionaries({"a": st.floats(allow_nan=False), "b": st.text()})),
 )
+@pytest.mark.slow
 def test_a_message_of_any_kind_comes_back(
     count: int, text: str, number: float, words: list[str], many: list[dict[str, Any]]
 ) -> None:
