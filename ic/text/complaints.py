@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 
 from ic.text.source import UnreadableStretch
 from met.diagnostic import Diagnostic, Label, Place, Problem, error, meant
@@ -131,7 +132,7 @@ class Complaints:
         also: Iterable[Label] = (),
         help: Iterable[str] | str = (),
     ) -> None:
-        """An error about what is defined at `of`, which has none of these entries, unless `lacks` says so."""
+        """An error about what is defined at `of`, which has none of these entries, unless that is known already."""
         if not self.is_known_to_lack(of, *names):
             self.error(code, message, at or of, also=also, help=help)
 
@@ -144,8 +145,7 @@ class Complaints:
         also: Iterable[Label] = (),
         help: Iterable[str] | str = (),
     ) -> None:
-        made = error(code, message, at, also=also, help=help)
-        self.add(Diagnostic(made.code, made.message, made.at, made.also, made.help, "warning"))
+        self.add(replace(error(code, message, at, also=also, help=help), severity="warning"))
 
     def remark(
         self,
@@ -157,8 +157,7 @@ class Complaints:
         help: Iterable[str] | str = (),
     ) -> None:
         """A warning about what the deck means, which says something only once the deck has no errors."""
-        made = error(code, message, at, also=also, help=help)
-        self._remarks.setdefault(Diagnostic(made.code, made.message, made.at, made.also, made.help, "warning"))
+        self._remarks.setdefault(replace(error(code, message, at, also=also, help=help), severity="warning"))
 
     def admit_remarks(self) -> None:
         """Makes warnings of the remarks."""
