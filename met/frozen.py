@@ -14,14 +14,21 @@ from typing import Any, Literal, TypeVar, dataclass_transform, overload
 T = TypeVar("T")
 
 
-def keyed(when: Literal["never", "where set"], *, default: Any = dataclasses.MISSING) -> Any:
-    """A field of a plan's dataclass that is in no structure key, or only where it is not empty, false or None.
+def keyed(
+    when: Literal["always", "never", "where set"], *, default: Any = dataclasses.MISSING, run_key: Any = None
+) -> Any:
+    """A field of a plan's dataclass, with when it is in a structure key.
 
+    "always"     as a field is that is not declared so
     "never"      what changes no number: places, names and units for the reader
-    "where set"  what plans have got since keys were first made: where it is left out keys are what they were
+    "where set"  what plans have got since keys were first made: where it is its default keys are what they were
+    run_key      the key of a run that it keeps (`met.plan.run_keys.RunKey`); None where it keeps none
     """
-    return dataclasses.field(default=default, metadata={IN_KEY: when})
+    return dataclasses.field(default=default, metadata={IN_KEY: when, **({RUN_KEY: run_key} if run_key else {})})
 
+
+RUN_KEY = "keeps this key of a run"
+"""Under which the metadata of a field has the key of a run that it keeps."""
 
 IN_KEY = "in the structure key"
 """Under which the metadata of a field says when it is in a structure key; always where they say nothing."""

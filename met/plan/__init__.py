@@ -47,6 +47,7 @@ import numpy as np
 
 from met.diagnostic import Place
 from met.frozen import frozen, keyed
+from met.plan.run_keys import BALANCED, VELOCITY_PRODUCTS, run_key
 from met.trace.graph import Formulas
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
@@ -361,7 +362,7 @@ class Structure:
     servos: tuple[ServoUse, ...]
     environment: tuple[EnvironmentUse, ...]
     metrics: tuple[MetricUse, ...]
-    velocity_products: bool
+    velocity_products: bool = keyed("always", run_key=VELOCITY_PRODUCTS)
     integrator: str
     schedule: Schedule
     record: tuple[Recorded, ...]
@@ -370,7 +371,7 @@ class Structure:
     payloads: tuple[Payload, ...] = keyed("where set", default=())
     guides: tuple[GuideUse, ...] = keyed("where set", default=())
     sensors: tuple[LinkSensor, ...] = keyed("where set", default=())
-    balanced: bool = keyed("where set", default=False)
+    balanced: bool = run_key(BALANCED)
 
     @property
     def free(self) -> bool:
