@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ic.language.declaration import BlockDeclaration, Entry
 from met.parameter import Parameter
-from met.plan.run_keys import BALANCED, VELOCITY_PRODUCTS
+from met.plan import BALANCED, VELOCITY_PRODUCTS
 
 DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
 SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")

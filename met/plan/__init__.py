@@ -47,7 +47,8 @@ import numpy as np
 
 from met.diagnostic import Place
 from met.frozen import frozen, keyed
-from met.plan.run_keys import BALANCED, VELOCITY_PRODUCTS, run_key
+from met.parameter import Parameter
+from met.plan.run_keys import RunKey, run_key
 from met.trace.graph import Formulas
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
@@ -346,6 +347,31 @@ class Recorded:
     def shape(self) -> tuple[int, ...]:
         """The shape of the variable at one instant: (joints, components), each where there are some."""
         return tuple(len(names) for names in (self.joints, self.components) if names)
+
+
+VELOCITY_PRODUCTS = RunKey(
+    path="environment.velocity_products",
+    parameter=Parameter(
+        name="velocity_products",
+        shape="word",
+        words=("on", "off"),
+        default="on",
+        doc="Coriolis, centrifugal and gyroscopic torques",
+    ),
+    true="on",
+    listed=False,
+)
+BALANCED = RunKey(
+    path="initial.servos",
+    parameter=Parameter(
+        name="servos",
+        shape="word",
+        words=("unloaded", "balanced"),
+        default="unloaded",
+        doc="whether servos begin with what keeps their joints from accelerating",
+    ),
+    true="balanced",
+)
 
 
 @frozen

@@ -56,28 +56,3 @@ def run_keys(cls: type) -> Iterator[tuple[str, RunKey]]:
     for field in dataclasses.fields(cls):
         if RUN_KEY in field.metadata:
             yield field.name, field.metadata[RUN_KEY]
-
-
-VELOCITY_PRODUCTS = RunKey(
-    path="environment.velocity_products",
-    parameter=Parameter(
-        name="velocity_products",
-        shape="word",
-        words=("on", "off"),
-        default="on",
-        doc="Coriolis, centrifugal and gyroscopic torques",
-    ),
-    true="on",
-    listed=False,
-)
-BALANCED = RunKey(
-    path="initial.servos",
-    parameter=Parameter(
-        name="servos",
-        shape="word",
-        words=("unloaded", "balanced"),
-        default="unloaded",
-        doc="whether servos begin with what keeps their joints from accelerating",
-    ),
-    true="balanced",
-)
