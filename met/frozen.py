@@ -70,11 +70,14 @@ def _compile_later(cls: type) -> None:
 
 
 def _compiled_init(cls: type) -> Callable[..., None]:
-    """The `__init__` of a dataclass: its fields as parameters, each put where attributes are kept."""
+    """The `__init__` of a dataclass: its fields as parameters, each put where attributes are kept.
+
+    Names of its own begin with an underscore and a verb, as `_set_on`, so that a field may have any usual name.
+    """
     fields = [field for field in dataclasses.fields(cls) if field.init]
     given: dict[str, Any] = {"_MISSING": dataclasses.MISSING}
-    head = {False: ["self"], True: ["*"]}
-    body = ["own = self.__dict__"]
+    head = {False: ["_set_on"], True: ["*"]}
+    body = ["_keep_in = _set_on.__dict__"]
     for field in fields:
         name, value = field.name, field.name
         default = ""
@@ -84,9 +87,9 @@ def _compiled_init(cls: type) -> Callable[..., None]:
             given[f"_make_{name}"], default = field.default_factory, "=_MISSING"
             value = f"_make_{name}() if {name} is _MISSING else {name}"
         head[bool(field.kw_only)].append(f"{name}{default}")
-        body.append(f"own[{name!r}] = {value}")
+        body.append(f"_keep_in[{name!r}] = {value}")
     if hasattr(cls, "__post_init__"):
-        body.append("self.__post_init__()")
+        body.append("_set_on.__post_init__()")
     parameters = [*head[False], *(head[True] if len(head[True]) > 1 else [])]
     text = f"def __init__({', '.join(parameters)}):\n" + "".join(f"    {line}\n" for line in body)
     exec(compile(text, f"<{cls.__qualname__}.__init__>", "exec"), given)

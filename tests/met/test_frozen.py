@@ -41,6 +41,12 @@ def test_a_call_that_does_not_fit_is_a_type_error(wrong) -> None:  # type: ignor
         wrong()
 
 
+def test_a_field_may_have_any_name_that_code_of_its_own_might_use() -> None:
+    names = ["own", "self", "fields", "given", "cls", "value", "dict"]
+    made = frozen(type("Named", (), {"__annotations__": dict.fromkeys(names, int)}))
+    assert made(*range(7)).__dict__ == dict(zip(names, range(7), strict=True))  # type: ignore[call-arg]
+
+
 def test_a_signature_is_that_of_the_fields_before_and_after_the_first_instance() -> None:
     before = str(inspect.signature(Keyed))
     assert before == "(*, first, second=2)"
