@@ -5,15 +5,17 @@ from __future__ import annotations
 from met import models
 from met.plan import Experiment
 from met.program.build import OUTPUTS
-from met.program.step import NOT_FINITE, OUT_OF_RANGE, SINGULAR
+from met.program.step import NOT_FINITE, OUT_OF_RANGE, SINGULAR, UNBALANCED
 
 
-def cause_of(experiment: Experiment, failure: float, number: float, tick: float) -> str:
-    """Why a case failed, in words; empty where it did not."""
+def cause_of(experiment: Experiment, row: int, failure: float, number: float, tick: float) -> str:
+    """Why a case failed, in words; empty where it did not. row: of the case table."""
     assert OUTPUTS[:3] == ("failure", "failure.joint", "failure.tick")
     if failure == 0.0:
         return ""
     moving = experiment.structure.moving
+    if failure == UNBALANCED:
+        return _cause_of_balance(experiment, row, moving[int(number)].name)
     if int(number) == len(moving) and experiment.structure.free:
         return _cause_of_base(experiment, failure, tick)
     others = len(moving) + experiment.structure.free + sum(each.flies for each in experiment.structure.payloads)
@@ -49,6 +51,21 @@ def cause_of(experiment: Experiment, failure: float, number: float, tick: float)
         f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: "
         f"{_of_guide(experiment, joint.name)}a step too long for {what} (see the stability figures of `met plan`; try "
         f"a faster rate for the dynamics), or a model that divides by zero."
+    )
+
+
+def _cause_of_balance(experiment: Experiment, row: int, joint: str) -> str:
+    """Why a case failed whose servos cannot hold their joints where it begins balanced, in words."""
+    from met.analysis.balance import unheld  # which runs the beginning of the program, and so needs met.run
+
+    found = {each.joint.name: each for each in unheld(experiment, row)}
+    if joint not in found:
+        return f"t = 0 s: joint {joint}: it cannot begin balanced: its servo holds just less than the joint takes."
+    each = found[joint]
+    where = f" ({each.servo.place.file}:{each.servo.place.line})" if each.servo.place else ""
+    return (
+        f"t = 0 s: joint {joint}: it cannot begin balanced{where}: it takes {each.wanted:.3g} {each.unit}, and its "
+        f"servo can hold {each.there:.3g} {each.unit}. {each.reason[0].upper()}{each.reason[1:]}."
     )
 
 

@@ -15,9 +15,9 @@ from met.backends.backend import Kernel
 from met.causes import cause_of
 from met.frozen import frozen
 from met.plan import REPEAT, Experiment, keys
-from met.program.build import COORDINATE, METRIC, build
+from met.program.build import COORDINATE, METRIC, OUTPUTS, UNHELD, build
 from met.program.control.substituted import LIMITED
-from met.program.step import EVENTS
+from met.program.step import EVENTS, UNBALANCED
 from met.trace.identity import result_keys, state_key
 from met.trace.program import Program
 from met.trace.recorder import record
@@ -105,8 +105,13 @@ class Prepared:
 
     @cached_property
     def work_key(self) -> str:
-        """Key of all that a case gives, in its order: the state, every recorded signal and every metric."""
-        keys = [self.code_key, *(f"{name} {key}" for name, key in self.result_keys.items())]
+        """Key of all that a case gives, in its order: the state, every recorded signal and every metric, and what else
+        is watched."""
+        known = (*(self.program.state_outputs or ()), *(METRIC + use.name for use in self.experiment.structure.metrics))
+        watched = {name: name for name in self.program.outputs if name not in known and not name.startswith(COORDINATE)}
+        of_watched = result_keys(self.recording, watched) if watched else {}
+        given = self.result_keys | {name: _code_key(key) for name, key in of_watched.items()}
+        keys = [self.code_key, *(f"{name} {key}" for name, key in given.items())]
         return _code_key(hashlib.sha256("\n".join(keys).encode()).hexdigest())
 
     @cached_property
@@ -178,7 +183,17 @@ def compute(
         threads=threads,
         progress=progress,
     )
+    _judge(prepared.program, outputs)
     return history, outputs
+
+
+def _judge(program: Program, outputs: np.ndarray) -> None:
+    """Writes failures into the outputs [case, output] of cases that the program itself carried to their end."""
+    failure, joint, tick = (outputs[:, program.outputs.index(name)] for name in OUTPUTS[:3])
+    if UNHELD in program.outputs:
+        unheld = outputs[:, program.outputs.index(UNHELD)]
+        first = (unheld != 0.0) & ((failure == 0.0) | (tick > 0.0))
+        failure[first], joint[first], tick[first] = UNBALANCED, unheld[first] - 1.0, 0.0
 
 
 def inputs(experiment: Experiment, rows: np.ndarray) -> np.ndarray:
@@ -215,7 +230,7 @@ def results(
     n_valid = np.where(failed, np.ceil(out["failure.tick"] / schedule.record), schedule.rows).astype(np.int64)
     causes = [""] * len(rows)
     for case in np.flatnonzero(failed & (out["failure"] != STOPPED)).tolist():
-        causes[case] = cause_of(experiment, *outputs[case, :3].tolist())
+        causes[case] = cause_of(experiment, int(rows[case]), *outputs[case, :3].tolist())
     status = np.where(failed, FAILED, DONE).astype(np.int8)
     for fated, (ended, why) in (fates or {}).items():
         status[fated], failed[fated], causes[fated] = ended, True, why

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 
 from met.plan import Experiment
 from met.plan.channel import Channel
-from met.program import balancing, cell_names, orientations
+from met.program import balancing, cell_names, holding, orientations
 from met.program.control import failing, guiding, link_sensors, sensing
 from met.program.control.substituted import LIMITED
 from met.program.evaluation import gravity, law
@@ -28,6 +28,9 @@ from met.trace.program import CallPhase, Control, Every, Phase, Program, RecordP
 Body = Callable[[Tape], None]
 
 OUTPUTS = ("failure", "failure.joint", "failure.tick", *EVENTS, LIMITED)
+
+UNHELD = "unheld"
+"""Output of a run that begins balanced: the first joint whose servo cannot hold it, by number from 1; 0: all do."""
 
 COORDINATE, METRIC = "coordinate:", "metric:"
 """Prefixes of the outputs, and cells, that are named by a deck: no name of a deck's is one of the engine's."""
@@ -84,6 +87,7 @@ class Builder:
             columns=len(columns),
             outputs=(
                 *OUTPUTS,
+                *self.watched,
                 *(METRIC + name for name, _, _ in self.system.metrics),
                 *(COORDINATE + path for path in coordinates),
                 *self.step.beds.wire_outputs,
@@ -92,10 +96,29 @@ class Builder:
             counters=(*EVENTS, LIMITED),
         )
 
+    @property
+    def watched(self) -> tuple[str, ...]:
+        """Outputs that say what became of a run without being part of its state."""
+        return (UNHELD,) * self.system.structure.balanced
+
     # The run's two ends.
 
     def start(self, tape: Tape) -> None:
-        """Parameters that vary, then the state at t = 0."""
+        """Parameters that vary, then the state at t = 0, memory of sensors and metrics."""
+        begun = self.begin(tape)
+        if self.system.structure.balanced:
+            y = self.step.state(tape)
+            demands = balancing.balance(self.system, tape, y, begun)
+            tape.write(UNHELD, holding.first_unheld(self.system, tape, y, demands))
+        for actuator in self.system.working:
+            self._begin_sensors(tape, actuator)
+        for name, metric, _ in self.system.metrics:
+            for memory in metric.memory:
+                tape.write(f"{METRIC}{name}.{memory.name}", memory.start)
+
+    def begin(self, tape: Tape) -> dict[str, dict[str, Real]]:
+        """Writes parameters that vary, then the state at t = 0 with servos unbalanced; returns what each of these
+        holds, and its states, by joint and name."""
         experiment = self.system.experiment
         inputs = {coordinate.path: tape.input(coordinate.path) for coordinate in experiment.cases.coordinates}
         values = experiment.formulas.replay(inputs)
@@ -109,14 +132,7 @@ class Builder:
         payloads.start(self.system, tape)
         guiding.start(self.system, tape)
         link_sensors.start(self.system, tape, lambda y: gravity(self.system, tape.read, y, 0.0))
-        begun = {actuator.use.joint: self._begin_servo(tape, actuator) for actuator in self.system.working}
-        if self.system.structure.balanced:
-            balancing.balance(self.system, tape, self.step.state(tape), begun)
-        for actuator in self.system.working:
-            self._begin_sensors(tape, actuator)
-        for name, metric, _ in self.system.metrics:
-            for memory in metric.memory:
-                tape.write(f"{METRIC}{name}.{memory.name}", memory.start)
+        return {actuator.use.joint: self._begin_servo(tape, actuator) for actuator in self.system.working}
 
     def _begin_servo(self, tape: Tape, actuator: Actuator) -> dict[str, Real]:
         """Write a servo's memory and states where a run begins, and return them by name."""
@@ -141,7 +157,7 @@ class Builder:
             tape.write(cell_names.SEEN(actuator.use.joint, of), sensing.true_value(seen, of))
 
     def end(self, tape: Tape) -> None:
-        for name in OUTPUTS:
+        for name in (*OUTPUTS, *self.watched):
             tape.output(name, tape.read(name))
         for name, metric, _ in self.system.metrics:
             p, held = self._metric(tape, name)
