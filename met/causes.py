@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from met import models
+from met.diagnostic import Place
 from met.plan import Experiment
-from met.program.build import OUTPUTS
-from met.program.step import NOT_FINITE, OUT_OF_RANGE, SINGULAR, UNBALANCED
+from met.program.plausible import DOUBTFUL, DOUBTFUL_TICK, FAILED, MEASURE, OF
+from met.program.step import FAILURE, NOT_FINITE, OUT_OF_RANGE, SINGULAR, TOO_FAST, UNBALANCED
 
 
-def cause_of(experiment: Experiment, row: int, failure: float, number: float, tick: float) -> str:
-    """Why a case failed, in words; empty where it did not. row: of the case table."""
-    assert OUTPUTS[:3] == ("failure", "failure.joint", "failure.tick")
-    if failure == 0.0:
-        return ""
+def cause_of(experiment: Experiment, row: int, outputs: Mapping[str, float]) -> str:
+    """Why a case failed, in words. row: of the case table; outputs: of its program, by name."""
+    failure, number, tick = (outputs[name] for name in FAILURE)
     moving = experiment.structure.moving
     if failure == UNBALANCED:
         return _cause_of_balance(experiment, row, moving[int(number)].name)
+    if failure == TOO_FAST:
+        name, unit, where = _of_rate(experiment, int(number))
+        return (
+            f"{_head(experiment, tick)}{name}: it moves faster than {FAILED * outputs[MEASURE]:.3g} {unit}, which "
+            f"nothing in the run could make it{where}. {_of_steps(experiment)}"
+        )
     if int(number) == len(moving) and experiment.structure.free:
         return _cause_of_base(experiment, failure, tick)
     others = len(moving) + experiment.structure.free + sum(each.flies for each in experiment.structure.payloads)
@@ -51,6 +58,45 @@ def cause_of(experiment: Experiment, row: int, failure: float, number: float, ti
         f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: "
         f"{_of_guide(experiment, joint.name)}a step too long for {what} (see the stability figures of `met plan`; try "
         f"a faster rate for the dynamics), or a model that divides by zero."
+    )
+
+
+def doubt_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
+    """What makes a case that is done doubtful, in words: a rate that hardly anything could give."""
+    name, unit, where = _of_rate(experiment, int(outputs[OF]))
+    return (
+        f"{_head(experiment, outputs[DOUBTFUL_TICK])}{name}: it moves faster than {DOUBTFUL * outputs[MEASURE]:.3g} "
+        f"{unit}, which hardly anything could make it{where}. {_of_steps(experiment)}"
+    )
+
+
+def _head(experiment: Experiment, tick: float) -> str:
+    return f"t = {tick / experiment.structure.schedule.base_hz:g} s: "
+
+
+def _of_rate(experiment: Experiment, number: int) -> tuple[str, str, str]:
+    """A joint or body by its number in the outputs: its name, the unit of its rates, and where the deck has it."""
+    structure = experiment.structure
+    joints = structure.moving
+    if number < len(joints):
+        joint = joints[number]
+        return f"joint {joint.name}", "m/s" if joint.kind == "prismatic" else "rad/s", _where(joint.place)
+    if structure.free and number == len(joints):
+        return "the base", "rad/s (m/s)", _where(structure.base.place if structure.base is not None else None)
+    payload = [each for each in structure.payloads if each.flies][number - len(joints) - structure.free]
+    return f"payload {payload.name}", "rad/s (m/s)", _where(payload.place)
+
+
+def _where(place: Place | None) -> str:
+    return f" ({place.file}:{place.line})" if place else ""
+
+
+def _of_steps(experiment: Experiment) -> str:
+    """The usual reason of a rate that is none, and the remedy."""
+    schedule = experiment.structure.schedule
+    return (
+        "Nearly always a step is too long for the servo, the arm or what acts on it, and the motion diverges: try a "
+        f"faster rate for the dynamics, which have {schedule.base_hz / schedule.dynamics:g} Hz."
     )
 
 

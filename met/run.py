@@ -12,12 +12,14 @@ import numpy as np
 
 from met import backends
 from met.backends.backend import Kernel
-from met.causes import cause_of
+from met.causes import cause_of, doubt_of
 from met.frozen import frozen
+from met.judging import judge
 from met.plan import REPEAT, Experiment, keys
-from met.program.build import COORDINATE, METRIC, OUTPUTS, UNHELD, build
+from met.program import plausible
+from met.program.build import COORDINATE, METRIC, build
 from met.program.control.substituted import LIMITED
-from met.program.step import EVENTS, UNBALANCED
+from met.program.step import EVENTS
 from met.trace.identity import result_keys, state_key
 from met.trace.program import Program
 from met.trace.recorder import record
@@ -45,6 +47,7 @@ class Run:
     coordinates  the varied parameters as the engine used them, by path, SI
     events       friction events by name: splits, clamped, undecided (docs/physics.md, section 6)
     limited      ticks at which the load motor of a bed was at its limit
+    warning      what makes a case that is done doubtful, in words, empty where nothing does
     """
 
     case: np.ndarray
@@ -58,6 +61,7 @@ class Run:
     coordinates: dict[str, np.ndarray]
     events: dict[str, np.ndarray]
     limited: np.ndarray
+    warning: list[str]
 
 
 @frozen
@@ -183,17 +187,8 @@ def compute(
         threads=threads,
         progress=progress,
     )
-    _judge(prepared.program, outputs)
+    judge(prepared.program.outputs, outputs)
     return history, outputs
-
-
-def _judge(program: Program, outputs: np.ndarray) -> None:
-    """Writes failures into the outputs [case, output] of cases that the program itself carried to their end."""
-    failure, joint, tick = (outputs[:, program.outputs.index(name)] for name in OUTPUTS[:3])
-    if UNHELD in program.outputs:
-        unheld = outputs[:, program.outputs.index(UNHELD)]
-        first = (unheld != 0.0) & ((failure == 0.0) | (tick > 0.0))
-        failure[first], joint[first], tick[first] = UNBALANCED, unheld[first] - 1.0, 0.0
 
 
 def inputs(experiment: Experiment, rows: np.ndarray) -> np.ndarray:
@@ -230,7 +225,7 @@ def results(
     n_valid = np.where(failed, np.ceil(out["failure.tick"] / schedule.record), schedule.rows).astype(np.int64)
     causes = [""] * len(rows)
     for case in np.flatnonzero(failed & (out["failure"] != STOPPED)).tolist():
-        causes[case] = cause_of(experiment, int(rows[case]), *outputs[case, :3].tolist())
+        causes[case] = cause_of(experiment, int(rows[case]), {name: float(of[case]) for name, of in out.items()})
     status = np.where(failed, FAILED, DONE).astype(np.int8)
     for fated, (ended, why) in (fates or {}).items():
         status[fated], failed[fated], causes[fated] = ended, True, why
@@ -240,6 +235,9 @@ def results(
             out[COORDINATE + coordinate.path][fated] = coordinate.values[rows[fated]]
     for case, cause in _misapplied(experiment, rows, out).items():
         status[case], failed[case], n_valid[case], causes[case] = FAILED, True, 0, cause
+    warnings = [""] * len(rows)
+    for case in np.flatnonzero(~failed & (out.get(plausible.DOUBTFUL_TICK, failed) != 0.0)).tolist():
+        warnings[case] = doubt_of(experiment, {name: float(of[case]) for name, of in out.items()})
     signals: dict[str, np.ndarray] = {}
     if history is not None:
         for case in np.flatnonzero(failed).tolist():
@@ -263,6 +261,7 @@ def results(
         coordinates={c.path: out[COORDINATE + c.path] for c in experiment.cases.coordinates},
         events={name.split(".")[1]: out[name].astype(np.int64) for name in EVENTS},
         limited=out[LIMITED].astype(np.int64),
+        warning=warnings,
     )
 
 

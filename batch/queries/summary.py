@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -79,6 +79,7 @@ class Summary:
     failures  all of them, by cause
     sweep     of which this is a group; "" where it is the whole of its run or sweep
     limited   cases in which the load motor of a bed was at its limit at some tick
+    warnings  of cases that are done and doubtful all the same, by what makes them so
     """
 
     name: str
@@ -90,6 +91,7 @@ class Summary:
     requirements: tuple[RequirementSummary, ...]
     limited: int = 0
     sweep: str = ""
+    warnings: tuple[FailureGroup, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -125,6 +127,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
             for i, text in enumerate(group.values("requirement"))
         )
     return Summary(
+        warnings=_warnings(group, here),
         name=group.name,
         cases=group.count if position is None else 1,
         failed=len(failed),
@@ -135,6 +138,17 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
         sweep=str(group.attributes.get("sweep", "")),
         limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
     )
+
+
+def _warnings(group: ArchiveGroup, here: slice) -> tuple[FailureGroup, ...]:
+    """What makes cases doubtful, by what it is; nothing of an archive of before there were warnings."""
+    if "warning" not in group.variables:
+        return ()
+    warnings = group.values("warning")[here]
+    doubtful = np.flatnonzero(warnings != "")
+    rows, ids = (group.values(name)[here][doubtful] for name in ("case", "case_id"))
+    found = failures(np.zeros(len(doubtful)), warnings[doubtful], rows, ids)
+    return tuple(replace(each, status="warning") for each in found)
 
 
 def _metric(variable: Stored, values: np.ndarray) -> MetricSummary:

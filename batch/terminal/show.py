@@ -183,6 +183,7 @@ def verdict(summary: Summary, width: int) -> list[str]:
     """Lines that say how it went: cases, metrics, requirements."""
     out = [_counts(summary)]
     out += failure_lines(summary.failures, width)
+    out += failure_lines(summary.warnings, width)
     if summary.limited:
         of = "" if summary.cases == 1 else f" in {summary.limited:,} of {summary.cases:,} cases"
         out.append(f"  note: the load motor of a bed was at its limit{of}: the run is not what the joint would do")

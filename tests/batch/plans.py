@@ -231,4 +231,5 @@ def answer(experiment: Any, cases: Any = None, *, record: bool = True, fails: fr
         coordinates=values,
         events={name: np.zeros(len(rows), dtype=np.int64) for name in ("splits", "clamped", "undecided")},
         limited=np.zeros(len(rows), dtype=np.int64),
+        warning=[""] * len(rows),
     )
