@@ -76,7 +76,7 @@ class Builder:
             tick.append(Every(divisor, (RunPhase(Phase(f"metrics_{divisor}", self._metrics(divisor))),)))
         if not self.step.beds.wire:
             watch = RunPhase(Phase("watch", self._watch))
-            tick.append(Every(plausible.divisor(self.schedule), (watch,)))
+            tick.append(Every(instant, (Every(plausible.divisor(self.schedule), (watch,)),)))
         if columns:
             tick.append(RecordPhase(Phase("record", self._recorder(columns, held, at_rows)), self.schedule.record))
 

@@ -29,7 +29,7 @@ OUTPUTS = (MEASURE, DOUBTFUL_TICK, FAILED_TICK, OF)
 """Outputs: the measure, rad/s (m/s); the first ticks at which a rate was seen to be doubtful, and a failure (0: none);
 the number of the joint or body whose was doubtful first, as the output `failure.joint` has it."""
 
-SPARSE = range(16, 7, -1)
+SPARSE = range(32, 15, -1)
 """Steps of the dynamics from one look to the next; the first that the run's last step is a multiple of."""
 
 
