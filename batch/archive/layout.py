@@ -3,6 +3,7 @@
     /                       attributes: schema, deck, and for a single experiment those of its group
       <variables>           a single experiment lies in the root
     /<experiment>           several: one group each; of a sweep of several structures, one for each structure
+      verification          in each: some cases with shorter steps, where they were run so (batch/archive/verified.py)
     /provenance             source (files of the deck, whole), plan (JSON); versions and git commit as attributes
       cases.<experiment>    coordinate by case: the whole case table, where it is too large for the plan's JSON
 
@@ -83,6 +84,7 @@ RESERVED = frozenset(
         "n_valid",
         "met",
         "provenance",
+        "verification",
         "bed_limited",
         *(f"friction_{name}" for name in EVENTS),
     }

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive import plain, sound
+from batch.archive import plain, sound, verified
 from batch.archive.hdf5 import SIGNATURE, h5py
 from batch.archive.layout import SCHEMA, VERSION
 from batch.archive.rows import row_of
@@ -66,6 +66,7 @@ class ArchiveGroup:
         with reading(path):
             self.attributes: dict[str, Any] = {name: _plain(value) for name, value in node.attrs.items()}
             sound.check(self)
+            self.verified = verified.read(node, self)
         self.name: str = self.attributes["experiment"]
         self.sweep: str = str(self.attributes.get("sweep", ""))
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from batch.archive import layout as archive_layout
+from batch.archive import verified
 from batch.archive.hdf5 import LIBVER, h5py
 from batch.archive.layout import Layout, Variable
 from batch.archive.provenance import Revision, version
@@ -95,6 +96,16 @@ class ArchiveWriter:
         here = (group.part.kept >= first) & (group.part.kept < first + len(run.case))
         for name, gathered in group.gathered.items():
             gathered[here] = values[name][group.part.kept[here] - first]
+        self._sink.check()
+
+    def values(self, number: int, role: str) -> dict[str, np.ndarray]:
+        """What was put of an experiment's cases: its variables of this role along `case`, by the engine's names."""
+        group = self.groups[number]
+        return {each.key: group.node[each.name][...] for each in group.layout.variables if each.role == role}
+
+    def put_verified(self, number: int, found: verified.Verified) -> None:
+        """What shorter steps gave for some cases of an experiment, in a group of its own."""
+        verified.write(self.groups[number].node, found)
         self._sink.check()
 
     def finish(self) -> None:

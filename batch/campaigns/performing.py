@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from batch.campaigns import merge, resuming
 from batch.campaigns.campaign import Campaign, histories_section, values_sections
 from batch.campaigns.drive import Driver, Progress, Stopped, TooManyFailures
 from batch.campaigns.folder import Folder, FolderBusy, beside, uncovered
+from batch.campaigns.keep import CaseOutcomes
 from batch.campaigns.output import busy, cannot_write, check_room, publish
 from batch.campaigns.status import Reporter, died_lines
 from batch.campaigns.tasks import CampaignSection
@@ -27,6 +28,10 @@ from batch.executors.threads import Threads
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 from met.outputs import quoted
+from met.run import DONE
+
+if TYPE_CHECKING:
+    from batch.archive.write import ArchiveWriter
 
 WORTH_SECONDS = 1.0
 """Work that took less is not kept where a campaign ends early: it is done again as fast as it is found."""
@@ -78,6 +83,7 @@ def perform(
     """
     values = resuming.as_begun(Folder(beside(campaign.output)), campaign, values_sections(campaign))
     key = resuming.campaign_key(values)
+    campaign = resuming.settled(campaign, values)
     there = resuming.finished_state(campaign, key)
     if there == resuming.WHOLE and not fresh:
         resuming.remove_leftovers(Folder(beside(campaign.output)), key)
@@ -257,6 +263,7 @@ class _CampaignWork:
                     histories.get(number),
                     lambda cases: self.reporter.advance(cases, 0),
                 )
+                self._verify(writer, number, section)
                 self.reporter.end()
             writer.finish()
             sidecar = {
@@ -277,6 +284,25 @@ class _CampaignWork:
             if writer.failure is not None and isinstance(reason, Exception):
                 raise writer.failure from reason
             raise
+
+    def _verify(self, writer: ArchiveWriter, number: int, section: CampaignSection) -> None:
+        """Run some of an experiment's cases, which are all in the archive by now, with shorter steps, where that is
+        wanted."""
+        from batch.verification import when
+
+        way = when.resolve(self.campaign.verify, section.prepared, len(section.rows))
+        if way == "none":
+            return
+        from batch.verification.choosing import chosen
+        from batch.verification.verifying import verify
+
+        experiment = self.campaign.parts[number].experiment
+        outcomes = CaseOutcomes(writer.values(number, "case")["status"], writer.values(number, "metric"))
+        places = np.flatnonzero(outcomes.status == DONE) if way == "all" else chosen(experiment, outcomes)
+        if len(places):
+            threads = getattr(self.driver and self.driver.executor, "threads", None)
+            names = {each.key: each.name for each in writer.groups[number].layout.role("metric")}
+            writer.put_verified(number, verify(experiment, section.rows[places], names, threads))
 
     def _timings(self) -> list[dict[str, Any]]:
         counts = self.driver.counts if self.driver else {}

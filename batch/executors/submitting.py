@@ -55,6 +55,7 @@ def submit(
         raise Problem(error("E358", "there is no `sbatch` here", help=helps))
     values = values_sections(campaign)
     key = resuming.campaign_key(values)
+    campaign = resuming.settled(campaign, values)
     if not fresh and resuming.finished_state(campaign, key) == resuming.WHOLE:
         return None
     if not fresh and not resuming.is_begun(Folder(beside(campaign.output)), key):
