@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,8 @@ import numpy as np
 from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
 from batch.queries.failures import FailureGroup, failures
 from batch.queries.signals import number_text
+from batch.verification import figures
+from batch.verification.figures import Verification
 from met.frozen import frozen
 
 
@@ -79,6 +81,7 @@ class Summary:
     failures  all of them, by cause
     sweep     of which this is a group; "" where it is the whole of its run or sweep
     limited   cases in which the load motor of a bed was at its limit at some tick
+    verified  how true the metrics are, by the names of their variables; None where that is not known
     """
 
     name: str
@@ -90,6 +93,7 @@ class Summary:
     requirements: tuple[RequirementSummary, ...]
     limited: int = 0
     sweep: str = ""
+    verified: Verification | None = None
 
     @property
     def ok(self) -> bool:
@@ -133,6 +137,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
         metrics=tuple(_metric(v, group.values(v.name)[here]) for v in group.role("metric")),
         requirements=requirements,
         sweep=str(group.attributes.get("sweep", "")),
+        verified=figures.figures(group, position),
         limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
     )
 
@@ -170,7 +175,9 @@ def median_text(values: np.ndarray, *, infinite: str = "inf", none: str = "-") -
 
 def as_json(summary: Summary) -> dict[str, Any]:
     """Plain data for `--format json`; a number that is not finite is null."""
-    data: dict[str, Any] = finite({**asdict(summary), "metrics": [_named_first(asdict(m)) for m in summary.metrics]})
+    plain = asdict(replace(summary, verified=None))
+    told = {"verified": figures.as_json(summary.verified)}
+    data: dict[str, Any] = finite({**plain, "metrics": [_named_first(asdict(m)) for m in summary.metrics], **told})
     return {**data, "ok": summary.ok}
 
 

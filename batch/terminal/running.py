@@ -21,6 +21,7 @@ from batch.queries.structures import structures
 from batch.queries.summary import summarise
 from batch.terminal.progress import Bar
 from batch.terminal.verdict import announcement, result_lines, verdict_json, worst_cases, writing
+from batch.verification.when import Verify
 from met.diagnostic import Problem, error
 from met.host.sources import names_archive, names_plan
 from met.messages import visible
@@ -43,6 +44,7 @@ def run_and_tell(
     timeout: float | None = None,
     max_failures: int | None = None,
     fresh: bool = False,
+    verify: Verify = "auto",
     no_picture: bool = False,
     defines: tuple[str, ...] = (),
     include_dirs: tuple[str, ...] = (),
@@ -82,6 +84,7 @@ def run_and_tell(
             histories=histories or ("all" if again.kept is None else "none"),
             kept=again.kept if not histories else None,
             float32=float32,
+            verify=verify,
         )
     else:
         campaign = _of_deck(
@@ -96,6 +99,7 @@ def run_and_tell(
             include_dirs,
             settings,
             quiet or json,
+            verify,
         )
     of_histories = bool(histories)
     if target is not None:
@@ -187,6 +191,7 @@ def submit_and_tell(
     options: tuple[str, ...] = (),
     timeout: float | None = None,
     fresh: bool = False,
+    verify: Verify = "auto",
     defines: tuple[str, ...] = (),
     include_dirs: tuple[str, ...] = (),
     settings: tuple[str, ...] = (),
@@ -201,7 +206,18 @@ def submit_and_tell(
 
     say = (lambda *_: None) if quiet or json else visible.say
     campaign = _of_deck(
-        source, names, everything, output, cases, histories, float32, defines, include_dirs, settings, quiet or json
+        source,
+        names,
+        everything,
+        output,
+        cases,
+        histories,
+        float32,
+        defines,
+        include_dirs,
+        settings,
+        quiet or json,
+        verify,
     )
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
     done = submit(campaign, jobs=jobs, options=options, timeout=timeout, fresh=fresh, say=say)
@@ -231,6 +247,7 @@ def _of_deck(
     include_dirs: tuple[str, ...],
     settings: tuple[str, ...],
     quiet: bool,
+    verify: Verify,
 ) -> Campaign:
     """The campaign that is asked of a deck or a plan."""
     plan = read_plan(
@@ -243,6 +260,7 @@ def _of_deck(
         cases=cases or None,
         histories=histories or "default",
         float32=float32,
+        verify=verify,
     )
 
 

@@ -19,6 +19,7 @@ from batch.queries.signals import case_text, history, number_text, panels, prett
 from batch.queries.structures import structures
 from batch.queries.summary import SPREAD_COLUMNS, MetricSummary, Summary, summary_of
 from batch.terminal import braille
+from batch.verification.words import NONE, about, error_text
 from ic.printing.columns import size as size_text
 from met.distinct import distinct
 from met.messages.visible import line
@@ -189,6 +190,8 @@ def verdict(summary: Summary, width: int) -> list[str]:
         out.append("  what gives it more: `i_max` and `kt_load` of the bed; what asks less: the arm, or its command")
     if summary.metrics:
         out += _metric_table(summary)
+    if summary.verified is not None:
+        out += textwrap.wrap(about(summary.verified), width, initial_indent="  ", subsequent_indent="    ")
     wide = max((len(r.text) for r in summary.requirements), default=0)
     for r in summary.requirements:
         if summary.cases == 1:
@@ -214,14 +217,22 @@ def _counts(summary: Summary) -> str:
 def _metric_table(summary: Summary) -> list[str]:
     single = summary.cases == 1
     head = ("",) if single else tuple(column.head for column in SPREAD_COLUMNS)
-    rows = [("", *head, "", "")]
+    errors = summary.verified
+    rows = [("", *head, *([] if errors is None else ["±"]), "", "")]
     for metric in summary.metrics:
         unit = "" if metric.deck_unit == "1" else pretty_unit(metric.deck_unit)
-        rows.append((metric.name, *_metric_numbers(metric, single), unit, _metric_words(metric, single)))
+        numbers = list(_metric_numbers(metric, single))
+        if errors is not None:
+            error = error_text(errors.metrics.get(metric.name), metric.deck_scale)
+            numbers.append(error if not single else "" if error == NONE else f"± {error}")
+        rows.append((metric.name, *numbers, unit, _metric_words(metric, single)))
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     out = []
     for row in rows[1:] if single else rows:
-        numbers = "  ".join(f"{text:>{wide}}" for text, wide in zip(row[1:-2], widths[1:-2], strict=True))
+        numbers = (" " if single else "  ").join(
+            f"{text:{'<' if text.startswith('± ') else '>'}{wide}}"
+            for text, wide in zip(row[1:-2], widths[1:-2], strict=True)
+        )
         out.append(f"  {row[0]:<{widths[0]}}  {numbers} {row[-2]:<{widths[-2]}}  {row[-1]}".rstrip())
     return out
 

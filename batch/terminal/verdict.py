@@ -13,6 +13,7 @@ from batch.campaigns.status import duration
 from batch.queries.failures import failure_lines
 from batch.queries.summary import Summary, as_json
 from batch.terminal.show import verdict
+from batch.verification.words import HINT
 from ic.printing.columns import size as size_text
 from met.frozen import frozen
 from met.outputs import quoted
@@ -128,6 +129,8 @@ def result_lines(
         name = f"{summary.name}: " if len(summaries) > 1 else ""
         took = f", {duration(seconds[summary.name])} of computing" if summary.name in seconds else ""
         out += ["", f"{name}{lines[0]}{took}", *lines[1:]]
+        if _may_be_verified(campaign, summary):
+            out.append(f"  {HINT}")
         out += ["", *cases.lines] if cases.lines else []
     out += [line for table in tables for line in ("", *table)]
     path = campaign.output
@@ -153,6 +156,12 @@ def result_lines(
     if not ok:
         out.append(f"exit 1: {_why_not(summaries)}")
     return out
+
+
+def _may_be_verified(campaign: Campaign, summary: Summary) -> bool:
+    """True where nothing is known of the step's error, and nobody has said that it is not wanted."""
+    there = summary.metrics and summary.failed < summary.cases
+    return bool(there) and summary.verified is None and campaign.verify != "none"
 
 
 def _why_not(summaries: tuple[Summary, ...]) -> str:

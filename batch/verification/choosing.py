@@ -26,8 +26,10 @@ def chosen(experiment: Experiment, results: CaseOutcomes) -> np.ndarray:
         ranked = worst(experiment, name, np.where(np.isfinite(values), values, np.nan))
         places += ranked[:1].tolist()
     for number in range(SEEDED):
-        digest = hashlib.sha256(f"verified {experiment.cases.seed} {number}".encode()).digest()
-        places.append(int(done[int.from_bytes(digest[:8], "big") % len(done)]))
+        left = done[~np.isin(done, places)]
+        if len(left):
+            digest = hashlib.sha256(f"verified {experiment.cases.seed} {number}".encode()).digest()
+            places.append(int(left[int.from_bytes(digest[:8], "big") % len(left)]))
     return distinct(np.array(places, np.int64))
 
 
