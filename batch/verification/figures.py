@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -114,6 +115,40 @@ def case_error(case: int, values: tuple[float, float, float], order: int, instan
     if instant:
         return CaseError(case, own, instant_error(first, second, abs(own - quarter), instant))
     return CaseError(case, own, step_error(first, second, abs(own), order))
+
+
+def together(found: Iterable[Verification | None]) -> Verification | None:
+    """The figures of several structures as those of one experiment: of each metric that of its worst case."""
+    those = [each for each in found if each is not None]
+    if len(those) < 2:
+        return those[0] if those else None
+    metrics: dict[str, MetricError] = {}
+    for one in those:
+        for name, each in one.metrics.items():
+            metrics[name] = _worse(metrics[name], each) if name in metrics else each
+    first = those[0]
+    return Verification(sum(one.cases for one in those), first.order, first.step, metrics)
+
+
+def _worse(one: MetricError, other: MetricError) -> MetricError:
+    worst = other if math.isnan(one.error) or other.error > one.error else one
+    return replace(
+        worst,
+        clear=one.clear and other.clear,
+        unknown=one.unknown + other.unknown,
+        why=one.why or other.why,
+        cases=one.cases + other.cases,
+    )
+
+
+def of_difference(a: Verification | None, b: Verification | None) -> dict[str, float]:
+    """The errors by the step of differences between two archives' metrics, SI: the sum of those that are known."""
+    known: dict[str, float] = {}
+    for found in (a, b):
+        for name, each in found.metrics.items() if found is not None else ():
+            if math.isfinite(each.error):
+                known[name] = known.get(name, 0.0) + each.error
+    return known
 
 
 def as_json(found: Verification | None) -> dict[str, Any] | None:

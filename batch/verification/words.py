@@ -31,7 +31,9 @@ def about(found: Verification) -> str:
     if orders:
         said += f", order {_between(orders)}"
     if unclear := [name for name, each in found.metrics.items() if not each.clear]:
-        said += f"; order unclear, so a bound: {', '.join(unclear)}"
+        known = [one.error for each in found.metrics.values() for one in each.cases if one.error is not None]
+        of = f"{sum(not error.clear for error in known):,} of {len(known):,} numbers"
+        said += f"; order unclear in {of}, where it is a rough bound: {', '.join(unclear)}"
     for name, each in found.metrics.items():
         if each.unknown:
             where = "" if found.cases == 1 else f" in {each.unknown:,}"

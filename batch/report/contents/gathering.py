@@ -20,6 +20,8 @@ from batch.report.contents.parts import Fact, Report, ReportSection, SourceListi
 from batch.report.contents.stability import stability
 from batch.report.contents.tables import replay, structures, worst
 from batch.report.contents.verdicts import metric_rows, verdict
+from batch.verification.figures import figures, together
+from batch.verification.words import about as about_errors
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem
 from met.host.files import open_regular
@@ -111,12 +113,13 @@ def _section(
     except Problem as problem:
         trouble = trouble or "; ".join(diagnostic.message for diagnostic in problem.diagnostics)
     drawn = signals(pool, values, before)
+    errors = together(map(figures, pool.groups))
     return ReportSection(
         name=pool.name,
         lede=_lede(pool),
         facts=_facts(pool, own),
         varied=varied(pool, own),
-        metrics=metric_rows(pool, before),
+        metrics=metric_rows(pool, before, errors),
         structures=structures(pool, before),
         worst=worst(pool, archive, only, before),
         overview=overview(pool, before),
@@ -127,6 +130,7 @@ def _section(
         trouble=trouble,
         notes=tuple(dict.fromkeys(note for experiment in own.values() for note in experiment.notes)),
         single=pool.count == 1,
+        by_step="" if errors is None else about_errors(errors),
     )
 
 
