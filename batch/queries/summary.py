@@ -13,6 +13,8 @@ from batch.queries.failures import FailureGroup, failures
 from batch.queries.signals import number_text
 from batch.verification import figures
 from batch.verification.figures import Verification
+from batch.verification.warning import warnings
+from met.diagnostic import Diagnostic
 from met.frozen import frozen
 
 
@@ -82,6 +84,7 @@ class Summary:
     sweep     of which this is a group; "" where it is the whole of its run or sweep
     limited   cases in which the load motor of a bed was at its limit at some tick
     verified  how true the metrics are, by the names of their variables; None where that is not known
+    warnings  of what that calls in question; of a case alone, none
     """
 
     name: str
@@ -94,6 +97,7 @@ class Summary:
     limited: int = 0
     sweep: str = ""
     verified: Verification | None = None
+    warnings: tuple[Diagnostic, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -138,6 +142,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
         requirements=requirements,
         sweep=str(group.attributes.get("sweep", "")),
         verified=figures.figures(group, position),
+        warnings=tuple(warnings(group)) if position is None else (),
         limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
     )
 
@@ -175,8 +180,9 @@ def median_text(values: np.ndarray, *, infinite: str = "inf", none: str = "-") -
 
 def as_json(summary: Summary) -> dict[str, Any]:
     """Plain data for `--format json`; a number that is not finite is null."""
-    plain = asdict(replace(summary, verified=None))
-    told = {"verified": figures.as_json(summary.verified)}
+    plain = asdict(replace(summary, verified=None, warnings=()))
+    warned = [{"code": each.code, "message": each.message, "help": each.help} for each in summary.warnings]
+    told = {"verified": figures.as_json(summary.verified), "warnings": warned}
     data: dict[str, Any] = finite({**plain, "metrics": [_named_first(asdict(m)) for m in summary.metrics], **told})
     return {**data, "ok": summary.ok}
 

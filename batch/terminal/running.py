@@ -21,6 +21,7 @@ from batch.queries.structures import structures
 from batch.queries.summary import summarise
 from batch.terminal.progress import Bar
 from batch.terminal.verdict import announcement, result_lines, verdict_json, worst_cases, writing
+from batch.verification.warning import campaign_warnings
 from batch.verification.when import Verify
 from met.diagnostic import Problem, error
 from met.host.sources import names_archive, names_plan
@@ -127,6 +128,8 @@ def run_and_tell(
     with ArchiveFile(campaign.output) as file:
         summaries = summarise(file)
         worst = worst_cases(file)
+        experiments = {part.experiment.name: part.experiment for part in campaign.parts}
+        warned = campaign_warnings(file.groups, experiments)
         tables = list(structures(file))
         try:
             picture, excuse = (None, "") if no_picture else first_picture(file)
@@ -171,6 +174,8 @@ def run_and_tell(
                 )
             )
         )
+        if warned and not quiet:
+            _complain(Problem(warned, {source.name: source.text for source in campaign.plan.sources}), json)
         for line in _compared(again, unlike):
             say(line)
         if missing and target is not None:

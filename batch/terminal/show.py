@@ -103,7 +103,8 @@ def _about(
         varied = cases.varied_lines(archive, group, position)
         name = [case_text(group, position, varied=False)] if group.count > 1 else []
         return [*name, *verdict(summary_of(group, position), width), *([""] if varied else []), *varied]
-    out = verdict(summary_of(group), width)
+    summary = summary_of(group)
+    out = [*verdict(summary, width), *warning_lines(summary, width)]
     if group.count > 1:
         most = None if all_cases else cases.SHOWN_CASES
         out += ["", cases.title(group, by=by), *cases.table(group, most, by=by)]
@@ -202,6 +203,16 @@ def verdict(summary: Summary, width: int) -> list[str]:
             said += f", not known of {r.unknown:,}" if r.unknown else ""
             said += f" (its metric has no value in {r.no_value:,})" if r.no_value else ""
         out.append(f"  require {r.text:<{wide}}  {said}")
+    return out
+
+
+def warning_lines(summary: Summary, width: int) -> list[str]:
+    """What the errors by the step call in question, and what to do."""
+    out = []
+    for each in summary.warnings:
+        said = [f"warning[{each.code}]: {each.message}", *(f"  help: {text}" for text in each.help)]
+        for text in said:
+            out += textwrap.wrap(text, width, initial_indent="  ", subsequent_indent="      ")
     return out
 
 

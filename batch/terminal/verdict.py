@@ -12,7 +12,7 @@ from batch.campaigns.campaign import Campaign, CampaignPart
 from batch.campaigns.status import duration
 from batch.queries.failures import failure_lines
 from batch.queries.summary import Summary, as_json
-from batch.terminal.show import verdict
+from batch.terminal.show import verdict, warning_lines
 from batch.verification.words import HINT
 from ic.printing.columns import size as size_text
 from met.frozen import frozen
@@ -179,7 +179,7 @@ def short_result_lines(archive: Archive) -> list[str]:
     for summary in archive.summaries:
         name = f"{summary.name}: " if len(archive.summaries) > 1 else ""
         lines = verdict(summary, 100)
-        out += ["", f"{name}{lines[0]}", *lines[1:]]
+        out += ["", f"{name}{lines[0]}", *lines[1:], *warning_lines(summary, 100)]
     out += ["", f"archive  {archive.path}  ({size_text(archive.path.stat().st_size)})"]
     return out if archive.ok else [*out, f"exit 1: {_why_not(archive.summaries)}"]
 

@@ -21,11 +21,13 @@ if TYPE_CHECKING:
 class CaseError:
     """The error of a metric in a case; None where it cannot be known, and why.
 
-    case   position in the case table;  value: the metric at the campaign's own step, SI
+    case   position in the case table;  value, half, quarter: the metric at the step and these shares of it, SI
     """
 
     case: int
     value: float
+    half: float
+    quarter: float
     error: StepError | None
     why: str = ""
 
@@ -105,16 +107,16 @@ def case_error(case: int, values: tuple[float, float, float], order: int, instan
     names = ("at the step", "at half the step", "at a quarter of the step")
     for value, name in zip(values, names, strict=True):
         if math.isnan(value):
-            return CaseError(case, own, None, f"no value {name}")
+            return CaseError(case, own, half, quarter, None, f"no value {name}")
     if math.isinf(own) and own == half == quarter:
-        return CaseError(case, own, None, "infinite at every step")
+        return CaseError(case, own, half, quarter, None, "infinite at every step")
     for value, name in zip(values, names, strict=True):
         if math.isinf(value):
-            return CaseError(case, own, None, f"infinite {name}, and not at another")
+            return CaseError(case, own, half, quarter, None, f"infinite {name}, and not at another")
     first, second = abs(own - half), abs(half - quarter)
     if instant:
-        return CaseError(case, own, instant_error(first, second, abs(own - quarter), instant))
-    return CaseError(case, own, step_error(first, second, abs(own), order))
+        return CaseError(case, own, half, quarter, instant_error(first, second, abs(own - quarter), instant))
+    return CaseError(case, own, half, quarter, step_error(first, second, abs(own), order))
 
 
 def together(found: Iterable[Verification | None]) -> Verification | None:

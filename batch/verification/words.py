@@ -18,7 +18,12 @@ def error_text(found: MetricError | None, scale: float = 1.0) -> str:
     """An error in two digits, in the unit of which `scale` is the size; NONE where it is not known."""
     if found is None or not math.isfinite(found.error):
         return NONE
-    return number_text(float(f"{found.error / abs(scale):.2g}"))
+    return rounded(found.error / abs(scale))
+
+
+def rounded(error: float) -> str:
+    """An error in two digits: no more of it is known."""
+    return number_text(float(f"{error:.2g}"))
 
 
 def about(found: Verification) -> str:

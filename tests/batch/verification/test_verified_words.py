@@ -49,7 +49,7 @@ def made(
 
 
 def metric(*errors: StepError | None) -> MetricError:
-    cases = tuple(CaseError(n, 1.0, error, "" if error else "no value") for n, error in enumerate(errors))
+    cases = tuple(CaseError(n, 1.0, 1.0, 1.0, error, "" if error else "no value") for n, error in enumerate(errors))
     known = [error for error in errors if error is not None]
     worst = max(known, key=lambda error: error.error, default=StepError(math.nan, math.nan, True))
     lost = len(errors) - len(known)
