@@ -78,7 +78,7 @@ def _undecided(
     margin = abs(case.value - required.limit)
     helps = [_remedy(found, case, margin, f"an error below the {number_text(margin / abs(scale))}{unit} that are left")]
     if len(those) > 1:
-        helps.append(f"the same holds of {len(those) - 1:,} more of the {counted(found.cases, 'verified case')}")
+        helps.append(f"so it is in {len(those):,} of the {found.cases:,} verified cases")
     place = None if experiment is None else experiment.requirements[required.place].place
     where = f"`{required.metric}` of case #{case.case} is {said}"
     return _warning("D310", f"the step decides whether `{required.text}` is met: {where}", place, helps)
@@ -116,10 +116,10 @@ def _unclear(group: ArchiveGroup, found: Verification, name: str, experiment: Ex
     assert case.error is not None
     scale, unit = deck_unit(group.variables[name])
     unit = "" if unit == "1" else f" {unit}"
-    order = "none" if math.isnan(case.error.order) else f"{case.error.order:.1f}"
+    seen = "is unclear" if math.isnan(case.error.order) else f"is {case.error.order:.1f}"
     message = (
         f"`{name}` of case #{case.case} is {number_text(case.value / scale)}{unit} ± "
-        f"{rounded(case.error.error / abs(scale))}{unit} by the step, of which the order is {order} and not "
+        f"{rounded(case.error.error / abs(scale))}{unit} by the step; the order of that {seen}, and should be "
         f"{found.order}"
     )
     helps = [_remedy(found, case, MATTERS * size, f"an error below {100 * MATTERS:g} %")]
@@ -145,7 +145,7 @@ def _lost(found: Verification, experiment: Experiment | None) -> list[Diagnostic
     position, factor = those[0]
     helps = [f"`rates {{ dynamics = {_rate(found, factor)}; }}` shows why it fails"]
     if len(those) > 1:
-        helps.append(f"so do {len(those) - 1:,} more of the {counted(found.cases, 'verified case')}")
+        helps.append(f"so it is in {len(those):,} of the {found.cases:,} verified cases")
     share = "half" if factor == 2 else "a quarter"
     message = f"case #{position} reaches its end at the step of {1e3 * found.step:g} ms, and does not at {share} of it"
     return [_warning("D312", message, None if experiment is None else experiment.place, helps)]

@@ -16,7 +16,7 @@ from met.frozen import frozen
 NEAR = 0.3
 """How far an observed order may be from the expected one."""
 
-ROUNDING = 1e-12
+ROUNDING = 1e-10
 """Differences below this share of the number are rounding, from which no order follows."""
 
 
