@@ -32,7 +32,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from batch.archive import limits
+from batch.archive import limits, step_errors
 from met.frozen import frozen
 from met.plan import Coordinate, Experiment, Plan, Recorded
 from met.plan.channel import DIMENSIONS, channels
@@ -348,9 +348,17 @@ def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, 
         "duration_s": schedule.duration,
         "structure_key": keys.structure_key(structure, keys.inputs(experiment)),
         "cases_in_table": experiment.cases.count,
+        **_step_errors(experiment, variables),
         "frame": FRAME if structure.base is None else WHERE_IT_MOVES,
         "coordinates": " ".join(coordinates),
     }
+
+
+def _step_errors(experiment: Experiment, variables: list[Variable]) -> dict[str, str]:
+    if not experiment.step_errors:
+        return {}
+    names = {variable.key: variable.name for variable in variables if variable.role == "metric"}
+    return {step_errors.ATTRIBUTE: step_errors.written(experiment.step_errors, names)}
 
 
 def group_names(plan: Plan) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive import plain, sound, verified
+from batch.archive import plain, sound, step_errors, verified
 from batch.archive.hdf5 import SIGNATURE, h5py
 from batch.archive.layout import SCHEMA, VERSION
 from batch.archive.rows import row_of
@@ -67,6 +67,7 @@ class ArchiveGroup:
             self.attributes: dict[str, Any] = {name: _plain(value) for name, value in node.attrs.items()}
             sound.check(self)
             self.verified = verified.read(node, self)
+            self.step_errors = step_errors.read(self)
         self.name: str = self.attributes["experiment"]
         self.sweep: str = str(self.attributes.get("sweep", ""))
 

@@ -13,6 +13,7 @@ from batch.queries.failures import FailureGroup, failures
 from batch.queries.signals import number_text
 from batch.verification import figures
 from batch.verification.figures import Verification
+from batch.verification.limits import StepErrorVerdict, verdicts
 from batch.verification.warning import warnings
 from met.diagnostic import Diagnostic
 from met.frozen import frozen
@@ -84,6 +85,7 @@ class Summary:
     sweep     of which this is a group; "" where it is the whole of its run or sweep
     limited   cases in which the load motor of a bed was at its limit at some tick
     verified  how true the metrics are, by the names of their variables; None where that is not known
+    step_errors  what is required of errors by the step; of a case alone, nothing
     warnings  of what that calls in question; of a case alone, none
     """
 
@@ -97,12 +99,18 @@ class Summary:
     limited: int = 0
     sweep: str = ""
     verified: Verification | None = None
+    step_errors: tuple[StepErrorVerdict, ...] = ()
     warnings: tuple[Diagnostic, ...] = ()
 
     @property
     def ok(self) -> bool:
-        """True if every case reached its end and met every requirement."""
-        return self.failed == 0 and all(r.met == self.cases for r in self.requirements)
+        """True if every case reached its end and met every requirement, and errors by the step are as required."""
+        return self.failed == 0 and all(r.met == self.cases for r in self.requirements) and not self.untrue
+
+    @property
+    def untrue(self) -> tuple[StepErrorVerdict, ...]:
+        """Requirements on errors by the step that are missed, or not known to be met."""
+        return tuple(each for each in self.step_errors if not each.met)
 
 
 def summarise(archive: ArchiveFile) -> tuple[Summary, ...]:
@@ -132,6 +140,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
             )
             for i, text in enumerate(group.values("requirement"))
         )
+    verified = figures.figures(group, position)
     return Summary(
         name=group.name,
         cases=group.count if position is None else 1,
@@ -141,7 +150,8 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
         metrics=tuple(_metric(v, group.values(v.name)[here]) for v in group.role("metric")),
         requirements=requirements,
         sweep=str(group.attributes.get("sweep", "")),
-        verified=figures.figures(group, position),
+        verified=verified,
+        step_errors=verdicts(group, verified) if position is None else (),
         warnings=tuple(warnings(group)) if position is None else (),
         limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
     )

@@ -193,7 +193,8 @@ def verdict(summary: Summary, width: int) -> list[str]:
         out += _metric_table(summary)
     if summary.verified is not None:
         out += textwrap.wrap(about(summary.verified), width, initial_indent="  ", subsequent_indent="    ")
-    wide = max((len(r.text) for r in summary.requirements), default=0)
+    texts = [*(each.text for each in summary.requirements), *(each.text for each in summary.step_errors)]
+    wide = max(map(len, texts), default=0)
     for r in summary.requirements:
         if summary.cases == 1:
             why = "its metric has no value here" if r.no_value else "the case failed"
@@ -203,6 +204,8 @@ def verdict(summary: Summary, width: int) -> list[str]:
             said += f", not known of {r.unknown:,}" if r.unknown else ""
             said += f" (its metric has no value in {r.no_value:,})" if r.no_value else ""
         out.append(f"  require {r.text:<{wide}}  {said}")
+    for each in summary.step_errors:
+        out.append(f"  require {each.text:<{wide}}  {each.word}: {each.said}")
     return out
 
 
@@ -240,11 +243,11 @@ def _metric_table(summary: Summary) -> list[str]:
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     out = []
     for row in rows[1:] if single else rows:
-        numbers = (" " if single else "  ").join(
+        shown = (" " if single else "  ").join(
             f"{text:{'<' if text.startswith('± ') else '>'}{wide}}"
             for text, wide in zip(row[1:-2], widths[1:-2], strict=True)
         )
-        out.append(f"  {row[0]:<{widths[0]}}  {numbers} {row[-2]:<{widths[-2]}}  {row[-1]}".rstrip())
+        out.append(f"  {row[0]:<{widths[0]}}  {shown} {row[-2]:<{widths[-2]}}  {row[-1]}".rstrip())
     return out
 
 

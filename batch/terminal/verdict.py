@@ -170,6 +170,8 @@ def _why_not(summaries: tuple[Summary, ...]) -> str:
     parts = [f"{failed:,} case{'s' if failed != 1 else ''} failed"] if failed else []
     if missed:
         parts.append("not met everywhere: " + ", ".join(dict.fromkeys(r.text for r in missed)))
+    if untrue := [each.text for summary in summaries for each in summary.untrue]:
+        parts.append("not met, or not known: " + ", ".join(dict.fromkeys(untrue)))
     return "; ".join(parts)
 
 

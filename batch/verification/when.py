@@ -26,13 +26,16 @@ SHORT_OPERATIONS, SHORT_PROGRAM = 40_000_000, 1_500
 
 
 def resolve(wanted: Verify, prepared: Prepared, cases: int) -> Verify:
-    """`none`, `some` or `all`: what is wanted of so many cases of an experiment; `auto` is settled by what it costs."""
+    """`none`, `some` or `all`: what is wanted of so many cases of an experiment; `auto` is `some` where
+    the deck requires something of errors by the step, and else settled by what it costs."""
     experiment = prepared.experiment
     metrics = len(experiment.structure.metrics)
     if not metrics or not cases:
         return "none"
     if wanted != "auto":
         return wanted
+    if experiment.step_errors:
+        return "some"
     steps = _steps(experiment)
     if cases == 1:
         size = _operations(prepared)

@@ -380,7 +380,8 @@ def _metrics(experiment: Experiment) -> Iterator[str]:
     yield "Metrics and what is required of them"
     rows = []
     for use in experiment.structure.metrics:
-        required = [requirement.text for requirement in experiment.requirements if requirement.metric == use.name]
+        required = [each.text for each in experiment.requirements if each.metric == use.name]
+        required += [each.text for each in experiment.step_errors if each.metric == use.name]
         rows.append((use.name, f"{use.model} of {use.of}", ", ".join(f"require {text}" for text in required)))
     yield from columns(rows)
 

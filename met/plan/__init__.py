@@ -283,6 +283,19 @@ class Requirement:
 
 
 @frozen
+class StepErrorLimit:
+    """A condition on a metric's error by the step, in each case that is run with shorter steps; `text` as the deck
+    wrote it. limit: SI, or where it is a `share`, of the size of the metric's value."""
+
+    text: str
+    metric: str
+    comparison: Literal["<", "<="]
+    limit: float
+    share: bool = False
+    place: Place | None = None
+
+
+@frozen
 class Tolerance:
     """By how much another version may differ before a diff calls it different; `text` as the deck wrote it.
 
@@ -506,6 +519,7 @@ class Experiment:
     notes: tuple[str, ...] = ()
     sweep: str = ""
     tolerances: tuple[Tolerance, ...] = ()
+    step_errors: tuple[StepErrorLimit, ...] = ()
 
     @property
     def name_in_deck(self) -> str:

@@ -58,6 +58,7 @@ def check(experiments: Iterable[Experiment]) -> None:
         names.append(experiment.name)
         plan_structure.check(experiment.structure, f"{where}.structure")
         _check_requirements(experiment, f"{where}.requirements")
+        _check_step_errors(experiment, f"{where}.step_errors")
         _check_tolerances(experiment, f"{where}.tolerances")
         _check_cases(experiment, f"{where}.cases")
         _check_formulas(experiment, where)
@@ -111,6 +112,17 @@ def _check_requirements(experiment: Experiment, where: str) -> None:
             requirement.limit,
         ):
             raise Damaged(f"{where}[{index}].text", "another requirement has the same text")
+
+
+def _check_step_errors(experiment: Experiment, where: str) -> None:
+    metrics = {use.name for use in experiment.structure.metrics}
+    for index, each in enumerate(experiment.step_errors):
+        if each.metric not in metrics:
+            raise Damaged(f"{where}[{index}].metric", f"there is no metric `{each.metric}`")
+        if not 0.0 < each.limit < math.inf:
+            raise Damaged(f"{where}[{index}].limit", "it should be a finite number above 0")
+    if len({each.text for each in experiment.step_errors}) < len(experiment.step_errors):
+        raise Damaged(where, "two have the same text")
 
 
 def _check_tolerances(experiment: Experiment, where: str) -> None:

@@ -10,7 +10,8 @@ from batch.queries.signals import deck_unit
 from batch.queries.summary import spread
 from batch.report.contents.against import EarlierCases
 from batch.report.contents.parts import FailureRow, MetricRow, OutcomeCount, RequirementCounts, Verdict
-from batch.verification.figures import Verification
+from batch.verification.figures import Verification, figures
+from batch.verification.limits import StepErrorVerdict, verdicts
 from batch.verification.words import NONE, error_text
 from ic.printing.columns import count as counted
 from met.run import DONE
@@ -28,16 +29,21 @@ def verdict(pool: Pool, *, named: bool) -> Verdict:
     ended = np.bincount(pool.ended, minlength=len(ENDED))
     parts = tuple(OutcomeCount(word, int(n)) for word, n in zip(ENDED, ended, strict=True) if n)
     good = int(ended[ENDED.index("met")] + ended[ENDED.index("done")])
+    errors = [each for group in pool.groups for each in verdicts(group, figures(group))]
     return Verdict(
         kind="requirements",
         about=pool.name if named else "",
-        ok=good == pool.count,
+        ok=good == pool.count and all(each.met for each in errors),
         headline=_headline(pool, good),
         parts=parts,
         demands=tuple(_demand(pool, place, text) for place, text in enumerate(pool.requirements)),
         failing=_failing(pool),
-        notes=_notes(pool),
+        notes=(*_notes(pool), *map(_of_step_error, errors)),
     )
+
+
+def _of_step_error(each: StepErrorVerdict) -> str:
+    return f"{each.text}: {each.word}, {each.said}."
 
 
 def _headline(pool: Pool, good: int) -> str:

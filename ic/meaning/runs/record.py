@@ -14,6 +14,7 @@ from ic.meaning.parameters.models import check_keys, find_model, refuse_values, 
 from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.step_errors import FLIPPED, is_step_error
 from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import Label, Place, did_you_mean, nearest
@@ -26,8 +27,6 @@ from met.trace import Scalar
 
 OF_SERVO = frozenset({"servo", "bed", "law"})
 """Heads of channels that a joint has only with a servo, or with its motor on a bed."""
-
-FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
 
 # Record
@@ -274,6 +273,8 @@ def read_requirements(scope: Scope, block: MergedBlock) -> list[WrittenRequireme
                 help="write `require METRIC < LIMIT;`, or <=, >, >=",
             )
             continue
+        if is_step_error(comparison):
+            continue  # `resolve_step_errors` reads it
         removed = {
             each.key.removeprefix("metric ")
             for each in block.removed
