@@ -13,15 +13,17 @@ import pytest
 import batch
 import ic
 from batch.archive.read import ArchiveFile
+from batch.campaigns import tasks
 from batch.campaigns.keep import CaseOutcomes
 from batch.verification import when
 from batch.verification.choosing import chosen, most
 from batch.verification.figures import case_error, figures
+from met import cli
 from met import run as engine
 from met.analysis.refinement import refine
 from met.diagnostic import Problem
 from met.plan import Plan
-from tests.batch import plans
+from tests.batch import begun, plans
 
 SWEEP = """#include <two_link.ic>
 run brief like nominal { duration = 2 s; metric turn = final { of = elbow.q; } }
@@ -97,6 +99,34 @@ def test_the_campaign_has_the_same_bytes_with_and_without(sweep: Plan, tmp_path:
     assert verified.read_bytes() == again.read_bytes()
     with ArchiveFile(bare) as file:
         assert file.groups[0].verified is None and figures(file.groups[0]) is None
+
+
+def test_a_campaign_that_was_interrupted_or_run_in_processes_is_verified_alike(
+    sweep: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wanted = batch.run(sweep, output=tmp_path / "a.h5", verify="some").path.read_bytes()
+    assert batch.run(sweep, output=tmp_path / "b.h5", verify="some", processes=2).path.read_bytes() == wanted
+    begun.short_tasks(monkeypatch)
+    monkeypatch.setattr(tasks, "MOST_CASES", 2)
+    (tmp_path / "alone").mkdir()
+    resumed = tmp_path / "alone" / "c.h5"
+    begun.begin(resumed, sweep, after=1, verify="some")
+    begun.go_on(resumed, sweep, verify="some")
+    assert resumed.read_bytes() == wanted
+
+
+def test_the_command_has_three_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "d.ic").write_text(SWEEP)
+    for word, cases in (("none", None), ("some", 4), ("all", 6)):
+        asked = ["run", "d.ic", "gain", "--verify", word, "-q", "--no-picture", "-o", f"{word}.h5"]
+        assert cli.main(asked) == cli.NO  # five of the cases never settle
+        with ArchiveFile(tmp_path / f"{word}.h5") as file:
+            found = file.groups[0].verified
+        assert (None if found is None else len(found.cases)) == cases
+    assert cli.main([*asked[:3], "--verify", "much"]) == cli.BAD_INPUT
+    with pytest.raises(ValueError, match="verify is one of auto, none, some, all, and not 'much'"):
+        batch.run(ic.compile("d.ic", select=["gain"]), verify="much")  # type: ignore[arg-type]
 
 
 def test_an_archive_is_whole_for_whoever_asks_for_the_same(sweep: Plan, tmp_path: Path) -> None:
