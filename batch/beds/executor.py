@@ -24,7 +24,7 @@ from batch.campaigns.tasks import CampaignSection, Done, Task
 from batch.executors import Outcome
 from hw import records
 from hw.case import CaseRequest, pace_of
-from hw.ports import same_bed
+from hw.drivers import same_bed
 from hw.process import talk
 from met.diagnostic import Problem, error
 from met.frozen import frozen
