@@ -15,7 +15,7 @@ from hw.transcript import TranscriptFile
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Experiment
-from met.program.control.plant import bed_values
+from met.plant import bed_values
 
 
 @frozen
