@@ -23,6 +23,7 @@ from met.metrics.metric import Metric
 from met.parameter import Memory, Parameter, State
 from met.plan import BASE, Experiment, Formula, Joint, LinkSensor, Payload, SensorUse, ServoUse, Structure
 from met.plan.channel import Channel, channels
+from met.plan.uses import sensor_parts, servo_parts
 from met.program.courses import recorded
 from met.program.values import NamedValues, answer, parameters, returned
 from met.sensors.sensor import Sensor
@@ -325,7 +326,7 @@ class System:
         has_course = use.command is not None and not use.command.guide
         profile = models.find("command", use.command.model, use.place) if use.command and has_course else None
         sensors = tuple(self._fitted(each, f"{use.joint}.servo.sensor.{each.of}") for each in use.sensors)
-        bare = Actuator(index, use, servo, profile, models.servo_parts(use), None, False, False, {}, sensors)
+        bare = Actuator(index, use, servo, profile, servo_parts(use), None, False, False, {}, sensors)
         drive, level, levels = self._probe(bare)
         if drive.given is not None and (level != 0.0 or use.joint in self.braked):
             message = f"{bare.owner} gives both an acceleration and dry friction"
@@ -344,7 +345,7 @@ class System:
         )
 
     def _fitted(self, use: SensorUse | LinkSensor, path: str) -> Fitted:
-        declared, states, memory = (models.sensor_parts(use, group) for group in ("parameters", "states", "memory"))
+        declared, states, memory = (sensor_parts(use, group) for group in ("parameters", "states", "memory"))
         return Fitted(use, models.find("sensor", use.model, use.place), declared, states, memory, path)
 
     def _probe(self, actuator: Actuator) -> tuple[Drive, float | None, dict[str, float | None]]:
