@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from batch.export.formats import endings
+from batch.formats import endings
 from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
 from met.messages.visible import line, say
 
