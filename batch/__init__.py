@@ -17,8 +17,8 @@ from met.frozen import frozen
 
 if TYPE_CHECKING:
     from batch.campaigns.drive import Progress
+    from batch.campaigns.executor import Executor
     from batch.differences.result import Diff
-    from batch.executors import Executor
     from batch.queries.summary import Summary
     from met.plan import Plan
 

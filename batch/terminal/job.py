@@ -1,7 +1,7 @@
 """A job of a cluster's queue: its share of a campaign's cases, or the end of it.
 
-    python -m batch.executors.job FOLDER share K TASKS.json     the K-th share, by processes of its own
-    python -m batch.executors.job FOLDER together               the archive, when all shares are done
+    python -m batch.terminal.job FOLDER share K TASKS.json     the K-th share, by processes of its own
+    python -m batch.terminal.job FOLDER together               the archive, when all shares are done
 
 Jobs need nothing of one another but the folder. Each writes down how far it is (`status.K.json`), and what it says goes
 to its log. One that is cancelled, or out of time, leaves its shards; what it had not done is missing, and is submitted
