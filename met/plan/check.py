@@ -32,7 +32,8 @@ from met.plan import structure as plan_structure
 from met.plan.codec import Damaged
 from met.plan.defaults import INERTIA, declared, heads_of_models, related
 from met.plan.outputs import tolerable
-from met.trace.graph import TRUTHS, Formulas
+from met.trace.graph import Formulas
+from met.trace.nodes import TRUTHS
 from met.unit_parser import parse_unit
 
 GROUP = re.compile(r"[\w+-]+(\.[\w+-]+)*")
