@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.archive.stored import Stored
 from batch.differences import matching
 from batch.differences.compare import (
     DIFFERENT,

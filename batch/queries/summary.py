@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.archive.stored import Stored
 from batch.queries.failures import FailureGroup, failures
 from batch.queries.signals import number_text
 from met.frozen import frozen
