@@ -17,10 +17,10 @@ from met.frozen import frozen
 
 if TYPE_CHECKING:
     from batch.campaigns.drive import Progress
+    from batch.campaigns.executor import Executor
+    from batch.campaigns.verification.when import Verify
     from batch.differences.result import Diff
-    from batch.executors import Executor
     from batch.queries.summary import Summary
-    from batch.verification.when import Verify
     from met.plan import Plan
 
 

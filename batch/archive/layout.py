@@ -37,6 +37,7 @@ from met.frozen import frozen
 from met.plan import Coordinate, Experiment, Plan, Recorded
 from met.plan.channel import DIMENSIONS, channels
 from met.plan.outputs import metric_units
+from met.unit_parser import parse_unit
 
 SCHEMA = "met.archive"
 VERSION = 1
@@ -185,12 +186,12 @@ def coordinate_unit(experiment: Experiment, coordinate: Coordinate) -> str:
     from met import units
 
     try:
-        written = units.parse_unit(coordinate.unit).dimension
+        written = parse_unit(coordinate.unit).dimension
     except ValueError:
         return coordinate.unit
     for path in coordinate.sets:  # a `let` may set parameters of other dimensions too
         unit = experiment.parameters[path].unit if path in experiment.parameters else ""
-        if unit and units.same(units.parse_unit(unit).dimension, written):
+        if unit and units.same(parse_unit(unit).dimension, written):
             return unit
     return units.text(written)
 

@@ -5,14 +5,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
 
-from batch.archive.sound import Unlike
+from batch.archive.stored import StoredGroup, Unlike
 from met.host.files import parse_json
 from met.plan import StepErrorLimit
-
-if TYPE_CHECKING:
-    from batch.archive.read import ArchiveGroup
 
 ATTRIBUTE = "step_errors"
 
@@ -26,7 +22,7 @@ def written(limits: Iterable[StepErrorLimit], names: Mapping[str, str]) -> str:
     return json.dumps(plain, sort_keys=True, separators=(",", ":"))
 
 
-def read(group: ArchiveGroup) -> tuple[StepErrorLimit, ...]:
+def read(group: StoredGroup) -> tuple[StepErrorLimit, ...]:
     """The requirements of a group; their metrics are names of variables. Raises Unlike."""
     text = group.attributes.get(ATTRIBUTE, "[]")
     try:

@@ -11,16 +11,14 @@ The values at the step itself are the campaign's own. Numbers are kept and no co
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from batch.archive.hdf5 import h5py
-from batch.archive.sound import MOST, Unlike
+from batch.archive.sound import MOST
+from batch.archive.stored import StoredGroup, Unlike
 from met.frozen import frozen
-
-if TYPE_CHECKING:
-    from batch.archive.read import ArchiveGroup
 
 NAME = "verification"
 
@@ -83,7 +81,7 @@ def write(parent: Any, found: Verified) -> None:
                 node[name].dims[axis].attach_scale(node[dim])
 
 
-def read(node: Any, group: ArchiveGroup) -> Verified | None:
+def read(node: Any, group: StoredGroup) -> Verified | None:
     """What stands in an experiment's group, checked; None where nothing was verified. Raises Unlike."""
     inside = node.get(NAME)
     if not isinstance(inside, h5py().Group):  # a metric of an older archive may be called so

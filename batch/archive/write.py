@@ -21,10 +21,11 @@ from batch.archive.hdf5 import LIBVER, h5py
 from batch.archive.layout import Layout, Variable
 from batch.archive.provenance import Revision, version
 from batch.archive.sink import Sink
-from met import backends, models
+from met import backends
 from met.frozen import frozen
 from met.plan import Experiment, Plan, keys
 from met.plan import file as plan_file
+from met.plan.uses import packages
 
 if TYPE_CHECKING:
     from met.run import Run
@@ -168,7 +169,7 @@ class ArchiveWriter:
         group = self._file.create_group("provenance", track_order=True)
         commit, changed = self._revision.read()
         versions = {"met": _met_version(), **backends.find().libraries(), "numpy": np.__version__}
-        versions |= {name: version(name) for name in models.packages(e.structure for e in self.plan.experiments)}
+        versions |= {name: version(name) for name in packages(e.structure for e in self.plan.experiments)}
         for name, value in versions.items():
             group.attrs[f"version_{name}"] = value
         group.attrs["git_commit"] = commit

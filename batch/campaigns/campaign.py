@@ -19,8 +19,8 @@ from batch.campaigns.folder import Folder, beside
 from batch.campaigns.keep import CaseOutcomes, Keep, as_list, keep, kept_before, kept_by_outcome
 from batch.campaigns.output import check_output, check_room, default_output
 from batch.campaigns.tasks import CampaignSection
-from batch.verification.when import WORDS as VERIFY_WORDS
-from batch.verification.when import Verify
+from batch.campaigns.verification.when import WORDS as VERIFY_WORDS
+from batch.campaigns.verification.when import Verify
 from ic.printing.columns import size as size_text
 from met import run as engine
 from met.diagnostic import Problem, error
@@ -92,7 +92,7 @@ class CampaignPart:
 @frozen
 class Campaign:
     """A campaign that is ready to run, all of it checked. words: the choice of histories, as `prepare` takes it;
-    verify: which cases are run with shorter steps besides (batch/verification/when.py)."""
+    verify: which cases are run with shorter steps besides (batch/campaigns/verification/when.py)."""
 
     plan: Plan
     parts: tuple[CampaignPart, ...]

@@ -18,13 +18,12 @@ from batch.archive.sink import temporary_of
 from batch.campaigns import merge, resuming
 from batch.campaigns.campaign import Campaign, histories_section, values_sections
 from batch.campaigns.drive import Driver, Progress, Stopped, TooManyFailures
+from batch.campaigns.executor import Executor
 from batch.campaigns.folder import Folder, FolderBusy, beside, uncovered
 from batch.campaigns.keep import CaseOutcomes
 from batch.campaigns.output import busy, cannot_write, check_room, publish
 from batch.campaigns.status import Reporter, died_lines
 from batch.campaigns.tasks import CampaignSection
-from batch.executors import Executor
-from batch.executors.threads import Threads
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 from met.outputs import quoted
@@ -61,7 +60,7 @@ class TooMany(Problem):
 def perform(
     campaign: Campaign,
     *,
-    executor: Executor | None = None,
+    executor: Executor,
     fresh: bool = False,
     max_failures: int | None = None,
     together: bool = False,
@@ -73,7 +72,7 @@ def perform(
     """Run a campaign into its archive. Raises Problem. An interrupt passes through, with words of what is kept and how
     to go on; without any where nothing is.
 
-    executor      who runs the tasks; None: the threads of this process
+    executor      who runs the tasks
     fresh         whether to start over where something is there
     max_failures  stop when more cases have failed
     together      put together what others have done; it cannot go on where cases are missing
@@ -109,7 +108,7 @@ def perform(
         work.begin(fresh)
         if ready is not None:
             ready()
-        return work.run(executor or Threads(), together)
+        return work.run(executor, together)
     except KeyboardInterrupt as interrupt:
         raise type(interrupt)(work.leave("interrupted")) from None
     except TooManyFailures as reason:
@@ -288,13 +287,13 @@ class _CampaignWork:
     def _verify(self, writer: ArchiveWriter, number: int, section: CampaignSection) -> None:
         """Run some of an experiment's cases, which are all in the archive by now, with shorter steps, where that is
         wanted."""
-        from batch.verification import when
+        from batch.campaigns.verification import when
 
         way = when.resolve(self.campaign.verify, section.prepared, len(section.rows))
         if way == "none":
             return
-        from batch.verification.choosing import chosen
-        from batch.verification.verifying import verify
+        from batch.campaigns.verification.choosing import chosen
+        from batch.campaigns.verification.verifying import verify
 
         experiment = self.campaign.parts[number].experiment
         outcomes = CaseOutcomes(writer.values(number, "case")["status"], writer.values(number, "metric"))

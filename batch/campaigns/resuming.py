@@ -17,7 +17,7 @@ from batch.campaigns.folder import Folder, FolderBusy, beside
 from batch.campaigns.output import sidecar_path
 from batch.campaigns.status import duration
 from batch.campaigns.tasks import CampaignSection
-from batch.verification import when
+from batch.campaigns.verification import when
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, read_json
 from met.plan import file as plan_file

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from batch.export.formats import endings
+from batch.formats import endings
 from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
 from met.messages.visible import line, say
 
@@ -48,11 +48,12 @@ def measured(value: Any, si: str) -> float:
     import re
 
     from met import units
+    from met.unit_parser import parse_unit
 
     split = re.fullmatch(r"([-+.\deE]*\d\.?)\s*(\D*)", str(value).strip())
     number, unit = split.groups() if split else ("", "")
-    found = float(number) * (units.parse_unit(unit).scale if unit else 1.0)
-    if unit and not units.same(units.parse_unit(unit).dimension, units.parse_unit(si).dimension):
+    found = float(number) * (parse_unit(unit).scale if unit else 1.0)
+    if unit and not units.same(parse_unit(unit).dimension, parse_unit(si).dimension):
         raise ValueError
     return found
 

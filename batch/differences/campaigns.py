@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.archive.stored import Stored
 from batch.differences import matching
 from batch.differences.compare import (
     DIFFERENT,
@@ -31,7 +32,7 @@ from batch.differences.samples import samples
 from batch.differences.tolerance import SignalTolerance, Tolerances, check, fits, of_deck
 from batch.differences.words import step_error_note
 from batch.queries.signals import deck_unit
-from batch.verification.figures import figures, of_difference
+from batch.queries.step_errors.figures import figures, of_difference
 from met.diagnostic import Problem
 from met.distinct import distinct
 from met.plan import Plan

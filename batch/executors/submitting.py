@@ -130,7 +130,7 @@ def shares(missing: Sequence[Task], count: int) -> list[list[Task]]:
 def _script(folder: Path, *words: str) -> str:
     """The job's script. words: after the folder, as a shell reads them."""
     exports = [f"export {name}={shlex.quote(value)}" for name, value in interpreter.packages().items()]
-    job = shlex.join(interpreter.command("batch.executors.job", str(folder.absolute())))
+    job = shlex.join(interpreter.command("batch.terminal.job", str(folder.absolute())))
     return "\n".join(["#!/bin/sh", *exports, f"exec {job} {' '.join(words)}", ""])
 
 

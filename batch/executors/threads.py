@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from batch.campaigns import shard, tasks
+from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.shard import cannot_keep
 from batch.campaigns.tasks import CampaignSection, Done, Task
-from batch.executors import Outcome
 
 
 class Threads:

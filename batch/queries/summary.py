@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.archive.stored import Stored
 from batch.queries.failures import FailureGroup, failures
 from batch.queries.signals import number_text
-from batch.verification import figures
-from batch.verification.figures import Verification
-from batch.verification.limits import StepErrorVerdict, verdicts
-from batch.verification.warning import warnings
+from batch.queries.step_errors import figures
+from batch.queries.step_errors.figures import Verification
+from batch.queries.step_errors.limits import StepErrorVerdict, verdicts
+from batch.queries.step_errors.warning import warnings
 from met.diagnostic import Diagnostic
 from met.frozen import frozen
 

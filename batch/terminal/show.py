@@ -16,10 +16,10 @@ from batch.queries.groups import cases_named
 from batch.queries.ordering import CaseOrder
 from batch.queries.pool import pools
 from batch.queries.signals import case_text, history, number_text, panels, pretty_unit
+from batch.queries.step_errors.words import NONE, about, error_text
 from batch.queries.structures import structures
 from batch.queries.summary import SPREAD_COLUMNS, MetricSummary, Summary, summary_of
 from batch.terminal import braille
-from batch.verification.words import NONE, about, error_text
 from ic.printing.columns import size as size_text
 from met.distinct import distinct
 from met.messages.visible import line

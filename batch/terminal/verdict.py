@@ -11,15 +11,14 @@ from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, CampaignPart
 from batch.campaigns.status import duration
 from batch.queries.failures import failure_lines
+from batch.queries.step_errors.words import HINT
 from batch.queries.summary import Summary, as_json
 from batch.terminal.show import verdict, warning_lines
-from batch.verification.words import HINT
 from ic.printing.columns import size as size_text
 from met.frozen import frozen
 from met.outputs import quoted
 
 if TYPE_CHECKING:
-    from batch import Archive
     from batch.export import Exported
 
 WORST = 3
@@ -175,15 +174,15 @@ def _why_not(summaries: tuple[Summary, ...]) -> str:
     return "; ".join(parts)
 
 
-def short_result_lines(archive: Archive) -> list[str]:
+def short_result_lines(path: Path, summaries: tuple[Summary, ...]) -> list[str]:
     """The verdict of an archive alone: for the log of a job."""
     out: list[str] = []
-    for summary in archive.summaries:
-        name = f"{summary.name}: " if len(archive.summaries) > 1 else ""
+    for summary in summaries:
+        name = f"{summary.name}: " if len(summaries) > 1 else ""
         lines = verdict(summary, 100)
         out += ["", f"{name}{lines[0]}", *lines[1:], *warning_lines(summary, 100)]
-    out += ["", f"archive  {archive.path}  ({size_text(archive.path.stat().st_size)})"]
-    return out if archive.ok else [*out, f"exit 1: {_why_not(archive.summaries)}"]
+    out += ["", f"archive  {path}  ({size_text(path.stat().st_size)})"]
+    return out if all(summary.ok for summary in summaries) else [*out, f"exit 1: {_why_not(summaries)}"]
 
 
 def verdict_json(

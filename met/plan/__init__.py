@@ -47,14 +47,11 @@ import numpy as np
 
 from met.diagnostic import Place
 from met.frozen import frozen, keyed
-from met.parameter import Parameter
+from met.parameter import BASE, Parameter
 from met.plan.run_keys import RunKey, run_key
 from met.trace.graph import Formulas
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
-
-BASE = "base"
-"""The link that the arm stands on. It has no joint, and matter only where a deck gives it some."""
 
 COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
 """Components of the pose of a prescribed base, and of a guide's path: m, and rad about fixed x, y, z."""

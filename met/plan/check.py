@@ -32,7 +32,9 @@ from met.plan import structure as plan_structure
 from met.plan.codec import Damaged
 from met.plan.defaults import INERTIA, declared, heads_of_models, related
 from met.plan.outputs import tolerable
-from met.trace.graph import TRUTHS, Formulas
+from met.trace.graph import Formulas
+from met.trace.nodes import TRUTHS
+from met.unit_parser import parse_unit
 
 GROUP = re.compile(r"[\w+-]+(\.[\w+-]+)*")
 """The name of a group of a sweep, behind the sweep's name."""
@@ -332,7 +334,7 @@ def _is_whole(values: np.ndarray) -> np.ndarray:
 
 def _same_unit(one: str, other: str) -> bool:
     try:
-        mine, theirs = units.parse_unit(one), units.parse_unit(other)
+        mine, theirs = parse_unit(one), parse_unit(other)
     except ValueError:
         return False
     return mine.scale == theirs.scale and units.same(mine.dimension, theirs.dimension)

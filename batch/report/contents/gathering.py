@@ -11,6 +11,8 @@ from typing import Any
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.groups import groups_named
 from batch.queries.pool import Pool, pools
+from batch.queries.step_errors.figures import figures, together
+from batch.queries.step_errors.words import about as about_errors
 from batch.report.contents import comparison
 from batch.report.contents.against import ComparedArchive, EarlierCases, of_groups
 from batch.report.contents.histories import MOST_VALUES, no_signals, signals
@@ -20,8 +22,6 @@ from batch.report.contents.parts import Fact, Report, ReportSection, SourceListi
 from batch.report.contents.stability import stability
 from batch.report.contents.tables import replay, structures, worst
 from batch.report.contents.verdicts import metric_rows, verdict
-from batch.verification.figures import figures, together
-from batch.verification.words import about as about_errors
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem
 from met.host.files import open_regular

@@ -7,12 +7,12 @@ import numpy as np
 from batch.queries.failures import failures, ranges
 from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
 from batch.queries.signals import deck_unit
+from batch.queries.step_errors.figures import Verification, figures
+from batch.queries.step_errors.limits import StepErrorVerdict, verdicts
+from batch.queries.step_errors.words import NONE, error_text
 from batch.queries.summary import spread
 from batch.report.contents.against import EarlierCases
 from batch.report.contents.parts import FailureRow, MetricRow, OutcomeCount, RequirementCounts, Verdict
-from batch.verification.figures import Verification, figures
-from batch.verification.limits import StepErrorVerdict, verdicts
-from batch.verification.words import NONE, error_text
 from ic.printing.columns import count as counted
 from met.run import DONE
 

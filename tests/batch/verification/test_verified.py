@@ -15,9 +15,9 @@ import ic
 from batch.archive.read import ArchiveFile
 from batch.campaigns import tasks
 from batch.campaigns.keep import CaseOutcomes
-from batch.verification import when
-from batch.verification.choosing import chosen, most
-from batch.verification.figures import case_error, figures
+from batch.campaigns.verification import when
+from batch.campaigns.verification.choosing import chosen, most
+from batch.queries.step_errors.figures import case_error, figures
 from met import cli
 from met import run as engine
 from met.analysis.refinement import refine

@@ -13,11 +13,7 @@ import ic
 from batch.archive.read import ArchiveFile
 from batch.differences.data import as_data
 from batch.differences.text import diff_lines
-from batch.queries.summary import as_json, summarise
-from batch.report.contents.gathering import gather
-from batch.report.html.page import page
-from batch.terminal.show import verdict
-from batch.verification.figures import (
+from batch.queries.step_errors.figures import (
     CaseError,
     MetricError,
     Verification,
@@ -26,7 +22,11 @@ from batch.verification.figures import (
     of_difference,
     together,
 )
-from batch.verification.words import NONE, about, error_text
+from batch.queries.step_errors.words import NONE, about, error_text
+from batch.queries.summary import as_json, summarise
+from batch.report.contents.gathering import gather
+from batch.report.html.page import page
+from batch.terminal.show import verdict
 from met.analysis.step_error import StepError
 
 SWEEP = """#include <two_link.ic>

@@ -13,10 +13,10 @@ import pytest
 import batch
 import ic
 from batch.archive.read import ArchiveFile
+from batch.queries.step_errors.warning import campaign_warnings, warnings
 from batch.queries.summary import as_json, summarise
 from batch.terminal.running import run_and_tell
 from batch.terminal.show import show
-from batch.verification.warning import campaign_warnings, warnings
 from met.diagnostic import Diagnostic
 from met.plan import Plan
 
@@ -145,7 +145,7 @@ def test_a_case_that_fails_with_a_shorter_step(tmp_path: Path, share: str, said:
 def test_a_case_that_fails_with_a_shorter_step_is_none_of_the_campaign_s_failures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from batch.verification import verifying
+    from batch.campaigns.verification import verifying
     from met import run as engine
 
     runs = engine.run

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import ic
-from batch.verification.figures import case_error
-from batch.verification.verifying import FACTORS
+from batch.campaigns.verification.verifying import FACTORS
+from batch.queries.step_errors.figures import case_error
 from met import models
 from met import run as engine
 from met.analysis.refinement import refine

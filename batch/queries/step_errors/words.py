@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from batch.queries.signals import number_text
-from batch.verification.figures import MetricError, Verification
+from batch.queries.step_errors.figures import MetricError, Verification
 
 HINT = "not verified: `--verify some` runs some cases at half and a quarter of the step"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, Literal
 
-from batch.verification.choosing import most
-from batch.verification.verifying import FACTORS
+from batch.campaigns.verification.choosing import most
+from batch.campaigns.verification.verifying import FACTORS
 from met.plan import Experiment
 from met.run import Prepared
 

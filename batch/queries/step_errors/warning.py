@@ -13,8 +13,8 @@ import numpy as np
 
 from batch.queries.requirements import GroupRequirement, group_requirements
 from batch.queries.signals import deck_unit, number_text
-from batch.verification.figures import CaseError, Verification, figures
-from batch.verification.words import rounded
+from batch.queries.step_errors.figures import CaseError, Verification, figures
+from batch.queries.step_errors.words import rounded
 from ic.printing.columns import count as counted
 from met.diagnostic import Diagnostic, Label, Place
 

@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING
 
 from batch.queries.signals import deck_unit
-from batch.verification.figures import CaseError, Verification
-from batch.verification.words import rounded
+from batch.queries.step_errors.figures import CaseError, Verification
+from batch.queries.step_errors.words import rounded
 from met.frozen import frozen
 from met.plan import StepErrorLimit
 
