@@ -25,6 +25,7 @@ itself still says what its cases are (`q.where(q["recorded.gearbox.kp"] > 0.02, 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import field
@@ -246,6 +247,7 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
             "metric": [named.get(r.metric, r.metric) for r in experiment.requirements],
             "comparison": [r.comparison for r in experiment.requirements],
             "limit": np.array([r.limit for r in experiment.requirements]),
+            **_over_cases(experiment),
         }
         flags = {"flag_values": np.array([1, 0, -1], np.int8), "flag_meanings": "met missed unknown"}
         out += [
@@ -260,6 +262,20 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
             ),
         ]
     return out
+
+
+def _over_cases(experiment: Experiment) -> dict[str, np.ndarray]:
+    """Share and confidence of each requirement, not-a-number where it has none; nothing where none of them has any."""
+    found = experiment.requirements
+    if all(requirement.share is None for requirement in found):
+        return {}
+    return {
+        name: np.array([math.nan if value is None else value for value in values])
+        for name, values in (
+            ("share", [requirement.share for requirement in found]),
+            ("confidence", [requirement.confidence for requirement in found]),
+        )
+    }
 
 
 def _apart(name: str, word: str, taken: Collection[str], fellows: Collection[str]) -> str:
@@ -281,6 +297,8 @@ def _coordinate(experiment: Experiment, coordinate: Coordinate, name: str) -> Va
     words = f"varied: {coordinate.path}"
     if name != coordinate.path:
         written["path"] = coordinate.path
+    if coordinate.design:
+        written["design"] = coordinate.design
     return Variable(name, "float64", ("case",), "coordinate", words, unit, written, coordinate.path)
 
 

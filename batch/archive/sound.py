@@ -148,11 +148,19 @@ def _requirements(group: StoredGroup) -> None:
     if count and "met" not in group.variables:
         raise Unlike("variable `met` is missing or of another type")
     told = group.variables["requirement"].attributes
-    for name, types in (("metric", str), ("comparison", str), ("limit", float)):
+    for name, types in (
+        ("metric", str),
+        ("comparison", str),
+        ("limit", float),
+        ("share", float),
+        ("confidence", float),
+    ):
         values = told.get(name, [])
         values = values if isinstance(values, list) else [values]
         if name in told and (len(values) != count or not all(isinstance(value, types) for value in values)):
             raise Unlike(f"attribute `{name}` of `requirement` is not of each")
+        if name in ("share", "confidence") and not all(0.0 < value <= 1.0 for value in values if value == value):
+            raise Unlike(f"attribute `{name}` of `requirement` is no share")
 
 
 def _values(group: StoredGroup) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.archive.stored import Stored
+from batch.queries.evidence import EvidenceRow, over_cases
 from batch.queries.failures import FailureGroup, failures
 from batch.queries.signals import number_text
 from batch.queries.step_errors import figures
@@ -69,6 +70,7 @@ class RequirementSummary:
     """The numbers of cases that meet a requirement, miss it, and leave it open.
 
     unknown  because they failed, or because the metric has no value;  no_value  of these, the latter
+    evidence of one over a share of cases, at each design point; empty of one that every case is to meet
     """
 
     text: str
@@ -76,6 +78,12 @@ class RequirementSummary:
     missed: int
     unknown: int
     no_value: int
+    evidence: tuple[EvidenceRow, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """True if every case meets it, or of one over a share of cases if it is so at every design point."""
+        return all(row.ok for row in self.evidence) if self.evidence else not self.missed and not self.unknown
 
 
 @frozen
@@ -106,7 +114,7 @@ class Summary:
     @property
     def ok(self) -> bool:
         """True if every case reached its end and met every requirement, and errors by the step are as required."""
-        return self.failed == 0 and all(r.met == self.cases for r in self.requirements) and not self.untrue
+        return self.failed == 0 and all(r.ok for r in self.requirements) and not self.untrue
 
     @property
     def untrue(self) -> tuple[StepErrorVerdict, ...]:
@@ -131,6 +139,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
     requirements: tuple[RequirementSummary, ...] = ()
     if "met" in group.variables:
         met, done = group.values("met")[here], group.values("status")[here] == 0
+        shares = over_cases(group) if position is None else []
         requirements = tuple(
             RequirementSummary(
                 str(text),
@@ -138,6 +147,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
                 missed=int((met[:, i] == 0).sum()),
                 unknown=int((met[:, i] == -1).sum()),
                 no_value=int(((met[:, i] == -1) & done).sum()),
+                evidence=tuple(row for row in shares if row.requirement.place == i),
             )
             for i, text in enumerate(group.values("requirement"))
         )

@@ -20,6 +20,8 @@ from batch.queries.step_errors.words import NONE, about, error_text
 from batch.queries.structures import structures
 from batch.queries.summary import SPREAD_COLUMNS, MetricSummary, Summary, summary_of
 from batch.terminal import braille
+from batch.terminal.evidence import evidence_lines
+from ic.printing.columns import count
 from ic.printing.columns import size as size_text
 from met.distinct import distinct
 from met.messages.visible import line
@@ -193,9 +195,12 @@ def verdict(summary: Summary, width: int) -> list[str]:
         out += _metric_table(summary)
     if summary.verified is not None:
         out += textwrap.wrap(about(summary.verified), width, initial_indent="  ", subsequent_indent="    ")
-    texts = [*(each.text for each in summary.requirements), *(each.text for each in summary.step_errors)]
-    wide = max(map(len, texts), default=0)
+    texts = [each.text for each in summary.requirements if not each.evidence]
+    wide = max(map(len, (*texts, *(each.text for each in summary.step_errors))), default=0)
     for r in summary.requirements:
+        if r.evidence:
+            out += [f"  require {r.text}", *(f"    {text}" for text in evidence_lines(r.evidence))]
+            continue
         if summary.cases == 1:
             why = "its metric has no value here" if r.no_value else "the case failed"
             said = "met" if r.met else "missed" if r.missed else f"not known: {why}"
@@ -206,6 +211,11 @@ def verdict(summary: Summary, width: int) -> list[str]:
         out.append(f"  require {r.text:<{wide}}  {said}")
     for each in summary.step_errors:
         out.append(f"  require {each.text:<{wide}}  {each.word}: {each.said}")
+    verdicts = [row for r in summary.requirements for row in r.evidence if row.lower is not None]
+    if len(verdicts) > 1:
+        tested = len({row.requirement.text for row in verdicts})
+        where = f"{count(tested, 'requirement')} at {count(len(verdicts) // tested, 'design point')}"
+        out.append(f"  {len(verdicts):,} verdicts ({where}): the confidence is that of each by itself")
     return out
 
 

@@ -270,13 +270,21 @@ class MetricUse:
 
 @frozen
 class Requirement:
-    """A condition on a metric that a case meets or misses, in SI; `text` as the deck wrote it."""
+    """A condition on a metric that a case meets or misses, in SI; `text` as the deck wrote it.
+
+    share       of all cases that may be drawn, the part that is to meet it, above 0 and at most 1; None where every
+                case of the campaign is to meet it
+    confidence  with which the cases that were drawn are to show the share, above 0 and below 1; None where the share of
+                these cases themselves decides
+    """
 
     text: str
     metric: str
     comparison: Literal["<", "<=", ">", ">="]
     limit: float
     place: Place | None = None
+    share: float | None = keyed("where set", default=None)
+    confidence: float | None = keyed("where set", default=None)
 
 
 @frozen
@@ -439,12 +447,17 @@ def ground(links: Iterable[Link], joints: Iterable[Joint]) -> tuple[str, ...]:
     return tuple(link.name for link in links if link.name in found)
 
 
+Design = Literal["", "random", "lhs", "sobol"]
+"""The ways in which values of a coordinate are drawn; "" where they are chosen."""
+
+
 @frozen
 class Coordinate:
     """One varied parameter of a sweep, as the deck wrote its path; values are in SI, one a case.
 
     sets: paths of the parameters that follow it directly. unit, scale: as the deck wrote it, for display;
     shown = value / scale.
+    design: of the sample that drew it; "" where its values were chosen
     """
 
     path: str
@@ -453,6 +466,7 @@ class Coordinate:
     values: np.ndarray
     sets: tuple[str, ...]
     place: Place | None = None
+    design: Design = keyed("never", default="")
 
 
 @frozen

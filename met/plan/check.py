@@ -107,6 +107,11 @@ def _check_requirements(experiment: Experiment, where: str) -> None:
             raise Damaged(f"{where}[{index}].metric", f"there is no metric `{requirement.metric}`")
         if math.isnan(requirement.limit):
             raise Damaged(f"{where}[{index}].limit", "it is not a number")
+        share, confidence = requirement.share, requirement.confidence
+        if share is not None and not 0.0 < share <= 1.0:
+            raise Damaged(f"{where}[{index}].share", "it should be above 0 and at most 1")
+        if confidence is not None and not (share is not None and share < 1.0 and 0.0 < confidence < 1.0):
+            raise Damaged(f"{where}[{index}].confidence", "it should be between 0 and 1, of a share between 0 and 1")
         first = said.setdefault(requirement.text, requirement)
         if (first.metric, first.comparison, first.limit) != (
             requirement.metric,

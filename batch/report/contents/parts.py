@@ -365,6 +365,7 @@ class ReportSection:
     """A run or sweep.
 
     name        as it is asked for;  lede  what it is, in a sentence
+    evidence    what the cases show of requirements over a share of cases;  None where there is none
     changes     against another archive, a structure each;  what one of them lacks is in `ArchiveChanges.alone`
     trouble     why parameters and stability are missing; "" where they are not
     by_step     what the errors of metrics by the step rest on; "" where none was verified
@@ -375,6 +376,7 @@ class ReportSection:
     facts: tuple[Fact, ...]
     varied: tuple[VariedParameter, ...]
     metrics: tuple[MetricRow, ...]
+    evidence: TextTable | None
     structures: TextTable | None
     worst: WorstCaseTable | None
     overview: Overview | None

@@ -10,7 +10,7 @@ from batch.queries.signals import deck_unit
 from batch.queries.step_errors.figures import Verification, figures
 from batch.queries.step_errors.limits import StepErrorVerdict, verdicts
 from batch.queries.step_errors.words import NONE, error_text
-from batch.queries.summary import spread
+from batch.queries.summary import spread, summary_of
 from batch.report.contents.against import EarlierCases
 from batch.report.contents.parts import FailureRow, MetricRow, OutcomeCount, RequirementCounts, Verdict
 from ic.printing.columns import count as counted
@@ -33,7 +33,7 @@ def verdict(pool: Pool, *, named: bool) -> Verdict:
     return Verdict(
         kind="requirements",
         about=pool.name if named else "",
-        ok=good == pool.count and all(each.met for each in errors),
+        ok=all(summary_of(group).ok for group in pool.groups),
         headline=_headline(pool, good),
         parts=parts,
         demands=tuple(_demand(pool, place, text) for place, text in enumerate(pool.requirements)),

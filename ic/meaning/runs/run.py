@@ -34,7 +34,8 @@ from ic.meaning.runs.environment import resolve_environment
 from ic.meaning.runs.initial import check_balanced, resolve_initial
 from ic.meaning.runs.keys import resolve_run_keys
 from ic.meaning.runs.rates import resolve_rates, resolve_schedule
-from ic.meaning.runs.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
+from ic.meaning.runs.record import resolve_metrics, resolve_record
+from ic.meaning.runs.requirements import read_requirements, resolve_requirements
 from ic.meaning.runs.step_errors import resolve_step_errors
 from ic.meaning.runs.tolerances import resolve_tolerances
 from ic.text.complaints import known_words, where_it_belongs
