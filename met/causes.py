@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from met import models
 from met.diagnostic import Place
 from met.plan import Experiment
 from met.program.plausible import DOUBTFUL, DOUBTFUL_TICK, FAILED, MEASURE, OF
 from met.program.step import FAILURE, NOT_FINITE, OUT_OF_RANGE, SINGULAR, TOO_FAST, UNBALANCED
+from met.program.unheld import Unheld, unheld
 
 
-def cause_of(experiment: Experiment, row: int, outputs: Mapping[str, float]) -> str:
-    """Why a case failed, in words. row: of the case table; outputs: of its program, by name."""
+def causes_of(experiment: Experiment, inputs: np.ndarray, outputs: Mapping[str, np.ndarray]) -> list[str]:
+    """Why cases failed, in words. inputs: of their program, [case, input]; outputs: of it, by name, [case]."""
+    each = [{name: float(of[case]) for name, of in outputs.items()} for case in range(len(inputs))]
+    found = ["" if of["failure"] == UNBALANCED else _cause_of(experiment, of) for of in each]
+    unbalanced = np.flatnonzero(outputs["failure"] == UNBALANCED)
+    if len(unbalanced):
+        for case, joints in zip(unbalanced.tolist(), unheld(experiment, inputs[unbalanced]), strict=True):
+            found[case] = _cause_of_balance(experiment, int(outputs["failure.joint"][case]), joints)
+    return found
+
+
+def _cause_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
+    """Why a case failed that its servos could begin, in words. outputs: of its program, by name."""
     failure, number, tick = (outputs[name] for name in FAILURE)
     moving = experiment.structure.moving
-    if failure == UNBALANCED:
-        return _cause_of_balance(experiment, row, moving[int(number)].name)
     if failure == TOO_FAST:
         name, unit, where = _of_rate(experiment, int(number))
         return (
@@ -100,11 +112,13 @@ def _of_steps(experiment: Experiment) -> str:
     )
 
 
-def _cause_of_balance(experiment: Experiment, row: int, joint: str) -> str:
-    """Why a case failed whose servos cannot hold their joints where it begins balanced, in words."""
-    from met.analysis.balance import unheld  # which runs the beginning of the program, and so needs met.run
+def _cause_of_balance(experiment: Experiment, number: int, joints: Sequence[Unheld]) -> str:
+    """Why a case failed whose servos cannot hold their joints where it begins balanced, in words.
 
-    found = {each.joint.name: each for each in unheld(experiment, row)}
+    number: of the first of the joints;  joints: what is known of all that are not held
+    """
+    joint = experiment.structure.moving[number].name
+    found = {each.joint.name: each for each in joints}
     if joint not in found:
         return f"t = 0 s: joint {joint}: it cannot begin balanced: its servo holds just less than the joint takes."
     each = found[joint]

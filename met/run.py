@@ -12,7 +12,7 @@ import numpy as np
 
 from met import backends
 from met.backends.backend import Kernel
-from met.causes import cause_of, doubt_of
+from met.causes import causes_of, doubt_of
 from met.frozen import frozen
 from met.judging import judge
 from met.plan import REPEAT, Experiment, keys
@@ -224,8 +224,12 @@ def results(
     failed = out["failure"] != 0.0
     n_valid = np.where(failed, np.ceil(out["failure.tick"] / schedule.record), schedule.rows).astype(np.int64)
     causes = [""] * len(rows)
-    for case in np.flatnonzero(failed & (out["failure"] != STOPPED)).tolist():
-        causes[case] = cause_of(experiment, int(rows[case]), {name: float(of[case]) for name, of in out.items()})
+    failures = np.flatnonzero(failed & (out["failure"] != STOPPED))
+    if len(failures):
+        of_failures = {name: values[failures] for name, values in out.items()}
+        found = causes_of(experiment, inputs(experiment, rows[failures]), of_failures)
+        for case, cause in zip(failures.tolist(), found, strict=True):
+            causes[case] = cause
     status = np.where(failed, FAILED, DONE).astype(np.int8)
     for fated, (ended, why) in (fates or {}).items():
         status[fated], failed[fated], causes[fated] = ended, True, why

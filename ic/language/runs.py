@@ -140,7 +140,9 @@ RUN = BlockDeclaration(
         Entry(name="metric", form="named", written="metric NAME = MODEL { ... }", default="none",
               path="metrics.NAME", doc="one number of a case"),
         Entry(name="require", form="statement", written="require METRIC < LIMIT;", default="none",
-              doc="a limit that counts for the exit code; also `<=`, `>`, `>=`"),
+              doc="a limit that counts for the exit code; also `<=`, `>`, `>=`; of a share of cases: "
+                  "`in 99 % of cases with 90 % confidence`; "
+                  "`step_error(METRIC) < 1 %` is one on its error by the step"),
         Entry(name="tolerances", written="tolerances { ... }", default="none: not in a bit",
               doc="by how much another version may differ before `met diff` says so"),
         Entry(name="seed", written="seed = 7;", default="0", parameter=SEED, path="seed",

@@ -14,10 +14,10 @@ def check_balance(complaints: Complaints, experiment: Experiment) -> None:
     """
     if not experiment.structure.balanced or any(isinstance(q.value, Formula) for q in experiment.parameters.values()):
         return
-    from met.analysis.balance import unheld
+    from met.analysis.balance import unheld_at_start
 
     with complaints.gather():
-        for each in unheld(experiment):
+        for each in unheld_at_start(experiment):
             help = [each.reason, "or let the servos begin unloaded: without `servos = balanced` the arm sinks in"]
             limits = [experiment.parameters[f"{each.joint.name}.servo.{name}"] for name, _ in each.limits]
             places = [quantity.origin.place for quantity in limits if quantity.origin.place is not None]

@@ -26,6 +26,7 @@ def experiment(scope: Scope, name: str, place: Place, resolved: Resolved, cases:
         place,
         notes,
         tolerances=resolved.tolerances,
+        step_errors=resolved.step_errors,
         **resolved.settings,
     )
 

@@ -33,8 +33,9 @@ class TestWhatIsSaid:
             "writing two_link.h5, about 58.3 KiB\n"
             "\n"
             "the case reached its end, TIME of computing\n"
-            "  settle      5 s  settling_time of shoulder.qd\n"
-            "  volts   5.758 V  max of shoulder.servo.voltage\n"
+            "  settle      5 ± 0.01 s  settling_time of shoulder.qd\n"
+            "  volts   5.758 ± 0    V  max of shoulder.servo.voltage\n"
+            "  ± by the step: 1 case at half and a quarter of the step\n"
             "  require settle < 10 s  met\n"
             "\n"
             f"archive  two_link.h5  ({size})\n"
@@ -64,6 +65,7 @@ class TestWhatIsSaid:
             "missed": 1,
             "unknown": 0,
             "no_value": 0,
+            "evidence": [],
         }
 
     @pytest.mark.slow

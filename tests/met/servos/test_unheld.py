@@ -134,3 +134,15 @@ def test_a_joint_that_turns_is_judged_at_its_rate(tmp_path: Path) -> None:
     assert not check(tmp_path, turning).diagnostics
     said = messages(check(tmp_path, turning.replace("v_max = 6.0 V", f"v_max = {4.0 + 0.5 * NEEDED['v_max']} V")))
     assert f"it takes 14.7 N m, and its servo can hold {0.5 * LOAD:.3g} N m" in said
+
+
+@pytest.mark.parametrize(("servo", "name"), LIMITS)
+def test_many_cases_are_told_what_each_would_be_alone(servo: str, name: str, tmp_path: Path) -> None:
+    """Their servos are judged together; the last can hold its joint."""
+    values = [share * NEEDED[name] for share in (0.1, 0.35, 0.6, 0.99, 1.5)]
+    made = swept(tmp_path, servo, name, values)
+    together = engine.run(made)
+    alone = [engine.run(made, [case]).cause[0] for case in range(len(values))]
+    assert together.cause == alone and len(set(alone)) == len(values) and not alone[-1]
+    for value, cause in zip(values[:-1], alone, strict=False):
+        assert f"`{name}`, {value:.3g} " in cause
