@@ -96,13 +96,17 @@ def under(parameter: Parameter, command: str) -> Parameter:
 
 @frozen(kw_only=True)
 class Memory:
-    """A number that a model's computer holds from one of its ticks to the next; recorded under its name."""
+    """A number that a model's computer holds from one of its ticks to the next; recorded under its name.
+
+    limit  the parameter that its size never exceeds, by name; "": none
+    """
 
     name: str
     unit: str
     doc: str
     start: float = 0.0
     only: Only | None = None
+    limit: str = ""
 
 
 @old_fields(between="in_transmission")
@@ -125,9 +129,13 @@ class State:
 
 @frozen(kw_only=True)
 class Signal:
-    """A number that a model shows at every instant, computed from the rest; recorded under its name."""
+    """A number that a model shows at every instant, computed from the rest; recorded under its name.
+
+    limit  the parameter that its size never exceeds, by name; "": none
+    """
 
     name: str
     unit: str
     doc: str
     only: Only | None = None
+    limit: str = ""

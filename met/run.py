@@ -10,13 +10,16 @@ from functools import cached_property
 
 import numpy as np
 
-from met import backends, models
+from met import backends
 from met.backends.backend import Kernel
+from met.causes import causes_of, doubt_of
 from met.frozen import frozen
+from met.judging import judge
 from met.plan import REPEAT, Experiment, keys
-from met.program.build import COORDINATE, METRIC, OUTPUTS, build
+from met.program import plausible
+from met.program.build import COORDINATE, METRIC, build
 from met.program.control.substituted import LIMITED
-from met.program.step import EVENTS, NOT_FINITE, OUT_OF_RANGE, SINGULAR
+from met.program.step import EVENTS
 from met.trace.identity import result_keys, state_key
 from met.trace.program import Program
 from met.trace.recorder import record
@@ -44,6 +47,7 @@ class Run:
     coordinates  the varied parameters as the engine used them, by path, SI
     events       friction events by name: splits, clamped, undecided (docs/physics.md, section 6)
     limited      ticks at which the load motor of a bed was at its limit
+    warning      what makes a case that is done doubtful, in words, empty where nothing does
     """
 
     case: np.ndarray
@@ -57,6 +61,7 @@ class Run:
     coordinates: dict[str, np.ndarray]
     events: dict[str, np.ndarray]
     limited: np.ndarray
+    warning: list[str]
 
 
 @frozen
@@ -104,8 +109,13 @@ class Prepared:
 
     @cached_property
     def work_key(self) -> str:
-        """Key of all that a case gives, in its order: the state, every recorded signal and every metric."""
-        keys = [self.code_key, *(f"{name} {key}" for name, key in self.result_keys.items())]
+        """Key of all that a case gives, in its order: the state, every recorded signal and every metric, and what else
+        is watched."""
+        known = (*(self.program.state_outputs or ()), *(METRIC + use.name for use in self.experiment.structure.metrics))
+        watched = {name: name for name in self.program.outputs if name not in known and not name.startswith(COORDINATE)}
+        of_watched = result_keys(self.recording, watched) if watched else {}
+        given = self.result_keys | {name: _code_key(key) for name, key in of_watched.items()}
+        keys = [self.code_key, *(f"{name} {key}" for name, key in given.items())]
         return _code_key(hashlib.sha256("\n".join(keys).encode()).hexdigest())
 
     @cached_property
@@ -177,6 +187,7 @@ def compute(
         threads=threads,
         progress=progress,
     )
+    judge(prepared.program.outputs, outputs)
     return history, outputs
 
 
@@ -213,8 +224,12 @@ def results(
     failed = out["failure"] != 0.0
     n_valid = np.where(failed, np.ceil(out["failure.tick"] / schedule.record), schedule.rows).astype(np.int64)
     causes = [""] * len(rows)
-    for case in np.flatnonzero(failed & (out["failure"] != STOPPED)).tolist():
-        causes[case] = _cause(experiment, *outputs[case, :3].tolist())
+    failures = np.flatnonzero(failed & (out["failure"] != STOPPED))
+    if len(failures):
+        of_failures = {name: values[failures] for name, values in out.items()}
+        found = causes_of(experiment, inputs(experiment, rows[failures]), of_failures)
+        for case, cause in zip(failures.tolist(), found, strict=True):
+            causes[case] = cause
     status = np.where(failed, FAILED, DONE).astype(np.int8)
     for fated, (ended, why) in (fates or {}).items():
         status[fated], failed[fated], causes[fated] = ended, True, why
@@ -224,6 +239,9 @@ def results(
             out[COORDINATE + coordinate.path][fated] = coordinate.values[rows[fated]]
     for case, cause in _misapplied(experiment, rows, out).items():
         status[case], failed[case], n_valid[case], causes[case] = FAILED, True, 0, cause
+    warnings = [""] * len(rows)
+    for case in np.flatnonzero(~failed & (out.get(plausible.DOUBTFUL_TICK, failed) != 0.0)).tolist():
+        warnings[case] = doubt_of(experiment, {name: float(of[case]) for name, of in out.items()})
     signals: dict[str, np.ndarray] = {}
     if history is not None:
         for case in np.flatnonzero(failed).tolist():
@@ -247,6 +265,7 @@ def results(
         coordinates={c.path: out[COORDINATE + c.path] for c in experiment.cases.coordinates},
         events={name.split(".")[1]: out[name].astype(np.int64) for name in EVENTS},
         limited=out[LIMITED].astype(np.int64),
+        warning=warnings,
     )
 
 
@@ -266,101 +285,3 @@ def _misapplied(experiment: Experiment, rows: np.ndarray, out: Mapping[str, np.n
 def _met(metric: np.ndarray, comparison: str, limit: float) -> np.ndarray:
     compare = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal}[comparison]
     return np.asarray(compare(metric, limit))
-
-
-def _cause(experiment: Experiment, failure: float, number: float, tick: float) -> str:
-    """Why a case failed, in words; empty where it did not."""
-    assert OUTPUTS[:3] == ("failure", "failure.joint", "failure.tick")
-    if failure == 0.0:
-        return ""
-    moving = experiment.structure.moving
-    if int(number) == len(moving) and experiment.structure.free:
-        return _cause_of_base(experiment, failure, tick)
-    others = len(moving) + experiment.structure.free + sum(each.flies for each in experiment.structure.payloads)
-    if int(number) >= others:
-        return _cause_of_sensor(experiment, int(number) - others, tick)
-    if int(number) >= len(moving):
-        return _cause_of_payload(experiment, int(number) - len(moving) - experiment.structure.free, tick)
-    joint = moving[int(number)]
-    prismatic = joint.kind == "prismatic"
-    unit = "kg" if prismatic else "kg m^2"
-    head = f"t = {tick / experiment.structure.schedule.base_hz:g} s: joint {joint.name}: "
-    where = f" ({joint.place.file}:{joint.place.line})" if joint.place else ""
-    if failure == SINGULAR and tick > 0.0:
-        return (
-            f"{head}D is not above 0 {unit} any more, so qdd is undefined{where}. At the start it was: usually the "
-            f"motion has diverged, and a step is too long for the servo, the arm or what acts on it (try a faster rate "
-            f"for the dynamics); or what is outboard has no inertia about this joint in this position."
-        )
-    if failure == SINGULAR:
-        return (
-            f"{head}D is not above 0 {unit}, so qdd is undefined. Nothing outboard has inertia about this "
-            f"joint{where}. Give the link mass or the servo a rotor inertia."
-        )
-    if failure == OUT_OF_RANGE:
-        return (
-            f"{head}a state of its servo is where it can never be{where}: a step is too long for the servo (try a "
-            f"faster rate for the dynamics). The bristles of `friction = lugre` want sigma_0 |motor rate|/f_c times "
-            f"the step to stay below the integrator's limit."
-        )
-    assert failure == NOT_FINITE
-    what = "the servo, the arm or what acts on its base" if experiment.structure.free else "the servo or the arm"
-    return (
-        f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: "
-        f"{_of_guide(experiment, joint.name)}a step too long for {what} (see the stability figures of `met plan`; try "
-        f"a faster rate for the dynamics), or a model that divides by zero."
-    )
-
-
-def _of_guide(experiment: Experiment, joint: str) -> str:
-    """In words, where the guide that a joint follows gives it no number; empty where there is no such guide."""
-    for use in experiment.structure.guides:
-        undefined = models.find("guide", use.model, use.place).undefined
-        if joint in use.joints and undefined:
-            where = f" ({use.place.file}:{use.place.line})" if use.place else ""
-            return f"guide `{use.name}`{where}, which it follows, {undefined}; "
-    return ""
-
-
-def _cause_of_payload(experiment: Experiment, number: int, tick: float) -> str:
-    """Why a case failed by one of the payloads that fly, in words."""
-    payload = [each for each in experiment.structure.payloads if each.flies][number]
-    where = f" ({payload.place.file}:{payload.place.line})" if payload.place else ""
-    return (
-        f"t = {tick / experiment.structure.schedule.base_hz:g} s: payload {payload.name}: position, rate or "
-        f"acceleration is no longer a finite number{where}. Usual reasons: a step too long for what acts on it (try a "
-        f"faster rate for the dynamics), or a model that divides by zero."
-    )
-
-
-def _cause_of_sensor(experiment: Experiment, number: int, tick: float) -> str:
-    """Why a case failed by one of the sensors of links, in words."""
-    sensor = experiment.structure.sensors[number]
-    where = f" ({sensor.place.file}:{sensor.place.line})" if sensor.place else ""
-    return (
-        f"t = {tick / experiment.structure.schedule.base_hz:g} s: sensor {sensor.name}: its filter is no longer a "
-        f"finite number{where}. Usual reasons: a step too long for its `cutoff` (try a faster rate for the dynamics), "
-        f"or numbers that no double holds."
-    )
-
-
-def _cause_of_base(experiment: Experiment, failure: float, tick: float) -> str:
-    """Why a case failed by its free base, in words."""
-    base = experiment.structure.base
-    head = f"t = {tick / experiment.structure.schedule.base_hz:g} s: the base: "
-    where = f" ({base.place.file}:{base.place.line})" if base is not None and base.place else ""
-    if failure == SINGULAR and tick > 0.0:
-        return (
-            f"{head}it moves freely and has no inertia in some direction any more, so its acceleration is "
-            f"undefined{where}. At the start it had: usually the motion has diverged, and a step is too long for what "
-            f"acts on the base or for a servo (try a faster rate for the dynamics)."
-        )
-    if failure == SINGULAR:
-        return (
-            f"{head}it moves freely and has no inertia in some direction, so its acceleration is undefined{where}. "
-            f"Give link base mass, and a shape or inertia."
-        )
-    return (
-        f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: a step too long for "
-        f"what acts on it (try a faster rate for the dynamics), or a model that divides by zero."
-    )

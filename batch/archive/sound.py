@@ -41,6 +41,7 @@ OTHERS: dict[str, tuple[tuple[str, ...], str]] = {
     "repeat": (("case",), WHOLE),
     "seed": (("case",), WHOLE),
     "bed_limited": (("case",), WHOLE),
+    "warning": (("case",), WORDS),
     "recorded_case": (("recorded_case",), WHOLE),
     "time": (("time",), "f"),
     "requirement": (("requirement",), WORDS),

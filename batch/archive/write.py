@@ -212,6 +212,7 @@ def _values(group: OpenGroup, run: Run) -> dict[str, Any]:
         "repeat": 0 if experiment.cases.repeats is None else experiment.cases.repeats[rows],
         "status": run.status,
         "cause": run.cause,
+        "warning": run.warning,
         "n_valid": run.n_valid,
         "bed_limited": run.limited,
         **{f"friction_{name}": count for name, count in run.events.items()},
@@ -220,7 +221,7 @@ def _values(group: OpenGroup, run: Run) -> dict[str, Any]:
     }
     for choice, variable in zip(experiment.cases.choices, group.layout.role("choice"), strict=True):
         values[variable.name] = [choice.value] * len(rows)
-    for name in ("case_id", "case_key", "cause"):
+    for name in ("case_id", "case_key", "cause", "warning"):
         values[name] = np.array(values[name], dtype=object)
     met = np.empty((len(rows), len(experiment.requirements)), np.int8)
     for index, requirement in enumerate(experiment.requirements):

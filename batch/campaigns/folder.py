@@ -39,7 +39,7 @@ from met.diagnostic import Problem, error
 from met.host.files import is_count, new_file, read_json, read_regular, whole_file
 from met.plan import Plan
 from met.plan import file as plan_file
-from met.program.step import OUT_OF_RANGE
+from met.program.step import TOO_FAST
 from met.version import VERSION
 
 SCHEMA, FORMAT = "met.campaign", 1
@@ -380,7 +380,7 @@ def _fits(section: CampaignSection, found: shard.Shard) -> bool:
         return False
     failed = found.outputs[found.outputs[:, 0] != 0.0, :3]
     parts = len(structure.moving) + bool(structure.free) + len(structure.payloads) + len(structure.sensors)
-    most = np.array([OUT_OF_RANGE, parts, structure.schedule.ticks + 1])
+    most = np.array([TOO_FAST, parts, structure.schedule.ticks + 1])
     return bool(((failed >= 0.0) & (failed <= most)).all())
 
 

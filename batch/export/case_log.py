@@ -48,6 +48,8 @@ def log_lines(case: ExportedCase) -> list[LogLine]:
     if "bed_limited" in group.variables and (ticks := int(_at(group, "bed_limited", position))):
         text = f"the load motor of a bed was at its limit for {ticks:,} ticks: the run is not what the joint would do"
         out.append(LogLine(end, "WARNING", text))
+    if "warning" in group.variables and (warning := str(_at(group, "warning", position))):
+        out.append(LogLine(end, "WARNING", warning))
     metrics = {variable.name: variable for variable in group.role("metric")}
     for text, outcome, name in _requirements(group, position):
         has = f" ({name} = {_value(group, metrics[name], position)})" if name in metrics else ""

@@ -84,12 +84,13 @@ class Pool:
 
     def texts(self, name: str, places: Sequence[int] | np.ndarray) -> list[str]:
         """A variable of words in the cases at these places."""
-        out = [""] * len(places)
+        wanted = np.asarray(places, np.int64)
+        out = [""] * len(wanted)
         for number, group in enumerate(self.groups):
-            mine = [i for i, place in enumerate(places) if self.group_of[place] == number]
-            if mine and name in group.variables:
-                found = group.at(name, [int(self.position_of[places[i]]) for i in mine])
-                for i, text in zip(mine, found, strict=True):
+            mine = np.flatnonzero(self.group_of[wanted] == number)
+            if len(mine) and name in group.variables:
+                found = group.at(name, self.position_of[wanted[mine]])
+                for i, text in zip(mine.tolist(), found.tolist(), strict=True):
                     out[i] = str(text)
         return out
 

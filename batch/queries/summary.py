@@ -96,6 +96,7 @@ class Summary:
     verified  how true the metrics are, by the names of their variables; None where that is not known
     step_errors  what is required of errors by the step; of a case alone, nothing
     warnings  of what that calls in question; of a case alone, none
+    doubts    of cases that are done and doubtful all the same, by what makes them so
     """
 
     name: str
@@ -110,6 +111,7 @@ class Summary:
     verified: Verification | None = None
     step_errors: tuple[StepErrorVerdict, ...] = ()
     warnings: tuple[Diagnostic, ...] = ()
+    doubts: tuple[FailureGroup, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -164,8 +166,20 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
         verified=verified,
         step_errors=verdicts(group, verified) if position is None else (),
         warnings=tuple(warnings(group)) if position is None else (),
+        doubts=_doubts(group, here),
         limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
     )
+
+
+def _doubts(group: ArchiveGroup, here: slice) -> tuple[FailureGroup, ...]:
+    """What makes cases doubtful, by what it is; nothing of an archive of before there were warnings."""
+    if "warning" not in group.variables:
+        return ()
+    causes = group.values("warning")[here]
+    doubtful = np.flatnonzero(causes != "")
+    rows, ids = (group.values(name)[here][doubtful] for name in ("case", "case_id"))
+    found = failures(np.zeros(len(doubtful)), causes[doubtful], rows, ids)
+    return tuple(replace(each, status="warning") for each in found)
 
 
 def _metric(variable: Stored, values: np.ndarray) -> MetricSummary:

@@ -186,7 +186,7 @@ def heading(group: ArchiveGroup, width: int) -> list[str]:
 def verdict(summary: Summary, width: int) -> list[str]:
     """Lines that say how it went: cases, metrics, requirements."""
     out = [_counts(summary)]
-    out += failure_lines(summary.failures, width)
+    out += failure_lines((*summary.failures, *summary.doubts), width)
     if summary.limited:
         of = "" if summary.cases == 1 else f" in {summary.limited:,} of {summary.cases:,} cases"
         out.append(f"  note: the load motor of a bed was at its limit{of}: the run is not what the joint would do")

@@ -122,8 +122,8 @@ def result_lines(
     for summary, cases in zip(summaries, worst, strict=True):
         lines = verdict(summary, 100)
         if summary.sweep in many:
-            if summary.failed:
-                out += ["", f"{summary.name}: {lines[0]}", *failure_lines(summary.failures, 100)]
+            if of_cases := (*summary.failures, *summary.doubts):
+                out += ["", f"{summary.name}: {lines[0]}", *failure_lines(of_cases, 100)]
             continue
         name = f"{summary.name}: " if len(summaries) > 1 else ""
         took = f", {duration(seconds[summary.name])} of computing" if summary.name in seconds else ""

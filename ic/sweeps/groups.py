@@ -9,6 +9,7 @@ from dataclasses import field, replace
 import numpy as np
 
 from ic.grammar.syntax import Deck, Expression, Name, Word, children
+from ic.meaning.checks.balance import check_balance
 from ic.meaning.checks.stops import check_stops
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.parameters.scope import Scope
@@ -61,6 +62,7 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
         source.effects.examine(scope, run, made)
         if not source.complaints.errors:
             check_stops(source.complaints, made)
+            check_balance(source.complaints, made)
         return [(made, scope)]
     return _sum(source, definition, ()) if definition.parts else _Sweep(source, definition).groups()
 
@@ -195,6 +197,7 @@ class _Sweep:
         if not self.complaints.errors:
             check_effects(self.complaints, there, made)
             check_stops(self.complaints, made)
+            check_balance(self.complaints, made)
             made = replace(made, notes=(*made.notes, *check_confidences(self.complaints, there, made)))
         self.source.effects.examine(scope, run, made, self.definition.group.body)
         return ((made, scope), rows[keep]), dropped

@@ -2,23 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
+from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.program import friction
 from met.program.evaluation import Derivative, brake_levels, derivative, servo_response
 from met.program.sticking import Sticking, sticking
-from met.program.system import System
+from met.program.system import Actuator, System
 from met.program.values import NamedValues, answer, returned
 from met.servos.servo import Seen, Setpoint
 from met.trace import Real, both, sign, where
 from met.trace.program import Tape
 
 
-def balance(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[str, Real]]) -> None:
-    """Writes states and integrals of the servos that can be balanced, for the arm at state y.
+@frozen
+class Demand:
+    """What the run's start demands of a servo that can be balanced.
+
+    torque  that keeps its joint from accelerating, N m (N)
+    seen    what its law sees there: a command that the joint be as it is, and the states that `starts` has
+    p       its parameters;  starts: memory and states with which it would begin unbalanced, by name
+    """
+
+    actuator: Actuator
+    torque: Real
+    seen: Seen
+    p: NamedValues
+    starts: Mapping[str, Real]
+
+    def states(self, torque: Real) -> Mapping[str, Real]:
+        """States and integrals, by name, with which the servo gives its joint this torque, N m (N), as far as it
+        can."""
+        servo, parts, owner = self.actuator.servo, self.actuator.parts, self.actuator.owner
+        assert servo.balance is not None
+        new = answer(owner, servo.balance, self.p, torque, self.seen)
+        return returned(owner, "balance", new, [part.name for part in (*parts.natural, *parts.integrals)])
+
+
+def balance(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[str, Real]]) -> list[Demand]:
+    """Writes states and integrals of the servos that can be balanced, for the arm at state y; returns what each meets.
 
     begun  by joint, what its servo holds, and its states, as they begin where it is not balanced
+    """
+    met = []
+    for demand in demands(system, tape, y, begun):
+        for name, value in demand.states(demand.torque).items():
+            tape.write(f"{demand.actuator.path}.{name}", value)
+        met.append(demand)
+    return met
+
+
+def demands(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[str, Real]]) -> Iterator[Demand]:
+    """What the start demands of each servo that can be balanced; y, begun: as of `balance`.
 
     The torques are those with which none of their joints accelerates. Other joints move as their servos let them; one
     at rest stays where its dry friction holds it while all of them do, and moves where it does not.
@@ -58,18 +94,23 @@ def balance(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[s
         }
         found = moved(modes)
     for actuator in balanced:
-        assert actuator.servo.balance is not None
-        parts, starts = actuator.parts, begun[actuator.use.joint]
-        q, qd = y.q[actuator.index], y.qd[actuator.index]
-        stays = {"position": Setpoint("position", q, qd), "rate": Setpoint("rate", qd, 0.0)}
-        setpoint = stays.get(actuator.command_kind, Setpoint(actuator.command_kind, 0.0, 0.0))
-        states = NamedValues(actuator.owner, {state.name: starts[state.name] for state in parts.natural})
-        seen = Seen(q, qd, setpoint, 0.0, 0.0, states)
-        p = system.servo_values(actuator, tape.read)
-        new = answer(actuator.owner, actuator.servo.balance, p, found.loads[actuator.index], seen)
-        names = [part.name for part in (*parts.natural, *parts.integrals)]
-        for name, value in returned(actuator.owner, "balance", new, names).items():
-            tape.write(f"{actuator.path}.{name}", value)
+        yield _demand(system, tape, y, actuator, found.loads[actuator.index], begun)
+
+
+def _demand(
+    system: System,
+    tape: Tape,
+    y: Motion,
+    actuator: Actuator,
+    torque: Real,
+    begun: Mapping[str, Mapping[str, Real]],
+) -> Demand:
+    starts, q, qd = begun[actuator.use.joint], y.q[actuator.index], y.qd[actuator.index]
+    stays = {"position": Setpoint("position", q, qd), "rate": Setpoint("rate", qd, 0.0)}
+    setpoint = stays.get(actuator.command_kind, Setpoint(actuator.command_kind, 0.0, 0.0))
+    states = NamedValues(actuator.owner, {state.name: starts[state.name] for state in actuator.parts.natural})
+    p = system.servo_values(actuator, tape.read)
+    return Demand(actuator, torque, Seen(q, qd, setpoint, 0.0, 0.0, states), p, starts)
 
 
 def _level(system: System, tape: Tape, y: Motion, each: Sticking, held: Sequence[NamedValues]) -> Real:

@@ -12,13 +12,13 @@ from collections.abc import Callable, Mapping
 
 from met.plan import Experiment
 from met.plan.channel import Channel
-from met.program import balancing, cell_names, orientations
+from met.program import balancing, cell_names, holding, orientations, plausible
 from met.program.control import failing, guiding, link_sensors, sensing, setpoints
 from met.program.control.substituted import LIMITED
 from met.program.evaluation import gravity, law
-from met.program.motion import base, payloads
+from met.program.motion import base, bodies, payloads
 from met.program.observe import derived
-from met.program.step import EVENTS, StepPhases
+from met.program.step import EVENTS, FAILURE, StepPhases
 from met.program.system import PARAMETER, Actuator, System
 from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.servo import Seen, Setpoint
@@ -27,7 +27,10 @@ from met.trace.program import CallPhase, Control, Every, Phase, Program, RecordP
 
 Body = Callable[[Tape], None]
 
-OUTPUTS = ("failure", "failure.joint", "failure.tick", *EVENTS, LIMITED)
+OUTPUTS = (*FAILURE, *EVENTS, LIMITED)
+
+UNHELD = "unheld"
+"""Output of a run that begins balanced: the first joint whose servo cannot hold it, by number from 1; 0: all do."""
 
 COORDINATE, METRIC = "coordinate:", "metric:"
 """Prefixes of the outputs, and cells, that are named by a deck: no name of a deck's is one of the engine's."""
@@ -71,6 +74,9 @@ class Builder:
             tick.append(Every(instant, (CallPhase(Phase("observe", self._observe(held))),)))
         for divisor in sorted({channel.divisor for _, _, channel in self.system.metrics}):
             tick.append(Every(divisor, (RunPhase(Phase(f"metrics_{divisor}", self._metrics(divisor))),)))
+        if not self.step.beds.wire:
+            watch = RunPhase(Phase("watch", self._watch))
+            tick.append(Every(instant, (Every(plausible.divisor(self.schedule), (watch,)),)))
         if columns:
             tick.append(RecordPhase(Phase("record", self._recorder(columns, held, at_rows)), self.schedule.record))
 
@@ -84,18 +90,42 @@ class Builder:
             columns=len(columns),
             outputs=(
                 *OUTPUTS,
+                *self.watched,
                 *(METRIC + name for name, _, _ in self.system.metrics),
                 *(COORDINATE + path for path in coordinates),
                 *self.step.beds.wire_outputs,
             ),
             state_outputs=(*OUTPUTS, *self.step.beds.wire_outputs),
-            counters=(*EVENTS, LIMITED),
+            counters=(*EVENTS, LIMITED, *plausible.OUTPUTS[1:]),
         )
+
+    @property
+    def watched(self) -> tuple[str, ...]:
+        """Outputs that say what became of a run without being part of its state."""
+        if self.step.beds.wire:
+            return ()
+        return (*plausible.OUTPUTS, *([UNHELD] if self.system.structure.balanced else []))
 
     # The run's two ends.
 
     def start(self, tape: Tape) -> None:
-        """Parameters that vary, then the state at t = 0."""
+        """Parameters that vary, then the state at t = 0, memory of sensors and metrics."""
+        begun = self.begin(tape)
+        if self.system.structure.balanced:
+            y = self.step.state(tape)
+            demands = balancing.balance(self.system, tape, y, begun)
+            if UNHELD in self.watched:
+                tape.write(UNHELD, holding.first_unheld(self.system, tape, y, demands))
+        plausible.start(tape, self.step.coordinates)
+        for actuator in self.system.working:
+            self._begin_sensors(tape, actuator)
+        for name, metric, _ in self.system.metrics:
+            for memory in metric.memory:
+                tape.write(f"{METRIC}{name}.{memory.name}", memory.start)
+
+    def begin(self, tape: Tape) -> dict[str, dict[str, Real]]:
+        """Writes parameters that vary, then the state at t = 0 with servos unbalanced; returns what each of these
+        holds, and its states, by joint and name."""
         experiment = self.system.experiment
         inputs = {coordinate.path: tape.input(coordinate.path) for coordinate in experiment.cases.coordinates}
         values = experiment.formulas.replay(inputs)
@@ -109,14 +139,7 @@ class Builder:
         payloads.start(self.system, tape)
         guiding.start(self.system, tape)
         link_sensors.start(self.system, tape, lambda y: gravity(self.system, tape.read, y, 0.0))
-        begun = {actuator.use.joint: self._begin_servo(tape, actuator) for actuator in self.system.working}
-        if self.system.structure.balanced:
-            balancing.balance(self.system, tape, self.step.state(tape), begun)
-        for actuator in self.system.working:
-            self._begin_sensors(tape, actuator)
-        for name, metric, _ in self.system.metrics:
-            for memory in metric.memory:
-                tape.write(f"{METRIC}{name}.{memory.name}", memory.start)
+        return {actuator.use.joint: self._begin_servo(tape, actuator) for actuator in self.system.working}
 
     def _begin_servo(self, tape: Tape, actuator: Actuator) -> dict[str, Real]:
         """Write a servo's memory and states where a run begins, and return them by name."""
@@ -141,7 +164,7 @@ class Builder:
             tape.write(cell_names.SEEN(actuator.use.joint, of), sensing.true_value(seen, of))
 
     def end(self, tape: Tape) -> None:
-        for name in OUTPUTS:
+        for name in (*OUTPUTS, *self.watched):
             tape.output(name, tape.read(name))
         for name, metric, _ in self.system.metrics:
             p, held = self._metric(tape, name)
@@ -252,7 +275,12 @@ class Builder:
     def _state_of(tape: Tape, joint: str) -> tuple[Real, Real]:
         return tape.read(f"{joint}.q"), tape.read(f"{joint}.qd")
 
-    # Metrics and the recorder.
+    # What is watched, metrics and the recorder.
+
+    def _watch(self, tape: Tape) -> None:
+        joints, names = len(self.joints), self.step.coordinates
+        numbers = [i if i < joints else joints + (i - joints) // bodies.SIX for i in range(len(names))]
+        plausible.watch(tape, names, numbers)
 
     def _metric(self, tape: Tape, name: str) -> tuple[NamedValues, NamedValues]:
         metric = next(model for known, model, _ in self.system.metrics if known == name)

@@ -28,8 +28,12 @@ from met.program.values import NamedValues
 from met.trace import Real, Truth, any_of, both, either, isfinite, not_, sign, where
 from met.trace.program import CallPhase, Control, Every, Phase, RunPhase, Tape, WhileAny
 
-SINGULAR, NOT_FINITE, OUT_OF_RANGE = 1.0, 2.0, 4.0
-"""Causes of a failed case (output `failure`); 0 is none, 3 what ended it from outside (met/run.py)."""
+SINGULAR, NOT_FINITE, OUT_OF_RANGE, UNBALANCED, TOO_FAST = 1.0, 2.0, 4.0, 5.0, 6.0
+"""Causes of a failed case (output `failure`); 0 is none, 3 what ended it from outside (met/run.py). UNBALANCED
+and TOO_FAST are judged when the run is over, from other outputs (met/judging.py)."""
+
+FAILURE = ("failure", "failure.joint", "failure.tick")
+"""Outputs of a failed case: its cause, the number of the joint, body or sensor, and the tick."""
 
 EVENTS = ("friction.splits", "friction.clamped", "friction.undecided")
 """Counts a case: steps split where a joint came to rest, crossings clamped, decisions at rest left open."""

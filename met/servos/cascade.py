@@ -179,7 +179,7 @@ SERVO = Servo(
         *gear.parameters(ELASTIC),
         *JOINT_FRICTION,
     ),
-    outputs=(Memory(name="current_cmd", unit="A", doc="current to be driven"),),
+    outputs=(Memory(name="current_cmd", unit="A", doc="current to be driven", limit="i_max"),),
     integrals=(State(name="integral", unit="rad", doc="integral of the motor's rate error"),),
     states=(
         State(name="current", unit="A", doc="current in the armature"),
@@ -189,7 +189,7 @@ SERVO = Servo(
         BRISTLE,
     ),
     signals=(
-        Signal(name="voltage", unit="V", doc="voltage on the armature"),
+        Signal(name="voltage", unit="V", doc="voltage on the armature", limit="v_max"),
         Signal(name="motor_torque", unit="N*m", doc="motor torque, before friction"),
         replace(compliant_gearbox.GEAR_TORQUE, only=ELASTIC),
     ),

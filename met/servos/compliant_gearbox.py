@@ -132,7 +132,10 @@ SERVO = Servo(
     outputs=rate_loop.OUTPUTS,
     integrals=rate_loop.INTEGRALS,
     states=(gear.deflection(), MOTOR_RATE, BRISTLE),
-    signals=(Signal(name="motor_torque", unit="N*m", doc="motor torque, before friction"), GEAR_TORQUE),
+    signals=(
+        Signal(name="motor_torque", unit="N*m", doc="motor torque, before friction", limit="tau_max"),
+        GEAR_TORQUE,
+    ),
     control=control,
     measured=measured,
     drive=drive,

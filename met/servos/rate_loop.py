@@ -33,7 +33,7 @@ PARAMETERS = (
     ),
 )
 
-OUTPUTS = (Memory(name="voltage", unit="V", doc="voltage on the drive motor"),)
+OUTPUTS = (Memory(name="voltage", unit="V", doc="voltage on the drive motor", limit="v_max"),)
 INTEGRALS = (State(name="integral", unit="rad", doc="integral of the motor's rate error"),)
 
 

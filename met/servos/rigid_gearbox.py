@@ -78,7 +78,7 @@ SERVO = Servo(
     states=(BRISTLE,),
     signals=(
         Signal(name="motor_rate", unit="rad/s", doc="rate of the motor's shaft"),
-        Signal(name="motor_torque", unit="N*m", doc="motor torque, before friction"),
+        Signal(name="motor_torque", unit="N*m", doc="motor torque, before friction", limit="tau_max"),
     ),
     control=control,
     drive=drive,

@@ -234,4 +234,5 @@ def answer(
         coordinates=values,
         events={name: np.zeros(len(rows), dtype=np.int64) for name in ("splits", "clamped", "undecided")},
         limited=np.zeros(len(rows), dtype=np.int64),
+        warning=[""] * len(rows),
     )

@@ -92,11 +92,20 @@ def _failing(pool: Pool) -> tuple[FailureRow, ...]:
 
 
 def _notes(pool: Pool) -> tuple[str, ...]:
+    notes = []
     limited = int((pool.gathered("bed_limited", 0.0) > 0).sum())
-    if not limited:
-        return ()
-    of = "" if pool.count == 1 else f" in {limited:,} of {pool.count:,} cases"
-    return (f"The load motor of a bed was at its limit{of}: there the run is not what the joint would do.",)
+    if limited:
+        of = "" if pool.count == 1 else f" in {limited:,} of {pool.count:,} cases"
+        notes.append(f"The load motor of a bed was at its limit{of}: there the run is not what the joint would do.")
+    return (*notes, *_warnings(pool))
+
+
+def _warnings(pool: Pool) -> list[str]:
+    """What makes cases doubtful that are done, each with the cases of which it is so."""
+    warnings = np.array(pool.texts("warning", np.arange(pool.count)), dtype=object)
+    doubtful = np.flatnonzero(warnings != "")
+    found = failures(np.zeros(len(doubtful)), warnings[doubtful], pool.cases[doubtful], pool.cases[doubtful])
+    return [f"Warning of {ranges(each.cases)}: {each.cause}" for each in found]
 
 
 def metric_rows(

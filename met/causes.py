@@ -1,0 +1,183 @@
+"""Why a case failed, in words: the time, the joint, body or sensor, its place in the deck, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from met import models
+from met.diagnostic import Place
+from met.plan import Experiment
+from met.program.plausible import DOUBTFUL, DOUBTFUL_TICK, FAILED, MEASURE, OF
+from met.program.step import FAILURE, NOT_FINITE, OUT_OF_RANGE, SINGULAR, TOO_FAST, UNBALANCED
+from met.program.unheld import Unheld, unheld
+
+
+def causes_of(experiment: Experiment, inputs: np.ndarray, outputs: Mapping[str, np.ndarray]) -> list[str]:
+    """Why cases failed, in words. inputs: of their program, [case, input]; outputs: of it, by name, [case]."""
+    each = [{name: float(of[case]) for name, of in outputs.items()} for case in range(len(inputs))]
+    found = ["" if of["failure"] == UNBALANCED else _cause_of(experiment, of) for of in each]
+    unbalanced = np.flatnonzero(outputs["failure"] == UNBALANCED)
+    if len(unbalanced):
+        for case, joints in zip(unbalanced.tolist(), unheld(experiment, inputs[unbalanced]), strict=True):
+            found[case] = _cause_of_balance(experiment, int(outputs["failure.joint"][case]), joints)
+    return found
+
+
+def _cause_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
+    """Why a case failed that its servos could begin, in words. outputs: of its program, by name."""
+    failure, number, tick = (outputs[name] for name in FAILURE)
+    moving = experiment.structure.moving
+    if failure == TOO_FAST:
+        name, unit, where = _of_rate(experiment, int(number))
+        return (
+            f"{_head(experiment, tick)}{name}: it moves faster than {FAILED * outputs[MEASURE]:.3g} {unit}, which "
+            f"nothing in the run could make it{where}. {_of_steps(experiment)}"
+        )
+    if int(number) == len(moving) and experiment.structure.free:
+        return _cause_of_base(experiment, failure, tick)
+    others = len(moving) + experiment.structure.free + sum(each.flies for each in experiment.structure.payloads)
+    if int(number) >= others:
+        return _cause_of_sensor(experiment, int(number) - others, tick)
+    if int(number) >= len(moving):
+        return _cause_of_payload(experiment, int(number) - len(moving) - experiment.structure.free, tick)
+    joint = moving[int(number)]
+    prismatic = joint.kind == "prismatic"
+    unit = "kg" if prismatic else "kg m^2"
+    head = f"t = {tick / experiment.structure.schedule.base_hz:g} s: joint {joint.name}: "
+    where = f" ({joint.place.file}:{joint.place.line})" if joint.place else ""
+    if failure == SINGULAR and tick > 0.0:
+        return (
+            f"{head}D is not above 0 {unit} any more, so qdd is undefined{where}. At the start it was: usually the "
+            f"motion has diverged, and a step is too long for the servo, the arm or what acts on it (try a faster rate "
+            f"for the dynamics); or what is outboard has no inertia about this joint in this position."
+        )
+    if failure == SINGULAR:
+        return (
+            f"{head}D is not above 0 {unit}, so qdd is undefined. Nothing outboard has inertia about this "
+            f"joint{where}. Give the link mass or the servo a rotor inertia."
+        )
+    if failure == OUT_OF_RANGE:
+        return (
+            f"{head}a state of its servo is where it can never be{where}: a step is too long for the servo (try a "
+            f"faster rate for the dynamics). The bristles of `friction = lugre` want sigma_0 |motor rate|/f_c times "
+            f"the step to stay below the integrator's limit."
+        )
+    assert failure == NOT_FINITE
+    what = "the servo, the arm or what acts on its base" if experiment.structure.free else "the servo or the arm"
+    return (
+        f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: "
+        f"{_of_guide(experiment, joint.name)}a step too long for {what} (see the stability figures of `met plan`; try "
+        f"a faster rate for the dynamics), or a model that divides by zero."
+    )
+
+
+def doubt_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
+    """What makes a case that is done doubtful, in words: a rate that hardly anything could give."""
+    name, unit, where = _of_rate(experiment, int(outputs[OF]))
+    return (
+        f"{_head(experiment, outputs[DOUBTFUL_TICK])}{name}: it moves faster than {DOUBTFUL * outputs[MEASURE]:.3g} "
+        f"{unit}, which hardly anything could make it{where}. {_of_steps(experiment)}"
+    )
+
+
+def _head(experiment: Experiment, tick: float) -> str:
+    return f"t = {tick / experiment.structure.schedule.base_hz:g} s: "
+
+
+def _of_rate(experiment: Experiment, number: int) -> tuple[str, str, str]:
+    """A joint or body by its number in the outputs: its name, the unit of its rates, and where the deck has it."""
+    structure = experiment.structure
+    joints = structure.moving
+    if number < len(joints):
+        joint = joints[number]
+        return f"joint {joint.name}", "m/s" if joint.kind == "prismatic" else "rad/s", _where(joint.place)
+    if structure.free and number == len(joints):
+        return "the base", "rad/s (m/s)", _where(structure.base.place if structure.base is not None else None)
+    payload = [each for each in structure.payloads if each.flies][number - len(joints) - structure.free]
+    return f"payload {payload.name}", "rad/s (m/s)", _where(payload.place)
+
+
+def _where(place: Place | None) -> str:
+    return f" ({place.file}:{place.line})" if place else ""
+
+
+def _of_steps(experiment: Experiment) -> str:
+    """The usual reason of a rate that is none, and the remedy."""
+    schedule = experiment.structure.schedule
+    return (
+        "Nearly always a step is too long for the servo, the arm or what acts on it, and the motion diverges: try a "
+        f"faster rate for the dynamics, which have {schedule.base_hz / schedule.dynamics:g} Hz."
+    )
+
+
+def _cause_of_balance(experiment: Experiment, number: int, joints: Sequence[Unheld]) -> str:
+    """Why a case failed whose servos cannot hold their joints where it begins balanced, in words.
+
+    number: of the first of the joints;  joints: what is known of all that are not held
+    """
+    joint = experiment.structure.moving[number].name
+    found = {each.joint.name: each for each in joints}
+    if joint not in found:
+        return f"t = 0 s: joint {joint}: it cannot begin balanced: its servo holds just less than the joint takes."
+    each = found[joint]
+    where = f" ({each.servo.place.file}:{each.servo.place.line})" if each.servo.place else ""
+    return (
+        f"t = 0 s: joint {joint}: it cannot begin balanced{where}: it takes {each.wanted:.3g} {each.unit}, and its "
+        f"servo can hold {each.there:.3g} {each.unit}. {each.reason[0].upper()}{each.reason[1:]}."
+    )
+
+
+def _of_guide(experiment: Experiment, joint: str) -> str:
+    """In words, where the guide that a joint follows gives it no number; empty where there is no such guide."""
+    for use in experiment.structure.guides:
+        undefined = models.find("guide", use.model, use.place).undefined
+        if joint in use.joints and undefined:
+            where = f" ({use.place.file}:{use.place.line})" if use.place else ""
+            return f"guide `{use.name}`{where}, which it follows, {undefined}; "
+    return ""
+
+
+def _cause_of_payload(experiment: Experiment, number: int, tick: float) -> str:
+    """Why a case failed by one of the payloads that fly, in words."""
+    payload = [each for each in experiment.structure.payloads if each.flies][number]
+    where = f" ({payload.place.file}:{payload.place.line})" if payload.place else ""
+    return (
+        f"t = {tick / experiment.structure.schedule.base_hz:g} s: payload {payload.name}: position, rate or "
+        f"acceleration is no longer a finite number{where}. Usual reasons: a step too long for what acts on it (try a "
+        f"faster rate for the dynamics), or a model that divides by zero."
+    )
+
+
+def _cause_of_sensor(experiment: Experiment, number: int, tick: float) -> str:
+    """Why a case failed by one of the sensors of links, in words."""
+    sensor = experiment.structure.sensors[number]
+    where = f" ({sensor.place.file}:{sensor.place.line})" if sensor.place else ""
+    return (
+        f"t = {tick / experiment.structure.schedule.base_hz:g} s: sensor {sensor.name}: its filter is no longer a "
+        f"finite number{where}. Usual reasons: a step too long for its `cutoff` (try a faster rate for the dynamics), "
+        f"or numbers that no double holds."
+    )
+
+
+def _cause_of_base(experiment: Experiment, failure: float, tick: float) -> str:
+    """Why a case failed by its free base, in words."""
+    base = experiment.structure.base
+    head = f"t = {tick / experiment.structure.schedule.base_hz:g} s: the base: "
+    where = f" ({base.place.file}:{base.place.line})" if base is not None and base.place else ""
+    if failure == SINGULAR and tick > 0.0:
+        return (
+            f"{head}it moves freely and has no inertia in some direction any more, so its acceleration is "
+            f"undefined{where}. At the start it had: usually the motion has diverged, and a step is too long for what "
+            f"acts on the base or for a servo (try a faster rate for the dynamics)."
+        )
+    if failure == SINGULAR:
+        return (
+            f"{head}it moves freely and has no inertia in some direction, so its acceleration is undefined{where}. "
+            f"Give link base mass, and a shape or inertia."
+        )
+    return (
+        f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: a step too long for "
+        f"what acts on it (try a faster rate for the dynamics), or a model that divides by zero."
+    )

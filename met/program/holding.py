@@ -1,0 +1,92 @@
+"""Whether a servo that begins balanced holds its joint: its torque is what the joint takes, and lasts.
+
+A limit of voltage, current or torque, or an integral that nothing feeds, makes a servo give less than `balance` is
+asked for; behind a gear its states then change at once. Nothing here knows of a particular limit: the servo's own law
+and physics are evaluated where it begins. Dry friction that would hold the rest counts as holding, at the joint and at
+what turns behind a gear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from met.integrators.integrator import Motion
+from met.program.balancing import Demand
+from met.program.evaluation import brake_levels, law
+from met.program.system import System
+from met.program.values import NamedValues, answer
+from met.servos.servo import Drive, JointMotion
+from met.trace import Real, Truth, absolute, all_of, either, maximum, sign, where
+from met.trace.program import Tape
+
+SHARE = 1e-6
+"""Share of the torque, and of what a slope depends on, that counts as nothing: far above rounding."""
+
+LEAST = 1e-9
+"""N m (N) that count as nothing: what rounding leaves where no load is."""
+
+
+def first_unheld(system: System, tape: Tape, y: Motion, demands: Sequence[Demand]) -> Real:
+    """The first joint, by its number from 1, whose servo cannot hold it at the start, at state y; 0 where all do."""
+    brakes = brake_levels(system, tape.read, y, 0.0, 0.0)
+    first: Real = 0.0
+    for demand in reversed(demands):
+        joint = demand.actuator.index
+        held = holds(demand, demand.torque, brakes.get(system.joints[joint].name, 0.0))
+        first = where(held, first, joint + 1.0)
+    return first
+
+
+def holds(demand: Demand, torque: Real, brake: Real) -> Truth:
+    """True where the servo, as it begins with what gives its joint this torque (N m; N), gives it and goes on to.
+
+    brake  dry friction of brakes on the joint, N m (N)
+    """
+    own = {**demand.starts, **demand.states(torque)}
+    if demand.seen.setpoint.kind == "torque":
+        return True  # the command decides what it gives
+    outputs = _outputs(demand, own)
+    drive = _drive(demand, own, outputs)
+    qd = demand.seen.qd
+    dry = drive.dry + brake
+    missing = absolute(drive.torque - sign(qd) * drive.dry - torque) - where(qd == 0.0, dry, 0.0)
+    lasting = [missing <= maximum(SHARE * absolute(torque), LEAST)]
+    slack = _slack(demand, own, outputs, drive)
+    for state in demand.actuator.parts.natural:
+        rate, level = own[state.name], drive.friction.get(state.name, 0.0)
+        slope = absolute(drive.slopes[state.name] - sign(rate) * level) - where(rate == 0.0, level, 0.0)
+        lasting.append(slope <= slack[state.name])
+    return either(absolute(torque) <= LEAST, all_of(lasting))
+
+
+def _outputs(demand: Demand, own: Mapping[str, Real]) -> Mapping[str, Real]:
+    """What the servo's law gives with this memory and these states."""
+    actuator, p, seen = demand.actuator, demand.p, demand.seen
+    held = NamedValues(actuator.owner, own)
+    q, qd = seen.q, seen.qd
+    if actuator.servo.measured is not None:
+        q, qd = answer(actuator.owner, actuator.servo.measured, p, q, qd, held)
+    return law(actuator, p, held, replace(seen, q=q, qd=qd, states=held)).outputs
+
+
+def _drive(demand: Demand, own: Mapping[str, Real], outputs: Mapping[str, Real]) -> Drive:
+    """The servo's physics with these states, under these outputs of its law."""
+    actuator, seen = demand.actuator, demand.seen
+    motion = JointMotion(seen.q, seen.qd, 0.0, 0.0, actuator.command_kind)
+    held = NamedValues(actuator.owner, {**own, **outputs})
+    return answer(actuator.owner, actuator.servo.drive, demand.p, held, NamedValues(actuator.owner, own), motion)
+
+
+def _slack(demand: Demand, own: Mapping[str, Real], outputs: Mapping[str, Real], drive: Drive) -> dict[str, Real]:
+    """Slopes of the servo's states that count as none, by name: what a `SHARE` of each of the numbers that they depend
+    on would change."""
+    names = [state.name for state in demand.actuator.parts.natural]
+    slack: dict[str, Real] = dict.fromkeys(names, 0.0)
+    moved = [({**own, name: (1.0 + SHARE) * own[name]}, outputs) for name in names]
+    moved += [(dict(own), {**outputs, name: (1.0 + SHARE) * value}) for name, value in outputs.items()]
+    for states, given in moved:
+        other = _drive(demand, states, given)
+        for name in names:
+            slack[name] = slack[name] + absolute(other.slopes[name] - drive.slopes[name])
+    return slack

@@ -1,0 +1,136 @@
+"""Servos that are to begin balanced and cannot hold their joints: what these take, what they get, what limits it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from met.backends.reference.plain import PlainTape
+from met.frozen import frozen
+from met.plan import Experiment, Joint, ServoUse
+from met.program.balancing import Demand, demands
+from met.program.build import Builder
+from met.program.evaluation import brake_levels
+from met.program.holding import holds
+from met.program.system import System
+from met.program.values import parameters
+from met.trace import Real
+
+HALVINGS = 20
+"""Of the interval in which the share that a servo holds is sought: to a millionth."""
+
+
+@frozen
+class Unheld:
+    """A joint whose servo cannot hold it as a run begins.
+
+    wanted  torque that the joint takes, N m (N);  there: what of it the servo can hold, friction's help included
+    limits  the servo's limits that stop it, by name, and as text with their units: those that do so alone, where there
+            are any; none where no limit is in the way, and an integral with a gain of 0 holds nothing
+    """
+
+    joint: Joint
+    servo: ServoUse
+    wanted: float
+    there: float
+    limits: tuple[tuple[str, str], ...]
+
+    @property
+    def unit(self) -> str:
+        """The unit of its torques, or forces."""
+        return "N" if self.joint.kind == "prismatic" else "N m"
+
+    @property
+    def reason(self) -> str:
+        """What is in the way, and what to do."""
+        if not self.limits:
+            return (
+                "none of its limits is in the way: an integral with a gain of 0 holds nothing; give the law an "
+                "integral gain"
+            )
+        named = " and ".join(f"`{name}`, {text}," for name, text in self.limits)
+        return f"{named} is too little: raise it or the gear's ratio, or lighten what the joint carries"
+
+
+def unheld(experiment: Experiment, values: np.ndarray) -> list[tuple[Unheld, ...]]:
+    """For each case of these inputs, [case, input], the joints that are to begin balanced and cannot be held, in the
+    arm's order."""
+    found: list[tuple[Unheld, ...]] = [()] * len(values)
+    if not experiment.structure.balanced or not len(values):
+        return found
+    system = System(experiment)
+    builder = Builder(system)
+    program = builder.program()
+    columns = values.T if len(values) > 1 else values[0]
+    tape = PlainTape(program, dict(zip(program.inputs, columns, strict=True)), 1)
+    with np.errstate(all="ignore"):
+        begun = builder.begin(tape)
+        y = builder.step.state(tape)
+        brakes = brake_levels(system, tape.read, y, 0.0, 0.0)
+        for demand in demands(system, tape, y, begun):
+            joint = system.joints[demand.actuator.index]
+            judged = _Judged(system, tape, demand, brakes.get(joint.name, 0.0), len(values))
+            for case in np.flatnonzero(~judged.held).tolist():
+                found[case] = (*found[case], Unheld(joint, demand.actuator.use, *judged.of(case)))
+    return found
+
+
+class _Judged:
+    """One servo in many cases, whose numbers are arrays over these, or single where they do not vary."""
+
+    def __init__(self, system: System, tape: PlainTape, demand: Demand, brake: Real, cases: int) -> None:
+        self.system, self.tape, self.demand, self.brake, self.cases = system, tape, demand, brake, cases
+        self.wanted = self._over_cases(demand.torque)
+        self.held = self._over_cases(holds(demand, demand.torque, brake))
+
+    def of(self, case: int) -> tuple[float, float, tuple[tuple[str, str], ...]]:
+        """What its joint takes in this case, what it can hold, and the limits that stop it, as `Unheld` has them."""
+        finite = [name for name, values in self.limits.items() if np.isfinite(values[case])]
+        alone = [name for name in finite if self.without_one[name][case]]
+        binding = alone or (finite if self.without_any[case] else [])
+        known, path = self.system.experiment.parameters, self.demand.actuator.path
+        texts = tuple((name, f"{self.limits[name][case]:.3g} {known[f'{path}.{name}'].unit}") for name in binding)
+        return float(self.wanted[case]), float(self.wanted[case] * self.share[case]), texts
+
+    @cached_property
+    def share(self) -> np.ndarray:
+        """The largest share of the torque that the servo holds, in each case."""
+        low, high = np.zeros(self.cases), np.ones(self.cases)
+        for _ in range(HALVINGS):
+            middle: Any = 0.5 * (low + high)
+            held: Any = holds(self.demand, middle * self.demand.torque, self.brake)
+            low, high = np.where(held, middle, low), np.where(held, high, middle)
+        return low
+
+    @cached_property
+    def limits(self) -> dict[str, np.ndarray]:
+        """The servo's limits in each case, by name."""
+        parts = self.demand.actuator.parts
+        declared = [*(part.limit for part in parts.outputs), *(part.limit for part in parts.signals)]
+        return {name: self._over_cases(getattr(self.demand.p, name)) for name in dict.fromkeys(declared) if name}
+
+    @cached_property
+    def without_one(self) -> dict[str, np.ndarray]:
+        """The cases in which the servo would hold its joint had it not the limit, by its name."""
+        return {name: self._without(name) for name in self.limits}
+
+    @cached_property
+    def without_any(self) -> np.ndarray:
+        """The cases in which the servo would hold its joint had it no limit."""
+        return self._without(*self.limits)
+
+    def _without(self, *names: str) -> np.ndarray:
+        actuator = self.demand.actuator
+        numbers = parameters(
+            actuator.owner,
+            actuator.path,
+            actuator.parts.parameters,
+            lambda path: np.inf if path.rpartition(".")[2] in names else self.system.value(path, self.tape.read),
+        )
+        return self._over_cases(holds(replace(self.demand, p=numbers), self.demand.torque, self.brake))
+
+    def _over_cases(self, value: object) -> np.ndarray:
+        return np.broadcast_to(np.asarray(value), (self.cases,))
