@@ -118,6 +118,7 @@ def derivative(
             qdd=tuple(given),
             mode=tuple(mode),
             rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
+            spin=rotor_spins(system, drives),
             gravity=base.to_base(loads.gravity),
             base_acceleration=(base.wd, base.a),
             base_rate=base.w,
@@ -157,6 +158,14 @@ def derivative(
         out_of_range=tuple(False if drive is None else drive.state_out_of_range for drive in drives),
         loads=tuple(a - b for a, b in zip(solved.tau_load, loads.torques, strict=True)),
     )
+
+
+def rotor_spins(system: System, drives: Sequence[Drive | None]) -> tuple[Real, ...] | None:
+    """Angular momentum of the rotors in the links before their joints, for joint rates of 1, kg m^2 (kg m); None where
+    the base does not move freely, whose motion they are left out of (docs/physics.md, section 1)."""
+    if free_base(system) is None:
+        return None
+    return tuple(0.0 if drive is None else drive.spin for drive in drives)
 
 
 @frozen

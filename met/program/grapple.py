@@ -15,7 +15,7 @@ from met.dynamics.spatial import ZERO, add, choose, compose, inverse, turn_vecto
 from met.integrators.integrator import Motion
 from met.plan import INSTANT
 from met.program import cell_names, cells
-from met.program.evaluation import servo_response
+from met.program.evaluation import rotor_spins, servo_response
 from met.program.motion import payloads
 from met.program.motion.base import base_of, free_base, motions
 from met.program.motion.bodies import place
@@ -117,6 +117,7 @@ class Grapple:
             (0.0,) * n,
             mode=tuple(False if i in on_beds else _yields(drive) for i, drive in enumerate(drives)),
             rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
+            spin=rotor_spins(system, drives),
             wrenches=blows,
         )
         jumping = tape.read_mask("grappling")

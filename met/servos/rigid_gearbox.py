@@ -44,6 +44,7 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
         torque=p.ratio * (tau_m - drag.torque),
         dry=p.ratio * drag.level,
         rotor=p.ratio * p.ratio * p.j_m,
+        spin=p.ratio * p.j_m,
         slopes=drag.bending,
         signals={"motor_rate": w_m, "motor_torque": tau_m},
         state_out_of_range=drag.state_out_of_range,
