@@ -28,10 +28,10 @@ from met.dynamics.tree import Tree
 class Energy(NamedTuple):
     """Energy and momentum of all that the joints move; of the base, and of links fixed to it, where it moves freely.
 
-    kinetic    J, 1/2 rotor qd^2 included, and of rotors with a spin what their parents' rotation adds
+    kinetic    J, 1/2 rotor qd^2 included, and what the rotation of the links that carry `momenta` adds to these
     potential  J, of uniform gravity, zero at the world's origin
     linear     momentum, world axes, kg m/s
-    angular    momentum about the world's origin, world axes, kg m^2/s; that of rotors included where they have a spin
+    angular    momentum about the world's origin, world axes, kg m^2/s; `momenta` included
     """
 
     kinetic: Real
@@ -46,13 +46,17 @@ def energy(
     qd: Sequence[Real],
     *,
     rotor: Sequence[Real] | None = None,
-    spin: Sequence[Real] | None = None,
+    momenta: Sequence[Real] | None = None,
     gravity: Vector = ZERO,
     base: Pose = HERE,
     base_velocity: tuple[Vector, Vector] = (ZERO, ZERO),
 ) -> Energy:
-    """Energy and momentum at a state; rotor and spin as in `recursion.solve`, gravity in world axes (m/s^2), base as in
-    `kinematics.link_motions`."""
+    """Energy and momentum at a state; rotor as in `recursion.solve`, gravity in world axes (m/s^2), base as in
+    `kinematics.link_motions`.
+
+    momenta  by joint: angular momentum about its axis of what turns there in the link before it, against that link,
+             kg m^2/s; None: none
+    """
     steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
     bodies = [joint.body for joint in tree.joints]
     poses = list(joint_poses(tree, steps, base))
@@ -73,9 +77,8 @@ def energy(
         weighed = add(weighed, add(scale(m, p), turn_vector(R, h)))
         if rotor is not None and i < len(rotor):
             kinetic = kinetic + 0.5 * (rotor[i] * (qd[i] * qd[i]))
-        if spin is not None and i < len(spin) and not is_zero(spin[i]):
-            of_rotor = spin[i] * qd[i]
-            parents = w[2] - qd[i] if tree.joints[i].kind == "revolute" else w[2]
-            kinetic = kinetic + of_rotor * parents
-            angular = add(angular, turn_vector(R, (0.0, 0.0, of_rotor)))
+        if momenta is not None and i < len(momenta) and not is_zero(momenta[i]):
+            of_link = w[2] - qd[i] if tree.joints[i].kind == "revolute" else w[2]
+            kinetic = kinetic + momenta[i] * of_link
+            angular = add(angular, turn_vector(R, (0.0, 0.0, momenta[i])))
     return Energy(kinetic, -dot(gravity, weighed), linear, angular)

@@ -20,11 +20,15 @@ its own: with g its spin, h = (0, 0, g; 0, 0, 0) and U = IA S + h, all of this h
 
     rest        (r - h_k)/D
     handed on:  column k of Ia is rest * IA S, less U Dinv g in entry (2, k); and the parent takes w x (0, 0, g qd)
+
+A rotor that turns freely about that axis (`FreeRotor`) does not take part in the rotation of its link about it: its
+inertia J leaves Ia, the torque on it and w x (0, 0, L) come to pa.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from met.dynamics.floating import Factors, accelerated, factors
 from met.dynamics.joints import JointTransform
@@ -64,6 +68,19 @@ SINGULAR = 1e-13
 """Share of the outboard inertia (`Joint.reach`) below which D is rounding noise: some hundred roundings."""
 
 
+class FreeRotor(NamedTuple):
+    """A rotor in the link before a joint, about whose axis it turns otherwise than the joint: behind an elastic gear.
+
+    inertia   J, kg m^2, also part of its link's; 0 while it does not turn against its link
+    torque    on it about its axis, N m
+    momentum  L, J times its rate against its link, kg m^2/s
+    """
+
+    inertia: Real
+    torque: Real
+    momentum: Real
+
+
 @frozen
 class Solved:
     """Results of one pass. Sequences have one entry a moving joint, in the tree's order of joints.
@@ -80,7 +97,8 @@ class Solved:
 
     mode, rotor, spin, steps, w (angular velocity), wd and a (angular acceleration; acceleration of the frame's origin
     less gravity), U (column k of IA, and the rotor's spin), D0 (entry k of IA), Dinv, load (wrench that was applied to
-    the body), rate (that the joint was given), base (IA_0 of a free one, taken apart).
+    the body), rate (that the joint was given), free_rotors, base (IA_0 of a free one, taken apart); and `about`, the
+    angular acceleration about the joint's axis of the link before it, rad/s^2.
     """
 
     qdd: tuple[Real, ...]
@@ -100,6 +118,8 @@ class Solved:
     Dinv: tuple[Real, ...]
     load: tuple[Wrench, ...]
     rate: tuple[Real, ...]
+    free_rotors: tuple[FreeRotor | None, ...]
+    about: tuple[Real, ...]
     base_acceleration: Wrench
     base_singular: Truth = False
     base: Factors | None = None
@@ -115,6 +135,7 @@ def solve(
     mode: Sequence[Truth] | Truth = True,
     rotor: Sequence[Real] | None = None,
     spin: Sequence[Real] | None = None,
+    free_rotors: Sequence[FreeRotor | None] | None = None,
     gravity: Vector = ZERO,
     base_acceleration: tuple[Vector, Vector] = (ZERO, ZERO),
     base_rate: Vector = ZERO,
@@ -130,6 +151,7 @@ def solve(
     rotor       N^2 J_m behind each joint, kg m^2 (kg). None: none
     spin        N J_m of the rotor behind each joint, which turns about the joint's axis in the link before it,
                 kg m^2 (kg m): its angular momentum there, for a rate of 1. None: rotors take and give no spin
+    free_rotors by joint, rotors that turn otherwise than it does. None: none
     gravity     acceleration of free fall, world axes, m/s^2
     base_acceleration  angular and linear acceleration of the base frame's origin, base axes, rad/s^2, m/s^2: the
                 derivative of its velocity (not Featherstone's spatial acceleration). The base's linear velocity has
@@ -148,6 +170,7 @@ def solve(
     qdd = (0.0,) * n if qdd is None else qdd
     rotor = (0.0,) * n if rotor is None else rotor
     spin = (0.0,) * n if spin is None else spin
+    free_rotors = (None,) * n if free_rotors is None else free_rotors
     modes = tuple(_truth(m) for m in mode) if isinstance(mode, Sequence) else (_truth(mode),) * n
     steps = tuple(joint.at(q[i]) for i, joint in enumerate(joints))
     base_w, base_wd, base_a = _base(tree, gravity, base_acceleration, base_rate if velocity_products else ZERO)
@@ -209,6 +232,12 @@ def solve(
         moment, force = add(tuple(pa[:3]), extra[0]), add(tuple(pa[3:]), extra[1])  # type: ignore[arg-type]
         if turns and velocity_products:
             moment = add(moment, cross(w[i], (0.0, 0.0, g * qd[i])))
+        free = free_rotors[i]
+        if free is not None:
+            Ia = Ia._replace(A=(*Ia.A[:5], Ia.A[5] - free.inertia))
+            moment = add(moment, (0.0, 0.0, free.torque))
+            if velocity_products:
+                moment = add(moment, cross(w[i], (0.0, 0.0, free.momentum)))
         raised, moment, force = steps[i].raise_articulated(Ia, moment, force, far[i])
         if joint.parent < 0:
             base_IA = symmetric_sum(base_IA, raised)
@@ -232,12 +261,14 @@ def solve(
     # Base to tips: accelerations, and what was to be solved.
     wd: list[Vector] = [ZERO] * n
     a: list[Vector] = [ZERO] * n
+    about: list[Real] = [0.0] * n
     solved: list[tuple[Real, Real, Real]] = [(0.0, 0.0, 0.0)] * n
     for i in tree.order:
         joint, k = joints[i], joints[i].axis
         parent = (base_wd, base_a) if joint.parent < 0 else (wd[joint.parent], a[joint.parent])
         turning, linear = steps[i].lower_acceleration(*parent, far[i])
         before = (*add(turning, c[i][0]), *add(linear, c[i][1]))
+        about[i] = before[2]
         others = [j for j in range(6) if j != k]
         through = dot([U[i][j] * Dinv[i] for j in others], [before[j] for j in others])
         own = e[i] - through + rest[i] * before[k]
@@ -269,6 +300,8 @@ def solve(
         Dinv=tuple(Dinv),
         load=load,
         rate=tuple(qd),
+        free_rotors=tuple(free_rotors),
+        about=tuple(about),
         base_acceleration=base_acceleration,
         base_singular=base_singular,
         base=base,
@@ -300,6 +333,10 @@ def reactions(tree: Tree, solved: Solved) -> tuple[Wrench, ...]:
                 turning = (0.0, 0.0, solved.spin[i] * solved.qdd[i])
                 gyroscopic = cross(solved.w[i], (0.0, 0.0, solved.spin[i] * solved.rate[i]))
                 moment = add(moment, add(turning, gyroscopic))
+            free = solved.free_rotors[i]
+            if free is not None:
+                turning = (0.0, 0.0, free.torque - free.inertia * solved.about[i])
+                moment = add(moment, add(turning, cross(solved.w[i], (0.0, 0.0, free.momentum))))
             outer = solved.steps[i].raise_force(moment, force)
             before = total[joint.parent]
             total[joint.parent] = (add(before[0], outer[0]), add(before[1], outer[1]))

@@ -15,7 +15,7 @@ import pytest
 
 from met.dynamics.effective_inertia import effective_inertia
 from met.dynamics.energy import energy
-from met.dynamics.recursion import Solved, solve
+from met.dynamics.recursion import FreeRotor, Solved, solve
 from met.dynamics.tree import Body, Tree
 from tests.met.dynamics.passes import CLOSE
 from tests.met.dynamics.test_free_base import Flight, flight, floated, passed, pose, vector, whole
@@ -60,9 +60,12 @@ def turned(arm: RandomArm, tree: Tree, base: Flight, spin: np.ndarray, mode: obj
     return passed(arm, tree, base, mode, spin=tuple(map(float, spin)), **words)
 
 
-def of_theirs(arm: RandomArm, base: Flight, theirs: FloatingPinocchio, G: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """M and h over base (angular, linear) and joints, the rotors in both: M a + h = (0, tau)."""
-    q, qd = (*arm.q, *(0.0,) * arm.n), G[6:, 6:] @ arm.qd
+def of_theirs(
+    arm: RandomArm, base: Flight, theirs: FloatingPinocchio, G: np.ndarray, rates: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """M and h over base (angular, linear) and joints, and what else G has columns of, the rotors in both:
+    M a + h = (0, tau). rates: of joints and rotors, rad/s; None: the arm's, and its rotors turn with its joints."""
+    q, qd = (*arm.q, *(0.0,) * arm.n), G[6:, 6:] @ arm.qd if rates is None else rates
 
     def forces(a: np.ndarray) -> np.ndarray:
         return np.concatenate(theirs.forces(base, q, qd, a[:3], a[3:6], a[6:], arm.wrenches))
@@ -128,7 +131,7 @@ def test_energy_and_momentum_are_those_of_rotors_that_are_bodies_of_their_own() 
     worst = Worst("rotors on a free base: energy and momentum")
     for arm, tree, base, spin, theirs, G in fleet():
         ours = energy(
-            tree, arm.q, arm.qd, rotor=arm.rotor, spin=tuple(map(float, spin)), gravity=arm.gravity,
+            tree, arm.q, arm.qd, rotor=arm.rotor, momenta=tuple(map(float, spin * arm.qd)), gravity=arm.gravity,
             base=pose(base), base_velocity=(vector(base.w), vector(base.v)),
         )  # fmt: skip
         q, qd = (*arm.q, *(0.0,) * arm.n), G[6:, 6:] @ arm.qd
@@ -137,6 +140,33 @@ def test_energy_and_momentum_are_those_of_rotors_that_are_bodies_of_their_own() 
         both = np.concatenate(theirs.momentum(base, q, qd))
         worst.see(relative((*ours.angular, *ours.linear), both), f"seed {arm.seed}, momentum")
     worst.below(CLOSE)
+
+
+@pytest.mark.oracle
+def test_rotors_behind_elastic_gears_turn_as_bodies_of_their_own() -> None:
+    worst, own = Worst("free rotors on a free base: the arm"), Worst("free rotors on a free base: themselves")
+    for arm, tree, base, spin, theirs, G in fleet():
+        random = np.random.default_rng(9500 + arm.seed)
+        free = np.flatnonzero(random.random(arm.n) < 0.5)
+        ratio = np.diag(G[6 + arm.n :, 6:])
+        J, torque, rate = spin / ratio, random.normal(0.0, 3.0, arm.n), random.normal(0.0, 20.0, arm.n)
+        # columns of G: base and joints, with the rotors that turn with them; then the free rotors
+        wide = np.hstack([G, np.eye(len(G))[:, 6 + arm.n + free]])
+        wide[6 + arm.n + free, 6 + free] = 0.0
+        turns = np.isin(np.arange(arm.n), free)
+        M, h = of_theirs(arm, base, theirs, wide, np.concatenate([arm.qd, np.where(turns, rate, ratio * arm.qd)]))
+        expected = np.linalg.solve(M, np.concatenate([np.zeros(6), arm.tau, torque[free]]) - h)
+        bound = replace(arm, rotor=tuple(np.where(turns, 0.0, arm.rotor)))
+        rotors = [
+            FreeRotor(float(J[i]), float(torque[i]), float(J[i] * rate[i])) if turns[i] else None for i in range(arm.n)
+        ]
+        ours = turned(bound, tree, base, np.where(turns, 0.0, spin), True, free_rotors=rotors)
+        worst.see(relative(whole(ours), expected[: 6 + arm.n]), f"seed {arm.seed}")
+        found = [torque[i] / J[i] - ours.about[i] for i in free]
+        if len(free):
+            own.see(relative(found, expected[6 + arm.n :]), f"seed {arm.seed}")
+    worst.below(CLOSE)
+    own.below(CLOSE)
 
 
 def test_a_spin_is_refused_nowhere_and_felt_on_a_base_that_is_given() -> None:
