@@ -14,11 +14,21 @@ One formula serves both modes. With r the rotor's inertia and D = S'IA S + r:
     handed on:  Ia = IA - U U' Dinv, whose row and column k are rest * U
                 pa = pA + Ia c + U e, whose component k is tau - r e + ... in torque mode
     outward:    S'a = e - Dinv sum(U_j a'_j, j != k) + rest * a'_k,  qdd = S'a - a'_k
+
+A rotor that turns about the joint's axis, in the link before the joint, also takes its parent's rotation and gives it
+its own: with g its spin, h = (0, 0, g; 0, 0, 0) and U = IA S + h, all of this holds but where IA S itself is meant:
+
+    rest        (r - h_k)/D
+    handed on:  column k of Ia is rest * IA S, less U Dinv g in entry (2, k); and the parent takes w x (0, 0, g qd)
+
+A rotor that turns freely about that axis (`FreeRotor`) does not take part in the rotation of its link about it: its
+inertia J leaves Ia, the torque on it and w x (0, 0, L) come to pa.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from met.dynamics.floating import Factors, accelerated, factors
 from met.dynamics.joints import JointTransform
@@ -37,6 +47,7 @@ from met.dynamics.spatial import (
     choose,
     cross,
     dot,
+    is_zero,
     scale,
     shift_motion,
     sub,
@@ -57,6 +68,19 @@ SINGULAR = 1e-13
 """Share of the outboard inertia (`Joint.reach`) below which D is rounding noise: some hundred roundings."""
 
 
+class FreeRotor(NamedTuple):
+    """A rotor in the link before a joint, about whose axis it turns otherwise than the joint: behind an elastic gear.
+
+    inertia   J, kg m^2, also part of its link's; 0 while it does not turn against its link
+    torque    on it about its axis, N m
+    momentum  L, J times its rate against its link, kg m^2/s
+    """
+
+    inertia: Real
+    torque: Real
+    momentum: Real
+
+
 @frozen
 class Solved:
     """Results of one pass. Sequences have one entry a moving joint, in the tree's order of joints.
@@ -71,9 +95,10 @@ class Solved:
 
     In the recursion's frames and with regrouped inertia (`tree`), for `effective_inertia`, `reactions`:
 
-    mode, rotor, steps, w (angular velocity), wd and a (angular acceleration; acceleration of the frame's origin less
-    gravity), U and D0 (column and entry k of IA), Dinv, load (wrench that was applied to the body), base (IA_0 of a
-    free one, taken apart).
+    mode, rotor, spin, steps, w (angular velocity), wd and a (angular acceleration; acceleration of the frame's origin
+    less gravity), U (column k of IA, and the rotor's spin), D0 (entry k of IA), Dinv, load (wrench that was applied to
+    the body), rate (that the joint was given), free_rotors, base (IA_0 of a free one, taken apart); and `about`, the
+    angular acceleration about the joint's axis of the link before it, rad/s^2.
     """
 
     qdd: tuple[Real, ...]
@@ -83,6 +108,7 @@ class Solved:
     singular: tuple[Truth, ...]
     mode: tuple[Truth, ...]
     rotor: tuple[Real, ...]
+    spin: tuple[Real, ...]
     steps: tuple[JointTransform, ...]
     w: tuple[Vector, ...]
     wd: tuple[Vector, ...]
@@ -91,6 +117,9 @@ class Solved:
     D0: tuple[Real, ...]
     Dinv: tuple[Real, ...]
     load: tuple[Wrench, ...]
+    rate: tuple[Real, ...]
+    free_rotors: tuple[FreeRotor | None, ...]
+    about: tuple[Real, ...]
     base_acceleration: Wrench
     base_singular: Truth = False
     base: Factors | None = None
@@ -105,6 +134,8 @@ def solve(
     qdd: Sequence[Real] | None = None,
     mode: Sequence[Truth] | Truth = True,
     rotor: Sequence[Real] | None = None,
+    spin: Sequence[Real] | None = None,
+    free_rotors: Sequence[FreeRotor | None] | None = None,
     gravity: Vector = ZERO,
     base_acceleration: tuple[Vector, Vector] = (ZERO, ZERO),
     base_rate: Vector = ZERO,
@@ -118,6 +149,9 @@ def solve(
     qdd         accelerations, rad/s^2 (m/s^2); read where it is in acceleration mode. None: zeros
     mode        True: torque mode; False: acceleration mode; a Mask chooses when the program runs
     rotor       N^2 J_m behind each joint, kg m^2 (kg). None: none
+    spin        N J_m of the rotor behind each joint, which turns about the joint's axis in the link before it,
+                kg m^2 (kg m): its angular momentum there, for a rate of 1. None: rotors take and give no spin
+    free_rotors by joint, rotors that turn otherwise than it does. None: none
     gravity     acceleration of free fall, world axes, m/s^2
     base_acceleration  angular and linear acceleration of the base frame's origin, base axes, rad/s^2, m/s^2: the
                 derivative of its velocity (not Featherstone's spatial acceleration). The base's linear velocity has
@@ -135,6 +169,8 @@ def solve(
     tau = (0.0,) * n if tau is None else tau
     qdd = (0.0,) * n if qdd is None else qdd
     rotor = (0.0,) * n if rotor is None else rotor
+    spin = (0.0,) * n if spin is None else spin
+    free_rotors = (None,) * n if free_rotors is None else free_rotors
     modes = tuple(_truth(m) for m in mode) if isinstance(mode, Sequence) else (_truth(mode),) * n
     steps = tuple(joint.at(q[i]) for i, joint in enumerate(joints))
     base_w, base_wd, base_a = _base(tree, gravity, base_acceleration, base_rate if velocity_products else ZERO)
@@ -167,6 +203,7 @@ def solve(
     IA: list[Symmetric] = [NOTHING] * n
     p: list[Wrench] = [(ZERO, ZERO)] * n
     U: list[Six] = [(0.0,) * 6] * n
+    D0: list[Real] = [0.0] * n
     Dinv: list[Real] = [0.0] * n
     rest: list[Real] = [0.0] * n
     e: list[Real] = [0.0] * n
@@ -179,15 +216,28 @@ def solve(
             moment, force = add(moment, gyroscopic), add(force, centrifugal)
         pA = (*sub(moment, load[i][0]), *sub(force, load[i][1]))
         IA[i], p[i] = M, (pA[:3], pA[3:])
-        U[i] = M.column(k)
-        Dinv[i], e[i], rest[i] = _resolve(modes[i], U[i][k], rotor[i], tau[i] - pA[k], qdd[i])
+        column, g = M.column(k), spin[i]
+        turns = not is_zero(g)
+        U[i] = (*column[:2], column[2] + g, *column[3:]) if turns else column
+        D0[i], of_axis = column[k], g if k == 2 else 0.0
+        Dinv[i], e[i], rest[i] = _resolve(modes[i], D0[i], rotor[i], of_axis, tau[i] - pA[k], qdd[i])
         if joint.parent < 0 and tree.floating is None:
             continue
-        Ia = _handed_on(M, k, U[i], Dinv[i], rest[i])
-        own = choose(modes[i], tau[i] - rotor[i] * e[i], pA[k] + U[i][k] * e[i])
+        Ia = _handed_on(M, k, U[i], Dinv[i], rest[i], g)
+        own = choose(modes[i], tau[i] - rotor[i] * e[i], pA[k] + D0[i] * e[i])
+        if turns and k == 2:
+            own = own + g * e[i]
         pa = [own if j == k else pA[j] + U[i][j] * e[i] for j in range(6)]
         extra = _apply(Ia, c[i])
         moment, force = add(tuple(pa[:3]), extra[0]), add(tuple(pa[3:]), extra[1])  # type: ignore[arg-type]
+        if turns and velocity_products:
+            moment = add(moment, cross(w[i], (0.0, 0.0, g * qd[i])))
+        free = free_rotors[i]
+        if free is not None:
+            Ia = Ia._replace(A=(*Ia.A[:5], Ia.A[5] - free.inertia))
+            moment = add(moment, (0.0, 0.0, free.torque))
+            if velocity_products:
+                moment = add(moment, cross(w[i], (0.0, 0.0, free.momentum)))
         raised, moment, force = steps[i].raise_articulated(Ia, moment, force, far[i])
         if joint.parent < 0:
             base_IA = symmetric_sum(base_IA, raised)
@@ -211,12 +261,14 @@ def solve(
     # Base to tips: accelerations, and what was to be solved.
     wd: list[Vector] = [ZERO] * n
     a: list[Vector] = [ZERO] * n
+    about: list[Real] = [0.0] * n
     solved: list[tuple[Real, Real, Real]] = [(0.0, 0.0, 0.0)] * n
     for i in tree.order:
         joint, k = joints[i], joints[i].axis
         parent = (base_wd, base_a) if joint.parent < 0 else (wd[joint.parent], a[joint.parent])
         turning, linear = steps[i].lower_acceleration(*parent, far[i])
         before = (*add(turning, c[i][0]), *add(linear, c[i][1]))
+        about[i] = before[2]
         others = [j for j in range(6) if j != k]
         through = dot([U[i][j] * Dinv[i] for j in others], [before[j] for j in others])
         own = e[i] - through + rest[i] * before[k]
@@ -224,10 +276,11 @@ def solve(
         wd[i], a[i] = after[:3], after[3:]  # type: ignore[assignment]
         found = choose(modes[i], own - before[k], qdd[i])
         needed = (*p[i][0], *p[i][1])[k] + dot(U[i], after)
+        if k == 2 and not is_zero(spin[i]):
+            needed = needed - spin[i] * found  # the rotor feels its parent's rotation alone
         tau_load = choose(modes[i], tau[i] - rotor[i] * found, needed)
         solved[i] = (found, choose(modes[i], tau[i], tau_load + rotor[i] * found), tau_load)
 
-    D0 = tuple(U[i][joint.axis] for i, joint in enumerate(joints))
     D = tuple(x + y for x, y in zip(D0, rotor, strict=True))
     return Solved(
         qdd=tuple(s[0] for s in solved),
@@ -237,14 +290,18 @@ def solve(
         singular=tuple(both(modes[i], D[i] <= SINGULAR * joints[i].reach) for i in range(n)),
         mode=modes,
         rotor=tuple(rotor),
+        spin=tuple(spin),
         steps=steps,
         w=tuple(w),
         wd=tuple(wd),
         a=tuple(a),
         U=tuple(U),
-        D0=D0,
+        D0=tuple(D0),
         Dinv=tuple(Dinv),
         load=load,
+        rate=tuple(qd),
+        free_rotors=tuple(free_rotors),
+        about=tuple(about),
         base_acceleration=base_acceleration,
         base_singular=base_singular,
         base=base,
@@ -255,7 +312,8 @@ def reactions(tree: Tree, solved: Solved) -> tuple[Wrench, ...]:
     """The wrench that each moving joint's link takes from its parent, through the joint: moment about the link
     frame's origin and force, in link axes (the deck's link frame), N m and N.
 
-    Its component along the joint is tau_load. Taken from the bodies' own inertia, not from the regrouped one.
+    Its component along the joint is tau_load, less spin times the parent's angular acceleration about it, which is the
+    rotor's and not the link's. Taken from the bodies' own inertia, not from the regrouped one.
     """
     total: list[Wrench] = [(ZERO, ZERO)] * len(tree.joints)
     result: list[Wrench] = list(total)
@@ -271,6 +329,14 @@ def reactions(tree: Tree, solved: Solved) -> tuple[Wrench, ...]:
         R, origin = tree.frames[tree.carried[i]].pose
         result[i] = (turn_vector_back(R, sub(moment, cross(origin, force))), turn_vector_back(R, force))
         if joint.parent >= 0:
+            if not is_zero(solved.spin[i]):  # of the rotor, which the parent carries
+                turning = (0.0, 0.0, solved.spin[i] * solved.qdd[i])
+                gyroscopic = cross(solved.w[i], (0.0, 0.0, solved.spin[i] * solved.rate[i]))
+                moment = add(moment, add(turning, gyroscopic))
+            free = solved.free_rotors[i]
+            if free is not None:
+                turning = (0.0, 0.0, free.torque - free.inertia * solved.about[i])
+                moment = add(moment, add(turning, cross(solved.w[i], (0.0, 0.0, free.momentum))))
             outer = solved.steps[i].raise_force(moment, force)
             before = total[joint.parent]
             total[joint.parent] = (add(before[0], outer[0]), add(before[1], outer[1]))
@@ -282,22 +348,29 @@ def rate_wrench(body: Rigid, w: Vector) -> Wrench:
     return cross(w, apply_symmetric(body.I, w)), cross(w, cross(w, body.h))
 
 
-def _resolve(mode: Truth, D0: Real, rotor: Real, u: Real, qdd: Real) -> tuple[Real, Real, Real]:
-    """Dinv, e and rest of one joint (head of this file)."""
+def _resolve(mode: Truth, D0: Real, rotor: Real, spin: Real, u: Real, qdd: Real) -> tuple[Real, Real, Real]:
+    """Dinv, e and rest of one joint (head of this file); spin: h_k."""
     if mode is False:
         return 0.0, qdd, 1.0
     D = D0 + rotor
     Dinv = 1.0 / D if isinstance(D, Scalar) else divide(1.0, D)
-    return choose(mode, Dinv, 0.0), choose(mode, u * Dinv, qdd), choose(mode, rotor * Dinv, 1.0)
+    return (
+        choose(mode, Dinv, 0.0),
+        choose(mode, u * Dinv, qdd),
+        choose(mode, (rotor if is_zero(spin) else rotor - spin) * Dinv, 1.0),
+    )
 
 
-def _handed_on(M: Symmetric, k: int, U: Six, Dinv: Real, rest: Real) -> Symmetric:
+def _handed_on(M: Symmetric, k: int, U: Six, Dinv: Real, rest: Real, spin: Real) -> Symmetric:
     """Ia: what of IA resists the parent."""
     g = [x * Dinv for x in U]
+    column = U if is_zero(spin) else M.column(k)
 
     def entry(i: int, j: int) -> Real:
         if k in (i, j):
-            return rest * U[i + j - k]
+            other = i + j - k
+            kept = rest * column[other]
+            return kept - g[k] * spin if other == 2 and not is_zero(spin) else kept
         if j < 3:
             old = M.A[AT[i][j]]
         else:

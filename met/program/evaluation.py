@@ -11,6 +11,7 @@ from met.dynamics.tree import Tree
 from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
+from met.program import rotors
 from met.program.control import failing, link_sensors, sensing, setpoints
 from met.program.motion.base import BaseMotion, base_of, free_base
 from met.program.motion.bodies import slopes
@@ -37,6 +38,8 @@ class Derivative:
     gravity  acceleration of free fall, of all environment models, world axes, m/s^2
     base     where the base is and how it moves
     stored   kinetic and potential energy in the servos, of what does not move with their joints, J
+    angular_momenta  of the rotors that a free base feels, by joint, about its axis against the link that carries them,
+             kg m^2/s; none of them where the base does not move freely
     out_of_range  of each moving joint, whether a state of its servo is where it can never be
     loads    what each moving joint would have to be driven with to move so, N m (N): what the arm takes less what the
              environment gives
@@ -50,6 +53,7 @@ class Derivative:
     gravity: Vector
     base: BaseMotion
     stored: tuple[Real, Real]
+    angular_momenta: tuple[Real, ...]
     out_of_range: tuple[Truth, ...]
     loads: tuple[Real, ...]
 
@@ -109,6 +113,10 @@ def derivative(
         loads.torques[i] + (0.0 if drive is None or i in prescribed_qdd else drive.torque)
         for i, drive in enumerate(drives)
     ]
+    turning = None
+    if free_base(system) is not None:
+        of_states, state_needs = _slopes(system, driven, friction)
+        turning = rotors.of(system, drives, y, of_states, friction, prescribed_qdd)
     with part("dynamics"):
         solved = solve(
             tree,
@@ -118,13 +126,18 @@ def derivative(
             qdd=tuple(given),
             mode=tuple(mode),
             rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
+            spin=None if turning is None else turning.spin,
+            free_rotors=None if turning is None else turning.free,
             gravity=base.to_base(loads.gravity),
             base_acceleration=(base.wd, base.a),
             base_rate=base.w,
             wrenches=wrenches,
             velocity_products=system.structure.velocity_products,
         )
-    of_states, state_needs = _slopes(system, driven, friction)
+    if turning is None:
+        of_states, state_needs = _slopes(system, driven, friction)
+    else:
+        of_states, state_needs = rotors.against_their_links(system, turning, solved, of_states, state_needs, friction)
     needs = {joint.name: a - b for joint, a, b in zip(system.joints, smooth, solved.tau_load, strict=True)}
     qd, qdd = (*y.qd[:n],), solved.qdd
     body = free_base(system)
@@ -154,6 +167,7 @@ def derivative(
             sum((drive.kinetic for drive in drives if drive is not None), 0.0),
             sum((drive.potential for drive in drives if drive is not None), 0.0),
         ),
+        angular_momenta=() if turning is None else turning.momenta(y.qd),
         out_of_range=tuple(False if drive is None else drive.state_out_of_range for drive in drives),
         loads=tuple(a - b for a, b in zip(solved.tau_load, loads.torques, strict=True)),
     )

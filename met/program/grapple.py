@@ -2,7 +2,8 @@
 
 Each at the first instant of the dynamics that is not before its time. All grapples of an instant are one impact, and
 releases follow it. Joints that are told their acceleration do not jump, nor do those whose motors are on a bed; dry
-friction holds no joint against a blow; states of servos stay what they are.
+friction holds no joint against a blow; states of servos stay what they are, but for the rate of a rotor behind an
+elastic gear on a free base: the rotor goes on turning as it did, and the link that its rate counts from jumps.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from met.dynamics.recursion import Wrench, solve
 from met.dynamics.spatial import ZERO, add, choose, compose, inverse, turn_vector
 from met.integrators.integrator import Motion
 from met.plan import INSTANT
-from met.program import cell_names, cells
+from met.program import cell_names, cells, rotors
 from met.program.evaluation import servo_response
 from met.program.motion import payloads
 from met.program.motion.base import base_of, free_base, motions
@@ -111,23 +112,28 @@ class Grapple:
         system, n = self.system, len(self.system.joints)
         drives = [self._drive(tape, actuator, y) for actuator in system.actuators]
         on_beds = {actuator.index for actuator, _, _ in system.mounted}
+        body = free_base(system)
+        turning = None if body is None else rotors.of(system, drives, y, (0.0,) * len(system.states), {}, on_beds)
         solved = solve(
             payloads.tree_with_payloads(system, tape.read),
             y.q[:n],
             (0.0,) * n,
             mode=tuple(False if i in on_beds else _yields(drive) for i, drive in enumerate(drives)),
             rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
+            spin=None if turning is None else turning.spin,
+            free_rotors=None if turning is None else turning.free,
             wrenches=blows,
         )
         jumping = tape.read_mask("grappling")
         jumps = [(joint.name, jump) for joint, jump in zip(system.joints, solved.qdd, strict=True)]
-        body = free_base(system)
         if body is not None:
             wd, a = solved.base_acceleration
             R = base_of(system, tape.read, y, tape.time).pose.R
             jumps += zip(body.coordinates, (*turn_vector(R, a), *wd), strict=True)
         for name, jump in jumps:
             cells.keep(tape, jumping, f"{name}.qd", tape.read(f"{name}.qd") + jump)
+        for i, channel in ({} if turning is None else turning.states).items():
+            cells.keep(tape, jumping, channel, tape.read(channel) - solved.about[i])
 
     def _drive(self, tape: Tape, actuator: Actuator | None, y: Motion) -> Drive | None:
         if actuator is None:

@@ -153,6 +153,7 @@ class Observed:
             self.q,
             self.qd,
             rotor=found.solved.rotor,
+            momenta=found.angular_momenta,
             gravity=found.gravity,
             base=base.pose,
             base_velocity=(base.w, base.v),

@@ -80,6 +80,7 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
         torque=p.ratio * (tau_m - drag.torque) - p.f_v_joint * joint.qd,
         dry=p.ratio * drag.level + p.f_c_joint,
         rotor=p.ratio * p.ratio * p.j_m,
+        spin=p.ratio * p.j_m,
         slopes={**electric, **drag.bending},
         signals=shown,
         state_out_of_range=drag.state_out_of_range,

@@ -57,6 +57,7 @@ def geared(p: Any, states: Any, joint: JointMotion, tau_m: Real, strongest: Real
         dry=p.f_c_joint,
         slopes={"deflection": rate, "motor_rate": (tau_m - at_motor - drag.torque) / p.j_m, **drag.bending},
         friction={"motor_rate": drag.level / p.j_m},
+        rotors={"motor_rate": p.j_m},
         signals={**shown, "gear_torque": joint.coupled * T},
         kinetic=0.5 * p.j_m * (w * w),
         potential=gear.energy(p, states.deflection),

@@ -10,7 +10,8 @@
 Or friction is Stribeck's, or LuGre's (met/servos/friction.py).
 
 The rotor's inertia N^2 J_m moves with the joint. Figure 3 and table 1 of Hill, Hopping and Price (1989).
-Not a gearbox with compliance, and neither the rotor's gyroscopic torque nor its coupling to the parent's rotation.
+Not a gearbox with compliance. What the rotor's turning does to the link that carries it is computed on a free base
+alone.
 
 A position command is followed by asking the rate loop for qd_cmd = d(q_cmd)/dt + k_position (q_cmd - q). A torque
 command sets the voltage that gives this torque at the rate seen, without friction's share; it is open loop.
@@ -44,6 +45,7 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
         torque=p.ratio * (tau_m - drag.torque),
         dry=p.ratio * drag.level,
         rotor=p.ratio * p.ratio * p.j_m,
+        spin=p.ratio * p.j_m,
         slopes=drag.bending,
         signals={"motor_rate": w_m, "motor_torque": tau_m},
         state_out_of_range=drag.state_out_of_range,

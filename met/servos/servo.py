@@ -95,6 +95,10 @@ class Drive:
     dry        level of dry friction that opposes motion and holds at rest, >= 0 (N m; N). The engine decides
                between sticking and sliding (docs/physics.md, "Friction sticks"). The number 0.0: none, ever
     rotor      inertia that moves rigidly with the joint but is not the arm's: N^2 J_m (kg m^2; kg)
+    spin       angular momentum about the joint's axis of what turns with the joint in the link before it, for a joint
+               rate of 1: N J_m, below zero where it turns against the joint (kg m^2; kg m). A free base feels it
+    rotors     of states that are rates of something that turns about the joint's axis in the link before it, by name:
+               its inertia, kg m^2. A free base feels it, and it feels the turning of its link
     given      None: the joint is in torque mode. A truth: where true, in acceleration mode with qdd = `qdd`
     qdd        the acceleration, where `given`
     slopes     d(state)/dt for each of the servo's `states`, by name; dry friction on a state not included
@@ -109,6 +113,8 @@ class Drive:
     torque: Real = 0.0
     dry: Real = 0.0
     rotor: Real = 0.0
+    spin: Real = 0.0
+    rotors: Mapping[str, Real] = field(default_factory=dict)
     given: Truth | None = None
     qdd: Real = 0.0
     slopes: Mapping[str, Real] = field(default_factory=dict)
