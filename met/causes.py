@@ -175,7 +175,7 @@ def _cause_of_base(experiment: Experiment, failure: float, tick: float) -> str:
     if failure == SINGULAR:
         return (
             f"{head}it moves freely and has no inertia in some direction, so its acceleration is undefined{where}. "
-            f"Give link base mass, and a shape or inertia."
+            f"Give link base mass, and a shape or inertia, that of the rotors it carries among it."
         )
     return (
         f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: a step too long for "

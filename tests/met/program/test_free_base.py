@@ -201,7 +201,7 @@ def test_a_base_without_inertia_fails_and_says_so(tmp_path: Path) -> None:
     assert run.status[0] == engine.FAILED
     assert run.cause[0].replace(str(tmp_path), "") == (
         "t = 0 s: the base: it moves freely and has no inertia in some direction, so its acceleration is undefined "
-        "(/deck.ic:10). Give link base mass, and a shape or inertia."
+        "(/deck.ic:10). Give link base mass, and a shape or inertia, that of the rotors it carries among it."
     )
 
 

@@ -80,3 +80,10 @@ def test_momentum_is_kept_through_a_grapple(tmp_path: Path, model: str) -> None:
     assert np.max(np.abs(rate[before + 1] - rate[before])) > 0.05
     print(model, lost(run))
     assert lost(run) < 1e-7
+
+
+def test_a_base_with_less_inertia_than_the_rotor_it_carries_is_a_failed_case(tmp_path: Path) -> None:
+    text = DECK.format(model="rigid_gearbox", more="", hz=1000).replace("j_m = 2e-3", "j_m = 60")
+    [why] = engine.run(experiment(tmp_path, text)).cause
+    assert "inertia" in why
+    assert why.endswith("Give link base mass, and a shape or inertia, that of the rotors it carries among it.")
