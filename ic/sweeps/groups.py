@@ -9,6 +9,7 @@ from dataclasses import field, replace
 import numpy as np
 
 from ic.grammar.syntax import Deck, Expression, Name, Word, children
+from ic.meaning.checks.steps import check_steps
 from ic.meaning.checks.stops import check_stops
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.parameters.scope import Scope
@@ -61,6 +62,8 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
         source.effects.examine(scope, run, made)
         if not source.complaints.errors:
             check_stops(source.complaints, made)
+            made = check_steps(scope, made)
+        source.complaints.settle()
         return [(made, scope)]
     return _sum(source, definition, ()) if definition.parts else _Sweep(source, definition).groups()
 
@@ -173,6 +176,7 @@ class _Sweep:
         self.source.effects.note_run(scope, run)
         check_coordinates(scope, complete=resolved is not None)
         if resolved is None:
+            self.complaints.settle()
             return None
         values = columns(there, rows)
         keep, counts = kept(scope, there, values, choices, len(rows), resolved.structure)
@@ -196,6 +200,8 @@ class _Sweep:
             check_effects(self.complaints, there, made)
             check_stops(self.complaints, made)
             made = replace(made, notes=(*made.notes, *check_confidences(self.complaints, there, made)))
+            made = check_steps(scope, made)
+        self.complaints.settle()
         self.source.effects.examine(scope, run, made, self.definition.group.body)
         return ((made, scope), rows[keep]), dropped
 
