@@ -68,7 +68,7 @@ def _cause_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
     what = "the servo, the arm or what acts on its base" if experiment.structure.free else "the servo or the arm"
     return (
         f"{head}position, rate or acceleration is no longer a finite number{where}. Usual reasons: "
-        f"{_of_guide(experiment, joint.name)}a step too long for {what} (see the stability figures of `met plan`; try "
+        f"{_of_guide(experiment, joint.name)}a step too long for {what} (see the step size of `met plan`; try "
         f"a faster rate for the dynamics), or a model that divides by zero."
     )
 

@@ -106,6 +106,7 @@ def compile_deck(
         complaints.error("D078", "this deck's values are nested too deeply", help="build them up in steps, with `let`")
     except Problem as problem:
         complaints.add(*problem.diagnostics)
+    complaints.settle()
     sources = (*deck.sources, *definitions.csv_files.sources, *definitions.robot_files.sources)
     texts = {source.name: source.text for source in sources}
     if not complaints.errors:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ic.printing.columns import count
-from ic.printing.plan import STABILITY, passive
+from ic.printing.plan import STEP_SIZE, passive
 from met.diagnostic import Diagnostic
 from met.plan import Plan
 
@@ -17,7 +17,7 @@ def notes(plan: Plan) -> Iterator[str]:
         if free:
             freely = "which moves freely" if len(free) == 1 else "which move freely"
             yield f"{experiment.name}: no servo on {', '.join(free)}, {freely}"
-        yield from (f"{experiment.name}: {note}" for note in experiment.notes if not note.startswith(STABILITY))
+        yield from (f"{experiment.name}: {note}" for note in experiment.notes if not note.startswith(STEP_SIZE))
 
 
 def verdict(plan: Plan, diagnostics: Sequence[Diagnostic]) -> str:

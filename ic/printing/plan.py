@@ -19,7 +19,7 @@ from met.plan.uses import sensor_parts
 
 CHOSEN = 88  # columns, of parameters that stand in one cell
 FIXED_SPACE = "\u00a0"  # no line ends at one
-STABILITY = "stability of "  # how the compiler's notes on it begin
+STEP_SIZE = "step size: "  # how the compiler's note on it begins
 
 
 class _Values:
@@ -118,7 +118,7 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
         yield from columns([(each.of, each.text) for each in experiment.tolerances])
     yield ""
     yield from _cases(experiment)
-    notes = [note for note in experiment.notes if not note.startswith(STABILITY)]
+    notes = [note for note in experiment.notes if not note.startswith(STEP_SIZE)]
     if notes:
         yield ""
         yield "Notes"
@@ -283,11 +283,7 @@ def _schedule(experiment: Experiment) -> Iterator[str]:
     ticks = count(schedule.ticks, "tick")
     yield f"Schedule: {number(schedule.duration)} s, {ticks} of the base rate, {number(base)} Hz"
     yield from columns(rows, right=(1,))
-    stability = [note.removeprefix(STABILITY) for note in experiment.notes if note.startswith(STABILITY)]
-    if stability:
-        limit = number(models.find("integrator", structure.integrator).real_limit)
-        yield f"Stability: step times the servo's fastest rate constant; {structure.integrator} is stable below {limit}"
-        yield from columns([note.removeprefix("joint ").partition(": ")[::2] for note in stability])
+    yield from (f"Step size: {note.removeprefix(STEP_SIZE)}" for note in experiment.notes if note.startswith(STEP_SIZE))
 
 
 def _substitutions(experiment: Experiment) -> Iterator[str]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ic.grammar.syntax import Deck, Expression, Name, Word, children
 from ic.meaning.checks.balance import check_balance
+from ic.meaning.checks.steps import check_steps
 from ic.meaning.checks.stops import check_stops
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.parameters.scope import Scope
@@ -63,6 +64,8 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
         if not source.complaints.errors:
             check_stops(source.complaints, made)
             check_balance(source.complaints, made)
+            made = check_steps(scope, made)
+        source.complaints.settle()
         return [(made, scope)]
     return _sum(source, definition, ()) if definition.parts else _Sweep(source, definition).groups()
 
@@ -175,6 +178,7 @@ class _Sweep:
         self.source.effects.note_run(scope, run)
         check_coordinates(scope, complete=resolved is not None)
         if resolved is None:
+            self.complaints.settle()
             return None
         values = columns(there, rows)
         keep, counts = kept(scope, there, values, choices, len(rows), resolved.structure)
@@ -199,6 +203,8 @@ class _Sweep:
             check_stops(self.complaints, made)
             check_balance(self.complaints, made)
             made = replace(made, notes=(*made.notes, *check_confidences(self.complaints, there, made)))
+            made = check_steps(scope, made)
+        self.complaints.settle()
         self.source.effects.examine(scope, run, made, self.definition.group.body)
         return ((made, scope), rows[keep]), dropped
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -16,6 +16,14 @@ REPORTED_ONCE = ("D060", "D061", "D076", "D077", "D087", "D104", "D109", "D125",
 inertia, a rate too slow, no entry of a run, no channel, no such key, a unit that may mean cycles, a share above 1."""
 
 
+REMARKED_ONCE = ("D317", "D318", "D319", "D320")
+"""Codes of warnings that a place has once: of a rate or a servo that several runs and sweeps share."""
+
+
+PROVISIONAL = ("D104", "D105", "D249")
+"""Codes of what a servo or a sensor says of its own step, which waits for what the whole arm's step says."""
+
+
 UNKNOWN_WORDS = ("D044", "D045", "D082", "D108", "D136", "D157")
 """Codes of messages about unknown words of the language, which no deck defines."""
 
@@ -26,6 +34,7 @@ class Complaints:
     def __init__(self, found: Iterable[Diagnostic] = ()) -> None:
         self._found: dict[Diagnostic, None] = dict.fromkeys(found)
         self._remarks: dict[Diagnostic, None] = {}
+        self._provisional: list[Diagnostic] = []
         self.error_count = (
             0  # errors so far, those that are not reported again included: to see whether a step found one
         )
@@ -105,7 +114,22 @@ class Complaints:
         also: Iterable[Label] = (),
         help: Iterable[str] | str = (),
     ) -> None:
-        self.add(error(code, message, at, also=also, help=help))
+        found = error(code, message, at, also=also, help=help)
+        if code in PROVISIONAL:
+            self._provisional.append(found)
+        else:
+            self.add(found)
+
+    def settle(self, refuted: Collection[str] = ()) -> frozenset[str]:
+        """Report what was provisional, but for these codes; returns the codes that were reported."""
+        kept = [each for each in self._provisional if each.code not in refuted]
+        self._provisional = []
+        for each in kept:
+            if each.severity == "error":
+                self.add(each)
+            else:
+                self._remarks.setdefault(each)
+        return frozenset(each.code for each in kept)
 
     def note_misspelling(self, of: Place, word: str, known: Iterable[str]) -> None:
         """Notes what an unknown entry of what is defined at `of` may have been meant for: that is not missing
@@ -157,7 +181,13 @@ class Complaints:
         help: Iterable[str] | str = (),
     ) -> None:
         """A warning about what the deck means, which says something only once the deck has no errors."""
-        self._remarks.setdefault(replace(error(code, message, at, also=also, help=help), severity="warning"))
+        found = replace(error(code, message, at, also=also, help=help), severity="warning")
+        if code in PROVISIONAL:
+            self._provisional.append(found)
+        elif code not in REMARKED_ONCE or all(
+            (each.code, each.at and each.at.place) != (code, found.at and found.at.place) for each in self._remarks
+        ):
+            self._remarks.setdefault(found)
 
     def admit_remarks(self) -> None:
         """Makes warnings of the remarks."""

@@ -30,6 +30,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from met.dynamics.floating import Factors, accelerated, factors
 from met.dynamics.joints import JointTransform
 from met.dynamics.spatial import (
@@ -397,6 +399,8 @@ def _apply(M: Symmetric, x: Wrench) -> Wrench:
 
 
 def _truth(mode: object) -> Truth:
+    if isinstance(mode, np.ndarray):  # of lanes, where a step is linearised
+        return mode  # type: ignore[return-value]
     return mode if isinstance(mode, Mask) else bool(mode)
 
 

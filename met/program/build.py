@@ -63,12 +63,7 @@ class Builder:
         held, at_rows = derived(self.system)
         tick: list[Control] = [Unless0((Every(instant, self.step.finish()),)), *self.step.grapple.events()]
         tick += self.step.beds.before_servos()
-        for divisor in sorted({use.divisor for use in self.system.structure.sensors}):
-            tick.append(Every(divisor, (RunPhase(Phase(f"sensors_{divisor}", self._sensors(divisor))),)))
-        for divisor in sorted({use.divisor for use in guiding.ticking(self.system)}):
-            tick.append(Every(divisor, (RunPhase(Phase(f"guides_{divisor}", self._guides(divisor))),)))
-        for divisor in sorted({actuator.use.divisor for actuator in self.system.working if actuator.ticks}):
-            tick.append(Every(divisor, (RunPhase(Phase(f"servos_{divisor}", self._servos(divisor))),)))
+        tick += self.computers()
         tick += self.step.begin()
         if held:
             tick.append(Every(instant, (CallPhase(Phase("observe", self._observe(held))),)))
@@ -105,6 +100,17 @@ class Builder:
         if self.step.beds.wire:
             return ()
         return (*plausible.OUTPUTS, *([UNHELD] if self.system.structure.balanced else []))
+
+    def computers(self) -> list[Control]:
+        """What ticks by clocks of its own, in this order: sensors of links, guides, servos."""
+        found: list[Control] = []
+        for divisor in sorted({use.divisor for use in self.system.structure.sensors}):
+            found.append(Every(divisor, (RunPhase(Phase(f"sensors_{divisor}", self._sensors(divisor))),)))
+        for divisor in sorted({use.divisor for use in guiding.ticking(self.system)}):
+            found.append(Every(divisor, (RunPhase(Phase(f"guides_{divisor}", self._guides(divisor))),)))
+        for divisor in sorted({actuator.use.divisor for actuator in self.system.working if actuator.ticks}):
+            found.append(Every(divisor, (RunPhase(Phase(f"servos_{divisor}", self._servos(divisor))),)))
+        return found
 
     # The run's two ends.
 

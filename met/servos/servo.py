@@ -145,7 +145,7 @@ class Servo:
                and the law asks for just that. seen: at time 0, with the states that `begin` gives, and a command that
                the joint be as it is. None: it is not balanced
     fastest    (p) -> upper bound of the fastest rate constant of the joint's motion under this servo, 1/s, whatever
-               arm it carries; for the plan's stability figure. None: no such bound
+               arm it carries; to hold the dynamics' step against. None: no such bound
     motor      (p) -> the motor that a bed may take the place of (met/substitution): the servo's computer then sets
                `voltage`, one of its outputs, on the bed. None: there is none to substitute
     motor_only word and value of it under which that is so; None: under all

@@ -31,7 +31,9 @@ def of_bits(bits: int) -> float:
 
 
 def divide(a: float, b: float) -> float:
-    """a / b of IEEE: 1/0 is infinite, 0/0 not a number."""
+    """a / b of IEEE: 1/0 is infinite, 0/0 not a number; of arrays too, where floating point errors are ignored."""
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return a / b
     if b != 0.0:
         return a / b
     if a == 0.0 or a != a or b != b:

@@ -115,8 +115,8 @@ def test_the_decks_runs_meet_their_requirements_and_its_steps_are_short_enough()
     for one in plan.experiments:
         result = engine.run(one)
         assert result.met and all(bool(met[0]) for met in result.met.values()), (one.name, result.metrics)
-        figures = [float(x) for note in one.notes for x in re.findall(r"h \* lambda = ([0-9.]+)", note)]
-        assert len(figures) == 7 and max(figures) <= 0.5
+        (figure,) = [float(x) for note in one.notes for x in re.findall(r"h \* lambda = ([0-9.]+)", note)]
+        assert figure <= 0.5  # of the fastest mode
 
 
 def test_the_payload_sweep_shows_what_a_weak_and_a_strong_gain_cost():

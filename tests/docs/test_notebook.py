@@ -102,11 +102,11 @@ class TestAsItIsStored:
         pages = re.findall(r"\]\(([^)#]+)\)", "".join(cell.source for cell in stored.cells))
         assert pages and [page for page in pages if not (DOCS / page).is_file()] == []
 
-    def test_its_deck_has_neither_errors_nor_warnings(self, stored: Any, tmp_path: Path) -> None:
+    def test_its_deck_has_the_one_warning_that_it_speaks_of(self, stored: Any, tmp_path: Path) -> None:
         (deck,) = (cell.source for cell in codes(stored) if cell.source.startswith("%%writefile boom.ic\n"))
         (tmp_path / "boom.ic").write_text(deck.partition("\n")[2], encoding="utf-8")
         compiled = ic.check(tmp_path / "boom.ic")
-        assert compiled.diagnostics == () and compiled.plan is not None
+        assert [each.code for each in compiled.diagnostics] == ["D317"] and compiled.plan is not None
         assert [experiment.cases.count for experiment in compiled.plan.experiments] == [1, 2000]
 
 

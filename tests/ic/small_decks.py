@@ -15,6 +15,9 @@ arm swing {
     joint hinge revolute { parent = base; child = bar; axis = z; }
 }
 """
+LIGHT = ARM.replace("shape = rod(length = 1 m, along = x)", "com = [0, 0, 0] m; inertia = [1e-9, 1e-9, 1e-9] kg*m^2")
+"""The same arm with a bar that hardly adds to the inertia of a servo's rotor."""
+
 SERVO = """\
 servo drive {
     model = rigid_gearbox;

@@ -26,7 +26,7 @@ from met.trace import Real
 
 T = TypeVar("T")
 
-GROWS = 1.0  # ln of the growth over a run, above which a warning is given: e times
+GROWS = float(np.log(1.1))  # ln of the growth over a run, above which a warning is given: by a tenth
 FINEST = 1000  # times the base rate: beyond, no rate is proposed
 
 
@@ -74,6 +74,7 @@ def check_swing(
         grown = np.where(np.isfinite(grown), grown, 0.0)
         if (grown > GROWS).any():
             a, b = map(float, values[int(np.argmax(grown))])
+            scope.note_rate("D249", float(np.max(grown)), int(np.argmax(grown)))
             every = h / (float(np.max(grown)) / steps)
             still = [
                 f"integrator = {name};"

@@ -191,8 +191,8 @@ def check_stability(
     dynamics: Rate,
     path: str,
     of: str = "the servo's fastest rate constant, on any arm",
-) -> Real | None:
-    """h lambda of a joint under its servo, or of a sensor: returned, with a warning or an error.
+) -> None:
+    """Warn of h lambda of a joint under its servo, or of a sensor; an error where it is unstable.
 
     label  the servo in words; joints with the same servo and the same figure are reported once, and of several servos
            for which one rate is too slow the first that is checked
@@ -206,6 +206,8 @@ def check_stability(
         def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
             x = h * values[:, 0]
             bad = ~(x < limit)
+            if bad.any():
+                scope.note_rate("D104", float(np.max(x)), int(np.argmax(x)))
             worst = float(np.max(values[:, 0])) if bad.any() else 0.0
             return bad, [
                 f"h * lambda = {float(np.max(x)):.3g}; the slowest rate that fits is {slowest(worst)}"
@@ -215,6 +217,7 @@ def check_stability(
             x = h * values[:, 0]
             above = WARN_ABOVE * (1.0 + 1e-9)
             if above < float(np.max(x)) < limit:
+                scope.note_rate("D105", float(np.max(x)), int(np.argmax(x)))
                 better = slowest_that_fits(schedule, above)(float(np.max(values[:, 0])))
                 scope.complaints.remark(
                     "D105",
@@ -234,8 +237,6 @@ def check_stability(
             needs=(path,),
         )
         scope.checks.observe((fastest,), warn, dynamics.place, needs=(path,))
-        return fastest * h
-    return None
 
 
 def slowest_that_fits(schedule: Schedule, limit: float) -> Callable[[float], str]:

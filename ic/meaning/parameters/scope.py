@@ -57,6 +57,8 @@ class Scope:
     sensors         names of the run's sensors on links
     removed         path of a parameter -> where `remove` took it away
     settings        path -> a number set on the command line
+    rate_place      where the rate of the dynamics is written; None where it is not, or wrong
+    declared_rates  code -> the largest figure that servos and sensors give for themselves, and the cases that have it
     """
 
     definitions: Definitions
@@ -76,6 +78,8 @@ class Scope:
     sensors: frozenset[str] = frozenset()
     removed: dict[str, Place] = field(default_factory=dict)
     settings: Mapping[str, Setting] = field(default_factory=dict)
+    rate_place: Place | None = None
+    declared_rates: dict[str, tuple[float, tuple[int, ...]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.checks = Checks(self.complaints, self.graph, self.varied)
@@ -83,6 +87,11 @@ class Scope:
         self.value_checks = ValueChecks(self.complaints, self.definitions, self.names, self.checks, self.joint_kinds)
         # the settings that are evaluated so far, by path; None for one that is no number
         self.evaluated_settings: dict[str, CommandLineValue | None] = {}
+
+    def note_rate(self, code: str, figure: float, case: int) -> None:
+        """Notes a figure that a servo or a sensor gives for itself, and the case that has it."""
+        before, cases = self.declared_rates.get(code, (0.0, ()))
+        self.declared_rates[code] = (max(before, figure), (*cases, case))
 
     def settled(self, path: str) -> Settled | None:
         """The settled value of a path, whether or not it is a parameter of the plan."""

@@ -43,7 +43,6 @@ from met import models
 from met.diagnostic import Place, did_you_mean
 from met.frozen import frozen
 from met.plan import Experiment, Requirement, Schedule, ServoUse, StepErrorLimit, Structure, Tolerance
-from met.trace import Real
 
 BLOCKS = ("servos", *(block.name for block in (INITIAL, ENVIRONMENT, RATES, TOLERANCES)))
 """Keys of a run that have a block."""
@@ -53,7 +52,6 @@ BLOCKS = ("servos", *(block.name for block in (INITIAL, ENVIRONMENT, RATES, TOLE
 class Resolved:
     """A run's structure, requirements and tolerances; its parameters are in the scope.
 
-    stability  h * lambda of every joint whose servo knows it
     settings   keys of the run that the experiment keeps beside its structure, by field
     """
 
@@ -62,7 +60,6 @@ class Resolved:
     step_errors: tuple[StepErrorLimit, ...]
     tolerances: tuple[Tolerance, ...]
     seed: int
-    stability: tuple[tuple[str, Real], ...]
     place: Place
     settings: Mapping[str, Any]
 
@@ -118,9 +115,9 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     check_friction(scope, uses, environment)
     _keep_settings(scope, block, arm, integrator, rates, schedule)
     on_beds = [each.joint for each in substitutions]
-    stability: tuple[tuple[str, Real], ...] = ()
     if known:
-        stability = _check_steps(scope, uses, sensors, on_beds, schedule, ticks, integrator, rates["dynamics"])
+        scope.rate_place = rates["dynamics"].place
+        _check_steps(scope, uses, sensors, on_beds, schedule, ticks, integrator, rates["dynamics"])
     servos = tuple(
         ServoUse(
             joint=use.joint,
@@ -166,7 +163,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     step_errors = resolve_step_errors(scope, block, structure)
     tolerances = resolve_tolerances(scope, body_of(scope, block.get("tolerances")), structure)
     settings = resolve_run_keys(scope, run, block, Experiment)
-    return Resolved(structure, requirements, step_errors, tolerances, seed, stability, definition.place, settings)
+    return Resolved(structure, requirements, step_errors, tolerances, seed, definition.place, settings)
 
 
 def _check_steps(
@@ -178,33 +175,27 @@ def _check_steps(
     ticks: Mapping[str, Ticks],
     integrator: Any,
     dynamics: Rate,
-) -> tuple[tuple[str, Real], ...]:
-    """Check that the integrator's steps can follow servos and sensors; h * lambda by joint, in the order of `uses`.
+) -> None:
+    """Check that the integrator's steps can follow what servos and sensors declare of themselves.
 
     on_beds  joints whose motor is on a bed, and so no part of the step
     """
-    fastest = {}
+    fastest = []
     for use in uses:
         if use.parameters is not None and use.joint not in on_beds:
             x = fastest_rate(
                 scope, use.servo, use.parameters, f"{use.joint}.servo", continuous=ticks[use.joint].continuous
             )
             if x is not None:
-                fastest[use.joint] = (use, x)
-    stability: dict[str, Real] = {}
-    for use, x in sorted(fastest.values(), key=lambda each: -scope.checks.first(each[1])):  # the worst is reported
-        h_lambda = check_stability(
-            scope, f"servo `{use.definition}`", x, schedule, integrator, dynamics, f"{use.joint}.servo"
-        )
-        if h_lambda is not None:
-            stability[use.joint] = h_lambda
+                fastest.append((use, x))
+    for use, x in sorted(fastest, key=lambda each: -scope.checks.first(each[1])):  # the worst is reported
+        check_stability(scope, f"servo `{use.definition}`", x, schedule, integrator, dynamics, f"{use.joint}.servo")
     for sensor in sensors:
         if sensor.values:
             model = models.find("sensor", sensor.model)
             check_sensor(scope, sensor.label, model, sensor.values, schedule, integrator, dynamics, sensor.path)
     for use in uses:
         check_circuits(scope, use, schedule, integrator, dynamics, on_bed=use.joint in on_beds)
-    return tuple((joint, stability[joint]) for joint in fastest if joint in stability)
 
 
 def _keep_settings(

@@ -154,6 +154,11 @@ def turn(system: System, tape: Tape, active: Truth, y: Motion, copy: str = "") -
         _write(body, tape, active, _turned(_read(body, tape.read, copy), body.q(y)[3:]))
 
 
+def turn_by(body: FreeBody, tape: Tape, theta: tuple[Real, ...]) -> None:
+    """Turns a body by this rotation vector of its own axes, rad."""
+    _write(body, tape, True, _turned(_read(body, tape.read, ""), theta))
+
+
 def _slope(theta: tuple[Real, ...], w: tuple[Real, ...]) -> Vector:
     """d(theta)/dt: head of this file."""
     if all(is_zero(part) for part in theta):

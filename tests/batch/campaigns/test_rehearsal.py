@@ -86,7 +86,7 @@ def test_a_model_that_ends_its_process_is_named(
     assert (
         capsys.readouterr().err
         == f"""\
-error[E217]: a model of `stopped` cannot be recorded: in `drive`, a process that tried it {how}
+error[E217]: a model of the deck cannot be recorded: in `drive`, a process that tried it {how}
  --> {file}:9:5
   |
 9 |     {does}

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ic.meaning.expressions import conditions
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, messages
+from tests.ic.small_decks import ARM, LIGHT, RUN, SERVO, changed, check, messages
 
 
 def shown(folder: Path, *parts: str) -> str:
@@ -230,7 +230,7 @@ error[D101]: a duration of 1.0005 s is 1000.5 steps of the dynamics
 
 def test_an_unstable_step(tmp_path: Path) -> None:
     assert (
-        shown(tmp_path, ARM, changed(SERVO, ("1e-4", "1e-6")), RUN)
+        shown(tmp_path, LIGHT, changed(SERVO, ("1e-4", "1e-6")), RUN)
         == """\
 error[D104]: servo `drive` is unstable with modified_euler at this rate of the dynamics
   --> deck.ic:14:24
@@ -585,7 +585,7 @@ error[D162]: this deck has 2 runs and sweeps, and none is marked `default`
 
 def test_a_fast_servo(tmp_path: Path) -> None:
     assert (
-        shown(tmp_path, ARM, changed(SERVO, ("1e-4", "2.5e-6")), RUN)
+        shown(tmp_path, LIGHT, changed(SERVO, ("1e-4", "2.5e-6")), RUN)
         == """\
 warning[D105]: servo `drive` is fast for the dynamics' step: h * lambda = 1
   --> deck.ic:14:24

@@ -214,10 +214,3 @@ def test_a_macro_in_a_condition_is_its_name_alone(tmp_path: Path) -> None:
         "D136 [exclude when macro] a condition names a macro by its name alone | leave out the word "
         "`macro`: the macro's value is put in as text"
     )
-
-
-def test_a_stability_that_hardly_varies_is_said_once(tmp_path: Path) -> None:
-    sweep = "sweep rubs of hold { vary drive.f_v = [1e-9, 2e-9] N*m*s/rad; }\n"
-    compiled = check(tmp_path, ARM, SERVO, RUN, sweep, select=["rubs"])
-    assert compiled.plan is not None
-    assert "stability of joint hinge: h * lambda = 0.025" in compiled.plan.experiments[0].notes

@@ -17,7 +17,7 @@ from met.diagnostic import Problem
 from met.integrators import modified_euler
 from met.integrators.integrator import Integrator, Motion, Slope, ahead, by_parts, mean
 from met.messages.render import render
-from met.trace import Real
+from met.trace import Real, Scalar
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, experiment
 
 Ask = Callable[[float, Motion], Slope]
@@ -130,7 +130,8 @@ KEPT = SimpleNamespace(slope=None)
 
 
 def keeping(slope: Ask, h: Real, y: Motion, k1: Slope) -> Motion:
-    before, KEPT.slope = KEPT.slope or k1, k1
+    before = KEPT.slope or k1
+    KEPT.slope = k1 if isinstance(k1.qdd[0], Scalar) else None
     return ahead(y, h, mean(before, k1))
 
 

@@ -55,7 +55,7 @@ sweep many of swung {
 
 NO_NUMBER = (
     "position, rate or acceleration is no longer a finite number ({file}:{line}). Usual reasons: a step too long for "
-    "the servo or the arm (see the stability figures of `met plan`; try a faster rate for the dynamics), or a model "
+    "the servo or the arm (see the step size of `met plan`; try a faster rate for the dynamics), or a model "
     "that divides by zero."
 )
 NO_INERTIA = (

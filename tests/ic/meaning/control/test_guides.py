@@ -498,7 +498,7 @@ def test_at_a_singularity_a_damped_guide_stays_and_another_fails(tmp_path: Path)
     assert bare.cause[0].replace(str(tmp_path), "") == (
         "t = 0 s: joint low: position, rate or acceleration is no longer a finite number (/deck.ic:4). Usual reasons: "
         "guide `tip` (/deck.ic:11), which it follows, at a singularity where its `max_damping` is 0 m; a step too long "
-        "for the servo or the arm (see the stability figures of `met plan`; try a faster rate for the dynamics), or a "
+        "for the servo or the arm (see the step size of `met plan`; try a faster rate for the dynamics), or a "
         "model that divides by zero."
     )
 

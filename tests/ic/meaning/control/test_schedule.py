@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from ic.meaning.control.schedule import exact
+from met import run as engine
 from met.plan import Experiment
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment
+from tests.ic.small_decks import ARM, LIGHT, RUN, SERVO, changed, check, codes, experiment
 
 RATES = "dynamics = 1 kHz; servos = 1 kHz; record = 100 Hz;"
 
@@ -129,36 +130,51 @@ def lagging(h_lambda: float) -> str:
     return changed(SERVO, ("j_m = 1e-4", f"j_m = {0.05**2 / 1.0 / h_lambda / 1000.0!r}"))
 
 
-def test_h_lambda_is_noted(tmp_path: Path) -> None:
-    run = experiment(tmp_path, ARM, lagging(0.25), RUN)
-    assert run.notes == ("stability of joint hinge: h * lambda = 0.25",)
+def test_the_fastest_mode_is_noted(tmp_path: Path) -> None:
+    """1 - x + x^2/2 of exp(-x), x = 0.25."""
+    (note,) = experiment(tmp_path, LIGHT, lagging(0.25), RUN).notes
+    assert note.startswith(
+        "step size: joint `hinge` decays with 250 1/s: h * lambda = 0.25, and a step makes 0.781 of it, in truth 0.779 ("
+    )
+    assert note.endswith("deck.ic:13)")
+    (note,) = experiment(tmp_path, ARM, lagging(0.25), changed(RUN, ("dynamics = 1 kHz", "dynamics = 10 kHz"))).notes
+    assert note == "step size: nothing changes by more than 1 % in a step"
 
 
 def test_h_lambda_above_a_half_warns(tmp_path: Path) -> None:
-    compiled = check(tmp_path, ARM, lagging(0.51), RUN)
+    compiled = check(tmp_path, LIGHT, lagging(0.51), RUN)
     assert [(d.code, d.severity) for d in compiled.diagnostics] == [("D105", "warning")]
-    assert codes(tmp_path, ARM, lagging(0.49), RUN) == []
+    assert codes(tmp_path, LIGHT, lagging(0.49), RUN) == []
 
 
 def test_h_lambda_at_the_limit_is_an_error_that_names_the_slowest_rate_that_fits(tmp_path: Path) -> None:
-    (diagnostic,) = check(tmp_path, ARM, lagging(2.001), RUN).diagnostics
+    (diagnostic,) = check(tmp_path, LIGHT, lagging(2.001), RUN).diagnostics
     assert diagnostic.code == "D104"
     assert diagnostic.at is not None and diagnostic.at.text.endswith("the slowest rate that fits is 2000 Hz")
-    assert codes(tmp_path, ARM, lagging(1.999), RUN) == ["D105"]
+    assert codes(tmp_path, LIGHT, lagging(1.999), RUN) == ["D105"]
 
 
 def test_the_slowest_rate_that_fits_does(tmp_path: Path) -> None:
     """At 1 kHz h lambda is 0.9; at 100 Hz it would be 9, and 500 Hz is the slowest whole divisor below 2."""
     rates = "dynamics = 100 Hz; servos = 1 kHz; record = 100 Hz;"
-    (diagnostic,) = check(tmp_path, ARM, lagging(0.9), with_rates(rates)[2]).diagnostics
+    (diagnostic,) = check(tmp_path, LIGHT, lagging(0.9), with_rates(rates)[2]).diagnostics
     assert diagnostic.at is not None and "the slowest rate that fits is 500 Hz" in diagnostic.at.text
     faster = with_rates("dynamics = 500 Hz; servos = 1 kHz; record = 100 Hz;")[2]
-    assert codes(tmp_path, ARM, lagging(0.9), faster) == ["D105"]
+    assert codes(tmp_path, LIGHT, lagging(0.9), faster) == ["D320", "D105"], "the loop swings from limit to limit"
+
+
+def test_what_a_servo_alone_cannot_bear_it_may_before_its_arm(tmp_path: Path) -> None:
+    """Of 2500 1/s the arm of 2/3 kg m^2 leaves 37 1/s, and the run is as it is at a step ten times shorter."""
+    slow = experiment(tmp_path, ARM, lagging(2.5), RUN)
+    fast = experiment(tmp_path, ARM, lagging(2.5), changed(RUN, ("dynamics = 1 kHz", "dynamics = 10 kHz")))
+    assert codes(tmp_path, ARM, lagging(2.5), RUN) == []
+    ends = [engine.run(each).signals["q"][0, -1, 0] for each in (slow, fast)]
+    assert ends[0] == pytest.approx(ends[1], rel=1e-4) and ends[0] > 0.05
 
 
 def test_stability_of_a_sweep_is_that_of_its_worst_case(tmp_path: Path) -> None:
     sweep = "sweep rotors of hold { vary drive.j_m = [1e-4, 1e-5, 1e-6] kg*m^2; }"
-    (diagnostic,) = check(tmp_path, ARM, SERVO, RUN, sweep, select=["rotors"]).diagnostics
+    (diagnostic,) = check(tmp_path, LIGHT, SERVO, RUN, sweep, select=["rotors"]).diagnostics
     assert diagnostic.code == "D104"
     assert "case #2" in diagnostic.message
 

@@ -170,7 +170,7 @@ def test_channels_of_a_joint_on_a_bed_tick_with_its_servo(tmp_path: Path) -> Non
 
 
 def test_the_step_need_not_be_short_for_a_motor_that_is_on_a_bed(tmp_path: Path) -> None:
-    fast = ("j_m = 1e-4", "j_m = 1e-6")
+    fast = ("kt = 0.05 N*m/A", "kt = 1 N*m/A")
     alone = check(tmp_path, ARM, changed(SERVOS, fast), RUN)
     assert [diagnostic.code for diagnostic in alone.diagnostics] == ["D104"]  # once of the one rate
     both = changed(HYBRID, ("    substitute", "    substitute two { law = torque_balance; }\n    substitute"))

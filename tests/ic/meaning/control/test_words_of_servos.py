@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
+from tests.ic.small_decks import ARM, LIGHT, RUN, SERVO, changed, check, codes, experiment, messages
 
 CURVED = changed(SERVO, ("j_m", "friction = stribeck;  f_c = 0.01 N*m;  f_s = 0.02 N*m;  rate_s = 3 rad/s;  j_m"))
 
@@ -72,8 +72,8 @@ def test_a_motor_on_a_bed_has_a_servo_that_ticks_and_coulombs_friction(tmp_path:
 def test_the_gains_of_a_continuous_law_count_for_its_stability(tmp_path: Path) -> None:
     """(Kt^2/R + Kt Kp/R)/J_m = 25 + 50 a second: at 100 Hz sampled 0.25, and continuous 0.75."""
     slow = changed(RUN, ("dynamics = 1 kHz", "dynamics = 100 Hz"), ("servos = 1 kHz", "servos = 100 Hz"))
-    assert codes(tmp_path, ARM, SERVO, slow) == []
-    compiled = check(tmp_path, ARM, SERVO, changed(slow, ("servos = 100 Hz", "servos = continuous")))
+    assert codes(tmp_path, LIGHT, SERVO, slow) == []
+    compiled = check(tmp_path, LIGHT, SERVO, changed(slow, ("servos = 100 Hz", "servos = continuous")))
     assert [each.code for each in compiled.diagnostics] == ["D105"]
     assert "h * lambda = 0.75" in compiled.diagnostics[0].message
 

@@ -1,0 +1,173 @@
+"""The modes of a linearised step, each beside what it is in truth: which of them a step makes grow, damps, or misses.
+
+An eigenvalue mu of the step's map M belongs to the one of dx/dt = A x whose motion it follows: with the left and right
+eigenvectors l and r of M, lambda = l A r/(l r), which is exact where M is a function of A, as of every Runge-Kutta
+method. Where eigenvectors fall together, as of a swing at the limit of damping, it is
+the eigenvalue of A of which the integrator alone makes the number that is nearest. In truth a step multiplies the mode
+by exp(lambda h).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from met.analysis.step_map import StepMap, linear_step
+from met.frozen import frozen
+from met.integrators.integrator import Integrator
+from met.plan import Schedule
+
+SLOW = 0.01
+"""h |lambda| up to which a step follows anything."""
+
+FAST = 0.5
+"""h |lambda| above which a step is long for a mode, though it may be stable: `modified_euler` is then 3 % off in a
+step of a decay."""
+
+TELLING = 0.1
+"""Share of a mode's size at its start by which the run may differ from the truth."""
+
+TURNS = 0.1
+"""Rate of turning of the arm, as a share of |lambda|, above which a mode is no mode: it changes while it swings."""
+
+FINEST = 1000
+"""Times the base rate: beyond, no rate is proposed."""
+
+TOGETHER = 300.0
+"""Sum of |l_i r_i|, where that of l_i r_i is 1, above which eigenvectors have fallen together."""
+
+LEAST = 1e-7
+"""Growth of a step, its logarithm, that differences are good for."""
+
+
+@frozen
+class Mode:
+    """One mode of a case's step.
+
+    root    lambda, 1/s;  factor: mu
+    turns   whether the arm turns too fast for it to be one, so that only its speed is known
+    names   of what is changed;  weights: l_i r_i of each
+    """
+
+    lane: int
+    case: int
+    loose: bool
+    root: complex
+    factor: complex
+    turns: bool
+    names: tuple[str, ...]
+    weights: np.ndarray
+
+    @property
+    def shares(self) -> tuple[tuple[str, float], ...]:
+        """How much each name takes part in it, largest first: the sum is 1."""
+        sizes = np.abs(self.weights) / np.sum(np.abs(self.weights))
+        return tuple((self.names[k], float(sizes[k])) for k in np.argsort(-sizes).tolist())
+
+    @property
+    def growth(self) -> float:
+        """ln |mu|, of a step."""
+        return math.log(abs(self.factor)) if self.factor else -math.inf
+
+    def grown(self, h: float, steps: int) -> float:
+        """ln of what the steps of a run make of it, where that grows and in truth does not so; else 0."""
+        if self.turns or self.growth <= LEAST:
+            return 0.0
+        return max(0.0, steps * (self.growth - max(0.0, h * self.root.real)))
+
+    def missed(self, h: float, steps: int) -> tuple[float, float, int]:
+        """Its size in the run and in truth, as shares of that at its start, and the step after which they differ most;
+        (1, 1, 0) of a mode that grows, or does not swing."""
+        a, b = -h * self.root.real, -self.growth
+        if self.turns or min(a, b) < -LEAST or abs(self.root.imag) <= abs(self.root.real) or not math.isfinite(b):
+            return 1.0, 1.0, 0
+        a, b = max(a, 0.0), max(b, 0.0)
+        k = steps if a == b or min(a, b) == 0.0 else min(steps, max(1, round(math.log(b / a) / (b - a))))
+        return math.exp(-k * b), math.exp(-k * a), k
+
+
+def modes(found: StepMap, integrator: Integrator) -> Iterator[Mode]:
+    """All modes that are not slow, of all lanes; of a pair the one that turns forward."""
+    h = found.h
+    lanes = np.flatnonzero(np.isfinite(found.slope).all((1, 2)) & np.isfinite(found.step).all((1, 2)))
+    lanes = lanes[np.any(np.abs(np.linalg.eigvals(found.slope[lanes])) * h > SLOW, axis=1)]
+    if not lanes.size:
+        return
+    A = found.slope[lanes]
+    factors, right = np.linalg.eig(found.step[lanes])
+    left = np.linalg.pinv(right)
+    weights = left * np.swapaxes(right, 1, 2)
+    sums = weights.sum(2)
+    with np.errstate(all="ignore"):
+        roots = np.einsum("lij,ljk,lki->li", left, A, right) / sums
+        apart = np.abs(weights).sum(2) < TOGETHER * np.abs(sums)
+    for at, lane in enumerate(lanes.tolist()):
+        for i in np.flatnonzero(factors[at].imag >= 0.0).tolist():
+            root, factor = complex(roots[at, i]), complex(factors[at, i])
+            if not apart[at, i]:
+                root = _nearest(factor, A[at], integrator, h)
+            if not max(abs(root) * h, abs(factor - 1.0)) > SLOW:
+                continue
+            turns = bool(found.rate[lane] > TURNS * abs(root))
+            case, loose = int(found.case[lane]), bool(found.loose[lane])
+            yield Mode(lane, case, loose, root, factor, turns, found.names, weights[at, i])
+
+
+def _nearest(factor: complex, A: np.ndarray, integrator: Integrator, h: float) -> complex:
+    """The eigenvalue of A of which the integrator makes what is nearest to mu, of a swing or of a lone state."""
+    roots = np.linalg.eigvals(A)
+    nearest, root = np.inf, 0j
+    for each in roots[roots.imag >= 0.0].tolist():
+        swing = np.array([[0.0, 1.0], [-(abs(each) ** 2), 2.0 * each.real]])
+        made = [*np.linalg.eigvals(linear_step(integrator, swing, 1, h))]
+        if each.imag == 0.0:
+            made += [*linear_step(integrator, np.array([[each.real]]), 0, h).ravel()]
+        distance = min(abs(complex(one) - factor) for one in made)
+        if distance < nearest:
+            nearest, root = distance, each
+    return root
+
+
+def of_lane(found: StepMap, lane: int, integrator: Integrator, h: float) -> StepMap:
+    """One lane alone, with the step that an integrator makes of h s."""
+    here = slice(lane, lane + 1)
+    A = found.slope[here]
+    M = linear_step(integrator, A, found.positions, h)
+    return StepMap(
+        found.case[here], found.loose[here], found.names, found.positions, A, M, found.rate[here], h
+    )  # fmt: skip
+
+
+def finer(schedule: Schedule) -> list[tuple[float, int]]:
+    """Rates of the dynamics that fit the run, from the next faster one on, Hz, and the steps of the run."""
+    divisors = (n for n in range(schedule.dynamics - 1, 0, -1) if schedule.ticks % n == 0)
+    found = [(schedule.base_hz / n, schedule.ticks // n) for n in divisors]
+    return found + [(schedule.base_hz * times, schedule.ticks * times) for times in range(2, FINEST + 1)]
+
+
+def slowest(found: StepMap, mode: Mode, integrator: Integrator, schedule: Schedule, *, follows: bool) -> float | None:
+    """The slowest faster rate of the dynamics at which no mode of the lane grows, Hz; None: none that is sensible.
+
+    follows  whether it is to follow all that swings over the run, and to have no mode that is fast
+    """
+    rates = finer(schedule)
+    low, high = 0, len(rates)
+    while low < high:
+        middle = (low + high) // 2
+        hz, steps = rates[middle]
+        h = 1.0 / hz
+        at = of_lane(found, mode.lane, integrator, h)
+        if all(_fits(each, h, steps, follows) for each in modes(at, integrator)):
+            high = middle
+        else:
+            low = middle + 1
+    return rates[low][0] if low < len(rates) else None
+
+
+def _fits(mode: Mode, h: float, steps: int, follows: bool) -> bool:
+    if mode.grown(h, steps) > np.log1p(TELLING):
+        return False
+    run, truth, _ = mode.missed(h, steps)
+    return not follows or (abs(run - truth) <= TELLING and h * abs(mode.root) <= FAST * (1.0 + 1e-6))

@@ -1,0 +1,194 @@
+"""Modes of an arm with all that acts on it which the step of the dynamics makes grow, damps, or is long for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from met import models
+from met.analysis.loops import Loops, Unstable, closed
+from met.analysis.modes import FAST, TELLING, Mode, modes, of_lane, slowest
+from met.analysis.step_map import Linearizer, StepMap
+from met.diagnostic import Problem
+from met.frozen import frozen
+from met.integrators.integrator import Integrator
+from met.plan import BASE, Experiment
+
+LANES = 300
+"""Names times cases that are looked at, at most: it bounds the time, some 50 ms."""
+
+
+@frozen
+class Fault:
+    """A mode that the step does not follow.
+
+    kind     "grows"; "misses": it is damped, or not damped, as in truth it is not; "fast": its h |lambda| is large
+    owner    what takes part in it most: `joint \\`elbow\\``, `the base` ...; joint: its name where it is one
+    figure   "grows": ln of the growth of a step; "misses": its size in the end, or where most of it is missed, as a
+             share; "fast": h |lambda|
+    truth    "misses": what is right
+    after    "misses": s from the start
+    """
+
+    kind: Literal["grows", "misses", "fast"]
+    mode: Mode
+    owner: str
+    joint: str
+    figure: float
+    truth: float
+    after: float
+
+
+@frozen
+class Remedy:
+    """What would follow a mode that the step does not follow.
+
+    rate     the slowest rate at which it is followed, Hz; None: none that is sensible
+    others   integrators that follow it at this rate
+    cause    the environment model without which it would not be so; "" where none is
+    """
+
+    rate: float | None
+    others: tuple[str, ...]
+    cause: str
+
+
+@frozen
+class StepSize:
+    """What was found of some cases: cases that were looked at; the fastest mode of the first, its owner and joint,
+    where there is one; the largest h |lambda|; ln of the largest growth over a run; faults, the worst of each kind;
+    whether all slopes are numbers; loops of servos that tick and are unstable; the map that all this is of."""
+
+    cases: tuple[int, ...]
+    mode: Mode | None
+    owner: str
+    joint: str
+    fastest: float
+    grown: float
+    faults: tuple[Fault, ...]
+    finite: bool
+    loops: tuple[Unstable, ...]
+    map: StepMap
+
+
+def chosen_cases(experiment: Experiment, also: Iterable[int] = ()) -> tuple[int, ...]:
+    """The first case, those in which each coordinate is least and largest, and `also`; as many as time allows."""
+    wanted = [0, *also]
+    for coordinate in experiment.cases.coordinates:
+        wanted += [int(np.argmin(coordinate.values)), int(np.argmax(coordinate.values))]
+    joints, states = len(experiment.structure.moving), 6 * len(experiment.structure.servos)
+    most = max(2, LANES // (2 * joints + states + 12))
+    found = list(dict.fromkeys(case for case in wanted if case < experiment.cases.count))[:most]
+    if len(found) < most:
+        even = np.linspace(0, experiment.cases.count - 1, min(experiment.cases.count, most)).astype(int).tolist()
+        found += [case for case in even if case not in found][: most - len(found)]
+    return tuple(found)
+
+
+def step_size(experiment: Experiment, cases: Sequence[int]) -> StepSize:
+    """The step of these cases against what it should follow. Raises Problem where the program cannot be built."""
+    integrator, schedule = models.find("integrator", experiment.structure.integrator), experiment.structure.schedule
+    linearizer = Linearizer(experiment, cases)
+    found, sampled = linearizer.map(), linearizer.sampled()
+    every = list(modes(found, integrator))
+    steps, h = schedule.ticks // schedule.dynamics, found.h
+    loops = closed(experiment, sampled) if sampled is not None else Loops((), frozenset())
+    held = {law.joint for law in sampled.laws} if sampled is not None else set()
+    faults: list[Fault] = []
+
+    def fault(kind: Literal["grows", "misses", "fast"], mode: Mode, figure: float, truth: float, after: float) -> None:
+        faults.append(Fault(kind, mode, *owner_of(mode), figure, truth, after))
+
+    growing = [each for each in every if each.grown(h, steps) > np.log1p(TELLING) and each.case not in loops.quiet]
+    if growing:
+        worst = max(growing, key=lambda each: (each.growth, not each.loose))
+        fault("grows", worst, worst.growth, 0.0, 0.0)
+    missing = [(each, *each.missed(h, steps)) for each in every]
+    missing = [one for one in missing if abs(one[1] - one[2]) > TELLING and owner_of(one[0])[1] not in held]
+    if missing:
+        mode, run, truth, k = max(missing, key=lambda one: (abs(one[1] - one[2]), not one[0].loose))
+        fault("misses", mode, run, truth, k * h)
+    fast = max(every, key=lambda each: (round(abs(each.root) * h, 6), not each.loose), default=None)
+    if fast is not None and abs(fast.root) * h > FAST * (1.0 + 1e-6):
+        fault("fast", fast, abs(fast.root) * h, 0.0, 0.0)
+    first = [each for each in every if each.case == cases[0]]
+    shown = max(first, key=lambda each: (round(abs(each.root) * h, 6), not each.loose), default=None)
+    return StepSize(
+        tuple(cases),
+        shown,
+        *(owner_of(shown) if shown is not None else ("", "")),
+        abs(fast.root) * h if fast is not None else 0.0,
+        max((each.grown(h, steps) for each in every), default=0.0),
+        tuple(faults),
+        bool(np.isfinite(found.slope).all()),
+        loops.unstable,
+        found,
+    )
+
+
+def remedy(experiment: Experiment, found: StepSize, fault: Fault) -> Remedy:
+    """The rate and the integrators that would do, and what of the environment is the cause."""
+    structure, mode = experiment.structure, fault.mode
+    integrator, steps = models.find("integrator", structure.integrator), structure.schedule.ticks
+    steps //= structure.schedule.dynamics
+    others = tuple(
+        name
+        for name, each in models.find_own("integrator").items()
+        if name != integrator.name and fault.kind != "fast" and _followed(found.map, mode, each, steps)
+    )
+    rate = slowest(found.map, mode, integrator, structure.schedule, follows=fault.kind != "grows")
+    return Remedy(rate, others, _cause(experiment, mode, fault.kind))
+
+
+def owner_of(mode: Mode) -> tuple[str, str]:
+    """What takes part in a mode most, in words; and the joint's name where it is one, or its servo."""
+    sums: dict[tuple[str, str], float] = {}
+    for name, share in mode.shares:
+        owner = _owner(name)
+        sums[owner] = sums.get(owner, 0.0) + share
+    return max(sums, key=lambda owner: round(sums[owner], 6))
+
+
+def _owner(name: str) -> tuple[str, str]:
+    head, _, rest = name.partition(".")
+    if head.startswith(f"{BASE}:"):
+        return "the base", ""
+    if head.startswith("payload:"):
+        return f"payload `{head.split(':')[1]}`", ""
+    if head == "sensors":
+        return f"sensor `{rest.partition('.')[0]}`", ""
+    if rest.startswith("servo.sensor."):
+        return f"sensor `{rest.split('.')[2]}` of joint `{head}`", head
+    return f"joint `{head}`", head
+
+
+def _followed(found: StepMap, mode: Mode, integrator: Integrator, steps: int) -> bool:
+    """True where another integrator makes no mode of the lane grow with this step, and misses none."""
+    for each in modes(of_lane(found, mode.lane, integrator, found.h), integrator):
+        run, truth, _ = each.missed(found.h, steps)
+        if each.grown(found.h, steps) > np.log1p(TELLING) or abs(run - truth) > TELLING:
+            return False
+    return True
+
+
+def _cause(experiment: Experiment, mode: Mode, kind: str) -> str:
+    """The environment model without which the case has no such mode: none that fast, or none that grows so."""
+    structure = experiment.structure
+    integrator = models.find("integrator", structure.integrator)
+    for use in structure.environment:
+        if models.find("environment", use.model).loads is None:
+            continue
+        rest = tuple(each for each in structure.environment if each is not use)
+        try:
+            found = Linearizer(replace(experiment, structure=replace(structure, environment=rest)), [mode.case]).map()
+        except Problem:
+            continue
+        lanes = [each for each in modes(found, integrator) if each.loose == mode.loose]
+        if kind == "grows" and all(each.growth < 0.5 * mode.growth for each in lanes):
+            return use.name
+        if kind != "grows" and all(abs(each.root) < 0.8 * abs(mode.root) for each in lanes):
+            return use.name
+    return ""
