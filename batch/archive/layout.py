@@ -348,6 +348,7 @@ def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, 
         "cases_in_table": experiment.cases.count,
         "frame": FRAME if structure.base is None else WHERE_IT_MOVES,
         "coordinates": " ".join(coordinates),
+        **({"allowed": "\n".join(map(str, experiment.allowances))} if experiment.allowances else {}),
     }
 
 

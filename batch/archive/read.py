@@ -68,6 +68,8 @@ class ArchiveGroup:
             sound.check(self)
         self.name: str = self.attributes["experiment"]
         self.sweep: str = str(self.attributes.get("sweep", ""))
+        self.allowed: tuple[str, ...] = tuple(str(self.attributes.get("allowed", "")).splitlines())
+        """Warnings that were allowed, a line each: `D105, because the report's own rates`."""
 
     @cached_property
     def variables(self) -> dict[str, Stored]:

@@ -167,6 +167,7 @@ def heading(group: ArchiveGroup, width: int) -> list[str]:
     else:
         lines = textwrap.wrap(text, width - indent)
     out = [f"{group.name}  {lines[0]}".rstrip(), *(" " * indent + rest for rest in lines[1:])]
+    out += [f"  allowed: {each}" for each in group.allowed]
     for variable in group.role("choice"):
         out.append(f"  {variable.path} = {group.at(variable.name, [0])[0]}")
     for variable in group.role("coordinate"):

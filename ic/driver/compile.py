@@ -16,6 +16,7 @@ from ic.meaning.control.servos import check_servo_definition
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.mechanics.arm import check_arm, resolve_arm
 from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.allowances import silence_of_all
 from ic.read import in_order, read, read_again
 from ic.sweeps.effects import Effects
 from ic.sweeps.groups import DeckSource, ScopedExperiment, experiments_of
@@ -110,6 +111,7 @@ def compile_deck(
     texts = {source.name: source.text for source in sources}
     if not complaints.errors:
         complaints.admit_remarks()
+        silence_of_all(experiments, complaints)
     else:
         return Compiled(None, in_order(complaints.all, sources), texts)
     files = tuple(File(source.name, source.text, source.sha256) for source in sources)

@@ -29,6 +29,7 @@ from ic.meaning.parameters.models import body_of, find_bare_model, overriding_pl
 from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.allowances import ALLOW
 from ic.meaning.runs.base import check_base, initial_base, resolve_base
 from ic.meaning.runs.environment import resolve_environment
 from ic.meaning.runs.initial import resolve_initial
@@ -260,7 +261,7 @@ def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> 
             scope.complaints.error("D109", f"a run has no `{item.name}`", item.place, help=helps)
     for statement in block.statements:
         words = " ".join(word.text for word in statement.words)
-        if words != "require":
+        if words != "require" and statement.words[0].text != ALLOW:
             scope.complaints.error(
                 "D110",
                 f"`{words}` in a run",
@@ -270,7 +271,10 @@ def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> 
                 else ["write `metric NAME = MODEL { of = CHANNEL; }`"]
                 if words == "metric"
                 else where_it_belongs(words)
-                or [*did_you_mean(words, ("require", "remove")), "statements of a run: require, remove"],
+                or [
+                    *did_you_mean(words, ("require", ALLOW, "remove")),
+                    known_words("statements of a run", ("require", ALLOW, "remove")),
+                ],
             )
 
 
