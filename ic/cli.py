@@ -203,8 +203,8 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
 
     KIND is servo, command, environment, metric, integrator, bed or law; MODEL one of them by name. Also: the blocks of
     a deck, such as `met doc run` or `joint`; `channels`, what can be recorded; `dh`, Denavit-Hartenberg numbers;
-    `shapes`, of links; `units`; `functions`; `designs` and `distributions` of samples; and the code of a message, as
-    in `met doc D060`.
+    `shapes`, of links; `units`; `functions`; `designs` and `distributions` of samples; the code of a message, as
+    in `met doc D060`; and a word of the glossary, such as `shard`.
     """
     from ic.language import BLOCKS
     from ic.printing import models as print_models
@@ -234,7 +234,18 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
         else:
             _print(text())
         return
-    found = print_models.selected_models(words)
+    try:
+        found = print_models.selected_models(words)
+    except Problem:
+        from ic.printing.glossary import meaning
+
+        lines = list(meaning(words[0])) if len(words) == 1 else []
+        if not lines:
+            raise
+        if form == "json":
+            raise click.UsageError("what a word means is text: it has no --format") from None
+        _print(lines)
+        return
     if form == "json":
         _print_json([print_models.model_json(kind, model) for kind, model in found])
     elif not words or (words[0].removesuffix("s") in models.GROUPS and len(words) == 1):

@@ -7,6 +7,7 @@ from typing import Literal
 
 from met.frozen import frozen
 from met.parameter import Parameter
+from met.plan.run_keys import RunKey
 
 Varies = Literal["number", "choice", "never"]
 """The ways in which a sweep may vary an entry: over numbers, over choices (each makes a program of its own), or not
@@ -36,6 +37,18 @@ class Entry:
     varies: Varies = "never"
     path: str = ""
 
+    @staticmethod
+    def of_plan(key: RunKey, written: str, *, varies: Varies = "choice") -> Entry:
+        """An entry that a plan keeps as one word or number; name, type, default and meaning are declared there."""
+        wanted = key.parameter
+        default = (
+            f"`{wanted.default}`" if wanted.shape == "word" else f"{wanted.default} {wanted.unit}".removesuffix(" 1")
+        )
+        return Entry(
+            name=wanted.name, written=written, doc=wanted.doc, default=default, parameter=wanted, varies=varies,
+            path=key.path,
+        )  # fmt: skip
+
     @property
     def unit(self) -> str:
         """The unit of its number; "" where it has none."""
@@ -52,6 +65,7 @@ class BlockDeclaration:
              deck's own definitions
     doc      what it is, in a sentence
     head     the first word of the paths of what stands in it, such as `links`; "" where that is a name of the deck's
+    called   what messages call it: `the environment`; "" of blocks with a name of the deck's
     free     what else may stand in it under names of the deck's or of models, in words
     """
 
@@ -61,6 +75,7 @@ class BlockDeclaration:
     doc: str
     entries: tuple[Entry, ...] = ()
     head: str = ""
+    called: str = ""
     free: str = ""
 
     def __getitem__(self, name: str) -> Entry:

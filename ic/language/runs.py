@@ -4,23 +4,10 @@ from __future__ import annotations
 
 from ic.language.declaration import BlockDeclaration, Entry
 from met.parameter import Parameter
+from met.plan import BALANCED, VELOCITY_PRODUCTS
 
 DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
 SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")
-VELOCITY_PRODUCTS = Parameter(
-    name="velocity_products",
-    shape="word",
-    words=("on", "off"),
-    default="on",
-    doc="Coriolis, centrifugal and gyroscopic torques",
-)
-BALANCED = Parameter(
-    name="servos",
-    shape="word",
-    words=("unloaded", "balanced"),
-    default="unloaded",
-    doc="whether servos begin with what keeps their joints from accelerating",
-)
 BASE_KINDS = ("fixed", "prescribed", "free")
 BED, LAW = "emulated", "velocity_tracking"
 """The models of a bed and of its law where a deck names none."""
@@ -58,14 +45,14 @@ INITIAL = BlockDeclaration(
     written="initial { ... }",
     within="run",
     head="initial",
+    called="the initial state",
     doc="The state at the start.",
     entries=(
         Entry(name="q", written="q = 0 rad;", default="0", varies="number", path="initial.JOINT.q",
               doc="position of every joint, or of one: `swing.q = 5 deg;`"),
         Entry(name="qd", written="qd = 0 rad/s;", default="0", varies="number", path="initial.JOINT.qd",
               doc="rate of every joint, or of one"),
-        Entry(name="servos", written="servos = balanced;", default="`unloaded`", parameter=BALANCED, varies="choice",
-              path="initial.servos", doc=BALANCED.doc),
+        Entry.of_plan(BALANCED, "servos = balanced;"),
     ),
     free="`base.position`, `base.rpy`, `base.velocity` and `base.rate` of a base that is free",
 )  # fmt: skip
@@ -75,11 +62,10 @@ ENVIRONMENT = BlockDeclaration(
     written="environment { ... }",
     within="run",
     head="environment",
+    called="the environment",
     doc="What acts on the arm from outside.",
     entries=(
-        Entry(name="velocity_products", written="velocity_products = off;", default="`on`",
-              parameter=VELOCITY_PRODUCTS, varies="choice", path="environment.velocity_products",
-              doc=VELOCITY_PRODUCTS.doc),
+        Entry.of_plan(VELOCITY_PRODUCTS, "velocity_products = off;"),
     ),
     free="`NAME = MODEL { ... }`: models, `met doc environment`; none act unless they are written",
 )  # fmt: skip

@@ -30,11 +30,11 @@ def print_code(word: str) -> Iterator[str]:
     if code not in entries:
         helps = [*did_you_mean(code, entries), "a code is printed with its message, as in `error[D060]`"]
         raise Problem(error("D171", f"no message has the code `{code}`, or none that needs an entry", help=helps))
-    yield from _plain(_HIDDEN.sub("", entries[code]).strip().removeprefix("### ")).rstrip().splitlines()
+    yield from in_plain_text(_HIDDEN.sub("", entries[code]).strip().removeprefix("### ")).rstrip().splitlines()
 
 
-def _plain(text: str) -> str:
-    """Markdown as the terminal shows it: what is code is set in, links are their words."""
+def in_plain_text(text: str) -> str:
+    """Markdown as the terminal shows it: blocks of code are set in, links are their words, bold type is plain."""
     lines = [""]
     code = False
     for line in text.splitlines():
@@ -44,7 +44,7 @@ def _plain(text: str) -> str:
         elif code:
             line = f"    {line}".rstrip()
         else:
-            line = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", line)
+            line = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", line).replace("**", "")
         if line or lines[-1]:
             lines.append(line)
     return "\n".join(lines[1:])

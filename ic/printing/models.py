@@ -10,6 +10,7 @@ from typing import Any, get_args
 
 from ic.language import BLOCKS
 from ic.printing.columns import columns, exactly
+from ic.printing.glossary import entries
 from met import models
 from met.diagnostic import Problem, did_you_mean, error
 from met.parameter import Parameter
@@ -66,7 +67,7 @@ def selected_models(words: tuple[str, ...]) -> list[tuple[models.Kind, Any]]:
     if len(words) > 1 and (words[0] in OTHERS or found):
         whole = f"{found[0][0]} {words[0]}" if found else words[0]
         raise Problem(error("D171", f"`{words[0]}` takes no second word", help=f"`met doc {whole}` says it all"))
-    known = [*KINDS, *OTHERS, *(model.name for _, model in everything)]
+    known = [*KINDS, *OTHERS, *(model.name for _, model in everything), *entries()]
     helps = [*did_you_mean(words[0], known), f"kinds: {', '.join(KINDS)}; also: {', '.join(OTHERS)}"]
     raise Problem(error("D171", f"no kind of model and no model `{words[0]}`", help=helps))
 

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from ic.printing.columns import columns, count, number, quantity, size, vector
+from ic.printing.settings import kept_keys
 from met import models
 from met.distinct import distinct
 from met.parameter import Parameter
@@ -97,8 +98,14 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
         yield from _sensors(experiment)
         yield ""
     yield from _environment(experiment)
-    if structure.balanced:
-        yield "Start: servos begin balanced, with what keeps their joints from accelerating"
+    chosen = [each for each in kept_keys(experiment) if each[0].listed and each[1] != each[0].parameter.default]
+    if chosen:
+        yield "Set by the run, and not the default"
+        rows = []
+        for key, value in chosen:
+            shown = value if isinstance(value, str) else quantity(value, key.parameter.unit)
+            rows.append((key.path, shown, key.parameter.doc))
+        yield from columns(rows)
     yield ""
     yield from _channels(structure)
     if structure.metrics:

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from met import models
 from met.diagnostic import Place
-from met.plan import Experiment, Origin, Quantity
+from met.plan import Experiment, Origin, Quantity, Structure
+from met.plan.run_keys import RunKey, run_keys
+
+
+def kept_keys(experiment: Experiment) -> list[tuple[RunKey, str | float]]:
+    """The keys of a run that the plan keeps as one word or number each, with what a deck would say, in SI."""
+    holders = ((Structure, experiment.structure), (Experiment, experiment))
+    return [(key, key.in_deck(getattr(holder, field))) for cls, holder in holders for field, key in run_keys(cls)]
 
 
 def settings(experiment: Experiment) -> dict[str, Quantity]:
@@ -50,8 +57,8 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
         number(f"sensors.{sensor.name}.rate", schedule.base_hz / sensor.divisor, "Hz", ticks)
     for environment in structure.environment:
         word(f"environment.{environment.name}.model", environment.model, environment.place)
-    word("environment.velocity_products", "on" if structure.velocity_products else "off")
-    word("initial.servos", "balanced" if structure.balanced else "unloaded")
+    for key, value in kept_keys(experiment):
+        made[key.path] = Quantity(value, "" if isinstance(value, str) else key.parameter.unit, Origin("deck"))
     number("rates.base", schedule.base_hz, "Hz")
     number("rates.dynamics", schedule.base_hz / schedule.dynamics, "Hz", f"{schedule.dynamics} base ticks a step")
     number("rates.record", schedule.base_hz / schedule.record, "Hz", f"{schedule.record} base ticks a row")

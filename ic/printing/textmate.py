@@ -18,7 +18,7 @@ from typing import Any
 
 from ic.language import BLOCKS, DEFINITIONS
 from ic.language.bodies import JOINT_KINDS
-from ic.language.runs import BASE_KINDS, VELOCITY_PRODUCTS
+from ic.language.runs import BASE_KINDS
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
 from ic.meaning.mechanics import dh
 from ic.meaning.mechanics.shapes import SHAPES
@@ -41,7 +41,8 @@ STATEMENTS = (
 PARTS = tuple(dict.fromkeys(word for block in BLOCKS.values() for word in block.named))
 """Words that begin an entry and are followed by a name."""
 
-WORDS = (BASE, "faults", *BASE_KINDS[1:], *VELOCITY_PRODUCTS.words)
+_DECLARED = [each.parameter for block in BLOCKS.values() for each in block.entries if each.parameter is not None]
+WORDS = (BASE, "faults", *BASE_KINDS[1:], *(word for wanted in _DECLARED for word in wanted.words))
 NAME = r"[A-Za-z_][A-Za-z0-9_]*"
 PATH = rf"{NAME}(?:\s*\.\s*{NAME})*"
 NUMBER = r"(?<![A-Za-z0-9_.])(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"

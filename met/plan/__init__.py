@@ -47,6 +47,8 @@ import numpy as np
 
 from met.diagnostic import Place
 from met.frozen import frozen, keyed
+from met.parameter import Parameter
+from met.plan.run_keys import RunKey, run_key
 from met.trace.graph import Formulas
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
@@ -360,6 +362,31 @@ class Recorded:
         return tuple(len(names) for names in (self.joints, self.components) if names)
 
 
+VELOCITY_PRODUCTS = RunKey(
+    path="environment.velocity_products",
+    parameter=Parameter(
+        name="velocity_products",
+        shape="word",
+        words=("on", "off"),
+        default="on",
+        doc="Coriolis, centrifugal and gyroscopic torques",
+    ),
+    true="on",
+    listed=False,
+)
+BALANCED = RunKey(
+    path="initial.servos",
+    parameter=Parameter(
+        name="servos",
+        shape="word",
+        words=("unloaded", "balanced"),
+        default="unloaded",
+        doc="whether servos begin with what keeps their joints from accelerating",
+    ),
+    true="balanced",
+)
+
+
 @frozen
 class Structure:
     """All that decides which program is compiled, values apart.
@@ -374,7 +401,7 @@ class Structure:
     servos: tuple[ServoUse, ...]
     environment: tuple[EnvironmentUse, ...]
     metrics: tuple[MetricUse, ...]
-    velocity_products: bool
+    velocity_products: bool = keyed("always", run_key=VELOCITY_PRODUCTS)
     integrator: str
     schedule: Schedule
     record: tuple[Recorded, ...]
@@ -383,7 +410,7 @@ class Structure:
     payloads: tuple[Payload, ...] = keyed("where set", default=())
     guides: tuple[GuideUse, ...] = keyed("where set", default=())
     sensors: tuple[LinkSensor, ...] = keyed("where set", default=())
-    balanced: bool = keyed("where set", default=False)
+    balanced: bool = run_key(BALANCED)
 
     @property
     def free(self) -> bool:

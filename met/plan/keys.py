@@ -104,10 +104,12 @@ def _value(value: Any) -> Any:
 def _described(value: Any) -> Any:
     """Plain data of a structure, without what changes no number."""
     if dataclasses.is_dataclass(value):
-        described = ((field.name, getattr(value, field.name), in_key(field)) for field in dataclasses.fields(value))
-        return {
-            name: _described(part) for name, part, when in described if when == "always" or (part and when != "never")
-        }
+        described = {}
+        for field in dataclasses.fields(value):
+            part, when = getattr(value, field.name), in_key(field)
+            if when == "always" or (when == "where set" and part != field.default):
+                described[field.name] = _described(part)
+        return described
     if isinstance(value, tuple):
         return [_described(part) for part in value]
     return value

@@ -264,3 +264,8 @@ def test_the_readmes_deck_runs_and_its_lines_of_python_open_what_they_wrote(
     for name in ("data", "same"):
         assert told[name]["qd"].sel(joint="elbow").isel(time=-1) == pytest.approx(0.03, rel=1e-3)  # type: ignore[index]
         told[name].close()  # type: ignore[attr-defined]
+
+
+def test_the_metrics_of_the_page_are_those_there_are() -> None:
+    listed = PAGE.split("The\nmodels are ")[1].split(", and those of")[0]
+    assert re.findall(r"`(\w+)`", listed) == sorted(models.find_own("metric"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ic.grammar.places import place_of
-from ic.language.runs import VELOCITY_PRODUCTS
+from ic.language.runs import ENVIRONMENT
 from ic.meaning.checks.idle import remark_idle, remark_kinds
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.quantity import Value
@@ -30,19 +30,16 @@ def resolve_environment(
     base: Base | None,
     payloads: tuple[Payload, ...],
     duration: float | None,
-) -> tuple[tuple[EnvironmentUse, ...], bool]:
+) -> tuple[EnvironmentUse, ...]:
+    """The environment models of a run, in the deck's order; their numbers are settled in the scope."""
     uses = []
-    products = True
     for item in body.items.values():
         if item.kind:
             meant = f"{item.name} = {item.kind}" if item.kind in models.available("environment") else "NAME = MODEL"
             scope.complaints.error(
                 "D157", f"no `{item.kind}` in an environment", item.place, help=f"write `{meant} {{ ... }}`"
             )
-        elif item.name == "velocity_products":
-            owner = Owner("the environment", item.place, "environment")
-            products = scope.word(owner, VELOCITY_PRODUCTS, item) != "off"
-        else:
+        elif item.name not in ENVIRONMENT.keys:
             use = _environment_use(scope, item, arm, base, payloads, duration)
             if use is not None:
                 uses.append(use)
@@ -53,7 +50,7 @@ def resolve_environment(
             statement.place,
             help="it belongs to a run or a sweep",
         )
-    return tuple(uses), products
+    return tuple(uses)
 
 
 def _environment_use(

@@ -29,6 +29,7 @@ def experiment(
         notes,
         tolerances=resolved.tolerances,
         allowances=allowances,
+        **resolved.settings,
     )
 
 

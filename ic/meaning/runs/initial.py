@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ic.language.runs import BALANCED
+from ic.language.runs import INITIAL
 from ic.meaning.control.servos import Use
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.quantity import Value, ValueList
@@ -20,11 +20,11 @@ from met.plan import BASE
 from met.units import PURE
 
 
-def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Sequence[Use]) -> bool:
-    """Settle the initial state of all joints; return True if servos begin balanced."""
+def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> None:
+    """Settle the initial state of all joints."""
     known = dict.fromkeys(("q", "qd"), "")
     known |= {f"{joint.name}.{name}": "" for joint in arm.moving for name in ("q", "qd")}
-    known["servos"] = ""
+    known |= dict.fromkeys(INITIAL.keys, "")
     of_base = dict.fromkeys(INITIAL_OF_BASE if any(link.name == BASE for link in arm.links) else (), "")
     for item in body.items.values():
         if not item.kind and item.name.partition(".")[0] in arm.failed:
@@ -69,15 +69,11 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
             if general is not None and own is None and listed is None and _mixed(scope, owner, wanted, general, arm):
                 break
             scope.number(owner, wanted, own or general, value=value)
-    return _balanced(scope, body.get("servos"), uses)
 
 
-def _balanced(scope: Scope, item: Item | None, uses: Sequence[Use]) -> bool:
-    """Return True if servos begin balanced, with a warning where none of them can."""
-    if item is None:
-        return False
-    balanced = scope.word(Owner("the initial state", item.place, "initial"), BALANCED, item) == "balanced"
-    if balanced and not any(use.servo.balance for use in uses):
+def check_balanced(scope: Scope, item: Item | None, uses: Sequence[Use], balanced: bool) -> None:
+    """Warn where servos are to begin balanced and none of them can. item: who wrote it."""
+    if balanced and item is not None and not any(use.servo.balance for use in uses):
         able = [name for name, model in models.available("servo").items() if model.balance]
         scope.complaints.remark(
             "D248",
@@ -85,7 +81,6 @@ def _balanced(scope: Scope, item: Item | None, uses: Sequence[Use]) -> bool:
             item.place,
             help=known_words("models that can", able),
         )
-    return balanced
 
 
 def _mixed(scope: Scope, owner: Owner, wanted: Parameter, general: Item, arm: ResolvedArm) -> bool:

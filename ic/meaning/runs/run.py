@@ -8,7 +8,7 @@ from typing import Any
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Name, Word
-from ic.language.runs import BALANCED, DURATION, ENVIRONMENT, INITIAL, RATES, RUN, SEED, TOLERANCES
+from ic.language.runs import DURATION, ENVIRONMENT, INITIAL, RATES, RUN, SEED, TOLERANCES
 from ic.meaning.checks.failures import check_failures, check_friction
 from ic.meaning.checks.idle import remark_beginnings
 from ic.meaning.checks.reading import remark_unread
@@ -32,7 +32,8 @@ from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import ALLOW
 from ic.meaning.runs.base import check_base, initial_base, resolve_base
 from ic.meaning.runs.environment import resolve_environment
-from ic.meaning.runs.initial import resolve_initial
+from ic.meaning.runs.initial import check_balanced, resolve_initial
+from ic.meaning.runs.keys import resolve_run_keys
 from ic.meaning.runs.rates import resolve_rates, resolve_schedule
 from ic.meaning.runs.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
 from ic.meaning.runs.tolerances import resolve_tolerances
@@ -40,7 +41,7 @@ from ic.text.complaints import known_words, where_it_belongs
 from met import models
 from met.diagnostic import Place, did_you_mean
 from met.frozen import frozen
-from met.plan import Requirement, Schedule, ServoUse, Structure, Tolerance
+from met.plan import Experiment, Requirement, Schedule, ServoUse, Structure, Tolerance
 from met.trace import Real
 
 BLOCKS = ("servos", *(block.name for block in (INITIAL, ENVIRONMENT, RATES, TOLERANCES)))
@@ -52,6 +53,7 @@ class Resolved:
     """A run's structure, requirements and tolerances; its parameters are in the scope.
 
     stability  h * lambda of every joint whose servo knows it
+    settings   keys of the run that the experiment keeps beside its structure, by field
     """
 
     structure: Structure
@@ -60,6 +62,7 @@ class Resolved:
     seed: int
     stability: tuple[tuple[str, Real], ...]
     place: Place
+    settings: Mapping[str, Any]
 
 
 def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
@@ -93,12 +96,13 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     if arm.free_of_errors:
         check_moved(scope, arm.links, arm.joints, payloads)
     sensors = resolve_link_sensors(scope, block, arm, payloads)
-    environment, products = resolve_environment(
-        scope, body_of(scope, block.get("environment")), arm, base, payloads, duration
-    )
-    balanced = resolve_initial(scope, body_of(scope, block.get("initial")), arm, uses)
+    environment = resolve_environment(scope, body_of(scope, block.get("environment")), arm, base, payloads, duration)
+    initial = body_of(scope, block.get("initial"))
+    resolve_initial(scope, initial, arm)
+    kept = resolve_run_keys(scope, run, block, Structure)
+    check_balanced(scope, initial.get("servos"), uses, kept["balanced"])
     remark_beginnings(scope, environment)
-    initial_base(scope, body_of(scope, block.get("initial")), base)
+    initial_base(scope, initial, base)
     for use in uses:
         check_rest(scope, use)
         check_start(scope, use)
@@ -136,7 +140,6 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         servos=servos,
         environment=environment,
         metrics=(),
-        velocity_products=products,
         integrator=integrator.name,
         schedule=schedule,
         record=(),
@@ -145,7 +148,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         payloads=payloads,
         guides=tuple(guide.use(others[guide.path]) for guide in guides),
         sensors=tuple(sensor.use(others[sensor.path]) for sensor in sensors),
-        balanced=balanced,
+        **kept,
     )
     check_base(scope, base, structure, body_of(scope, block.get("environment")), block.get("base"))
     check_payloads(scope, block, structure)
@@ -159,7 +162,8 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     scope.keep_setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure)
     tolerances = resolve_tolerances(scope, body_of(scope, block.get("tolerances")), structure)
-    return Resolved(structure, requirements, tolerances, seed, stability, definition.place)
+    settings = resolve_run_keys(scope, run, block, Experiment)
+    return Resolved(structure, requirements, tolerances, seed, stability, definition.place, settings)
 
 
 def _check_steps(
@@ -210,10 +214,6 @@ def _keep_settings(
         scope.keep_setting("rates.base", schedule.base_hz, "Hz", note="the fastest of the rates")
     if "rates.record" not in scope.auxiliary:
         scope.keep_setting("rates.record", schedule.base_hz / schedule.dynamics, "Hz", note="that of the dynamics")
-    if "environment.velocity_products" not in scope.auxiliary:
-        scope.keep_setting("environment.velocity_products", "on")
-    if "initial.servos" not in scope.auxiliary:
-        scope.keep_setting("initial.servos", str(BALANCED.default))
     if "seed" not in scope.auxiliary:
         scope.keep_setting("seed", 0.0, "1")
 

@@ -10,6 +10,7 @@ import pytest
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
 from ic.meaning.mechanics.shapes import SHAPES
 from ic.printing import codes
+from ic.printing.glossary import meaning
 from ic.sweeps.designs import DESIGNS, DISTRIBUTIONS
 from met import cli, models, units
 
@@ -175,3 +176,15 @@ error[D171]: `{words[0]}` takes no second word
 
 def test_the_page_of_this_checkout_is_found(capsys: pytest.CaptureFixture[str]) -> None:
     assert printed(capsys, "D060").startswith("D060: ")
+
+
+def test_a_word_of_the_glossary_is_explained(capsys: pytest.CaptureFixture[str]) -> None:
+    assert printed(capsys, "shard") == "task, shard: some cases that are run in one go; the file of what they gave\n"
+
+
+def test_every_word_of_the_glossary_is_found() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "glossary.md").read_text(encoding="utf-8")
+    rows = [line.split(" | ")[0].removeprefix("| ") for line in page.splitlines() if line.startswith("| ")]
+    words = [word for row in rows if row != "word" for word in row.split(", ")]
+    assert len(words) > 50
+    assert not [word for word in words if not list(meaning(word.replace("**", "").removeprefix("the ")))]

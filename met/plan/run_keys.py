@@ -1,0 +1,58 @@
+"""Keys of a run that a plan keeps as one word or number each, declared once: at the field that keeps them.
+
+From the declaration follow how a deck may write the key (its type, unit, bounds and default), what `met explain` and
+`met plan` say of it, and what an older plan means that lacks it. The deck language refers to it, and adds how it is
+written and whether a sweep may choose it (`ic.language.runs`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+from met.frozen import RUN_KEY, frozen, keyed
+from met.parameter import Parameter
+
+
+@frozen(kw_only=True)
+class RunKey:
+    """A key of a run, of its `environment` or of its `initial`.
+
+    path       what sweeps, `--set` and `met explain` call it: `environment.velocity_products`
+    parameter  its type, unit, bounds, default and meaning: a word, or a number that decides the program
+    true       of a key of two words: the one that the plan keeps as True; "" where it keeps the word or the number
+    listed     whether `met plan` lists it where it is not the default; False where another line says it
+    """
+
+    path: str
+    parameter: Parameter
+    true: str = ""
+    listed: bool = True
+
+    def in_plan(self, written: str | float) -> Any:
+        """The plan's value for what the deck says, in SI."""
+        if self.true:
+            return written == self.true
+        return int(written) if self.parameter.whole else written
+
+    def in_deck(self, kept: Any) -> str | float:
+        """What the deck says, in SI, for the plan's value."""
+        if self.true:
+            return next(word for word in self.parameter.words if (word == self.true) is kept)
+        return kept if isinstance(kept, str) else float(kept)
+
+
+def run_key(key: RunKey) -> Any:
+    """A field of a plan's dataclass that keeps this key. A plan without it means the default, and keys of structures
+    are then what they were."""
+    default = key.parameter.default
+    assert isinstance(default, str | float | int)  # else nothing could be said of plans that lack it
+    return keyed("where set", default=key.in_plan(default), run_key=key)
+
+
+def run_keys(cls: type) -> Iterator[tuple[str, RunKey]]:
+    """The fields of a plan's dataclass that keep keys of a run, by name, with what they keep."""
+    for field in dataclasses.fields(cls):
+        if RUN_KEY in field.metadata:
+            yield field.name, field.metadata[RUN_KEY]
