@@ -1,27 +1,37 @@
 """Frozen dataclasses that cost a fifth to define: `@frozen` for `@dataclass(frozen=True)`.
 
 `dataclasses` compiles six methods for each frozen class, half a millisecond a class and a sixth of the start of
-`met check`. Here only `__init__` is compiled; the other methods are shared and go by the fields. What is made is a
-dataclass: `fields`, `replace` and `asdict` work on it, and type checkers see one.
+`met check`. Here only `__init__` is compiled, when the first instance is made; the other methods are shared and go by
+the fields. What is made is a dataclass: `fields`, `replace` and `asdict` work on it, and type checkers see one.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, Literal, TypeVar, dataclass_transform, overload
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, dataclass_transform, overload
+
+if TYPE_CHECKING:
+    import inspect
 
 T = TypeVar("T")
 
 
-def keyed(when: Literal["never", "where set"], *, default: Any = dataclasses.MISSING) -> Any:
-    """A field of a plan's dataclass that is in no structure key, or only where it is not empty, false or None.
+def keyed(
+    when: Literal["always", "never", "where set"], *, default: Any = dataclasses.MISSING, run_key: Any = None
+) -> Any:
+    """A field of a plan's dataclass, with when it is in a structure key.
 
+    "always"     as a field is that is not declared so
     "never"      what changes no number: places, names and units for the reader
-    "where set"  what plans have got since keys were first made: where it is left out keys are what they were
+    "where set"  what plans have got since keys were first made: where it is its default keys are what they were
+    run_key      the key of a run that it keeps (`met.plan.run_keys.RunKey`); None where it keeps none
     """
-    return dataclasses.field(default=default, metadata={IN_KEY: when})
+    return dataclasses.field(default=default, metadata={IN_KEY: when, **({RUN_KEY: run_key} if run_key else {})})
 
+
+RUN_KEY = "keeps this key of a run"
+"""Under which the metadata of a field has the key of a run that it keeps."""
 
 IN_KEY = "in the structure key"
 """Under which the metadata of a field says when it is in a structure key; always where they say nothing."""
@@ -37,7 +47,8 @@ def frozen(cls: type[T] | None = None, /, *, kw_only: bool = False) -> type[T] |
 
     def make(cls: type[T]) -> type[T]:
         cls.__doc__ = cls.__doc__ or ""  # else dataclasses writes one, from a signature that takes long to make
-        made = dataclasses.dataclass(eq=False, repr=False, kw_only=kw_only)(cls)
+        made = dataclasses.dataclass(init=False, eq=False, repr=False, kw_only=kw_only)(cls)
+        _compile_later(made)
         for method in (__setattr__, __delattr__, __eq__, __hash__, __repr__):
             if method.__name__ not in cls.__dict__ or method.__name__ == "__hash__":
                 setattr(made, method.__name__, method)
@@ -46,13 +57,68 @@ def frozen(cls: type[T] | None = None, /, *, kw_only: bool = False) -> type[T] |
     return make if cls is None else make(cls)
 
 
+def _compile_later(cls: type) -> None:
+    """Gives a class an `__init__` that is compiled when it is first called."""
+
+    compiled: Callable[..., None] | None = None
+
+    def __init__(self: Any, *positional: Any, **named: Any) -> None:
+        nonlocal compiled
+        if compiled is None:
+            compiled = _compiled_init(cls)
+            if cls.__init__ is __init__:  # type: ignore[misc]  # else a decorator has wrapped it
+                cls.__init__ = compiled  # type: ignore[misc]
+        compiled(self, *positional, **named)
+
+    cls.__init__ = __init__  # type: ignore[misc]
+    cls.__signature__ = _LazySignature()  # type: ignore[attr-defined]
+
+
+def _compiled_init(cls: type) -> Callable[..., None]:
+    """The `__init__` of a dataclass: its fields as parameters, each put where attributes are kept.
+
+    Names of its own begin with an underscore and a verb, as `_set_on`, so that a field may have any usual name.
+    """
+    fields = [field for field in dataclasses.fields(cls) if field.init]
+    given: dict[str, Any] = {"_MISSING": dataclasses.MISSING}
+    head = {False: ["_set_on"], True: ["*"]}
+    body = ["_keep_in = _set_on.__dict__"]
+    for field in fields:
+        name, value = field.name, field.name
+        default = ""
+        if field.default is not dataclasses.MISSING:
+            given[f"_default_{name}"], default = field.default, f"=_default_{name}"
+        elif field.default_factory is not dataclasses.MISSING:
+            given[f"_make_{name}"], default = field.default_factory, "=_MISSING"
+            value = f"_make_{name}() if {name} is _MISSING else {name}"
+        head[bool(field.kw_only)].append(f"{name}{default}")
+        body.append(f"_keep_in[{name!r}] = {value}")
+    if hasattr(cls, "__post_init__"):
+        body.append("_set_on.__post_init__()")
+    parameters = [*head[False], *(head[True] if len(head[True]) > 1 else [])]
+    text = f"def __init__({', '.join(parameters)}):\n" + "".join(f"    {line}\n" for line in body)
+    exec(compile(text, f"<{cls.__qualname__}.__init__>", "exec"), given)
+    compiled: Callable[..., None] = given["__init__"]
+    return compiled
+
+
+class _LazySignature:
+    """The signature of a frozen class, for those who ask how it is called: that of the compiled `__init__`."""
+
+    def __get__(self, instance: object, owner: type) -> inspect.Signature:
+        import inspect
+
+        signature = inspect.signature(_compiled_init(owner))
+        return signature.replace(parameters=list(signature.parameters.values())[1:])
+
+
 def _values(self: Any) -> tuple[Any, ...]:
     """The fields that count, in order."""
     return tuple(getattr(self, name) for name, field in self.__dataclass_fields__.items() if field.compare)
 
 
 def __setattr__(self: Any, name: str, value: Any) -> None:
-    """`__init__` sets each field once; nothing else sets anything."""
+    """A `__post_init__` may set a field that `__init__` does not; nothing else sets anything."""
     own = self.__dict__
     if name in own or name not in self.__dataclass_fields__:
         raise dataclasses.FrozenInstanceError(f"cannot assign to {name!r} of a {type(self).__name__}")
