@@ -12,6 +12,7 @@ from ic.language.runs import DURATION, ENVIRONMENT, INITIAL, RATES, RUN, SEED, T
 from ic.meaning.checks.failures import check_failures, check_friction
 from ic.meaning.checks.idle import remark_beginnings
 from ic.meaning.checks.reading import remark_unread
+from ic.meaning.checks.sampling import check_sampling
 from ic.meaning.checks.spin import check_spins
 from ic.meaning.checks.swings import check_circuits, check_sensor
 from ic.meaning.control.guides import check_guides, name_guides, resolve_guides
@@ -159,6 +160,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     record = resolve_record(scope, run, block.get("record"), structure)
     structure = replace(structure, metrics=metrics, record=record)
     remark_unread(scope, uses, structure)
+    check_sampling(scope, structure)
     scope.keep_setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure)
     tolerances = resolve_tolerances(scope, body_of(scope, block.get("tolerances")), structure)
