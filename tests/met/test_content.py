@@ -71,7 +71,8 @@ def test_the_fastest_swing_is_that_of_the_course_within_the_run(name: str, seed:
 def test_a_pulse_is_beyond_half_of_its_height_between_its_ends() -> None:
     content = content_of_points((0.0, 0.2, 0.4, 0.6), (1.0, 1.0, 3.0, 0.0), begin=10.0)
     assert (content.begins, content.ends) == (10.2, 10.6)
-    assert content.pulses == (pytest.approx((10.3, 10.4 + 0.2 / 3.0)),)
+    (pulse,) = content.pulses
+    assert pulse == pytest.approx((10.3, 10.4 + 0.2 / 3.0))
 
 
 def test_a_jump_and_a_rise_are_no_pulse_and_a_ripple_of_a_large_range_is_none() -> None:

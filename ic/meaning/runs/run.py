@@ -11,10 +11,12 @@ from ic.grammar.syntax import Call, Name, Word
 from ic.language.runs import DURATION, ENVIRONMENT, INITIAL, RATES, RUN, SEED, TOLERANCES
 from ic.meaning.checks.failures import check_failures, check_friction
 from ic.meaning.checks.idle import remark_beginnings
+from ic.meaning.checks.reach import check_reach
 from ic.meaning.checks.reading import remark_unread
 from ic.meaning.checks.sampling import check_sampling
 from ic.meaning.checks.spin import check_spins
 from ic.meaning.checks.swings import check_circuits, check_sensor
+from ic.meaning.checks.together import check_together
 from ic.meaning.control.guides import check_guides, name_guides, resolve_guides
 from ic.meaning.control.link_sensors import Sensing, resolve_link_sensors
 from ic.meaning.control.schedule import Rate, Ticks, check_stability, fastest_rate
@@ -161,6 +163,8 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     structure = replace(structure, metrics=metrics, record=record)
     remark_unread(scope, uses, structure)
     check_sampling(scope, structure)
+    check_together(scope, uses, structure)
+    check_reach(scope, block, structure)
     scope.keep_setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure)
     tolerances = resolve_tolerances(scope, body_of(scope, block.get("tolerances")), structure)
