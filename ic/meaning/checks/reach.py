@@ -29,7 +29,8 @@ def check_reach(scope: Scope, block: MergedBlock, structure: Structure) -> None:
             item = items[payload.name]
             grapple = item.body.get("grapple") if item.body is not None else None
             gravity = [f"environment.{load.name}.g" for load in structure.environment if load.model == "gravity"]
-            _observe(scope, payload, [f"{joint}.at" for joint in joints], gravity, value_place(grapple or item))
+            offsets, place = [f"{joint}.at" for joint in joints], value_place(grapple or item)
+            _observe(scope, payload, offsets, gravity, structure.schedule.duration, place)
 
 
 def _way_to(structure: Structure, link: str) -> list[str] | None:
@@ -59,7 +60,9 @@ def _is_pushed(scope: Scope, structure: Structure, payload: Payload) -> bool:
     return False
 
 
-def _observe(scope: Scope, payload: Payload, joints: list[str], gravity: list[str], place: Place) -> None:
+def _observe(
+    scope: Scope, payload: Payload, joints: list[str], gravity: list[str], duration: float, place: Place
+) -> None:
     """joints, gravity: paths of the vectors from joint to joint, and of the accelerations of free fall."""
     head = f"payloads.{payload.name}"
     link = f"links.{payload.link}" if f"links.{payload.link}.mass" in scope.parameters else head
@@ -82,7 +85,7 @@ def _observe(scope: Scope, payload: Payload, joints: list[str], gravity: list[st
         reach = reach + 2.0 * _length(middle) + _size(of_link)
         # its frame goes round its centre, which flies straight; and as far again as its body is large
         loose = _length(com) * (2.0 + _length(rate) * time) + _size(own)
-        far = np.flatnonzero(away > FAR * (reach + loose))
+        far = np.flatnonzero((away > FAR * (reach + loose)) & (time <= duration))
         if far.size:
             row = far[np.argmax(away[far])]
             scope.complaints.remark(
