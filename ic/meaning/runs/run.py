@@ -13,6 +13,7 @@ from ic.meaning.checks.failures import check_failures, check_friction
 from ic.meaning.checks.idle import remark_beginnings
 from ic.meaning.checks.reach import check_reach
 from ic.meaning.checks.reading import remark_unread
+from ic.meaning.checks.requirements import check_requirements
 from ic.meaning.checks.sampling import check_sampling
 from ic.meaning.checks.spin import check_spins
 from ic.meaning.checks.swings import check_circuits, check_sensor
@@ -167,6 +168,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     check_reach(scope, block, structure)
     scope.keep_setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure)
+    check_requirements(scope, requirements, structure)
     tolerances = resolve_tolerances(scope, body_of(scope, block.get("tolerances")), structure)
     settings = resolve_run_keys(scope, run, block, Experiment)
     return Resolved(structure, requirements, tolerances, seed, stability, definition.place, settings)
