@@ -17,8 +17,9 @@ from met.frozen import frozen
 
 if TYPE_CHECKING:
     from batch.campaigns.drive import Progress
+    from batch.campaigns.executor import Executor
+    from batch.campaigns.verification.when import Verify
     from batch.differences.result import Diff
-    from batch.executors import Executor
     from batch.queries.summary import Summary
     from met.plan import Plan
 
@@ -55,6 +56,7 @@ def run(
     timeout: float | None = None,
     max_failures: int | None = None,
     fresh: bool = False,
+    verify: Verify = "auto",
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Archive:
@@ -75,6 +77,8 @@ def run(
     timeout       s without any progress after which a case is given up; in processes
     max_failures  stop when more cases have failed
     fresh         start over, rather than run what is missing
+    verify        which cases are run again with shorter steps, so that metrics have errors: "none", "some", "all", or
+                  "auto": some where that is cheap
     executor      who runs it, in place of threads, processes and dask (batch/executors)
 
     Raises met.diagnostic.Problem for what a user can mend.
@@ -87,7 +91,13 @@ def run(
     archive, target = from_run.archive_and_export(output)
     chosen = executor or choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
     campaign = prepare(
-        _plan(plan), output=archive, experiments=experiments, cases=cases, histories=histories, float32=float32
+        _plan(plan),
+        output=archive,
+        experiments=experiments,
+        cases=cases,
+        histories=histories,
+        float32=float32,
+        verify=verify,
     )
     if target is not None:
         from_run.check(campaign, target, histories=histories != "default")

@@ -17,8 +17,9 @@ from hw import loop, process, refusals
 from hw.bed import About, BedDriver, Capability
 from hw.beds import latch
 from hw.driven import LANES, CaseKernel, divisor, substituted
+from hw.drivers import opened
 from hw.pace import Pace, pace
-from hw.ports import Port, opened
+from hw.ports import Port
 from hw.writer import recording
 from met.diagnostic import Problem, error
 from met.frozen import frozen

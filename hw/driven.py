@@ -12,7 +12,7 @@ import numpy as np
 
 from met.backends.backend import Block
 from met.plan import Experiment
-from met.program.control.plant import bed_values, servo_period
+from met.plant import bed_values, servo_period
 from met.run import Prepared, inputs
 
 LANES = 4

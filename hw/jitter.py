@@ -17,8 +17,9 @@ import numpy as np
 from hw import loop, process
 from hw.bed import Capability
 from hw.case import pace_of
+from hw.drivers import opened
 from hw.pace import Pace
-from hw.ports import Port, opened
+from hw.ports import Port
 from hw.records import ANSWERED, LAYOUT
 from hw.timing import Timing, stops, time_spread, timing
 from met.diagnostic import Problem, error

@@ -60,15 +60,14 @@ def frozen(cls: type[T] | None = None, /, *, kw_only: bool = False) -> type[T] |
 def _compile_later(cls: type) -> None:
     """Gives a class an `__init__` that is compiled when it is first called."""
 
-    compiled: Callable[..., None] | None = None
+    compiled: list[Callable[..., None]] = []
 
     def __init__(self: Any, *positional: Any, **named: Any) -> None:
-        nonlocal compiled
-        if compiled is None:
-            compiled = _compiled_init(cls)
-            if cls.__init__ is __init__:  # type: ignore[misc]  # else a decorator has wrapped it
-                cls.__init__ = compiled  # type: ignore[misc]
-        compiled(self, *positional, **named)
+        if not compiled:
+            compiled.append(_compiled_init(cls))
+        if cls.__dict__["__init__"] is __init__:  # a decorator may have put one around it, which stays
+            cls.__init__ = compiled[0]  # type: ignore[misc]
+        compiled[0](self, *positional, **named)
 
     cls.__init__ = __init__  # type: ignore[misc]
     cls.__signature__ = _LazySignature()  # type: ignore[attr-defined]

@@ -14,17 +14,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Any, Literal, Protocol
 
-from met import units
 from met.diagnostic import Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.host.entry_points import offered
-from met.parameter import Parameter, is_present
-from met.plan import LinkSensor, SensorUse, ServoUse, Structure
-
-if TYPE_CHECKING:
-    from met.servos.servo import Parts
+from met.parameter import Parameter
+from met.unit_parser import parse_unit
 
 Kind = Literal["servo", "sensor", "environment", "command", "guide", "metric", "integrator", "bed", "law"]
 
@@ -162,10 +158,10 @@ def available(kind: Kind) -> dict[str, Any]:
 
 def _check_names(kind: Kind, model: Any, found_at: str) -> None:
     """Raise Problem where names of a model's numbers are the same, or the engine's: each is recorded under its name."""
-    from met.plan.channel import OF_BED, OF_LAW, OF_OBSERVER
-
-    own = {"bed": OF_BED, "law": OF_LAW + OF_OBSERVER}.get(kind, ())
-    taken = [name for name, *_ in own] or ["command"]
+    if kind in ("bed", "law"):
+        taken = [name for name, *_ in _of_engine(kind)]
+    else:
+        taken = ["command"]
     shown = [part.name for group in HELD for part in getattr(model, group, ())]
     parameters = [*getattr(model, "parameters", ()), *getattr(model, "of_joint", ())]
     for names in ([*taken, *shown], distinct_names(parameters)):
@@ -173,6 +169,17 @@ def _check_names(kind: Kind, model: Any, found_at: str) -> None:
         if twice:
             message = f"{found_at} declares `{twice[0]}` twice"
             raise Problem(error("E215", message, help="each memory, state, signal and parameter has its own name"))
+
+
+def _of_engine(kind: Kind) -> tuple[tuple[str, str, str], ...]:
+    """Name, unit and meaning of what the engine holds of a bed, or of a law, besides its memory."""
+    if kind == "bed":
+        from met.substitution.bed import OF_BED
+
+        return OF_BED
+    from met.substitution.law import OF_LAW, OF_OBSERVER
+
+    return OF_LAW + OF_OBSERVER
 
 
 def distinct_names(parameters: Sequence[Parameter]) -> list[str]:
@@ -190,16 +197,16 @@ def distinct_names(parameters: Sequence[Parameter]) -> list[str]:
 
 def _check_units(model: Any, found_at: str) -> None:
     """Every declared unit can be read."""
-    words = {word: units.parse_unit("1") for word in ("joint", "effort", "command", "of")}
+    words = {word: parse_unit("1") for word in ("joint", "effort", "command", "of")}
     if getattr(model, "measures", None) is not None:
         try:
-            units.parse_unit(model.unit)
+            parse_unit(model.unit)
         except ValueError as reason:
             message = f"{found_at} measures something with {reason}"
             raise Problem(error("E215", message, help="give its `unit`, as decks write it: `m/s^2`")) from None
     for part in (p for group in ("parameters", "of_joint", *HELD) for p in getattr(model, group, ())):
         try:
-            units.parse_unit(part.unit, words)
+            parse_unit(part.unit, words)
         except ValueError as reason:
             message = f"{found_at} declares `{part.name}` with {reason}"
             help = "units are those of decks, and joint, effort, command, of"
@@ -244,29 +251,6 @@ def find(kind: Kind, name: str, place: Place | None = None) -> Any:
     raise Problem(error("D140", f"no {kind} model `{name}`", place, help=helps))
 
 
-def packages(structures: Iterable[Structure]) -> tuple[str, ...]:
-    """The other packages whose models structures use, by name."""
-    used: dict[Kind, set[str]] = {kind: set() for kind in GROUPS}
-    for each in structures:
-        used["servo"] |= {servo.model for servo in each.servos}
-        used["sensor"] |= {sensor.model for servo in each.servos for sensor in servo.sensors}
-        used["sensor"] |= {sensor.model for sensor in each.sensors}
-        commands = [servo.command for servo in each.servos if servo.command is not None]
-        used["command"] |= {command.model for command in commands if not command.guide}
-        used["command"] |= {course.model for use in (each.base, *each.guides) if use for course in use.courses}
-        used["environment"] |= {use.model for use in each.environment}
-        used["guide"] |= {use.model for use in each.guides}
-        used["metric"] |= {use.model for use in each.metrics}
-        used["integrator"].add(each.integrator)
-        used["bed"] |= {use.bed for use in each.substitutions}
-        used["law"] |= {use.law for use in each.substitutions}
-    found = set()
-    for kind, names in used.items():
-        if theirs := names - find_own(kind).keys():
-            found |= {point.package for point in offered(GROUPS[kind].entry_points) if point.name in theirs}
-    return tuple(sorted(found))
-
-
 def find_own(kind: Kind) -> dict[str, Any]:
     """MET's own models of this kind by name: found without loading what other packages offer."""
     return {model.name: model for model in GROUPS[kind].own()[0]}
@@ -285,25 +269,6 @@ def written(model: Any) -> tuple[Parameter, ...]:
 def has_motor(servo: Any) -> bool:
     """True where a bed may take the place of this servo's motor: it has one, and its computer sets the voltage."""
     return servo.motor is not None and any(output.name == "voltage" for output in servo.outputs)
-
-
-def quantities(use: ServoUse) -> dict[str, str]:
-    """Quantities that a sensor of this servo may read, with declared units: the joint's motion, the servo's states."""
-    return {"q": "joint", "qd": "joint/s", **{state.name: state.unit for state in servo_parts(use).natural}}
-
-
-def sensor_parts(use: SensorUse | LinkSensor, group: str) -> tuple[Any, ...]:
-    """The parts of a sensor's `parameters`, `states` or `memory` that are present under this use's words."""
-    sensor = find("sensor", use.model, use.place)
-    defaults = {each.name: each.default for each in sensor.parameters if isinstance(each.default, str)}
-    return tuple(part for part in getattr(sensor, group) if is_present(part, defaults | dict(use.words)))
-
-
-def servo_parts(use: ServoUse) -> Parts:
-    """The parts of a servo that are present in this use of it."""
-    from met.servos.servo import parts
-
-    return parts(find("servo", use.model, use.place), dict(use.words), continuous=use.continuous)
 
 
 def parameter(model: Any, name: str) -> Parameter | None:

@@ -17,6 +17,9 @@ from typing import Literal
 from met.frozen import frozen
 from met.messages.renamed import old_fields
 
+BASE = "base"
+"""The link that the arm stands on. It has no joint, and matter only where a deck gives it some."""
+
 WORLD = "world"
 """A word that may stand for a link: the ground, whose frame is the world's."""
 

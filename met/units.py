@@ -11,16 +11,12 @@ prefixes beyond the table, so that a unit's name is known to be one wherever a d
 from __future__ import annotations
 
 import math
-import re
 import sys
 from collections.abc import Iterable, Mapping
-from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
 from met.frozen import frozen
-
-BIGGEST_EXPONENT = 9
 
 
 class Dimension(NamedTuple):
@@ -216,30 +212,30 @@ UNITS: Mapping[str, NamedUnit] = MappingProxyType(
     }
 )
 
-# how a dimension is said, where base units would be hard to read; the first that matches
-_SPOKEN = (
-    "N*m/A",
-    "V*s/rad",
-    "V/rad",
-    "N*m*s/rad",
-    "kg*m^2",
-    "N",
-    "N*m",
-    "W",
-    "V",
-    "ohm",
-    "H",
-    "F",
-    "Pa",
-    "N/m",
-    "N*s/m",
-    "V*s",
-    "V/s",
-    "N*m/s",
-    "N/s",
-    "N/A",
-    "N*m/rad",
+_SPOKEN: Mapping[Dimension, str] = MappingProxyType(
+    {
+        _ENERGY / _CURRENT: "N*m/A",
+        _VOLTAGE * _TIME / _ANGLE: "V*s/rad",
+        _VOLTAGE / _ANGLE: "V/rad",
+        _ENERGY * _TIME / _ANGLE: "N*m*s/rad",
+        _MASS * _LENGTH**2: "kg*m^2",
+        _FORCE: "N",
+        _ENERGY: "N*m",
+        _POWER: "W",
+        _VOLTAGE: "V",
+        _RESISTANCE: "ohm",
+        _INDUCTANCE: "H",
+        _CAPACITANCE: "F",
+        _PRESSURE: "Pa",
+        _FORCE / _LENGTH: "N/m",
+        _FORCE * _TIME / _LENGTH: "N*s/m",
+        _VOLTAGE / _TIME: "V/s",
+        _FORCE / _TIME: "N/s",
+        _FORCE / _CURRENT: "N/A",
+        _ENERGY / _ANGLE: "N*m/rad",
+    }
 )
+"""How a dimension is said where base units would be hard to read."""
 
 
 def is_unit(name: str) -> bool:
@@ -271,7 +267,7 @@ def same(a: Dimension, b: Dimension) -> bool:
 
 def text(dimension: Dimension) -> str:
     """The dimension in SI units, as a deck would write it: `N*m`, `rad/s`, `1` for a pure number."""
-    spoken = _spoken().get(dimension)
+    spoken = _SPOKEN.get(dimension)
     if spoken is not None:
         return spoken
     exponents = [(name, getattr(dimension, name)) for name in ("kg", "m", "s", "A", "K", "rad")]
@@ -283,89 +279,5 @@ def text(dimension: Dimension) -> str:
     return f"{'*'.join(above) or '1'}/{divisor}"
 
 
-def parse_unit(written: str, names: Mapping[str, Measure] = MappingProxyType({})) -> Measure:
-    """The meaning of a unit as a model's declaration writes it: `V*s/rad`, `N*m/(rad*s)`, `m^2`, `1/s`, `1`.
-
-    names: further words and what they stand for here, such as `joint`. ValueError where it cannot be read: a
-    declaration is a programmer's text (a deck's units are read by ic).
-    """
-    return _UnitReader(written, names).whole()
-
-
 def _power(name: str, exponent: int) -> str:
     return name if exponent == 1 else f"{name}^{exponent}"
-
-
-@lru_cache(maxsize=1)
-def _spoken() -> Mapping[Dimension, str]:
-    table: dict[Dimension, str] = {}
-    for written in _SPOKEN:
-        table.setdefault(parse_unit(written).dimension, written)
-    return table
-
-
-_PIECE = re.compile(r"\s*(?:(%|[A-Za-z_]+)|(-?\d+)|([*/^()]))")
-
-
-class _UnitReader:
-    """Recursive descent over a declaration's unit."""
-
-    def __init__(self, written: str, names: Mapping[str, Measure]) -> None:
-        self.written = written
-        self.names = names
-        self.pieces: list[str] = []
-        at = 0
-        while written[at:].strip():
-            match = _PIECE.match(written, at)
-            if match is None:
-                raise ValueError(f"unit `{written}`: cannot read `{written[at:].strip()}`")
-            self.pieces.append(match.group().strip())
-            at = match.end()
-        self.at = 0
-
-    def whole(self) -> Measure:
-        result = self.product()
-        if self.at < len(self.pieces):
-            raise ValueError(f"unit `{self.written}`: cannot read `{self.pieces[self.at]}`")
-        return result
-
-    def take(self) -> str:
-        if self.at >= len(self.pieces):
-            raise ValueError(f"unit `{self.written}` ends too early")
-        self.at += 1
-        return self.pieces[self.at - 1]
-
-    def next_is(self, *wanted: str) -> bool:
-        return self.at < len(self.pieces) and self.pieces[self.at] in wanted
-
-    def product(self) -> Measure:
-        result = self.factor()
-        while self.next_is("*", "/"):
-            sign = 1 if self.take() == "*" else -1
-            result = result * self.factor() ** sign
-        return result
-
-    def factor(self) -> Measure:
-        piece = self.take()
-        if piece == "(":
-            result = self.product()
-            if self.take() != ")":
-                raise ValueError(f"unit `{self.written}`: `)` is missing")
-        elif piece == "1":
-            result = ONE
-        elif piece in self.names:
-            result = self.names[piece]
-        elif piece in UNITS:
-            result = UNITS[piece].measure
-        else:
-            from met.messages.other_units import suggest  # for a message alone
-
-            near = suggest(piece)
-            raise ValueError(f"unit `{self.written}`: `{piece}` is not a unit" + (f"; `{near}`?" if near else ""))
-        if self.next_is("^"):
-            self.take()
-            exponent = self.take()
-            if not exponent.lstrip("-").isdigit() or abs(int(exponent)) > BIGGEST_EXPONENT:
-                raise ValueError(f"unit `{self.written}`: `{exponent}` is not a small whole exponent")
-            result = result ** int(exponent)
-        return result

@@ -3,6 +3,7 @@
     /                       attributes: schema, deck, and for a single experiment those of its group
       <variables>           a single experiment lies in the root
     /<experiment>           several: one group each; of a sweep of several structures, one for each structure
+      verification          in each: some cases with shorter steps, where they were run so (batch/archive/verified.py)
     /provenance             source (files of the deck, whole), plan (JSON); versions and git commit as attributes
       cases.<experiment>    coordinate by case: the whole case table, where it is too large for the plan's JSON
 
@@ -24,6 +25,7 @@ itself still says what its cases are (`q.where(q["recorded.gearbox.kp"] > 0.02, 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import field
@@ -31,11 +33,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from batch.archive import limits
+from batch.archive import limits, step_errors
 from met.frozen import frozen
 from met.plan import Coordinate, Experiment, Plan, Recorded
 from met.plan.channel import DIMENSIONS, channels
 from met.plan.outputs import metric_units
+from met.unit_parser import parse_unit
 
 SCHEMA = "met.archive"
 VERSION = 1
@@ -83,6 +86,7 @@ RESERVED = frozenset(
         "n_valid",
         "met",
         "provenance",
+        "verification",
         "bed_limited",
         *(f"friction_{name}" for name in EVENTS),
     }
@@ -183,12 +187,12 @@ def coordinate_unit(experiment: Experiment, coordinate: Coordinate) -> str:
     from met import units
 
     try:
-        written = units.parse_unit(coordinate.unit).dimension
+        written = parse_unit(coordinate.unit).dimension
     except ValueError:
         return coordinate.unit
     for path in coordinate.sets:  # a `let` may set parameters of other dimensions too
         unit = experiment.parameters[path].unit if path in experiment.parameters else ""
-        if unit and units.same(units.parse_unit(unit).dimension, written):
+        if unit and units.same(parse_unit(unit).dimension, written):
             return unit
     return units.text(written)
 
@@ -243,6 +247,7 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
             "metric": [named.get(r.metric, r.metric) for r in experiment.requirements],
             "comparison": [r.comparison for r in experiment.requirements],
             "limit": np.array([r.limit for r in experiment.requirements]),
+            **_over_cases(experiment),
         }
         flags = {"flag_values": np.array([1, 0, -1], np.int8), "flag_meanings": "met missed unknown"}
         out += [
@@ -257,6 +262,20 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
             ),
         ]
     return out
+
+
+def _over_cases(experiment: Experiment) -> dict[str, np.ndarray]:
+    """Share and confidence of each requirement, not-a-number where it has none; nothing where none of them has any."""
+    found = experiment.requirements
+    if all(requirement.share is None for requirement in found):
+        return {}
+    return {
+        name: np.array([math.nan if value is None else value for value in values])
+        for name, values in (
+            ("share", [requirement.share for requirement in found]),
+            ("confidence", [requirement.confidence for requirement in found]),
+        )
+    }
 
 
 def _apart(name: str, word: str, taken: Collection[str], fellows: Collection[str]) -> str:
@@ -278,6 +297,8 @@ def _coordinate(experiment: Experiment, coordinate: Coordinate, name: str) -> Va
     words = f"varied: {coordinate.path}"
     if name != coordinate.path:
         written["path"] = coordinate.path
+    if coordinate.design:
+        written["design"] = coordinate.design
     return Variable(name, "float64", ("case",), "coordinate", words, unit, written, coordinate.path)
 
 
@@ -346,10 +367,18 @@ def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, 
         "duration_s": schedule.duration,
         "structure_key": keys.structure_key(structure, keys.inputs(experiment)),
         "cases_in_table": experiment.cases.count,
+        **_step_errors(experiment, variables),
         "frame": FRAME if structure.base is None else WHERE_IT_MOVES,
         "coordinates": " ".join(coordinates),
         **({"allowed": "\n".join(map(str, experiment.allowances))} if experiment.allowances else {}),
     }
+
+
+def _step_errors(experiment: Experiment, variables: list[Variable]) -> dict[str, str]:
+    if not experiment.step_errors:
+        return {}
+    names = {variable.key: variable.name for variable in variables if variable.role == "metric"}
+    return {step_errors.ATTRIBUTE: step_errors.written(experiment.step_errors, names)}
 
 
 def group_names(plan: Plan) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 from met import units
 from met.plan import Requirement
+from met.unit_parser import parse_unit
 
 # what a unit may stand behind: a number, or the end of a sum in parentheses
 _NUMBER = re.compile(r"\d[\d.]*(?:[eE][-+]?\d+)?|\)")
@@ -23,14 +24,14 @@ def deck_unit(metric: str, unit: str, requirements: Iterable[Requirement]) -> tu
 def written_unit(text: str, unit: str) -> tuple[str, float] | None:
     """The unit at the end of a requirement's text and its size in SI; None where no unit of this dimension is there."""
     try:
-        wanted = units.parse_unit(unit).dimension
+        wanted = parse_unit(unit).dimension
     except ValueError:
         return None
     limit = re.split(r"[<>]=?", text, maxsplit=1)[-1]
     for number in _NUMBER.finditer(limit):
         written = limit[number.end() :].strip()
         try:
-            measure = units.parse_unit(written)
+            measure = parse_unit(written)
         except ValueError:
             continue
         if units.same(measure.dimension, wanted):

@@ -15,34 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive import plain, sound
+from batch.archive import plain, sound, step_errors, verified
 from batch.archive.hdf5 import SIGNATURE, h5py
 from batch.archive.layout import SCHEMA, VERSION
 from batch.archive.rows import row_of
-from batch.archive.sound import Unlike, of_joints
+from batch.archive.stored import Stored, Unlike
 from met.diagnostic import Problem, error
 from met.distinct import distinct
-from met.frozen import frozen
 from met.host.files import open_regular
 from met.plan import Plan
-
-
-@frozen
-class Stored:
-    """One variable as it lies in the file."""
-
-    name: str
-    dims: tuple[str, ...]
-    role: str
-    unit: str
-    units_by_joint: tuple[str, ...]
-    long_name: str
-    attributes: dict[str, Any]
-
-    @property
-    def path(self) -> str:
-        """A coordinate's path in the deck, which is its name unless that was taken."""
-        return str(self.attributes.get("path", self.name))
 
 
 @contextmanager
@@ -66,6 +47,8 @@ class ArchiveGroup:
         with reading(path):
             self.attributes: dict[str, Any] = {name: _plain(value) for name, value in node.attrs.items()}
             sound.check(self)
+            self.verified = verified.read(node, self)
+            self.step_errors = step_errors.read(self)
         self.name: str = self.attributes["experiment"]
         self.sweep: str = str(self.attributes.get("sweep", ""))
         self.allowed: tuple[str, ...] = tuple(str(self.attributes.get("allowed", "")).splitlines())
@@ -161,11 +144,11 @@ class ArchiveGroup:
 
     def joints(self, variable: Stored) -> tuple[str, ...]:
         """Names along a signal's joint dimension; none where it has no such dimension."""
-        return self._along(variable.dims[2:3]) if of_joints(variable) else ()
+        return self._along(variable.dims[2:3]) if variable.of_joints else ()
 
     def components(self, variable: Stored) -> tuple[str, ...]:
         """Names of a signal's components; none where it is no vector."""
-        return self._along(variable.dims[3:4] if of_joints(variable) else variable.dims[2:3])
+        return self._along(variable.dims[3:4] if variable.of_joints else variable.dims[2:3])
 
     def _along(self, dims: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(map(str, self.values(dims[0]))) if dims else ()

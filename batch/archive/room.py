@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from batch.archive.hdf5 import h5py
-from batch.archive.sound import Unlike
+from batch.archive.stored import Unlike
 
 PACKED = 1100
 """Bytes that a byte of a file may hold, at most: what deflate makes of zeros, 1032, and a little."""

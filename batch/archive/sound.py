@@ -7,20 +7,13 @@ sizes are those of the dimensions. Values of signals, metrics and coordinates ma
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from batch.archive.stored import Stored, StoredGroup, Unlike
 from met.messages.visible import line
 from met.run import DONE, LOST
-
-if TYPE_CHECKING:
-    from batch.archive.read import ArchiveGroup, Stored
-
-
-class Unlike(ValueError):
-    """An archive lacks something that all archives have: what."""
-
 
 NUMBERS, WHOLE, WORDS = "iuf", "iu", "O"
 """Kinds of numpy's types: of numbers, of whole ones, and of strings as h5py has them."""
@@ -73,7 +66,7 @@ MOST_CASE = 1 << 53
 """Numbers of cases are exact as doubles, too."""
 
 
-def check(group: ArchiveGroup) -> None:
+def check(group: StoredGroup) -> None:
     """Raises Unlike; what HDF5 says of bytes that are damaged passes through."""
     _attributes(group.attributes)
     variables = group.variables
@@ -97,12 +90,7 @@ def check(group: ArchiveGroup) -> None:
     _values(group)
 
 
-def of_joints(variable: Stored) -> bool:
-    """True if a signal's third dimension holds joints."""
-    return any(dim == "joint" or dim.startswith("joint_of_") for dim in variable.dims[2:3])
-
-
-def _names(group: ArchiveGroup) -> None:
+def _names(group: StoredGroup) -> None:
     """Check that the deck's names are names: letters, numbers and marks that can be seen, in one line."""
     attributes = group.attributes
     names = [attributes["experiment"], attributes.get("sweep", ""), *group.variables]
@@ -143,7 +131,7 @@ def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
     if variable.role == "signal":
         if dims[:2] != ("recorded_case", "time"):
             raise Unlike(f"variable `{name}` is not over cases and time")
-        if len(dims) > (4 if of_joints(variable) else 3):
+        if len(dims) > (4 if variable.of_joints else 3):
             raise Unlike(f"variable `{name}` has more dimensions than joints and components")
         if any(kinds[dim] not in WORDS for dim in dims[2:]):
             raise Unlike(f"variable `{name}` has a dimension without names")
@@ -152,7 +140,7 @@ def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
         raise Unlike(f"variable `{name}` has no scale")
 
 
-def _requirements(group: ArchiveGroup) -> None:
+def _requirements(group: StoredGroup) -> None:
     """Check that each attribute of the requirements has a value for each of them, and that `met` is 1, 0 or -1."""
     if "requirement" not in group.variables:
         return
@@ -160,14 +148,22 @@ def _requirements(group: ArchiveGroup) -> None:
     if count and "met" not in group.variables:
         raise Unlike("variable `met` is missing or of another type")
     told = group.variables["requirement"].attributes
-    for name, types in (("metric", str), ("comparison", str), ("limit", float)):
+    for name, types in (
+        ("metric", str),
+        ("comparison", str),
+        ("limit", float),
+        ("share", float),
+        ("confidence", float),
+    ):
         values = told.get(name, [])
         values = values if isinstance(values, list) else [values]
         if name in told and (len(values) != count or not all(isinstance(value, types) for value in values)):
             raise Unlike(f"attribute `{name}` of `requirement` is not of each")
+        if name in ("share", "confidence") and not all(0.0 < value <= 1.0 for value in values if value == value):
+            raise Unlike(f"attribute `{name}` of `requirement` is no share")
 
 
-def _values(group: ArchiveGroup) -> None:
+def _values(group: StoredGroup) -> None:
     """Check that cases rise, and that statuses, times and names have values that they can have."""
     cases, valid = group.values("case"), group.values("n_valid")
     if not _rises(cases) or (len(cases) and not (cases[0] >= 0 and cases[-1] <= MOST_CASE)):
@@ -194,7 +190,7 @@ def _values(group: ArchiveGroup) -> None:
             names = group.values(dim).tolist()
             if not names or len(set(names)) != len(names) or not all(names):
                 raise Unlike(f"variable `{dim}` does not name each")
-        joints = group.shape(variable.dims[2])[0] if of_joints(variable) else 1
+        joints = group.shape(variable.dims[2])[0] if variable.of_joints else 1
         if variable.units_by_joint and len(variable.units_by_joint) != joints:
             raise Unlike(f"variable `{variable.name}` has not a unit of each joint")
         if "time" not in group.variables or "recorded_case" not in group.variables:
@@ -205,7 +201,7 @@ def _rises(values: np.ndarray) -> bool:
     return bool((values[1:] > values[:-1]).all())
 
 
-def _within(group: ArchiveGroup, name: str, low: int, high: int) -> None:
+def _within(group: StoredGroup, name: str, low: int, high: int) -> None:
     values = group.values(name)
     if values.size and not (values.min() >= low and values.max() <= high):
         raise Unlike(f"variable `{name}` has a value that it cannot have")

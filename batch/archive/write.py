@@ -16,14 +16,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from batch.archive import layout as archive_layout
+from batch.archive import verified
 from batch.archive.hdf5 import LIBVER, h5py
 from batch.archive.layout import Layout, Variable
 from batch.archive.provenance import Revision, version
 from batch.archive.sink import Sink
-from met import backends, models
+from met import backends
 from met.frozen import frozen
 from met.plan import Experiment, Plan, keys
 from met.plan import file as plan_file
+from met.plan.uses import packages
 
 if TYPE_CHECKING:
     from met.run import Run
@@ -97,6 +99,16 @@ class ArchiveWriter:
             gathered[here] = values[name][group.part.kept[here] - first]
         self._sink.check()
 
+    def values(self, number: int, role: str) -> dict[str, np.ndarray]:
+        """What was put of an experiment's cases: its variables of this role along `case`, by the engine's names."""
+        group = self.groups[number]
+        return {each.key: group.node[each.name][...] for each in group.layout.variables if each.role == role}
+
+    def put_verified(self, number: int, found: verified.Verified) -> None:
+        """What shorter steps gave for some cases of an experiment, in a group of its own."""
+        verified.write(self.groups[number].node, found)
+        self._sink.check()
+
     def finish(self) -> None:
         """Write what is left, and see the file safely on the disk under its temporary name, still locked."""
         for group in self.groups:
@@ -157,7 +169,7 @@ class ArchiveWriter:
         group = self._file.create_group("provenance", track_order=True)
         commit, changed = self._revision.read()
         versions = {"met": _met_version(), **backends.find().libraries(), "numpy": np.__version__}
-        versions |= {name: version(name) for name in models.packages(e.structure for e in self.plan.experiments)}
+        versions |= {name: version(name) for name in packages(e.structure for e in self.plan.experiments)}
         for name, value in versions.items():
             group.attrs[f"version_{name}"] = value
         group.attrs["git_commit"] = commit

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from batch.campaigns.choosing import experiments_named
 from batch.campaigns.plans import read_plan
-from hw.ports import check_model, kind_of
+from hw.drivers import check_model, kind_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Experiment, Plan

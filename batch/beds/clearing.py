@@ -9,7 +9,8 @@ from batch.beds.chosen_bed import chosen_bed
 from hw import refusals
 from hw.bed import About, Fault
 from hw.beds import latch
-from hw.ports import Port, kind_of, opened
+from hw.drivers import kind_of, opened
+from hw.ports import Port
 from met.diagnostic import Problem, error
 from met.messages.visible import say
 

@@ -19,12 +19,12 @@ import numpy as np
 from batch.beds.campaign_records import CampaignRecords
 from batch.beds.case_result import CaseResult, case_result
 from batch.campaigns import shard
+from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.tasks import CampaignSection, Done, Task
-from batch.executors import Outcome
 from hw import records
 from hw.case import CaseRequest, pace_of
-from hw.ports import same_bed
+from hw.drivers import same_bed
 from hw.process import talk
 from met.diagnostic import Problem, error
 from met.frozen import frozen

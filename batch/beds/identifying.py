@@ -23,7 +23,7 @@ from met.messages import visible
 from met.outputs import check_place
 from met.plan import Experiment, Formula, Plan, Substitution
 from met.plan import file as plan_file
-from met.program.control.plant import bed_values
+from met.plant import bed_values
 
 if TYPE_CHECKING:
     from hw.identify.fit import Estimate, FitResult

@@ -9,8 +9,8 @@ from typing import Any
 
 from batch.beds.chosen_bed import ChosenBed, chosen_bed
 from hw.case import pace_of
+from hw.drivers import kind_of
 from hw.jitter import JitterRequest
-from hw.ports import kind_of
 from hw.process import talk
 from hw.timing import EDGES
 from ic.printing.columns import columns

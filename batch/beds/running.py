@@ -19,7 +19,7 @@ from batch.terminal.margin import in_words, remedy
 from batch.terminal.running import first_picture
 from batch.terminal.verdict import announcement, result_lines, worst_cases, writing
 from hw.case import pace_of
-from hw.ports import check_model, in_lock_step, kind_of, ports_in_words
+from hw.drivers import check_model, in_lock_step, kind_of, ports_in_words
 from met.analysis.margin import margins
 from met.diagnostic import Problem, error
 from met.host.files import read_json

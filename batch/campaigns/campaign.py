@@ -19,6 +19,8 @@ from batch.campaigns.folder import Folder, beside
 from batch.campaigns.keep import CaseOutcomes, Keep, as_list, keep, kept_before, kept_by_outcome
 from batch.campaigns.output import check_output, check_room, default_output
 from batch.campaigns.tasks import CampaignSection
+from batch.campaigns.verification.when import WORDS as VERIFY_WORDS
+from batch.campaigns.verification.when import Verify
 from ic.printing.columns import size as size_text
 from met import run as engine
 from met.diagnostic import Problem, error
@@ -89,7 +91,8 @@ class CampaignPart:
 
 @frozen
 class Campaign:
-    """A campaign that is ready to run, all of it checked. words: the choice of histories, as `prepare` takes it."""
+    """A campaign that is ready to run, all of it checked. words: the choice of histories, as `prepare` takes it;
+    verify: which cases are run with shorter steps besides (batch/campaigns/verification/when.py)."""
 
     plan: Plan
     parts: tuple[CampaignPart, ...]
@@ -97,6 +100,7 @@ class Campaign:
     words: tuple[str | int, ...]
     output: Path
     notes: tuple[str, ...] = ()
+    verify: Verify = "auto"
 
     @property
     def cases(self) -> int:
@@ -135,6 +139,7 @@ def prepare(
     selected: Sequence[tuple[Experiment, np.ndarray]] | None = None,
     kept: Mapping[str, np.ndarray] | None = None,
     wires: Wires | None = None,
+    verify: Verify = "auto",
 ) -> Campaign:
     """Settle what will be run; raises Problem for anything that would stop it later, and writes nothing.
 
@@ -145,8 +150,11 @@ def prepare(
     float32      keep histories as numbers of four bytes
     selected     experiments with rows of their case tables, in place of `experiments` and `cases`
     kept         rows whose histories are kept, by the experiment's name, in place of `histories`
-    wires        where it is run on real beds
+    wires        where it is run on real beds: then nothing is verified
+    verify       which cases are run again with shorter steps: "none", "some", "all", or "auto": some where it is cheap
     """
+    if verify not in VERIFY_WORDS:
+        raise ValueError(f"verify is one of {', '.join(VERIFY_WORDS)}, and not {verify!r}")
     all_of = None
     if selected is None:
         asked = choosing.experiments_named(plan, experiments)
@@ -174,7 +182,7 @@ def prepare(
     parts = tuple(replace(part, wires=wires) for part in parts)
     kept_plan = replace(plan, experiments=tuple(part.experiment for part in parts), selected=())
     words = tuple("all" if word == "default" else word for word in words)
-    campaign = Campaign(kept_plan, parts, wanted, words, target, tuple(notes))
+    campaign = Campaign(kept_plan, parts, wanted, words, target, tuple(notes), "none" if wires else verify)
     check_output(target, kept_plan)
     if not target.exists():  # one that is there may be whole, and need nothing: then `perform` sees to it
         check_room(target, campaign.bytes_missing)

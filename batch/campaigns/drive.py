@@ -13,9 +13,9 @@ from typing import Protocol
 
 from batch.campaigns import shard, tasks
 from batch.campaigns.cutting import Cutter
+from batch.campaigns.executor import Executor, Outcome
 from batch.campaigns.folder import Folder, uncovered
 from batch.campaigns.tasks import CampaignSection, Task
-from batch.executors import Executor, Outcome
 from met.run import LOST, TIMED_OUT
 
 TRIES = 3

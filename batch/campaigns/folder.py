@@ -33,6 +33,7 @@ import numpy as np
 from batch.archive.sink import is_at
 from batch.campaigns import shard
 from batch.campaigns.tasks import CampaignSection, Done, Task
+from batch.campaigns.verification.when import WORDS as VERIFY_WORDS
 from met import run as engine
 from met.diagnostic import Problem, error
 from met.host.files import is_count, new_file, read_json, read_regular, whole_file
@@ -339,6 +340,7 @@ def _checked(data: Any) -> dict[str, Any]:
         and Path(data["archive"]).name == data["archive"] != ""
         and all(isinstance(word, str) or is_count(word) for word in data["histories"])
         and isinstance(data["float32"], bool)
+        and data.get("verify", "auto") in VERIFY_WORDS
         and [each["number"] for each in sections] == list(range(len(sections)))
     )
     for each in sections if good else ():

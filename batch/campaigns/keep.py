@@ -131,11 +131,11 @@ def kept_by_outcome(found: Keep, experiment: Experiment, results: CaseOutcomes |
     for count, by in found.worst:
         metric = by or (experiment.structure.metrics[0].name if experiment.structure.metrics else "")
         if metric in results.metrics:
-            kept[_worst(experiment, metric, results.metrics[metric])[:count]] = True
+            kept[worst(experiment, metric, results.metrics[metric])[:count]] = True
     return np.flatnonzero(kept)
 
 
-def _worst(experiment: Experiment, metric: str, values: np.ndarray) -> np.ndarray:
+def worst(experiment: Experiment, metric: str, values: np.ndarray) -> np.ndarray:
     """Places of the cases that have the metric, worst first: the largest, or the smallest where the first requirement
     of it sets a lower limit. Equal ones in the order of the table."""
     limits = [r.comparison for r in experiment.requirements if r.metric == metric]

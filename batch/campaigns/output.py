@@ -15,7 +15,7 @@ import numpy as np
 
 from batch.archive.sink import FileBusy, Sink, temporary_of
 from batch.campaigns.folder import Folder, beside
-from batch.export.formats import format_of
+from batch.formats import format_of
 from ic.printing.columns import size as size_text
 from met import outputs
 from met.diagnostic import Problem, error

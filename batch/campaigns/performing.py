@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,15 +18,19 @@ from batch.archive.sink import temporary_of
 from batch.campaigns import merge, resuming
 from batch.campaigns.campaign import Campaign, histories_section, values_sections
 from batch.campaigns.drive import Driver, Progress, Stopped, TooManyFailures
+from batch.campaigns.executor import Executor
 from batch.campaigns.folder import Folder, FolderBusy, beside, uncovered
+from batch.campaigns.keep import CaseOutcomes
 from batch.campaigns.output import busy, cannot_write, check_room, publish
 from batch.campaigns.status import Reporter, died_lines
 from batch.campaigns.tasks import CampaignSection
-from batch.executors import Executor
-from batch.executors.threads import Threads
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 from met.outputs import quoted
+from met.run import DONE
+
+if TYPE_CHECKING:
+    from batch.archive.write import ArchiveWriter
 
 WORTH_SECONDS = 1.0
 """Work that took less is not kept where a campaign ends early: it is done again as fast as it is found."""
@@ -56,7 +60,7 @@ class TooMany(Problem):
 def perform(
     campaign: Campaign,
     *,
-    executor: Executor | None = None,
+    executor: Executor,
     fresh: bool = False,
     max_failures: int | None = None,
     together: bool = False,
@@ -68,7 +72,7 @@ def perform(
     """Run a campaign into its archive. Raises Problem. An interrupt passes through, with words of what is kept and how
     to go on; without any where nothing is.
 
-    executor      who runs the tasks; None: the threads of this process
+    executor      who runs the tasks
     fresh         whether to start over where something is there
     max_failures  stop when more cases have failed
     together      put together what others have done; it cannot go on where cases are missing
@@ -78,6 +82,7 @@ def perform(
     """
     values = resuming.as_begun(Folder(beside(campaign.output)), campaign, values_sections(campaign))
     key = resuming.campaign_key(values)
+    campaign = resuming.settled(campaign, values)
     there = resuming.finished_state(campaign, key)
     if there == resuming.WHOLE and not fresh:
         resuming.remove_leftovers(Folder(beside(campaign.output)), key)
@@ -103,7 +108,7 @@ def perform(
         work.begin(fresh)
         if ready is not None:
             ready()
-        return work.run(executor or Threads(), together)
+        return work.run(executor, together)
     except KeyboardInterrupt as interrupt:
         raise type(interrupt)(work.leave("interrupted")) from None
     except TooManyFailures as reason:
@@ -257,6 +262,7 @@ class _CampaignWork:
                     histories.get(number),
                     lambda cases: self.reporter.advance(cases, 0),
                 )
+                self._verify(writer, number, section)
                 self.reporter.end()
             writer.finish()
             sidecar = {
@@ -277,6 +283,25 @@ class _CampaignWork:
             if writer.failure is not None and isinstance(reason, Exception):
                 raise writer.failure from reason
             raise
+
+    def _verify(self, writer: ArchiveWriter, number: int, section: CampaignSection) -> None:
+        """Run some of an experiment's cases, which are all in the archive by now, with shorter steps, where that is
+        wanted."""
+        from batch.campaigns.verification import when
+
+        way = when.resolve(self.campaign.verify, section.prepared, len(section.rows))
+        if way == "none":
+            return
+        from batch.campaigns.verification.choosing import chosen
+        from batch.campaigns.verification.verifying import verify
+
+        experiment = self.campaign.parts[number].experiment
+        outcomes = CaseOutcomes(writer.values(number, "case")["status"], writer.values(number, "metric"))
+        places = np.flatnonzero(outcomes.status == DONE) if way == "all" else chosen(experiment, outcomes)
+        if len(places):
+            threads = getattr(self.driver and self.driver.executor, "threads", None)
+            names = {each.key: each.name for each in writer.groups[number].layout.role("metric")}
+            writer.put_verified(number, verify(experiment, section.rows[places], names, threads))
 
     def _timings(self) -> list[dict[str, Any]]:
         counts = self.driver.counts if self.driver else {}

@@ -17,6 +17,7 @@ from batch.campaigns.folder import Folder, FolderBusy, beside
 from batch.campaigns.output import sidecar_path
 from batch.campaigns.status import duration
 from batch.campaigns.tasks import CampaignSection
+from batch.campaigns.verification import when
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, read_json
 from met.plan import file as plan_file
@@ -48,6 +49,13 @@ def as_begun(folder: Folder, campaign: Campaign, values: list[CampaignSection]) 
         return values
     older = [replace(section, begun=section.prepared.old_code_key) for section in values]
     return older if campaign_key(older) == begun else values
+
+
+def settled(campaign: Campaign, values: Sequence[CampaignSection]) -> Campaign:
+    """The campaign, with `verify` as "auto" where that asks for the same."""
+    if campaign.verify == "auto":
+        return campaign
+    return replace(campaign, verify=when.settled(campaign.verify, ((each.prepared, len(each.rows)) for each in values)))
 
 
 def _begun_key(folder: Folder, campaign: Campaign) -> str:
@@ -160,6 +168,7 @@ def describe(folder: Folder, campaign: Campaign, sections: Iterable[CampaignSect
         archive=campaign.output.name,
         histories=campaign.words,
         float32=any(part.single for part in campaign.parts),
+        verify=campaign.verify,
     )
 
 
@@ -178,6 +187,7 @@ def described(folder: Folder) -> Campaign:
         selected=selected,
         histories=told["histories"],
         float32=told["float32"],
+        verify=told.get("verify", "auto"),
     )
 
 
@@ -210,6 +220,8 @@ def _other_work(campaign: Campaign, values: Sequence[CampaignSection], told: dic
 def _asked_sum(campaign: Campaign) -> str:
     """A digest of the plan, the cases, and the choice of histories."""
     summed = hashlib.sha256(json.dumps([campaign.keep.failed, campaign.keep.worst]).encode())
+    if campaign.verify != "auto":
+        summed.update(f"verify {campaign.verify}".encode())
 
     def refer(experiment: Any, index: int) -> dict[str, Any]:
         if not index:

@@ -62,7 +62,7 @@ class BedCommands(click.Group):
     """The group `met bed`, whose help lists the ports that there are drivers for, those of other packages too."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        from hw.ports import kinds
+        from hw.drivers import kinds
 
         with formatter.section("Ports"):
             formatter.write_dl([(kind.written, kind.doc) for kind in kinds()])

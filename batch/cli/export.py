@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from batch.export.formats import FORMATS
+from batch.formats import FORMATS
 from met.cli import YES, format_option, loudness_options
 from met.messages.visible import say
 

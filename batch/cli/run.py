@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from batch.export.formats import endings
+from batch.formats import endings
 from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
 from met.messages.visible import line, say
 
@@ -33,17 +33,27 @@ class Seconds(click.ParamType):
 
 SECONDS = Seconds()
 
+VERIFY = click.option(
+    "--verify",
+    type=click.Choice(["auto", "none", "some", "all"]),
+    default="auto",
+    metavar="WHICH",
+    help="Cases to run again at half and a quarter of the step, for errors of metrics: none, some, all, "
+    "or auto: some where that is cheap. [auto]",
+)
+
 
 def measured(value: Any, si: str) -> float:
     """A number with or without a unit, in SI. si: the unit that is meant without one. Raises ValueError."""
     import re
 
     from met import units
+    from met.unit_parser import parse_unit
 
     split = re.fullmatch(r"([-+.\deE]*\d\.?)\s*(\D*)", str(value).strip())
     number, unit = split.groups() if split else ("", "")
-    found = float(number) * (units.parse_unit(unit).scale if unit else 1.0)
-    if unit and not units.same(units.parse_unit(unit).dimension, units.parse_unit(si).dimension):
+    found = float(number) * (parse_unit(unit).scale if unit else 1.0)
+    if unit and not units.same(parse_unit(unit).dimension, parse_unit(si).dimension):
         raise ValueError
     return found
 
@@ -85,6 +95,7 @@ def measured(value: Any, si: str) -> float:
 )
 @click.option("--max-failures", type=click.IntRange(min=0), metavar="N", help="Stop when more cases have failed.")
 @click.option("--fresh", is_flag=True, help="Start over, rather than run what is missing.")
+@VERIFY
 @click.option("--no-picture", is_flag=True, help="Draw no picture beside the archive.")
 @deck_options
 @format_option
@@ -129,6 +140,7 @@ def run(source: str, names: tuple[str, ...], form: str, **options: Any) -> int:
 @click.option("--float32", is_flag=True, help="Keep signals as numbers of four bytes.")
 @click.option("--timeout", type=SECONDS, metavar="TIME", help="Give up a case that makes no progress for so long.")
 @click.option("--fresh", is_flag=True, help="Start over, rather than submit what is missing.")
+@VERIFY
 @deck_options
 @format_option
 @loudness_options

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.archive.stored import Stored
 from batch.differences import matching
 from batch.differences.compare import (
     DIFFERENT,
@@ -29,7 +30,9 @@ from batch.differences.provenance import provenance_changes
 from batch.differences.result import Diff, DiffPlace, EndingDiff, ExperimentDiff, RankedCase, SignalDiff
 from batch.differences.samples import samples
 from batch.differences.tolerance import SignalTolerance, Tolerances, check, fits, of_deck
+from batch.differences.words import step_error_note
 from batch.queries.signals import deck_unit
+from batch.queries.step_errors.figures import figures, of_difference
 from met.diagnostic import Problem
 from met.distinct import distinct
 from met.plan import Plan
@@ -114,8 +117,12 @@ def _experiment(
     out.only_b = b.values("case")[matched.only_b].tolist()
     scores = _Scores(matched.count)
     _ended(a, b, matched, out)
+    by_step = of_difference(figures(a), figures(b))
     for name in matching.names([v.name for v in a.role("metric")], [v.name for v in b.role("metric")]):
         out.signals.append(_metric(a, b, matched, name, allowed, scores))
+        out.signals[-1].by_step = by_step.get(name, float("nan"))
+    if note := step_error_note(out):
+        out.notes.append(note)
     out.signals += _signals(a, b, matched, allowed, scores, out)
     if not out.signals:
         out.notes.append("neither has a metric or a history: nothing is compared but how cases end")

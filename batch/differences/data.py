@@ -78,6 +78,7 @@ def _signal(found: SignalDiff) -> dict[str, Any]:
         "used",
         "nan",
         "why",
+        "by_step",
     )
     return {
         **{name: getattr(found, name) for name in kept},

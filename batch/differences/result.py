@@ -41,6 +41,7 @@ class SignalDiff:
     first        s, the earliest time of a difference, in whichever case; first_beyond: by more than is allowed
     used         the largest share of the tolerance that was needed
     nan          values that are not-a-number in one archive alone
+    by_step      of a metric, the sum of both archives' errors by the step; not a number where neither was verified
     """
 
     name: str
@@ -67,6 +68,7 @@ class SignalDiff:
     high: float = float("-inf")
     most: float = 0.0
     beyond: bool = False
+    by_step: float = float("nan")
     squares: float = 0.0
     values: int = 0
 
@@ -75,6 +77,11 @@ class SignalDiff:
         if self.why:
             return INCOMPARABLE
         return DIFFERENT if self.different else EQUIVALENT if self.equivalent else IDENTICAL
+
+    @property
+    def within_step_error(self) -> bool:
+        """True if there are differences, all finite, and the errors by the step are as large."""
+        return not self.why and not self.nan and 0.0 < self.largest <= self.by_step
 
     @property
     def rms(self) -> float:

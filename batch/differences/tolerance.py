@@ -16,6 +16,7 @@ from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Experiment
 from met.plan.outputs import OF_ALL
+from met.unit_parser import parse_unit
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 NONE = "none"
@@ -131,7 +132,7 @@ def fits(written: str, known: Sequence[str]) -> bool:
     """True if a tolerance as it was written has the one unit of what it is of."""
     wanted, *others = known
     unit = written.partition(" ")[2]
-    return not others and units.same(units.parse_unit(unit or "1").dimension, units.parse_unit(wanted or "1").dimension)
+    return not others and units.same(parse_unit(unit or "1").dimension, parse_unit(wanted or "1").dimension)
 
 
 def check(found: Tolerances, known: Mapping[str, Sequence[str]], shown: Sequence[str]) -> None:
@@ -156,10 +157,10 @@ def check(found: Tolerances, known: Mapping[str, Sequence[str]], shown: Sequence
 
 def _in_si(word: str, size: float, unit: str, wanted: str = "") -> float:
     try:
-        measure = units.parse_unit(unit or "1")
+        measure = parse_unit(unit or "1")
     except ValueError:
         raise _wrong(f"tolerance `{word}`: `{unit}` is no unit") from None
-    if wanted and not units.same(measure.dimension, units.parse_unit(wanted).dimension):
+    if wanted and not units.same(measure.dimension, parse_unit(wanted).dimension):
         raise _wrong(f"tolerance `{word}`: `{unit or '1'}` is no unit of time")
     return size * measure.scale
 

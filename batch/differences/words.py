@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -146,6 +147,7 @@ class SignalRow:
     largest    the largest difference, in `unit`
     share      of it, in what the values of a span
     where      it is, and in which `case`
+    by_step    of a metric, the sum of both archives' errors by the step, in `unit`
     first      the earliest difference, with its unit
     tolerance  what was given, and how much of it was used
     """
@@ -156,6 +158,7 @@ class SignalRow:
     largest: str = ""
     unit: str = ""
     share: str = ""
+    by_step: str = ""
     where: str = ""
     first: str = ""
     tolerance: str = ""
@@ -187,6 +190,7 @@ SIGNAL_COLUMNS = (
     DiffColumn("cases", "cases", "cases", always=True),
     DiffColumn("largest", "largest", "largest difference", unit="unit", kind="number"),
     DiffColumn("share", "of range", "of range", kind="number"),
+    DiffColumn("by_step", "by the step", "error by the step", kind="number"),
     DiffColumn("where", "where", "where", kind="words"),
     DiffColumn("first", "first", "first"),
     DiffColumn("tolerance", "tolerance", "tolerance", kind="words"),
@@ -227,11 +231,29 @@ def signal_row(signal: SignalDiff) -> SignalRow:
         largest=largest,
         unit=unit if largest else "",
         share=share,
+        by_step=_by_step(signal) if largest else "",
         where=where,
         first=first,
         tolerance=_tolerance(signal),
         case=None if place is None else place.case,
     )
+
+
+def _by_step(signal: SignalDiff) -> str:
+    """The errors by the step, in two digits; "" where they are not known."""
+    if not math.isfinite(signal.by_step):
+        return ""
+    return f"± {number_text(float(f'{signal.by_step / abs(signal.deck_scale):.2g}'))}"
+
+
+def step_error_note(experiment: ExperimentDiff) -> str:
+    """A note on the metrics that differ by no more than their errors by the step; "" where none does."""
+    names = [f"`{signal.name}`" for signal in experiment.signals if signal.within_step_error]
+    if not names:
+        return ""
+    one = len(names) == 1
+    said = "differs by no more than its error" if one else "differ by no more than their errors"
+    return f"{', '.join(names)} {said} by the step: with shorter steps the difference may be another"
 
 
 def _tolerance(signal: SignalDiff) -> str:

@@ -19,9 +19,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from batch.campaigns.executor import Outcome
 from batch.campaigns.output import more_files
 from batch.campaigns.tasks import Done, Task
-from batch.executors import Outcome
 from met.host import interpreter
 from met.outputs import refusal_text
 

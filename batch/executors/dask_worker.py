@@ -21,8 +21,8 @@ from distributed.utils import sync
 from distributed.worker import WORKER_ANY_RUNNING
 
 from batch.campaigns import shard
+from batch.campaigns.executor import Outcome
 from batch.campaigns.tasks import Task
-from batch.executors import Outcome
 from batch.executors.child import Crew
 from met.version import VERSION
 

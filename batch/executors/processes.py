@@ -6,9 +6,9 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 
+from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.tasks import CampaignSection, Task
-from batch.executors import Outcome
 from batch.executors.child import COMMAND, Crew
 
 TELL_SECONDS = 0.1

@@ -55,6 +55,7 @@ def submit(
         raise Problem(error("E358", "there is no `sbatch` here", help=helps))
     values = values_sections(campaign)
     key = resuming.campaign_key(values)
+    campaign = resuming.settled(campaign, values)
     if not fresh and resuming.finished_state(campaign, key) == resuming.WHOLE:
         return None
     if not fresh and not resuming.is_begun(Folder(beside(campaign.output)), key):
@@ -129,7 +130,7 @@ def shares(missing: Sequence[Task], count: int) -> list[list[Task]]:
 def _script(folder: Path, *words: str) -> str:
     """The job's script. words: after the folder, as a shell reads them."""
     exports = [f"export {name}={shlex.quote(value)}" for name, value in interpreter.packages().items()]
-    job = shlex.join(interpreter.command("batch.executors.job", str(folder.absolute())))
+    job = shlex.join(interpreter.command("batch.terminal.job", str(folder.absolute())))
     return "\n".join(["#!/bin/sh", *exports, f"exec {job} {' '.join(words)}", ""])
 
 

@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from batch.campaigns import shard, tasks
+from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.shard import cannot_keep
 from batch.campaigns.tasks import CampaignSection, Done, Task
-from batch.executors import Outcome
 
 
 class Threads:
@@ -20,8 +20,8 @@ class Threads:
     workers = 1
 
     def __init__(self, threads: int | None = None) -> None:
-        self._threads = threads or len(os.sched_getaffinity(0))
-        self.about = f"{self._threads} thread{'s' if self._threads > 1 else ''}"
+        self.threads = threads or len(os.sched_getaffinity(0))
+        self.about = f"{self.threads} thread{'s' if self.threads > 1 else ''}"
         self._computed = 0
         self._waiting: deque[Task] = deque()
         self._written: deque[tuple[Task, Done, Future[None]]] = deque()
@@ -41,7 +41,7 @@ class Threads:
     def wait(self) -> list[Outcome]:
         if self._waiting:
             task = self._waiting.popleft()
-            computed = tasks.compute(self._sections[task.section], task, threads=self._threads, progress=self._progress)
+            computed = tasks.compute(self._sections[task.section], task, threads=self.threads, progress=self._progress)
             assert self._writer is not None
             path = self._folder.shards / task.name
             writing = self._writer.submit(shard.write, path, computed)

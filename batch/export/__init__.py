@@ -22,7 +22,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from batch.export.formats import FORMATS, ExportRequest, Rows, endings, find, format_of
+from batch.export.formats import ExportRequest, Rows, find
+from batch.formats import FORMATS, endings, format_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 
@@ -63,7 +64,7 @@ def export(
     """Write an archive for another tool: histories, or a table of cases with their metrics.
 
     output   the file; None: the archive's name with the ending of `form`
-    form     a name in `batch.export.formats.FORMATS`, such as "csv"; None: by the ending of `output`, and mcap where
+    form     a name in `batch.formats.FORMATS`, such as "csv"; None: by the ending of `output`, and mcap where
              there is no output
     runs     names of runs and sweeps; none: the first one
     cases    `7`, `"#7"`, or the beginnings of case_ids, in the order in which they are wanted; none: all, of histories

@@ -8,7 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from batch.archive.read import ArchiveGroup, Stored
+from batch.archive.read import ArchiveGroup
+from batch.archive.stored import Stored
 from batch.export.picking import ExportedCase
 from batch.export.wire import MessageField
 from batch.queries.failures import STATUS

@@ -1,7 +1,6 @@
-"""The file formats of `met export`: one file in this folder each, and one line in `FORMATS`.
+"""What a file format of `met export` declares: one file in this folder each, and one line in `batch.formats.FORMATS`.
 
-Its module has a `FORMAT`, an object of a class derived from `ExportFormat`. Everything that asks about formats asks
-here: `met export`, `met run -o FILE.ending`, what an archive must not be called, and what their help lists.
+Its module has a `FORMAT`, an object of a class derived from `ExportFormat`.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from batch.formats import FORMATS
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 
@@ -19,13 +19,6 @@ if TYPE_CHECKING:
     from batch.campaigns.campaign import Campaign
     from batch.export.case_table import CaseTable
     from batch.export.picking import ExportedCase
-
-FORMATS = {
-    "mcap": "batch.export.mcap",
-    "csv": "batch.export.csv",
-    "parquet": "batch.export.parquet",
-}
-"""The module of each format, by its name, which is also the ending of its files. The first is the default."""
 
 Rows = Literal["metrics", "histories"]
 """The rows of an export: a case with its metrics, or an instant of a case."""
@@ -117,15 +110,3 @@ def find(name: str) -> ExportFormat:
     """The format of that name; its module is imported when it is first asked for. Raises KeyError."""
     found: ExportFormat = import_module(FORMATS[name]).FORMAT
     return found
-
-
-def format_of(path: Path) -> str | None:
-    """The name of the format that a file's ending says; None for any other ending."""
-    ending = path.suffix.lower().removeprefix(".")
-    return ending if ending in FORMATS else None
-
-
-def endings(last: str = ", ") -> str:
-    """The endings of all formats, for help and messages: `.mcap, .csv, .parquet`. last: between the last two."""
-    *others, end = (f".{name}" for name in FORMATS)
-    return ", ".join(others) + last + end

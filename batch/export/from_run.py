@@ -7,8 +7,9 @@ from pathlib import Path
 
 from batch.campaigns.campaign import Campaign
 from batch.export import Exported, export
-from batch.export.formats import ExportRequest, find, format_of
+from batch.export.formats import ExportRequest, find
 from batch.export.output import check as check_place
+from batch.formats import format_of
 from met.diagnostic import Problem, error
 from met.outputs import quoted
 

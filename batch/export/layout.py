@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from batch.export import mcap, scene
+from batch.export import scene, topics
 from batch.export.output import whole
 from batch.export.poses import PosedArm
 from batch.plotting.sheet import COLOURS
@@ -41,7 +41,7 @@ def write(output: Path, text: str) -> None:
 
 def text(arms: Sequence[PosedArm]) -> str:
     """The layout of an export of these arms."""
-    known = mcap.signals(arms[0].case)
+    known = topics.signals(arms[0].case)
     signals = [name for name in PLOTTED if name in known] or list(known)[: len(PLOTTED)]
     panels: dict[str, Any] = {"3D!arm": _view(arms)}
     panels |= {f"Plot!{name}": _plot(arms, name) for name in signals}
@@ -59,7 +59,7 @@ def text(arms: Sequence[PosedArm]) -> str:
 
 def _view(arms: Sequence[PosedArm]) -> dict[str, Any]:
     """The 3D panel: the whole arm from obliquely above, on a grid."""
-    base, size = mcap.root(arms), scene.size(arms)
+    base, size = topics.root(arms), scene.size(arms)
     return {
         "cameraState": {
             "distance": DISTANCE * size,
@@ -77,7 +77,7 @@ def _view(arms: Sequence[PosedArm]) -> dict[str, Any]:
         "followTf": base,
         "scene": {"transforms": {"showLabel": False, "axisScale": AXES * size, "lineWidth": 0}},
         "transforms": {},
-        "topics": {mcap.topic(arm, "scene"): {"visible": True} for arm in arms},
+        "topics": {topics.topic(arm, "scene"): {"visible": True} for arm in arms},
         "layers": {
             "grid": {
                 "layerId": "foxglove.Grid",
@@ -103,11 +103,11 @@ def _plot(arms: Sequence[PosedArm], signal: str) -> dict[str, Any]:
     """A signal over time: a line a joint or component, of each case."""
     paths, units = [], []
     for number, arm in enumerate(arms):
-        for place, column in enumerate(mcap.signals(arm.case).get(signal, [])):
+        for place, column in enumerate(topics.signals(arm.case).get(signal, [])):
             colour = LINKS[place % len(LINKS)] + (GHOST if number else "")
             field = ".".join(column.parts or ("value",))
             label = f"{arm.prefix.replace('/', ' ')}{'.'.join(column.parts)}".strip() or signal
-            value = f"{mcap.topic(arm, signal)}.{field}"
+            value = f"{topics.topic(arm, signal)}.{field}"
             paths.append(
                 {"value": value, "label": label, "color": colour, "enabled": True, "timestampMethod": "receiveTime"}
             )

@@ -24,7 +24,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign
-from batch.export import scene, wire
+from batch.export import layout, scene, topics, wire
 from batch.export.case_log import LogLine, log_lines, result, varied
 from batch.export.formats import ExportFormat, ExportRequest, WrittenExport
 from batch.export.output import check, whole
@@ -85,31 +85,6 @@ def too_many(cases: int, asked: str, helps: Sequence[str]) -> Diagnostic:
     return error("E372", f"{cases:,} cases of `{asked}` are too many to show over one another", help=helps)
 
 
-def root(arms: Sequence[PosedArm]) -> str:
-    """The frame that nothing moves: the first of these names that is no link's."""
-    taken = {arm.prefix + name for arm in arms for name in arm.poses}
-    names = itertools.chain(("world", "base", "ground"), (f"world_{number}" for number in itertools.count(2)))
-    return next(name for name in names if name not in taken)
-
-
-def topic(arm: PosedArm, name: str) -> str:
-    """The topic of a signal, in which dots would be taken for fields: `/case7/elbow/servo/voltage`."""
-    return f"/{arm.prefix}{name.replace('.', '/')}"
-
-
-def fields(columns: Sequence[SignalColumn]) -> tuple[wire.MessageField, ...]:
-    """The fields of a signal's messages: joints, components, or `value`."""
-    return wire.tree([column.parts or ("value",) for column in columns])
-
-
-def signals(case: ExportedCase) -> dict[str, list[SignalColumn]]:
-    """The columns of a case, by signal."""
-    out: dict[str, list[SignalColumn]] = {}
-    for column in case.columns:
-        out.setdefault(column.variable, []).append(column)
-    return out
-
-
 def write(file: ArchiveFile, arms: Sequence[PosedArm], output: Path) -> int:
     """Write the cases of these arms; the number of their rows. Raises Problem E305."""
     from mcap.writer import Writer
@@ -133,7 +108,7 @@ def _about(writer: Writer, file: ArchiveFile, arms: Sequence[PosedArm]) -> None:
         "archive": file.path.name,
         "deck": file.deck,
         "arm": arms[0].experiment.structure.arm,
-        "base_frame": root(arms),
+        "base_frame": topics.root(arms),
         "met": VERSION,
         **{name: str(value) for name, value in file.provenance.items()},
     }
@@ -205,12 +180,12 @@ def _messages(channels: Channels, arms: Sequence[PosedArm], number: int) -> Iter
     from foxglove_schemas_protobuf.Log_pb2 import Log
     from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-    arm, base = arms[number], root(arms)
+    arm, base = arms[number], topics.root(arms)
     case = arm.case
-    frames = channels.foxglove(topic(arm, "tf"), FrameTransforms)
-    drawn = channels.foxglove(topic(arm, "scene"), SceneUpdate)
+    frames = channels.foxglove(topics.topic(arm, "tf"), FrameTransforms)
+    drawn = channels.foxglove(topics.topic(arm, "scene"), SceneUpdate)
     log = channels.foxglove("/log", Log)
-    streams = [_stream(channels, arm, name, columns) for name, columns in signals(case).items()]
+    streams = [_stream(channels, arm, name, columns) for name, columns in topics.signals(case).items()]
     said = log_lines(case)
     update = scene.scene(arm, base, number > 0, scene.size(arms))
     yield 0, number, drawn, update.SerializeToString(deterministic=True)
@@ -227,17 +202,17 @@ def _messages(channels: Channels, arms: Sequence[PosedArm], number: int) -> Iter
     parts, data = result(case)
     units = {v.name.rpartition(".")[2]: v.unit for v in case.group.role("metric")}
     told = {f"unit.{name}": unit for name, unit in units.items()}
-    channel = channels.own(topic(arm, "result"), "result", parts, told)
+    channel = channels.own(topics.topic(arm, "result"), "result", parts, told)
     yield _ns(said[-1].time), number, channel, wire.message(parts, data)
 
 
 def _stream(channels: Channels, arm: PosedArm, name: str, columns: Sequence[SignalColumn]) -> SignalStream:
     values = arm.case.signal(name)[:, [column.place for column in columns]]
-    parts = fields(columns)
+    parts = topics.fields(columns)
     units = {".".join(column.parts or ("value",)): column.unit for column in columns}
     one = len(set(units.values())) == 1
     told = {"unit": columns[0].unit} if one else {f"unit.{path}": unit for path, unit in units.items()}
-    channel = channels.own(topic(arm, name), name.replace(".", "_"), parts, {**told, "about": columns[0].about})
+    channel = channels.own(topics.topic(arm, name), name.replace(".", "_"), parts, {**told, "about": columns[0].about})
     return SignalStream(channel, parts, values)
 
 
@@ -343,8 +318,6 @@ class Mcap(ExportFormat):
     def write_histories(
         self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: ExportRequest
     ) -> WrittenExport:
-        from batch.export import layout
-
         shown = arms(file, cases, named=request.named)
         if not request.layout:
             return WrittenExport(write(file, shown, target))

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.archive.stored import Stored
 from batch.queries.groups import cases_named, groups_named
 from batch.queries.signals import panels
 from met.diagnostic import Problem

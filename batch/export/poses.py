@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.read import Stored, reading
+from batch.archive.read import reading
+from batch.archive.stored import Stored
 from batch.export.picking import ExportedCase
 from met.diagnostic import Problem, error
 from met.dynamics.spatial import HERE, IDENTITY, Pose, compose, inverse, rotation_quaternion, sub

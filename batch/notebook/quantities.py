@@ -12,6 +12,7 @@ import xarray
 from batch.notebook.table import path_of
 from met import units
 from met.diagnostic import Problem, error
+from met.unit_parser import parse_unit
 
 QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 """A number and its unit."""
@@ -81,7 +82,7 @@ def in_deck_unit(values: Iterable[float], attributes: Mapping[str, Any]) -> list
     unit, shown = str(attributes.get("units", "")), str(attributes.get("deck_unit", attributes.get("units", "")))
     if not _known(unit) or not _known(shown):
         unit = shown = ""
-    scale = units.parse_unit(shown or "1").scale / units.parse_unit(unit or "1").scale
+    scale = parse_unit(shown or "1").scale / parse_unit(unit or "1").scale
     return [f"{value / scale:.10g}{'' if shown in ('', '1') else f' {shown}'}" for value in values]
 
 
@@ -100,7 +101,7 @@ def _converted(variable: xarray.Variable, name: str, unit: str) -> xarray.Variab
 
 def _known(unit: str) -> bool:
     try:
-        units.parse_unit(unit or "1")
+        parse_unit(unit or "1")
     except ValueError:
         return False
     return True
@@ -108,7 +109,7 @@ def _known(unit: str) -> bool:
 
 def _measure(unit: str, name: str) -> units.Measure:
     try:
-        return units.parse_unit(unit or "1")
+        return parse_unit(unit or "1")
     except ValueError as reason:
         raise _wrong(f"`{name}`: {reason}", "units are those of decks: `met doc units`") from None
 

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.archive.stored import Stored
 from batch.plotting import held, layout
 from batch.plotting.against import OtherGroup, not_in_other
 from batch.plotting.sheet import COLOURS, FAINT, INK, PictureSheet, sequence

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.archive.stored import Stored
 from batch.queries.grids import is_grid, levels
 from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import number_text, panels

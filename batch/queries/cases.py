@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.archive.stored import Stored
 from batch.queries import ordering, requirements
 from batch.queries.failures import STATUS
 from batch.queries.ordering import CaseOrder

@@ -11,7 +11,8 @@ from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.signals import Panel
 from met.diagnostic import Place, Problem
 from met.plan import Experiment, Plan
-from met.units import Measure, parse_unit
+from met.unit_parser import parse_unit
+from met.units import Measure
 
 MOTION = re.compile(r"initial\.|metrics\.|guides?\.|environment\.|(.*\.)?servo\.command\.")
 """Parameters in whose units a motion is thought of; lengths of links and torques of friction say nothing of it."""

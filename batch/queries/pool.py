@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from batch.archive.read import ArchiveGroup, Stored
+from batch.archive.read import ArchiveGroup
+from batch.archive.stored import Stored
 from batch.queries import requirements
 from batch.queries.failures import STATUS
 from batch.queries.grids import METRIC_SPAN, is_log, levels, spans

@@ -3,6 +3,7 @@ miss them."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -16,13 +17,15 @@ from met.run import DONE
 @frozen
 class GroupRequirement:
     """A requirement: its text and place among the group's, the metric's variable, `<` or `>` with or without `=`, and
-    the limit in SI."""
+    the limit in SI; of one over cases the share that is to meet it, and the confidence."""
 
     text: str
     place: int
     metric: str
     comparison: str
     limit: float
+    share: float | None = None
+    confidence: float | None = None
 
 
 def requirement_texts(group: ArchiveGroup) -> list[str]:
@@ -36,16 +39,26 @@ def group_requirements(group: ArchiveGroup) -> list[GroupRequirement]:
     if not known:
         return []
     told = group.variables["requirement"].attributes
-    given = (told.get(name, []) for name in ("metric", "comparison", "limit"))
-    metrics, comparisons, limits = (value if isinstance(value, list) else [value] for value in given)
+    given = (told.get(name, []) for name in ("metric", "comparison", "limit", "share", "confidence"))
+    metrics, comparisons, limits, shares, confidences = (
+        value if isinstance(value, list) else [value] for value in given
+    )
     if not len(metrics) == len(comparisons) == len(limits) == len(known):
         return []
+    shares, confidences = ([*map(_number, values or [math.nan] * len(known))] for values in (shares, confidences))
     there = {variable.name for variable in group.role("metric")}
     return [
-        GroupRequirement(text, place, str(metric), str(comparison), limit)
-        for place, (text, metric, comparison, limit) in enumerate(zip(known, metrics, comparisons, limits, strict=True))
+        GroupRequirement(text, place, str(metric), str(comparison), limit, share, confidence)
+        for place, (text, metric, comparison, limit, share, confidence) in enumerate(
+            zip(known, metrics, comparisons, limits, shares, confidences, strict=True)
+        )
         if metric in there and isinstance(limit, float)
     ]
+
+
+def _number(value: float) -> float | None:
+    """None in place of not-a-number, which stands in an archive where there is no value."""
+    return None if math.isnan(value) else value
 
 
 def outcomes(group: ArchiveGroup, positions: np.ndarray | None = None) -> np.ndarray:

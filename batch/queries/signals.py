@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from batch.archive.read import ArchiveGroup, Stored
+from batch.archive.read import ArchiveGroup
+from batch.archive.stored import Stored
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan.channel import FAMILIES, channel_paths, joint_of

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, ArchiveGroup, Stored
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.archive.stored import Stored
+from batch.queries.evidence import EvidenceRow, over_cases
 from batch.queries.failures import FailureGroup, failures
 from batch.queries.signals import number_text
+from batch.queries.step_errors import figures
+from batch.queries.step_errors.figures import Verification
+from batch.queries.step_errors.limits import StepErrorVerdict, verdicts
+from batch.queries.step_errors.warning import warnings
+from met.diagnostic import Diagnostic
 from met.frozen import frozen
 
 
@@ -63,6 +70,7 @@ class RequirementSummary:
     """The numbers of cases that meet a requirement, miss it, and leave it open.
 
     unknown  because they failed, or because the metric has no value;  no_value  of these, the latter
+    evidence of one over a share of cases, at each design point; empty of one that every case is to meet
     """
 
     text: str
@@ -70,6 +78,12 @@ class RequirementSummary:
     missed: int
     unknown: int
     no_value: int
+    evidence: tuple[EvidenceRow, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """True if every case meets it, or of one over a share of cases if it is so at every design point."""
+        return all(row.ok for row in self.evidence) if self.evidence else not self.missed and not self.unknown
 
 
 @frozen
@@ -79,6 +93,9 @@ class Summary:
     failures  all of them, by cause
     sweep     of which this is a group; "" where it is the whole of its run or sweep
     limited   cases in which the load motor of a bed was at its limit at some tick
+    verified  how true the metrics are, by the names of their variables; None where that is not known
+    step_errors  what is required of errors by the step; of a case alone, nothing
+    warnings  of what that calls in question; of a case alone, none
     """
 
     name: str
@@ -90,11 +107,19 @@ class Summary:
     requirements: tuple[RequirementSummary, ...]
     limited: int = 0
     sweep: str = ""
+    verified: Verification | None = None
+    step_errors: tuple[StepErrorVerdict, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()
 
     @property
     def ok(self) -> bool:
-        """True if every case reached its end and met every requirement."""
-        return self.failed == 0 and all(r.met == self.cases for r in self.requirements)
+        """True if every case reached its end and met every requirement, and errors by the step are as required."""
+        return self.failed == 0 and all(r.ok for r in self.requirements) and not self.untrue
+
+    @property
+    def untrue(self) -> tuple[StepErrorVerdict, ...]:
+        """Requirements on errors by the step that are missed, or not known to be met."""
+        return tuple(each for each in self.step_errors if not each.met)
 
 
 def summarise(archive: ArchiveFile) -> tuple[Summary, ...]:
@@ -114,6 +139,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
     requirements: tuple[RequirementSummary, ...] = ()
     if "met" in group.variables:
         met, done = group.values("met")[here], group.values("status")[here] == 0
+        shares = over_cases(group) if position is None else []
         requirements = tuple(
             RequirementSummary(
                 str(text),
@@ -121,9 +147,11 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
                 missed=int((met[:, i] == 0).sum()),
                 unknown=int((met[:, i] == -1).sum()),
                 no_value=int(((met[:, i] == -1) & done).sum()),
+                evidence=tuple(row for row in shares if row.requirement.place == i),
             )
             for i, text in enumerate(group.values("requirement"))
         )
+    verified = figures.figures(group, position)
     return Summary(
         name=group.name,
         cases=group.count if position is None else 1,
@@ -133,6 +161,9 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
         metrics=tuple(_metric(v, group.values(v.name)[here]) for v in group.role("metric")),
         requirements=requirements,
         sweep=str(group.attributes.get("sweep", "")),
+        verified=verified,
+        step_errors=verdicts(group, verified) if position is None else (),
+        warnings=tuple(warnings(group)) if position is None else (),
         limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
     )
 
@@ -170,7 +201,10 @@ def median_text(values: np.ndarray, *, infinite: str = "inf", none: str = "-") -
 
 def as_json(summary: Summary) -> dict[str, Any]:
     """Plain data for `--format json`; a number that is not finite is null."""
-    data: dict[str, Any] = finite({**asdict(summary), "metrics": [_named_first(asdict(m)) for m in summary.metrics]})
+    plain = asdict(replace(summary, verified=None, warnings=()))
+    warned = [{"code": each.code, "message": each.message, "help": each.help} for each in summary.warnings]
+    told = {"verified": figures.as_json(summary.verified), "warnings": warned}
+    data: dict[str, Any] = finite({**plain, "metrics": [_named_first(asdict(m)) for m in summary.metrics], **told})
     return {**data, "ok": summary.ok}
 
 

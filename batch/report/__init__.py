@@ -52,12 +52,12 @@ def report(
         check(target)
         other = None
         if against is not None:
-            from batch import diff
+            from batch.differences.campaigns import diff
+            from batch.differences.tolerance import tolerances as read
 
             groups_named(file, experiments)
-            found = rename_archives(
-                diff(against, archive, tolerances=tolerances), *display_names(Path(against), archive)
-            )
+            texts = [tolerances] if isinstance(tolerances, str) else tolerances
+            found = rename_archives(diff(Path(against), archive, read(texts)), *display_names(Path(against), archive))
             other = ComparedArchive(stack.enter_context(ArchiveFile(Path(against))), found)
         text = page(gather(file, experiments, title, progress, other))
     write(target, text)

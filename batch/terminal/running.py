@@ -5,26 +5,68 @@ from __future__ import annotations
 import dataclasses
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, prepare
-from batch.campaigns.performing import TooMany, perform
+from batch.campaigns.drive import Progress
+from batch.campaigns.executor import Executor
+from batch.campaigns.performing import Performed, TooMany, perform
 from batch.campaigns.plans import read_plan
 from batch.campaigns.rehearsal import rehearse
 from batch.campaigns.replaying import Replay, differences, replay
+from batch.campaigns.verification.when import Verify
 from batch.executors.choose import choose
 from batch.executors.threads import Threads
+from batch.export import Exported
 from batch.export.from_run import archive_and_export, check, export_command, export_run
+from batch.queries.step_errors.warning import campaign_warnings
 from batch.queries.structures import structures
-from batch.queries.summary import summarise
+from batch.queries.summary import Summary, summarise
 from batch.terminal.progress import Bar
-from batch.terminal.verdict import announcement, result_lines, verdict_json, worst_cases, writing
-from met.diagnostic import Problem, error
+from batch.terminal.verdict import WorstCaseLines, announcement, result_lines, verdict_json, worst_cases, writing
+from met.diagnostic import Diagnostic, Problem, error
+from met.frozen import frozen
 from met.host.sources import names_archive, names_plan
 from met.messages import visible
 from met.outputs import quoted
+
+
+@frozen
+class RunRequest:
+    """Runs of a deck, a plan or an archive, and how a deck is read, as `batch.campaigns.plans.read_plan` takes them."""
+
+    source: str
+    names: tuple[str, ...]
+    everything: bool
+    defines: tuple[str, ...]
+    include_dirs: tuple[str, ...]
+    settings: tuple[str, ...]
+
+
+@frozen
+class RunResult:
+    """What an archive says of the cases that were run, and the picture of it.
+
+    worst    the worst cases of each summary
+    tables   of sweeps of several structures
+    picture  its file; None where there is none
+    excuse   why there can be none, in words
+    warned   what the errors by the step call in question, with the places in the deck
+    """
+
+    summaries: tuple[Summary, ...]
+    worst: tuple[WorstCaseLines, ...]
+    tables: Sequence[Sequence[str]]
+    picture: Path | None
+    excuse: str
+    warned: tuple[Diagnostic, ...]
+
+    @property
+    def ok(self) -> bool:
+        """True if every case reached its end and met its requirements."""
+        return all(summary.ok for summary in self.summaries)
 
 
 def run_and_tell(
@@ -43,6 +85,7 @@ def run_and_tell(
     timeout: float | None = None,
     max_failures: int | None = None,
     fresh: bool = False,
+    verify: Verify = "auto",
     no_picture: bool = False,
     defines: tuple[str, ...] = (),
     include_dirs: tuple[str, ...] = (),
@@ -56,122 +99,156 @@ def run_and_tell(
     if failed and not names_archive(source):
         helps = "`met run ARCHIVE.h5 --failed` runs those again that failed"
         raise Problem(error("E357", f"`--failed` is of an archive, and {source} is none", help=helps))
+    request = RunRequest(source, names, everything, defines, include_dirs, settings)
     executor = choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
     if not isinstance(executor, Threads):
-        rehearse(
-            timeout,
-            source=source,
-            names=names,
-            everything=everything,
-            defines=defines,
-            include_dirs=include_dirs,
-            settings=settings,
-        )
+        rehearse(timeout, **dataclasses.asdict(request))
     archive, target = archive_and_export(output)
-    again = None
-    if names_archive(source):
-        again = replay(source, names, cases, failed, everything)
-        archive = archive or again.output
-        if os.path.realpath(archive) == os.path.realpath(source):  # Path.resolve has an error for a link to itself
-            helps = "`-o FILE` names another place"
-            raise Problem(error("E305", f"cannot write {archive}: it is what is run again", help=helps))
-        campaign = prepare(
-            again.plan,
-            output=archive,
-            selected=again.selected,
-            histories=histories or ("all" if again.kept is None else "none"),
-            kept=again.kept if not histories else None,
-            float32=float32,
-        )
+    again = replay(source, names, cases, failed, everything) if names_archive(source) else None
+    if again is not None:
+        campaign = _of_archive(source, again, archive, histories, float32, verify)
     else:
-        campaign = _of_deck(
-            source,
-            names,
-            everything,
-            archive,
-            cases,
-            histories,
-            float32,
-            defines,
-            include_dirs,
-            settings,
-            quiet or json,
-        )
-    of_histories = bool(histories)
+        campaign = _of_deck(request, archive, cases, histories, float32, quiet or json, verify)
     if target is not None:
-        check(campaign, target, histories=of_histories)
+        check(campaign, target, histories=bool(histories))
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
+    bar = None if quiet or json else Bar()
+    performed = _performed(campaign, executor, fresh, max_failures, bar, json, say)
+    if performed is None:
+        return False
+    result = _result(campaign, no_picture, say)
+    exported, refused = _exported(campaign, target, bool(histories), json, say)
+    unlike = differences(again.archive, campaign.output) if again is not None else []
+    compared = _compared(again, unlike)
+    missing = target is not None and exported is None
+    ok = result.ok and not unlike and not missing
+    if json:
+        print(_json(campaign, result, exported, performed, [*compared, *refused], ok))
+        return ok
+    say("\n".join(_lines(source, campaign, result, exported, performed)))
+    if result.warned and not quiet:
+        _complain(Problem(result.warned, {each.name: each.text for each in campaign.plan.sources}), json)
+    for line in compared:
+        say(line)
+    if missing and target is not None:
+        say(f"exit 1: {target} is missing: `{export_command(campaign, target, histories=bool(histories))}`")
+    return ok
+
+
+def _of_archive(
+    source: str, again: Replay, output: Path | None, histories: str | Sequence[str], float32: bool, verify: Verify
+) -> Campaign:
+    """The campaign that runs cases of an archive again. Raises Problem E305 where it would be written over that one."""
+    archive = output or again.output
+    if os.path.realpath(archive) == os.path.realpath(source):  # Path.resolve has an error for a link to itself
+        helps = "`-o FILE` names another place"
+        raise Problem(error("E305", f"cannot write {archive}: it is what is run again", help=helps))
+    return prepare(
+        again.plan,
+        output=archive,
+        selected=again.selected,
+        histories=histories or ("all" if again.kept is None else "none"),
+        kept=again.kept if not histories else None,
+        float32=float32,
+        verify=verify,
+    )
+
+
+def _performed(
+    campaign: Campaign,
+    executor: Executor,
+    fresh: bool,
+    max_failures: int | None,
+    progress: Progress | None,
+    json: bool,
+    say: Callable[[str], None],
+) -> Performed | None:
+    """Run a campaign's cases; None where it stopped because more cases failed than may, which is said."""
     try:
         performed = perform(
             campaign,
             executor=executor,
             fresh=fresh,
             max_failures=max_failures,
-            progress=None if quiet or json else Bar(),
+            progress=progress,
             ready=lambda: say(writing(campaign)),
             say=say,
         )
     except TooMany as problem:
         _complain(problem, json)
-        return False
+        return None
     except KeyboardInterrupt as interrupt:
         if str(interrupt) and not json:
             visible.say(f"\n{interrupt}", err=True)
         raise
     if performed.whole:
         say(f"nothing is missing: {campaign.output} has all of it (`--fresh` runs it again)")
+    return performed
+
+
+def _result(campaign: Campaign, no_picture: bool, say: Callable[[str], None]) -> RunResult:
+    """Read what came of a campaign, and draw the picture beside its archive."""
     with ArchiveFile(campaign.output) as file:
         summaries = summarise(file)
         worst = worst_cases(file)
+        experiments = {part.experiment.name: part.experiment for part in campaign.parts}
+        warned = campaign_warnings(file.groups, experiments)
         tables = list(structures(file))
         try:
             picture, excuse = (None, "") if no_picture else first_picture(file)
         except KeyboardInterrupt as interrupt:
             say(f"{campaign.output} is whole; its picture is missing: `met plot {quoted(campaign.output)}`")
             raise type(interrupt) from None
-    exported = None
-    refused: list[str] = []
+    return RunResult(summaries, worst, tables, picture, excuse, tuple(warned))
+
+
+def _exported(
+    campaign: Campaign, target: Path | None, histories: bool, json: bool, say: Callable[[str], None]
+) -> tuple[Exported | None, list[str]]:
+    """Export what was run, where that is asked for; where it is refused, the reasons, which people are told at once."""
+    if target is None:
+        return None, []
     try:
-        exported = None if target is None else export_run(campaign, target, histories=of_histories)
+        return export_run(campaign, target, histories=histories), []
     except Problem as problem:
-        refused = [each.message for each in problem.diagnostics]
         if not json:
             _complain(problem, json)
+        return None, [each.message for each in problem.diagnostics]
     except KeyboardInterrupt as interrupt:
-        if target is not None:
-            command = export_command(campaign, target, histories=of_histories)
-            say(f"{campaign.output} is whole; {target} is missing: `{command}`")
+        command = export_command(campaign, target, histories=histories)
+        say(f"{campaign.output} is whole; {target} is missing: `{command}`")
         raise type(interrupt) from None
-    ok = all(summary.ok for summary in summaries)
-    missing = target is not None and exported is None
-    unlike = differences(again.archive, campaign.output) if again is not None else []
-    notes = [*performed.notes, *_compared(again, unlike), *refused]
-    if json:
-        print(
-            verdict_json(
-                campaign,
-                summaries,
-                worst,
-                picture,
-                exported,
-                performed.seconds,
-                notes,
-                ok and not unlike and not missing,
-            )
-        )
-    else:
-        say(
-            "\n".join(
-                result_lines(
-                    source, campaign, summaries, worst, picture, excuse, exported, performed.seconds, ok, tables
-                )
-            )
-        )
-        for line in _compared(again, unlike):
-            say(line)
-        if missing and target is not None:
-            say(f"exit 1: {target} is missing: `{export_command(campaign, target, histories=of_histories)}`")
-    return ok and not unlike and not missing
+
+
+def _json(
+    campaign: Campaign,
+    result: RunResult,
+    exported: Exported | None,
+    performed: Performed,
+    notes: Sequence[str],
+    ok: bool,
+) -> str:
+    """The verdict for programs. notes: besides those of the run itself."""
+    seconds, notes = performed.seconds, [*performed.notes, *notes]
+    return verdict_json(campaign, result.summaries, result.worst, result.picture, exported, seconds, notes, ok)
+
+
+def _lines(
+    source: str, campaign: Campaign, result: RunResult, exported: Exported | None, performed: Performed
+) -> list[str]:
+    """The verdict for people."""
+    return result_lines(
+        source,
+        campaign,
+        result.summaries,
+        result.worst,
+        result.picture,
+        result.excuse,
+        exported,
+        performed.seconds,
+        result.ok,
+        result.tables,
+    )
 
 
 def submit_and_tell(
@@ -187,6 +264,7 @@ def submit_and_tell(
     options: tuple[str, ...] = (),
     timeout: float | None = None,
     fresh: bool = False,
+    verify: Verify = "auto",
     defines: tuple[str, ...] = (),
     include_dirs: tuple[str, ...] = (),
     settings: tuple[str, ...] = (),
@@ -200,9 +278,8 @@ def submit_and_tell(
     from batch.executors.submitting import submit
 
     say = (lambda *_: None) if quiet or json else visible.say
-    campaign = _of_deck(
-        source, names, everything, output, cases, histories, float32, defines, include_dirs, settings, quiet or json
-    )
+    request = RunRequest(source, names, everything, defines, include_dirs, settings)
+    campaign = _of_deck(request, output, cases, histories, float32, quiet or json, verify)
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
     done = submit(campaign, jobs=jobs, options=options, timeout=timeout, fresh=fresh, say=say)
     archive = str(campaign.output)
@@ -220,29 +297,23 @@ def submit_and_tell(
 
 
 def _of_deck(
-    source: str,
-    names: tuple[str, ...],
-    everything: bool,
+    request: RunRequest,
     output: str | Path | None,
     cases: tuple[str, ...],
     histories: str | Sequence[str],
     float32: bool,
-    defines: tuple[str, ...],
-    include_dirs: tuple[str, ...],
-    settings: tuple[str, ...],
     quiet: bool,
+    verify: Verify,
 ) -> Campaign:
     """The campaign that is asked of a deck or a plan."""
-    plan = read_plan(
-        source, names, everything=everything, defines=defines, include_dirs=include_dirs, settings=settings, quiet=quiet
-    )
     return prepare(
-        plan,
+        read_plan(**dataclasses.asdict(request), quiet=quiet),
         output=output,
-        experiments=names or None,
+        experiments=request.names or None,
         cases=cases or None,
         histories=histories or "default",
         float32=float32,
+        verify=verify,
     )
 
 

@@ -16,9 +16,12 @@ from batch.queries.groups import cases_named
 from batch.queries.ordering import CaseOrder
 from batch.queries.pool import pools
 from batch.queries.signals import case_text, history, number_text, panels, pretty_unit
+from batch.queries.step_errors.words import NONE, about, error_text
 from batch.queries.structures import structures
 from batch.queries.summary import SPREAD_COLUMNS, MetricSummary, Summary, summary_of
 from batch.terminal import braille
+from batch.terminal.evidence import evidence_lines
+from ic.printing.columns import count
 from ic.printing.columns import size as size_text
 from met.distinct import distinct
 from met.messages.visible import line
@@ -102,7 +105,8 @@ def _about(
         varied = cases.varied_lines(archive, group, position)
         name = [case_text(group, position, varied=False)] if group.count > 1 else []
         return [*name, *verdict(summary_of(group, position), width), *([""] if varied else []), *varied]
-    out = verdict(summary_of(group), width)
+    summary = summary_of(group)
+    out = [*verdict(summary, width), *warning_lines(summary, width)]
     if group.count > 1:
         most = None if all_cases else cases.SHOWN_CASES
         out += ["", cases.title(group, by=by), *cases.table(group, most, by=by)]
@@ -190,8 +194,14 @@ def verdict(summary: Summary, width: int) -> list[str]:
         out.append("  what gives it more: `i_max` and `kt_load` of the bed; what asks less: the arm, or its command")
     if summary.metrics:
         out += _metric_table(summary)
-    wide = max((len(r.text) for r in summary.requirements), default=0)
+    if summary.verified is not None:
+        out += textwrap.wrap(about(summary.verified), width, initial_indent="  ", subsequent_indent="    ")
+    texts = [each.text for each in summary.requirements if not each.evidence]
+    wide = max(map(len, (*texts, *(each.text for each in summary.step_errors))), default=0)
     for r in summary.requirements:
+        if r.evidence:
+            out += [f"  require {r.text}", *(f"    {text}" for text in evidence_lines(r.evidence))]
+            continue
         if summary.cases == 1:
             why = "its metric has no value here" if r.no_value else "the case failed"
             said = "met" if r.met else "missed" if r.missed else f"not known: {why}"
@@ -200,6 +210,23 @@ def verdict(summary: Summary, width: int) -> list[str]:
             said += f", not known of {r.unknown:,}" if r.unknown else ""
             said += f" (its metric has no value in {r.no_value:,})" if r.no_value else ""
         out.append(f"  require {r.text:<{wide}}  {said}")
+    for each in summary.step_errors:
+        out.append(f"  require {each.text:<{wide}}  {each.word}: {each.said}")
+    verdicts = [row for r in summary.requirements for row in r.evidence if row.lower is not None]
+    if len(verdicts) > 1:
+        tested = len({row.requirement.text for row in verdicts})
+        where = f"{count(tested, 'requirement')} at {count(len(verdicts) // tested, 'design point')}"
+        out.append(f"  {len(verdicts):,} verdicts ({where}): the confidence is that of each by itself")
+    return out
+
+
+def warning_lines(summary: Summary, width: int) -> list[str]:
+    """What the errors by the step call in question, and what to do."""
+    out = []
+    for each in summary.warnings:
+        said = [f"warning[{each.code}]: {each.message}", *(f"  help: {text}" for text in each.help)]
+        for text in said:
+            out += textwrap.wrap(text, width, initial_indent="  ", subsequent_indent="      ")
     return out
 
 
@@ -215,15 +242,23 @@ def _counts(summary: Summary) -> str:
 def _metric_table(summary: Summary) -> list[str]:
     single = summary.cases == 1
     head = ("",) if single else tuple(column.head for column in SPREAD_COLUMNS)
-    rows = [("", *head, "", "")]
+    errors = summary.verified
+    rows = [("", *head, *([] if errors is None else ["±"]), "", "")]
     for metric in summary.metrics:
         unit = "" if metric.deck_unit == "1" else pretty_unit(metric.deck_unit)
-        rows.append((metric.name, *_metric_numbers(metric, single), unit, _metric_words(metric, single)))
+        numbers = list(_metric_numbers(metric, single))
+        if errors is not None:
+            error = error_text(errors.metrics.get(metric.name), metric.deck_scale)
+            numbers.append(error if not single else "" if error == NONE else f"± {error}")
+        rows.append((metric.name, *numbers, unit, _metric_words(metric, single)))
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     out = []
     for row in rows[1:] if single else rows:
-        numbers = "  ".join(f"{text:>{wide}}" for text, wide in zip(row[1:-2], widths[1:-2], strict=True))
-        out.append(f"  {row[0]:<{widths[0]}}  {numbers} {row[-2]:<{widths[-2]}}  {row[-1]}".rstrip())
+        shown = (" " if single else "  ").join(
+            f"{text:{'<' if text.startswith('± ') else '>'}{wide}}"
+            for text, wide in zip(row[1:-2], widths[1:-2], strict=True)
+        )
+        out.append(f"  {row[0]:<{widths[0]}}  {shown} {row[-2]:<{widths[-2]}}  {row[-1]}".rstrip())
     return out
 
 

@@ -11,14 +11,14 @@ from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, CampaignPart
 from batch.campaigns.status import duration
 from batch.queries.failures import failure_lines
+from batch.queries.step_errors.words import HINT
 from batch.queries.summary import Summary, as_json
-from batch.terminal.show import verdict
+from batch.terminal.show import verdict, warning_lines
 from ic.printing.columns import size as size_text
 from met.frozen import frozen
 from met.outputs import quoted
 
 if TYPE_CHECKING:
-    from batch import Archive
     from batch.export import Exported
 
 WORST = 3
@@ -128,6 +128,8 @@ def result_lines(
         name = f"{summary.name}: " if len(summaries) > 1 else ""
         took = f", {duration(seconds[summary.name])} of computing" if summary.name in seconds else ""
         out += ["", f"{name}{lines[0]}{took}", *lines[1:]]
+        if _may_be_verified(campaign, summary):
+            out.append(f"  {HINT}")
         out += ["", *cases.lines] if cases.lines else []
     out += [line for table in tables for line in ("", *table)]
     path = campaign.output
@@ -155,24 +157,32 @@ def result_lines(
     return out
 
 
+def _may_be_verified(campaign: Campaign, summary: Summary) -> bool:
+    """True where nothing is known of the step's error, and nobody has said that it is not wanted."""
+    there = summary.metrics and summary.failed < summary.cases
+    return bool(there) and summary.verified is None and campaign.verify != "none"
+
+
 def _why_not(summaries: tuple[Summary, ...]) -> str:
     failed = sum(summary.failed for summary in summaries)
-    missed = [r for summary in summaries for r in summary.requirements if r.met < summary.cases]
+    missed = [r for summary in summaries for r in summary.requirements if not r.ok]
     parts = [f"{failed:,} case{'s' if failed != 1 else ''} failed"] if failed else []
     if missed:
         parts.append("not met everywhere: " + ", ".join(dict.fromkeys(r.text for r in missed)))
+    if untrue := [each.text for summary in summaries for each in summary.untrue]:
+        parts.append("not met, or not known: " + ", ".join(dict.fromkeys(untrue)))
     return "; ".join(parts)
 
 
-def short_result_lines(archive: Archive) -> list[str]:
+def short_result_lines(path: Path, summaries: tuple[Summary, ...]) -> list[str]:
     """The verdict of an archive alone: for the log of a job."""
     out: list[str] = []
-    for summary in archive.summaries:
-        name = f"{summary.name}: " if len(archive.summaries) > 1 else ""
+    for summary in summaries:
+        name = f"{summary.name}: " if len(summaries) > 1 else ""
         lines = verdict(summary, 100)
-        out += ["", f"{name}{lines[0]}", *lines[1:]]
-    out += ["", f"archive  {archive.path}  ({size_text(archive.path.stat().st_size)})"]
-    return out if archive.ok else [*out, f"exit 1: {_why_not(archive.summaries)}"]
+        out += ["", f"{name}{lines[0]}", *lines[1:], *warning_lines(summary, 100)]
+    out += ["", f"archive  {path}  ({size_text(path.stat().st_size)})"]
+    return out if all(summary.ok for summary in summaries) else [*out, f"exit 1: {_why_not(summaries)}"]
 
 
 def verdict_json(

@@ -17,7 +17,7 @@ from hw.beds import greeting
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
 from met.diagnostic import Problem, error
-from met.program.control.plant import Plant
+from met.plant import Plant
 from met.substitution.bed import SIMULATION_PARAMETERS
 
 FINE = 2.0**-20

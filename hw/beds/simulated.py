@@ -25,7 +25,7 @@ from hw.ports import Opening, PortKind
 from hw.protocol import messages
 from hw.transcript import TranscribedLine, TranscriptWriter
 from met.diagnostic import Problem, error
-from met.program.control.plant import plant_c
+from met.plant import plant_c
 from met.substitution.bed import SIMULATION_PARAMETERS
 
 WITHIN = 20.0

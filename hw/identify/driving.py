@@ -16,8 +16,9 @@ from hw import loop, process, refusals
 from hw.bed import Capability, Limits
 from hw.beds import latch
 from hw.case import pace_of
+from hw.drivers import opened
 from hw.identify.moves import MoveGuide, Peaks, guided
-from hw.ports import Port, opened
+from hw.ports import Port
 from hw.writer import recording
 from met.diagnostic import Problem, error
 from met.frozen import frozen

@@ -16,8 +16,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from ic.formatting.begins import goes_on, stands_below
-from ic.formatting.pieces import RowPiece, blanks_between
-from ic.formatting.rows import BLANK, CODE, REMARK, Row
+from ic.formatting.pieces import blanks_between
+from ic.formatting.row import BLANK, CODE, REMARK, Row, RowPiece
 
 REACH = 3  # lines: two that are aligned may have as many less one between them
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")

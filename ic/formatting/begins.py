@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ic.formatting.rows import Row
+from ic.formatting.row import Row
 from ic.text.lexer import NUMBERS, STRING
 
 _JOINING = frozenset(("+", "-", "*", "/", "^", "=", "+=", "<", "<=", ">", ">=", "==", "!=", "..", "and", "or", "by"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from ic.formatting.layout import laid_out
-from ic.formatting.rows import BLANKS, written
+from ic.formatting.row import BLANKS, written
 from ic.formatting.tabs import rows_as_seen
 from ic.text.lexer import SPACE, Text, Token, logical_lines
 from met.diagnostic import Place, Problem, error

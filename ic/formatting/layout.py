@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from ic.formatting.align import Groups, Node, aligned, offset
 from ic.formatting.begins import goes_on, stands_below
 from ic.formatting.pieces import blanks_between
-from ic.formatting.rows import BLANK, BLANKS, CODE, REMARK, TAB, Row
+from ic.formatting.row import BLANK, BLANKS, CODE, REMARK, TAB, Row
 
 BEFORE_COMMENT = 2
 MOST_WORK = 3_000_000  # columns looked at; a deck by hand takes some thousand

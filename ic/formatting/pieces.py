@@ -8,21 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
 
+from ic.formatting.row import Kind, Row, RowPiece
 from ic.grammar.cursor import OPENING
 from ic.grammar.expressions import Expressions
 from ic.text.lexer import END, NAME, NUMBERS, SPACE, STRING, WHOLE, Text, Token, logical_lines
 from ic.text.limits import Findings
 from met import units
-from met.frozen import frozen
-
-if TYPE_CHECKING:
-    from ic.formatting.rows import Row
-
-Kind = Literal[
-    "name", "word", "number", "unit", "string", "open", "close", "stop", "operator", "sign", "comment", "other"
-]
 
 WORDS = ("and", "or", "not", "when", "require", "by")
 """Behind these a value begins."""
@@ -30,24 +22,6 @@ WORDS = ("and", "or", "not", "when", "require", "by")
 OPERATORS = ("+", "-", "*", "/", "^", "=", "+=", "<", "<=", ">", ">=", "==", "!=", "..", "&&", "||")
 _SIGNS = ("-", "+", "!")
 _OPERANDS = ("name", "number", "unit", "string", "close")
-
-
-@frozen
-class RowPiece:
-    """Tokens that stand together.
-
-    text    as it is laid out
-    column  where it was written, from 0
-    written how many columns it took there
-    gap     blanks that were before it; 0 for the first of a row
-    """
-
-    kind: Kind
-    text: str
-    column: int
-    written: int
-    gap: int
-    tokens: tuple[Token, ...]
 
 
 def cut(rows: Iterable[Row]) -> None:

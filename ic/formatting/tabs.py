@@ -6,7 +6,8 @@ from collections.abc import Collection, Sequence
 
 from ic.formatting.align import ANCHORS, lines_of, meeting, neighbours
 from ic.formatting.begins import stands_below
-from ic.formatting.rows import BLANK, CODE, REMARK, Row, rows
+from ic.formatting.row import BLANK, CODE, REMARK, Row
+from ic.formatting.rows import rows
 from ic.text.lexer import Text
 
 OTHER_STOPS = (8, 2)  # what terminals have, and the narrowest that editors are set to

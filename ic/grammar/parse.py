@@ -18,7 +18,7 @@ from itertools import takewhile
 
 from ic.grammar.cursor import OPENING, SHOWN, EndedInsideBlock, Unreadable, span, token_in_words
 from ic.grammar.expressions import Expressions
-from ic.grammar.syntax import Broken, Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
+from ic.grammar.syntax import Broken, Call, Entry, Expression, Group, Let, Name, OverCases, Setting, Statement, Word
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import Findings, GiveUp, without_collection
 from ic.text.source import UnreadableStretch
@@ -26,6 +26,7 @@ from met import units
 from met.diagnostic import Diagnostic, Label, Place
 
 COMPARE = ("require", "exclude")
+_OVER_CASES = "write `require METRIC < LIMIT in 99 % of cases with 90 % confidence;`"
 _SEMICOLON = "an entry ends with `;`"
 _NOT_OPEN = "leave it out, or open it where it begins"
 
@@ -352,8 +353,31 @@ class _Parser(Expressions):
         value = self.value()
         if words[0].text == "sample" and self.token.text == "{":
             self.unexpected("`;`", help="a sample names its design: `sample lhs(200) { ... }`")
+        if words[0].text == "require" and self.token.text in ("in", "with") and not self.on_new_line(self.at):
+            value = self.over_cases(value)
         self.semicolon(value)
         return Statement(_words(words), value, span(words[0], words[-1]))
+
+    def over_cases(self, comparison: Expression) -> Expression:
+        """`in SHARE of cases` and `with CONFIDENCE confidence`, one of them or both, behind a comparison."""
+        first = self.token
+        share = confidence = None
+        if self.token.text == "in":
+            self.advance()
+            share = self.expression()
+            self.needs_word("of", _OVER_CASES)
+            self.needs_word("cases", _OVER_CASES)
+        if self.token.text == "with":
+            self.advance()
+            confidence = self.expression()
+            self.needs_word("confidence", _OVER_CASES)
+        return OverCases(comparison, share, confidence, span(first, self.previous))
+
+    def needs_word(self, word: str, usage: str) -> None:
+        """Step over a word that has to stand here."""
+        if self.token.text != word:
+            self.unexpected(f"`{word}`", help=usage)
+        self.advance()
 
     def no_statement(self, names: list[Token], token: Token) -> None:
         last = names[-1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ic.grammar.syntax import Binary, Expression, Number, Range, Unary, WithUnit
+from ic.grammar.syntax import Binary, Expression, Number, OverCases, Range, Unary, WithUnit
 from met.diagnostic import Place
 
 
@@ -22,6 +22,8 @@ def place_of(expression: Expression) -> Place:
             return spanned(place_of(left), place_of(expression.right))
         case WithUnit():
             return spanned(place_of(expression.inner), expression.unit.place)
+        case OverCases():
+            return spanned(place_of(expression.comparison), expression.place)
         case Range():
             return spanned(place_of(expression.first), place_of(expression.step))
     return expression.place

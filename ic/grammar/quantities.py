@@ -68,7 +68,7 @@ class Quantities(Cursor):
                 )
         if token.kind != NAME and token.text not in ("%", "(") and over is None:
             return None
-        if self.begins_entry(self.at):
+        if self.begins_entry(self.at) or self.is_word_of_requirement():
             return None
         if over is None and token.text != "(" and not units.is_unit(token.text):
             self.unknown_unit()
@@ -91,6 +91,13 @@ class Quantities(Cursor):
         self.not_a_second_unit(start)
         taken = self.tokens[start : self.at]
         return Unit(tuple(factors), span(taken[0], taken[-1]), "".join(t.text for t in taken))
+
+    def is_word_of_requirement(self) -> bool:
+        """Return True at `in 99 %`, `of cases`, `with 90 %` or `confidence`, of which none is a unit."""
+        text, following = self.token.text, self.following
+        if text in ("in", "with"):
+            return following.kind in (*NUMBERS, NAME) or following.text == "("
+        return (text == "of" and following.text == "cases") or text == "confidence"
 
     def unit_product(
         self, at: int, sign: int, depth: int, first: tuple[list[tuple[Word, int]], int] | None = None

@@ -13,6 +13,7 @@ from ic.grammar.syntax import (
     List,
     Name,
     Number,
+    OverCases,
     Range,
     Setting,
     String,
@@ -46,6 +47,10 @@ def spell(expression: Expression, within: int = 0) -> str:
             inside = ", ".join([*(spell(value) for value in expression.positional), *named])
             head = expression.name.text + (f"({inside})" if inside or expression.body is None else "")
             return head if expression.body is None else f"{head} {_body(expression.body)}"
+        case OverCases():
+            share = f" in {spell(expression.share)} of cases" if expression.share is not None else ""
+            confidence = f" with {spell(expression.confidence)} confidence" if expression.confidence is not None else ""
+            return f"{spell(expression.comparison)}{share}{confidence}"
         case Broken():
             return "..."
         case Range():

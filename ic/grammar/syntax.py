@@ -16,6 +16,7 @@ what may stand where is decided when the tree is resolved. So a joint may be cal
     sweep both = gains + spread;                            Setting, words ("sweep",), path ("both",)
     sample lhs(200) { ... }                                 Statement, words ("sample",), value a Call with a body
     require settle < 10 s;                                  Statement, words ("require",), value
+    require settle < 10 s in 99 % of cases;                 Statement, words ("require",), value an OverCases
     exclude when kp > 3 V*s/rad and m > 5 kg;               Statement, words ("exclude", "when"), value
     remove settle;                                          Statement, words ("remove",), value a Name
 """
@@ -126,13 +127,23 @@ class Binary:
 
 
 @frozen
+class OverCases:
+    """`COMPARISON in 99 % of cases with 90 % confidence`; share and confidence are None where they are not written."""
+
+    comparison: Expression
+    share: Expression | None
+    confidence: Expression | None
+    place: Place  # of the words behind the comparison
+
+
+@frozen
 class Broken:
     """An expression that could not be read (already reported)."""
 
     place: Place
 
 
-Expression = Number | String | Name | List | Call | WithUnit | Range | Unary | Binary | Broken
+Expression = Number | String | Name | List | Call | WithUnit | Range | Unary | Binary | OverCases | Broken
 
 
 def children(expression: Expression) -> tuple[Expression, ...]:
@@ -148,6 +159,8 @@ def children(expression: Expression) -> tuple[Expression, ...]:
             return (operand,)
         case Binary(left=left, right=right):
             return (left, right)
+        case OverCases(comparison=comparison, share=share, confidence=confidence):
+            return (comparison, *(part for part in (share, confidence) if part is not None))
         case Call(positional=positional, named=named):
             return (*positional, *(value for _, value in named))
     return ()

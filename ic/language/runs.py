@@ -140,7 +140,9 @@ RUN = BlockDeclaration(
         Entry(name="metric", form="named", written="metric NAME = MODEL { ... }", default="none",
               path="metrics.NAME", doc="one number of a case"),
         Entry(name="require", form="statement", written="require METRIC < LIMIT;", default="none",
-              doc="a limit that counts for the exit code; also `<=`, `>`, `>=`"),
+              doc="a limit that counts for the exit code; also `<=`, `>`, `>=`; of a share of cases: "
+                  "`in 99 % of cases with 90 % confidence`; "
+                  "`step_error(METRIC) < 1 %` is one on its error by the step"),
         Entry(name="allow", form="statement", written='allow CODE because "REASON";', default="none",
               doc="a warning that is right, and not to be given: `allow D105 because \"the report's own rates\";`"),
         Entry(name="tolerances", written="tolerances { ... }", default="none: not in a bit",

@@ -9,6 +9,7 @@ from functools import lru_cache
 from met import units
 from met.plan import Joint, JointKind
 from met.plan.channel import joint_unit
+from met.unit_parser import parse_unit
 from met.units import PURE, Dimension
 
 
@@ -30,8 +31,8 @@ def units_of(dimension: Dimension) -> list[str]:
 @lru_cache(maxsize=4096)
 def measure_here(written: str, joint: JointKind, command: str | None, of: str | None) -> units.Measure:
     """The SI measure of a declared unit where `joint`, `effort`, `command` and `of` mean this."""
-    names = {} if of is None else {"of": units.parse_unit(of)}
-    return units.parse_unit(joint_unit(written, Joint("", joint, "", ""), command), names)
+    names = {} if of is None else {"of": parse_unit(of)}
+    return parse_unit(joint_unit(written, Joint("", joint, "", ""), command), names)
 
 
 @lru_cache(maxsize=4096)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ic.printing.columns import columns, count, number, size
+from ic.sweeps.confidences import OF_CASES
 from met.plan import Coordinate, Experiment, keys
 
 HEAD, TAIL = 30, 10
@@ -29,7 +30,7 @@ def print_cases(groups: Sequence[Experiment], *, everything: bool = False) -> It
     else:
         each = groups[0].structure.history_bytes
         yield title + (f", {size(each)} of histories each" if each and total > 1 else "")
-    for note in dict.fromkeys(note for group in groups for note in group.notes if note.startswith(SAMPLED)):
+    for note in dict.fromkeys(note for group in groups for note in group.notes if note.startswith((SAMPLED, OF_CASES))):
         yield f"  {note}"
     positions = list(range(total))
     cut = not everything and total > HEAD + TAIL

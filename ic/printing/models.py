@@ -14,7 +14,7 @@ from ic.printing.glossary import entries
 from met import models
 from met.diagnostic import Problem, did_you_mean, error
 from met.parameter import Parameter
-from met.plan.channel import of_bed, of_law, watched_unit
+from met.plan.channel import watched_unit
 
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
 WHERE_WRITTEN = {
@@ -146,7 +146,7 @@ def recorded_channels(kind: models.Kind, model: Any) -> Iterator[tuple[str, list
     if kind == "sensor" and model.measures is not None:
         rows = [(p.name, unit_in_words(watched_unit(p.unit, model.unit)), p.doc) for p in model.states]
         yield "Integrated with the motion; recorded as sensors.NAME.NAME, what it reads as sensors.NAME", rows
-    shown = list(of_bed(model) if kind == "bed" else of_law(model) if kind == "law" else ())
+    shown = list(model.shown if kind in ("bed", "law") else ())
     if shown:
         rows = [(name, unit_in_words(unit), doc) for name, unit, doc in shown]
         yield f"Held from tick to tick; recorded as JOINT.{kind}.NAME", rows

@@ -15,6 +15,7 @@ from met.distinct import distinct
 from met.parameter import Parameter
 from met.plan import BASE, Base, Experiment, Formula, Joint, Plan, Structure
 from met.plan.defaults import OF_FREE_BASE
+from met.plan.uses import sensor_parts
 
 CHOSEN = 88  # columns, of parameters that stand in one cell
 FIXED_SPACE = "\u00a0"  # no line ends at one
@@ -341,7 +342,7 @@ def _sensors(experiment: Experiment) -> Iterator[str]:
     yield "Sensors of links"
     rows = []
     for use in experiment.structure.sensors:
-        given = _given(experiment, f"sensors.{use.name}", models.sensor_parts(use, "parameters"))
+        given = _given(experiment, f"sensors.{use.name}", sensor_parts(use, "parameters"))
         rows.append((use.name, use.model, ", ".join(given)))
     yield from columns(rows)
 
@@ -383,7 +384,8 @@ def _metrics(experiment: Experiment) -> Iterator[str]:
     yield "Metrics and what is required of them"
     rows = []
     for use in experiment.structure.metrics:
-        required = [requirement.text for requirement in experiment.requirements if requirement.metric == use.name]
+        required = [each.text for each in experiment.requirements if each.metric == use.name]
+        required += [each.text for each in experiment.step_errors if each.metric == use.name]
         rows.append((use.name, f"{use.model} of {use.of}", ", ".join(f"require {text}" for text in required)))
     yield from columns(rows)
 

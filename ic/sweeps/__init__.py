@@ -5,5 +5,6 @@ choices   what decides the structure: words, models, rates, macros; a run with o
 designs   samples: lhs, sobol, random, and the distributions they are drawn from
 table     axes -> rows of the case table, parted by structure, less what `exclude when` drops
 reach     which parameters a coordinate sets, and that each sets something
+confidences  what a confidence asks of the cases: draws of their own, and enough of them
 groups    a run, a sweep or a sum of them -> experiments
 """

@@ -37,6 +37,7 @@ from ic.text.complaints import Complaints, known_words, where_it_belongs
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
+from met.plan import Design
 from met.trace import Graph, Scalar
 
 MOST_CASES = 10_000_000
@@ -48,10 +49,12 @@ Column = VariedPath | ChoiceColumn
 
 @frozen
 class SweepAxis:
-    """Columns of one length that vary together. note: how they were made, for `met cases`."""
+    """Columns of one length that vary together. note: how they were made, for `met cases`; design: of the sample that
+    drew them, "" where they were written."""
 
     columns: tuple[Column, ...]
     note: str = ""
+    design: Design = ""
 
     @property
     def size(self) -> int:
@@ -82,6 +85,11 @@ class Sweep:
     @property
     def chosen(self) -> tuple[ChoiceColumn, ...]:
         return tuple(column for axis in self.axes for column in axis.columns if isinstance(column, ChoiceColumn))
+
+    @property
+    def designs(self) -> dict[str, Design]:
+        """The design of the sample that drew each path; without those that were not drawn."""
+        return {column.path: axis.design for axis in self.axes if axis.design for column in axis.columns}
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -264,7 +272,7 @@ class _SweepReader:
             columns.append(replace(column, drawn=part.distribution))
         if sample.warning is not None:
             self.complaints.remark("D228", *sample.warning, help="take a power of 2")
-        self.axes.append(SweepAxis(tuple(columns), sample.note))
+        self.axes.append(SweepAxis(tuple(columns), sample.note, sample.design))
 
     def repeats(self, statement: Statement) -> None:
         if self.repeated is not None:

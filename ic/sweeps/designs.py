@@ -30,12 +30,13 @@ from met import units
 from met.diagnostic import Place, Problem, did_you_mean, error
 from met.distinct import distinct
 from met.frozen import frozen
+from met.plan import Design
 from met.trace import Scalar
 
 DIGITS = 12
 MOST_SAMPLES = 1_000_000
 MOST_SOBOL = 1 << 30
-DESIGNS = ("lhs", "sobol", "random")
+DESIGNS: tuple[Design, ...] = ("lhs", "sobol", "random")
 DISTRIBUTIONS: Mapping[str, tuple[str, ...]] = {
     "uniform": ("from", "to"), "loguniform": ("from", "to"), "normal": ("mean", "deviation"),
     "truncated": ("mean", "deviation", "from", "to"),
@@ -69,7 +70,7 @@ class DrawnParameter:
 class SampleDesign:
     """A `sample` statement as read. warning: message and place of a warning about it."""
 
-    design: str
+    design: Design
     count: int
     seed: int
     parts: tuple[DrawnParameter, ...]

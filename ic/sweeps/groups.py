@@ -17,6 +17,7 @@ from ic.meaning.runs.experiment import experiment
 from ic.meaning.runs.run import resolve_run
 from ic.sweeps.axes import Sweep, read_sweep, varied_paths, whole_number
 from ic.sweeps.choices import Choices, with_choices
+from ic.sweeps.confidences import check_confidences
 from ic.sweeps.effects import Effects
 from ic.sweeps.reach import check_coordinates, check_effects, plan_coordinates
 from ic.sweeps.settings import Settings
@@ -226,6 +227,7 @@ class _Sweep:
         if not self.complaints.errors:
             check_effects(self.complaints, there, made)
             check_stops(self.complaints, made)
+            made = replace(made, notes=(*made.notes, *check_confidences(self.complaints, there, made)))
         self.source.effects.examine(scope, run, made, self.definition.group.body)
         return ((made, scope), rows[keep]), dropped
 

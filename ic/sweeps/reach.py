@@ -105,7 +105,7 @@ def plan_coordinates(
     dependents: dict[str, list[str]],
 ) -> tuple[Coordinate, ...]:
     """The coordinates as a plan holds them. dependents: parameters whose formulas need each coordinate."""
-    made = []
+    made, designs = [], sweep.designs
     for varied in sweep.varied:
         direct = [path for path in scope.targets.get(varied.path, ()) if path in scope.parameters]
         unit = varied.unit.text if varied.unit is not None else units.text(varied.value.dimension)
@@ -117,6 +117,7 @@ def plan_coordinates(
                 columns[varied.path],
                 tuple(direct or dependents.get(varied.path, ())),
                 varied.place,
+                designs.get(varied.path, ""),
             )
         )
     return tuple(made)

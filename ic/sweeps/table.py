@@ -22,6 +22,7 @@ from met.diagnostic import Label, Problem, did_you_mean, error
 from met.plan import Structure
 from met.plan.channel import channels
 from met.trace import Formulas, Scalar
+from met.unit_parser import parse_unit
 
 MOST_NAMED = 4
 ROUNDING = 1e-12  # relative: some thousand roundings, and far below what anyone means to tell apart
@@ -245,7 +246,7 @@ class _Truths:
             )
         for settled in found.values():
             if isinstance(settled.value, (float, int, Scalar)):
-                measure = units.parse_unit(settled.unit)
+                measure = parse_unit(settled.unit)
                 return Value(settled.value, measure.dimension, name.place, hertz=measure.hertz)
         try:
             return scope.names.find(name)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from met.plan import Experiment
 from met.program.build import COORDINATE, build
-from met.trace.graph import live
+from met.trace.nodes import live
 from met.trace.program import WhileAny, walk
 from met.trace.recorder import record
 from met.trace.recording import CodeSection

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from met import models
 from met.plan import ServoUse
+from met.plan.uses import quantities, servo_parts
 from met.servos.servo import JointMotion, Seen, Setpoint
 from met.trace import Graph, Real, Scalar
 
@@ -19,11 +20,11 @@ T = TypeVar("T")
 
 
 def reads(use: ServoUse, values: Mapping[str, Any]) -> frozenset[str] | None:
-    """Quantities that the law's outputs and integrals depend on, among those it could see (`met.models.quantities`).
+    """Quantities that the law's outputs and integrals depend on, among those it could see (`met.plan.uses.quantities`).
 
     values  of the servo's parameters, for its words and lists;  None: the law could not be recorded
     """
-    servo, parts, graph = models.find("servo", use.model, use.place), models.servo_parts(use), Graph()
+    servo, parts, graph = models.find("servo", use.model, use.place), servo_parts(use), Graph()
     if servo.control is None:
         return frozenset()
     of_law = parts.integrals if parts.continuous else (*parts.outputs, *parts.integrals)
@@ -40,12 +41,12 @@ def reads(use: ServoUse, values: Mapping[str, Any]) -> frozenset[str] | None:
         return None
     roots = [x.ref for x in (*found.outputs.values(), *found.slopes.values()) if isinstance(x, Scalar)]
     inputs = {graph.nodes[position][1] for position in graph.live(roots) if graph.nodes[position][0] == "input"}
-    return frozenset(inputs & set(models.quantities(use)))
+    return frozenset(inputs & set(quantities(use)))
 
 
 def accelerates(use: ServoUse, values: Mapping[str, Any]) -> bool | None:
     """True where the servo gives its joint's acceleration, at least at times. None: it could not be recorded."""
-    servo, parts, graph = models.find("servo", use.model, use.place), models.servo_parts(use), Graph()
+    servo, parts, graph = models.find("servo", use.model, use.place), servo_parts(use), Graph()
     q, qd, time, begin = (graph.input(name) for name in ("q", "qd", ":time", ":begin"))
     joint = JointMotion(q, qd, time, begin, use.command.kind if use.command is not None else "none")
     held, states = _named(graph, (*parts.outputs, *parts.integrals)), _named(graph, parts.natural)

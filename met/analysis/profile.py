@@ -30,7 +30,7 @@ from met.program.system import PARAMETER, TREE
 from met.run import inputs
 from met.trace import fma
 from met.trace.counting import counting
-from met.trace.graph import LEAVES, OPERANDS
+from met.trace.nodes import LEAVES, OPERANDS
 from met.trace.program import Every, Phase, Program, RecordPhase, RunPhase, Tape, Unless0, WhileAny, walk
 from met.trace.recorder import record
 from met.trace.recording import Branch, CodeSection, RecordedControl, Recording, RecordSection, RunSection

@@ -16,7 +16,7 @@ from met.frozen import frozen
 NEAR = 0.3
 """How far an observed order may be from the expected one."""
 
-ROUNDING = 1e-12
+ROUNDING = 1e-10
 """Differences below this share of the number are rounding, from which no order follows."""
 
 
@@ -59,3 +59,20 @@ def step_error(first: float, second: float, scale: float, expected: int) -> Step
     if any(abs(order - p) <= NEAR for p in {1, expected}):
         return StepError(first * 2.0**order / (2.0**order - 1.0), order, True)
     return StepError(3.0 * max(first, second), order, False)
+
+
+def instant_error(first: float, second: float, both: float, instant: float) -> StepError:
+    """The error at the step h of an instant that is seen at whole steps alone, such as a settling time: a bound.
+
+    With a quarter of the step it is known to `instant`, a quarter of h, and to what the quarter's own integration may
+    err, which is below the difference from the half where the error falls at all. Such differences are whole steps, so
+    no order follows from them; they are clear where they do not grow by more than what is seen of them.
+
+    first    |x(h) - x(h/2)|, s
+    second   |x(h/2) - x(h/4)|, s
+    both     |x(h) - x(h/4)|, s
+    instant  h/4, s
+    """
+    if not all(map(math.isfinite, (first, second, both))):
+        return StepError(math.inf, math.nan, False)
+    return StepError(both + second + instant, math.nan, second <= first + 2.0 * instant * (1.0 + ROUNDING))

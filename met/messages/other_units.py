@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from met.diagnostic import nearest
+from met.messages.alike import nearest
 from met.units import UNITS, is_unit
 
 LONGEST = 16  # of a word that is looked for

@@ -19,7 +19,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, TextIO
 
-from met.diagnostic import Diagnostic, Label, Place
+from met.messages.message import Diagnostic, Label, Place
 
 JSON_VERSION = 1
 TAB = 4

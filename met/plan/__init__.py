@@ -47,14 +47,11 @@ import numpy as np
 
 from met.diagnostic import Place
 from met.frozen import frozen, keyed
-from met.parameter import Parameter
+from met.parameter import BASE, Parameter
 from met.plan.run_keys import RunKey, run_key
 from met.trace.graph import Formulas
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
-
-BASE = "base"
-"""The link that the arm stands on. It has no joint, and matter only where a deck gives it some."""
 
 COMPONENTS = ("x", "y", "z", "roll", "pitch", "yaw")
 """Components of the pose of a prescribed base, and of a guide's path: m, and rad about fixed x, y, z."""
@@ -273,12 +270,33 @@ class MetricUse:
 
 @frozen
 class Requirement:
-    """A condition on a metric that a case meets or misses, in SI; `text` as the deck wrote it."""
+    """A condition on a metric that a case meets or misses, in SI; `text` as the deck wrote it.
+
+    share       of all cases that may be drawn, the part that is to meet it, above 0 and at most 1; None where every
+                case of the campaign is to meet it
+    confidence  with which the cases that were drawn are to show the share, above 0 and below 1; None where the share of
+                these cases themselves decides
+    """
 
     text: str
     metric: str
     comparison: Literal["<", "<=", ">", ">="]
     limit: float
+    place: Place | None = None
+    share: float | None = keyed("where set", default=None)
+    confidence: float | None = keyed("where set", default=None)
+
+
+@frozen
+class StepErrorLimit:
+    """A condition on a metric's error by the step, in each case that is run with shorter steps; `text` as the deck
+    wrote it. limit: SI, or where it is a `share`, of the size of the metric's value."""
+
+    text: str
+    metric: str
+    comparison: Literal["<", "<="]
+    limit: float
+    share: bool = False
     place: Place | None = None
 
 
@@ -442,12 +460,17 @@ def ground(links: Iterable[Link], joints: Iterable[Joint]) -> tuple[str, ...]:
     return tuple(link.name for link in links if link.name in found)
 
 
+Design = Literal["", "random", "lhs", "sobol"]
+"""The ways in which values of a coordinate are drawn; "" where they are chosen."""
+
+
 @frozen
 class Coordinate:
     """One varied parameter of a sweep, as the deck wrote its path; values are in SI, one a case.
 
     sets: paths of the parameters that follow it directly. unit, scale: as the deck wrote it, for display;
     shown = value / scale.
+    design: of the sample that drew it; "" where its values were chosen
     """
 
     path: str
@@ -456,6 +479,7 @@ class Coordinate:
     values: np.ndarray
     sets: tuple[str, ...]
     place: Place | None = None
+    design: Design = keyed("never", default="")
 
 
 @frozen
@@ -520,6 +544,7 @@ class Experiment:
     notes: tuple[str, ...] = ()
     sweep: str = ""
     tolerances: tuple[Tolerance, ...] = ()
+    step_errors: tuple[StepErrorLimit, ...] = ()
     allowances: tuple[Allowance, ...] = ()
 
     def allows(self, code: str) -> bool:

@@ -35,11 +35,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import Any
 
 from met import models, units
 from met.frozen import frozen
 from met.plan import Joint, Recorded, Structure
+from met.plan.uses import quantities, sensor_parts, servo_parts
+from met.unit_parser import parse_unit
 
 MOTION = (
     ("q", "joint", "joint position"),
@@ -55,20 +56,6 @@ DIMENSIONS = {XYZ: "axis", WXYZ: "quaternion"}
 JOINT_AXIS = "about or along the joint's axis"
 WORLD_AXES = "world axes"
 CONTINUOUS = "to world axes, continuous from w >= 0"
-
-# What the engine holds of a bed and a law, besides their own memory: name, unit, meaning.
-OF_BED = (
-    ("drive_voltage", "V", "voltage that is on the drive motor"),
-    ("load_current", "A", "current that is in the load motor"),
-)
-OF_LAW = (
-    ("torque", "N*m", "load torque that the law asks"),
-    ("rate", "rad/s", "rate of the shaft that the law believes"),
-)
-OF_OBSERVER = (
-    ("unknown_torque", "N*m", "torque on the shaft that the motor's parameters do not tell"),
-    ("reference_rate", "rad/s", "rate that the shaft would have on the joint itself"),
-)
 
 # Name, unit, meaning, components, frame.
 OF_JOINT = (
@@ -162,7 +149,7 @@ def watched_unit(declared: str, of: str) -> str:
     """A metric's declared unit with `of`, the unit of what it watches, put in: of `rad/s`, `of*s` is `rad`."""
     if declared == "of" or "of" not in re.findall(r"[A-Za-z_]+", declared):
         return of if declared == "of" else declared
-    return units.text(units.parse_unit(declared, {"of": units.parse_unit(of)}).dimension)
+    return units.text(parse_unit(declared, {"of": parse_unit(of)}).dimension)
 
 
 def _per_time(repeated: re.Match[str]) -> str:
@@ -201,7 +188,7 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
         use = servos.get(joint.name)
         if use is None:
             continue
-        of_servo = models.servo_parts(use)
+        of_servo = servo_parts(use)
         kind = use.command.kind if use.command is not None else None
         if kind is not None:
             unit = joint_unit(COMMAND_UNIT[kind], joint)
@@ -211,16 +198,16 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
                 unit = joint_unit(part.unit, joint, kind)
                 add(f"{joint.name}.servo.{part.name}", unit, part.doc, divisor, joint.name)
         for sensor in use.sensors:
-            unit = joint_unit(models.quantities(use)[sensor.of], joint, kind)
+            unit = joint_unit(quantities(use)[sensor.of], joint, kind)
             path = f"{joint.name}.servo.sensor.{sensor.of}"
             add(path, unit, f"what the servo sees as {sensor.of}", use.divisor, joint.name)
-            for state in models.sensor_parts(sensor, "states"):
+            for state in sensor_parts(sensor, "states"):
                 add(f"{path}.{state.name}", watched_unit(state.unit, unit), state.doc, dynamics, joint.name)
         if joint.name in on_beds:
             bed, law = (models.find(kind, getattr(on_beds[joint.name], kind)) for kind in ("bed", "law"))
-            for name, unit, doc in of_bed(bed):
+            for name, unit, doc in bed.shown:
                 add(f"{joint.name}.bed.{name}", joint_unit(unit, joint), doc, use.divisor, joint.name)
-            for name, unit, doc in of_law(law):
+            for name, unit, doc in law.shown:
                 add(f"{joint.name}.law.{name}", joint_unit(unit, joint), doc, use.divisor, joint.name)
     for guide in structure.guides:
         for part in models.find("guide", guide.model, guide.place).memory:
@@ -228,7 +215,7 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
     for on_link in structure.sensors:
         unit, path = models.find("sensor", on_link.model, on_link.place).unit, f"sensors.{on_link.name}"
         add(path, unit, f"what the {on_link.model} reads", on_link.divisor, "")
-        for state in models.sensor_parts(on_link, "states"):
+        for state in sensor_parts(on_link, "states"):
             add(f"{path}.{state.name}", watched_unit(state.unit, unit), state.doc, dynamics, "")
     mentions = (*names, *(recorded.name for recorded in structure.record), *(metric.of for metric in structure.metrics))
     mentioned = {name.split(".")[1] for name in mentions if name.startswith("links.")}
@@ -249,16 +236,6 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
     for name, unit, doc, components, frame in OF_ARM:
         derive(name, unit, doc, components, frame)
     return found
-
-
-def of_bed(bed: Any) -> tuple[tuple[str, str, str], ...]:
-    """Name, unit and meaning of what there is of a bed, its own memory first."""
-    return (*((memory.name, memory.unit, memory.doc) for memory in bed.memory), *OF_BED)
-
-
-def of_law(law: Any) -> tuple[tuple[str, str, str], ...]:
-    """Name, unit and meaning of what there is of a law, its own memory first."""
-    return (*((memory.name, memory.unit, memory.doc) for memory in law.memory), *OF_LAW, *OF_OBSERVER * law.observer)
 
 
 def _carrying(structure: Structure, link: str) -> list[Joint]:

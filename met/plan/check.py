@@ -32,7 +32,9 @@ from met.plan import structure as plan_structure
 from met.plan.codec import Damaged
 from met.plan.defaults import INERTIA, declared, heads_of_models, related
 from met.plan.outputs import tolerable
-from met.trace.graph import TRUTHS, Formulas
+from met.trace.graph import Formulas
+from met.trace.nodes import TRUTHS
+from met.unit_parser import parse_unit
 
 GROUP = re.compile(r"[\w+-]+(\.[\w+-]+)*")
 """The name of a group of a sweep, behind the sweep's name."""
@@ -61,6 +63,7 @@ def check(experiments: Iterable[Experiment]) -> None:
         names.append(experiment.name)
         plan_structure.check(experiment.structure, f"{where}.structure")
         _check_requirements(experiment, f"{where}.requirements")
+        _check_step_errors(experiment, f"{where}.step_errors")
         _check_tolerances(experiment, f"{where}.tolerances")
         _check_allowances(experiment, f"{where}.allowances")
         _check_cases(experiment, f"{where}.cases")
@@ -108,6 +111,11 @@ def _check_requirements(experiment: Experiment, where: str) -> None:
             raise Damaged(f"{where}[{index}].metric", f"there is no metric `{requirement.metric}`")
         if math.isnan(requirement.limit):
             raise Damaged(f"{where}[{index}].limit", "it is not a number")
+        share, confidence = requirement.share, requirement.confidence
+        if share is not None and not 0.0 < share <= 1.0:
+            raise Damaged(f"{where}[{index}].share", "it should be above 0 and at most 1")
+        if confidence is not None and not (share is not None and share < 1.0 and 0.0 < confidence < 1.0):
+            raise Damaged(f"{where}[{index}].confidence", "it should be between 0 and 1, of a share between 0 and 1")
         first = said.setdefault(requirement.text, requirement)
         if (first.metric, first.comparison, first.limit) != (
             requirement.metric,
@@ -115,6 +123,17 @@ def _check_requirements(experiment: Experiment, where: str) -> None:
             requirement.limit,
         ):
             raise Damaged(f"{where}[{index}].text", "another requirement has the same text")
+
+
+def _check_step_errors(experiment: Experiment, where: str) -> None:
+    metrics = {use.name for use in experiment.structure.metrics}
+    for index, each in enumerate(experiment.step_errors):
+        if each.metric not in metrics:
+            raise Damaged(f"{where}[{index}].metric", f"there is no metric `{each.metric}`")
+        if not 0.0 < each.limit < math.inf:
+            raise Damaged(f"{where}[{index}].limit", "it should be a finite number above 0")
+    if len({each.text for each in experiment.step_errors}) < len(experiment.step_errors):
+        raise Damaged(where, "two have the same text")
 
 
 def _check_tolerances(experiment: Experiment, where: str) -> None:
@@ -332,7 +351,7 @@ def _is_whole(values: np.ndarray) -> np.ndarray:
 
 def _same_unit(one: str, other: str) -> bool:
     try:
-        mine, theirs = units.parse_unit(one), units.parse_unit(other)
+        mine, theirs = parse_unit(one), parse_unit(other)
     except ValueError:
         return False
     return mine.scale == theirs.scale and units.same(mine.dimension, theirs.dimension)

@@ -155,7 +155,7 @@ def _quantity(data: Any, where: str) -> Any:
 
 def _check_formulas(values: dict[str, Any], where: str) -> None:
     """Formulas are replayed, so a reference that points nowhere must not get that far."""
-    from met.trace.graph import OPERANDS, TRUTHS
+    from met.trace.nodes import OPERANDS, TRUTHS
 
     nodes = values.get("nodes", ())
     truths: list[bool] = []

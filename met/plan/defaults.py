@@ -9,6 +9,7 @@ from met.diagnostic import Place, nearest
 from met.parameter import Parameter, under
 from met.plan import COMPONENTS, Course, Experiment, Joint, Origin, Quantity, Structure
 from met.plan.channel import channels, joint_unit, watched_unit
+from met.plan.uses import quantities, sensor_parts, servo_parts
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
@@ -72,7 +73,7 @@ def related(structure: Structure) -> Iterator[tuple[str, tuple[Parameter, ...]]]
     together."""
     yield from of_environment(structure)
     for sensor in structure.sensors:
-        yield f"sensors.{sensor.name}", models.sensor_parts(sensor, "parameters")
+        yield f"sensors.{sensor.name}", sensor_parts(sensor, "parameters")
     for use in structure.guides:
         yield f"guides.{use.name}", models.find("guide", use.model, use.place).parameters
 
@@ -99,13 +100,13 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
     yield from _of_base(structure)
     for use in structure.servos:
         joint = kinds[use.joint]
-        for parameter in models.servo_parts(use).parameters:
+        for parameter in servo_parts(use).parameters:
             held = parameter if use.command is None else under(parameter, use.command.kind)
             yield from _numbers(f"{use.joint}.servo", held, joint_unit(parameter.unit, joint))
         for sensor in use.sensors:
-            of = joint_unit(models.quantities(use)[sensor.of], joint)
+            of = joint_unit(quantities(use)[sensor.of], joint)
             head = f"{use.joint}.servo.sensor.{sensor.of}"
-            for parameter in models.sensor_parts(sensor, "parameters"):
+            for parameter in sensor_parts(sensor, "parameters"):
                 yield from _numbers(head, parameter, watched_unit(parameter.unit, of))
         if use.command is not None and not use.command.guide:
             for parameter in models.find("command", use.command.model, use.place).parameters:
@@ -129,7 +130,7 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
     yield from _of_guides(structure)
     for on_link in structure.sensors:
         unit = models.find("sensor", on_link.model, on_link.place).unit
-        for parameter in models.sensor_parts(on_link, "parameters"):
+        for parameter in sensor_parts(on_link, "parameters"):
             yield from _numbers(f"sensors.{on_link.name}", parameter, watched_unit(parameter.unit, unit))
     watched = channels(structure) if structure.metrics else {}
     for metric in structure.metrics:

@@ -12,6 +12,7 @@ from met.plan import BASE, COMPONENTS, ServoUse, Structure
 from met.plan import guides as guides
 from met.plan.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.plan.codec import Damaged
+from met.plan.uses import quantities
 
 NAME = re.compile(r"[^\W\d]\w*")
 """A name in a deck: it is part of paths, of messages, of files' names."""
@@ -176,7 +177,7 @@ def _check_sensors(use: ServoUse, path: str) -> None:
     seen: set[str] = set()
     for index, sensor in enumerate(use.sensors):
         where = f"{path}.sensors[{index}]"
-        if sensor.of not in models.quantities(use) or sensor.of in seen:
+        if sensor.of not in quantities(use) or sensor.of in seen:
             raise Damaged(f"{where}.of", f"there is no `{sensor.of}` to be sensed, or it has a sensor already")
         if models.find("sensor", sensor.model, sensor.place).measures is not None:
             raise Damaged(f"{where}.model", f"`{sensor.model}` is a sensor of a link: it stands in a run")

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from met.plan import Experiment
 from met.plan.channel import Channel
 from met.program import balancing, cell_names, orientations
-from met.program.control import failing, guiding, link_sensors, sensing
+from met.program.control import failing, guiding, link_sensors, sensing, setpoints
 from met.program.control.substituted import LIMITED
 from met.program.evaluation import gravity, law
 from met.program.motion import base, payloads
@@ -175,7 +175,7 @@ class Builder:
     def _tick(self, tape: Tape, actuator: Actuator) -> None:
         """One tick of one servo's computer, on the state at this time."""
         joint = self.joints[actuator.index]
-        setpoint = self.system.setpoint(actuator, tape.read, tape.time)
+        setpoint = setpoints.setpoint(self.system, actuator, tape.read, tape.time)
         if actuator.use.command is not None:
             tape.write(f"{actuator.path}.command", setpoint.value)
         on_bed, between = self.step.beds.seen(tape, actuator), actuator in self.system.ticking_between

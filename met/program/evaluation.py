@@ -11,7 +11,7 @@ from met.dynamics.tree import Tree
 from met.environments.environment import Environment
 from met.frozen import frozen
 from met.integrators.integrator import Motion, Slope
-from met.program.control import failing, link_sensors, sensing
+from met.program.control import failing, link_sensors, sensing, setpoints
 from met.program.motion.base import BaseMotion, base_of, free_base
 from met.program.motion.bodies import slopes
 from met.program.motion.payloads import slopes_of_payloads, split_wrenches, tree_with_payloads
@@ -185,9 +185,8 @@ def servo_response(
     seen = Seen(*sensing.measured(actuator, p, q, qd, natural), Setpoint("none", 0.0, 0.0), 0.0, time, natural)
     of_sensors = sensing.slopes(system, actuator, read, seen, own)
     if parts.continuous:
-        seen = sensing.seen_at_stage(
-            system, actuator, read, replace(seen, setpoint=system.setpoint(actuator, read, time)), own
-        )
+        with_setpoint = replace(seen, setpoint=setpoints.setpoint(system, actuator, read, time))
+        seen = sensing.seen_at_stage(system, actuator, read, with_setpoint, own)
         seen = failing.seen(system, actuator, read, seen, None)
         integrals = {state.name: own[f"{actuator.path}.{state.name}"] for state in parts.integrals}
         found = law(actuator, p, NamedValues(owner, integrals), seen)

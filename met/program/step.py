@@ -19,8 +19,8 @@ from met.program import cell_names, cells, friction
 from met.program.asking import Question, advance_with, changed_count, question_count
 from met.program.control.substituted import Substituted
 from met.program.evaluation import Derivative, brake_levels, derivative, servo_response
+from met.program.grapple import Grapple
 from met.program.motion import base, bodies
-from met.program.motion.grapple import Grapple
 from met.program.observe import Observed
 from met.program.sticking import sticking
 from met.program.system import Actuator, System

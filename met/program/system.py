@@ -23,11 +23,11 @@ from met.metrics.metric import Metric
 from met.parameter import Memory, Parameter, State
 from met.plan import BASE, Experiment, Formula, Joint, LinkSensor, Payload, SensorUse, ServoUse, Structure
 from met.plan.channel import Channel, channels
-from met.program.control import guided
-from met.program.motion.courses import recorded
+from met.plan.uses import sensor_parts, servo_parts
+from met.program.courses import recorded
 from met.program.values import NamedValues, answer, parameters, returned
 from met.sensors.sensor import Sensor
-from met.servos.servo import Drive, JointMotion, Parts, Servo, Setpoint
+from met.servos.servo import Drive, JointMotion, Parts, Servo
 from met.substitution import BedModel, Law
 from met.trace import Formulas, Graph, Real, Scalar
 from met.vectors import Vector
@@ -210,7 +210,7 @@ class System:
 
     @cached_property
     def courses(self) -> Formulas:
-        """The motion of a prescribed base, as formulas of time (`met.program.motion.courses`)."""
+        """The motion of a prescribed base, as formulas of time (`met.program.courses`)."""
         return recorded(self.experiment)
 
     @cached_property
@@ -251,22 +251,6 @@ class System:
 
     def servo_values(self, actuator: Actuator, read: ReadCell) -> NamedValues:
         return parameters(actuator.owner, actuator.path, actuator.parts.parameters, lambda path: self.value(path, read))
-
-    def setpoint(self, actuator: Actuator, read: ReadCell, time: Real) -> Setpoint:
-        """The setpoint of a joint at a time; kind "none" where it has no command."""
-        if actuator.use.command is not None and actuator.use.command.guide:
-            guide = next(use for use in self.structure.guides if use.name == actuator.use.command.guide)
-            return guided.setpoint(self, actuator.use.joint, actuator.command_kind, guide, read, time)
-        if actuator.profile is None:
-            return Setpoint("none", 0.0, 0.0)
-        p = parameters(
-            f"command `{actuator.profile.name}` of {actuator.owner}",
-            f"{actuator.path}.command",
-            actuator.profile.parameters,
-            lambda path: self.value(path, read),
-        )
-        value, slope = answer(actuator.owner, actuator.profile.course, p, time)
-        return Setpoint(actuator.command_kind, value, slope)
 
     def tree(self, read: ReadCell) -> Tree:
         """The arm as the dynamics see it: built once where no case varies it, else kept in the case's memory."""
@@ -342,7 +326,7 @@ class System:
         has_course = use.command is not None and not use.command.guide
         profile = models.find("command", use.command.model, use.place) if use.command and has_course else None
         sensors = tuple(self._fitted(each, f"{use.joint}.servo.sensor.{each.of}") for each in use.sensors)
-        bare = Actuator(index, use, servo, profile, models.servo_parts(use), None, False, False, {}, sensors)
+        bare = Actuator(index, use, servo, profile, servo_parts(use), None, False, False, {}, sensors)
         drive, level, levels = self._probe(bare)
         if drive.given is not None and (level != 0.0 or use.joint in self.braked):
             message = f"{bare.owner} gives both an acceleration and dry friction"
@@ -361,7 +345,7 @@ class System:
         )
 
     def _fitted(self, use: SensorUse | LinkSensor, path: str) -> Fitted:
-        declared, states, memory = (models.sensor_parts(use, group) for group in ("parameters", "states", "memory"))
+        declared, states, memory = (sensor_parts(use, group) for group in ("parameters", "states", "memory"))
         return Fitted(use, models.find("sensor", use.model, use.place), declared, states, memory, path)
 
     def _probe(self, actuator: Actuator) -> tuple[Drive, float | None, dict[str, float | None]]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from met.parameter import Parameter
-from met.plan import BASE
+from met.parameter import BASE, Parameter
 from met.sensors.digital import converted, delayed, noisy
 from met.sensors.sensor import Reading, Sensed
 from met.trace import Real, sqrt

@@ -67,6 +67,13 @@ MEMORY = (Memory(name="shaft_rate", unit="rad/s", doc="rate of the shaft itself"
 reads; without it the encoder stays at 0."""
 
 
+OF_BED = (
+    ("drive_voltage", "V", "voltage that is on the drive motor"),
+    ("load_current", "A", "current that is in the load motor"),
+)
+"""Name, unit and meaning of what the engine holds of every bed, besides the memory of its model."""
+
+
 @frozen(kw_only=True)
 class BedModel:
     """A bed that the engine simulates; one a file. `check` says what is missing in a declaration.
@@ -89,6 +96,11 @@ class BedModel:
     read: Callable[[Any, Any], Real]
     taken: Callable[[Any, Wire], tuple[Wire, Truth]]
     presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    @property
+    def shown(self) -> tuple[tuple[str, str, str], ...]:
+        """Name, unit and meaning of all that can be recorded of a bed of this model, its own memory first."""
+        return (*((memory.name, memory.unit, memory.doc) for memory in self.memory), *OF_BED)
 
 
 def check(model: BedModel) -> tuple[str, str] | None:

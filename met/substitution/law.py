@@ -51,6 +51,19 @@ class LawOutput:
     qdd: Real
 
 
+OF_LAW = (
+    ("torque", "N*m", "load torque that the law asks"),
+    ("rate", "rad/s", "rate of the shaft that the law believes"),
+)
+"""Name, unit and meaning of what the engine holds of every law, besides its own memory."""
+
+OF_OBSERVER = (
+    ("unknown_torque", "N*m", "torque on the shaft that the motor's parameters do not tell"),
+    ("reference_rate", "rad/s", "rate that the shaft would have on the joint itself"),
+)
+"""Name, unit and meaning of what the engine holds of a law with an observer besides."""
+
+
 @frozen(kw_only=True)
 class Law:
     """The declaration of a law; one a file. All substituted joints of a run have the same.
@@ -72,6 +85,12 @@ class Law:
         [Sequence[Any], Sequence[Any], Sequence[LawInput], Callable[[Sequence[Real]], Sequence[Real]]],
         Sequence[tuple[LawOutput, Mapping[str, Real]]],
     ]
+
+    @property
+    def shown(self) -> tuple[tuple[str, str, str], ...]:
+        """Name, unit and meaning of all that can be recorded of this law, its own memory first."""
+        own = ((memory.name, memory.unit, memory.doc) for memory in self.memory)
+        return (*own, *OF_LAW, *OF_OBSERVER * self.observer)
 
 
 BAND = Parameter(

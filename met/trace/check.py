@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-from met.trace.graph import OPERANDS, TRUTHS, Node
+from met.trace.nodes import OPERANDS, TRUTHS, Node
 from met.trace.program import WhileAny
 from met.trace.recording import Branch, CodeSection, RecordedControl, Recording
 

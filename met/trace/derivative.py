@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from met.trace.graph import OPERANDS, TRUTHS, ZERO, Graph
+from met.trace.nodes import OPERANDS, TRUTHS, ZERO, Nodes
 from met.trace.scalar import Scalar
 
 ROUNDS = 2.0**51
@@ -37,17 +37,17 @@ def derivative(x: Scalar, name: str) -> Scalar:
     return Scalar(graph, slopes[x.ref >> 1] ^ (x.ref & 1))
 
 
-def _rounds(graph: Graph, op: str, operands: list[int]) -> bool:
+def _rounds(graph: Nodes, op: str, operands: list[int]) -> bool:
     """True where a node is a sum that rounds to whole numbers, or halves."""
     added = {"add": operands[:2], "sub": operands[:2], "fma": operands[2:3]}.get(op, [])
     return any(abs(value) >= ROUNDS for ref in added if (value := graph.value(ref)) is not None)
 
 
-Rule = Callable[[Graph, list[int], Scalar, list[Scalar], list[Scalar]], Scalar]
+Rule = Callable[[Nodes, list[int], Scalar, list[Scalar], list[Scalar]], Scalar]
 """(graph, what stands behind the operands, the node, its operands, their derivatives) -> its derivative."""
 
 
-def _flip(graph: Graph, sign: Scalar, move: Scalar, bit: int) -> Scalar:
+def _flip(graph: Nodes, sign: Scalar, move: Scalar, bit: int) -> Scalar:
     return Scalar(graph, graph.flip(move.ref, sign.ref, bit))
 
 

@@ -16,13 +16,14 @@ from typing import Any
 import numpy as np
 
 from met.trace import elementary
-from met.trace.graph import Graph, Real, Truth
+from met.trace.graph import Real, Truth
+from met.trace.nodes import Nodes
 from met.trace.primitives import ARRAYS, PLAIN
 from met.trace.refusal import refuse
 from met.trace.scalar import Mask, Scalar
 
 
-def _graph_of(*values: Any) -> Graph | None:
+def _graph_of(*values: Any) -> Nodes | None:
     """The graph that the values are recorded in, None where all are plain."""
     for value in values:
         if value.__class__ is Scalar or value.__class__ is Mask:
@@ -30,7 +31,7 @@ def _graph_of(*values: Any) -> Graph | None:
     return None
 
 
-def _ref(graph: Graph, value: Any) -> int:
+def _ref(graph: Nodes, value: Any) -> int:
     """A number's or a truth value's reference in the graph."""
     if value.__class__ is Scalar or value.__class__ is Mask:
         if value.graph is not graph:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from met.trace.graph import OPERANDS, Node, live
+from met.trace.nodes import OPERANDS, Node, live
 
 
 def fused(nodes: Sequence[Node], roots: Iterable[int], leading: Iterable[int] | None = None) -> list[Node]:

@@ -16,7 +16,7 @@ import hashlib
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
-from met.trace.graph import OPERANDS, live
+from met.trace.nodes import OPERANDS, live
 from met.trace.program import WhileAny
 from met.trace.recording import Branch, CodeSection, RecordedControl, Recording, RecordSection
 from met.trace.slicing import cells_behind, slice_roots

@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import cached_property
 
 from met.frozen import frozen
-from met.trace.graph import Node, live
+from met.trace.nodes import Node, live
 from met.trace.program import Every, Program, Unless0, WhileAny
 
 

@@ -7,12 +7,10 @@ Whatever needs to know the value now (`if`, `float()`, an index) is refused at t
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
+from met.trace.nodes import Nodes
 from met.trace.refusal import RECORDS, refuse
-
-if TYPE_CHECKING:
-    from met.trace.graph import Graph
 
 
 class Scalar:
@@ -20,7 +18,7 @@ class Scalar:
 
     __slots__ = ("graph", "ref")
 
-    def __init__(self, graph: Graph, ref: int) -> None:
+    def __init__(self, graph: Nodes, ref: int) -> None:
         self.graph = graph
         self.ref = ref
 
@@ -181,7 +179,7 @@ class Mask:
 
     __slots__ = ("graph", "ref")
 
-    def __init__(self, graph: Graph, ref: int) -> None:
+    def __init__(self, graph: Nodes, ref: int) -> None:
         self.graph = graph
         self.ref = ref
 

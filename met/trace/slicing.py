@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 
-from met.trace.graph import live
+from met.trace.nodes import live
 from met.trace.program import WhileAny
 from met.trace.recording import Branch, CodeSection, RecordedControl
 

@@ -32,7 +32,7 @@ from hw.process import talk
 from hw.timing import Timing, timing
 from met.plan import Experiment, Plan
 from met.plan import file as plan_file
-from met.program.control.plant import Plant, bed_values, plant_c
+from met.plant import Plant, bed_values, plant_c
 from met.run import prepare
 
 TITLE = "a Panda at 1 kHz with its shoulder's motor on a bed, us and counts; no hard real time"

@@ -168,6 +168,7 @@ class Answering:
         self.code_key = self.work_key = self.old_code_key = f"answers of {experiment.name}"
         self.result_keys: dict[str, str] = {}
         columns = sum(len(recorded.channels) for recorded in experiment.structure.record)
+        self.recording = SimpleNamespace(sections=())
         self.program = SimpleNamespace(outputs=("failure",), columns=columns)
 
     def is_work(self, key: str) -> bool:
@@ -197,7 +198,9 @@ def answering(monkeypatch: Any) -> None:
         monkeypatch.setattr(engine, name, mine)
 
 
-def answer(experiment: Any, cases: Any = None, *, record: bool = True, fails: frozenset[int] = frozenset()) -> Any:
+def answer(
+    experiment: Any, cases: Any = None, *, threads: Any = None, record: bool = True, fails: frozenset[int] = frozenset()
+) -> Any:
     """What `met.run.run` gives back, by closed formulas: first-order rise of the rates; cases in `fails` break off."""
     from met.run import Run
 

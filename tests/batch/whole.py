@@ -18,9 +18,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from batch.campaigns.executor import Executor, Outcome
 from batch.campaigns.folder import Folder, beside, uncovered
 from batch.campaigns.tasks import CampaignSection, Task
-from batch.executors import Executor, Outcome
 from batch.executors.threads import Threads
 from met.plan import Experiment
 from tests.batch import plans

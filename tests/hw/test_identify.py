@@ -23,7 +23,7 @@ from hw.identify.series import Series, series
 from hw.pace import pace
 from met.diagnostic import Problem
 from met.plan import Experiment
-from met.program.control.plant import Plant, bed_values
+from met.plant import Plant, bed_values
 from tests.hw.conftest import said
 
 pytestmark = pytest.mark.slow

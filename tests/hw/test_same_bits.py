@@ -13,8 +13,8 @@ from hw.beds import emulated
 from hw.beds.emulated import EmulatedBed
 from met.backends.llvm import kernel
 from met.plan import Experiment
+from met.plant import Plant as DeckPlant
 from met.program import build
-from met.program.control.plant import Plant as DeckPlant
 from met.run import prepare, run
 from tests.hw.conftest import LineBed
 from tests.hw.device import Device

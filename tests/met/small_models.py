@@ -20,7 +20,8 @@ from met.frozen import frozen
 from met.parameter import Memory, Parameter, State, is_present, under
 from met.plan import JointKind
 from met.servos.servo import Parts, parts
-from met.units import PURE, Dimension, parse_unit
+from met.unit_parser import parse_unit
+from met.units import PURE, Dimension
 from tests.met import small_guides
 
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)

@@ -18,7 +18,7 @@ from met.backends.reference.plain import execute
 from met.parameter import Parameter
 from met.plan.channel import COMMAND_UNIT
 from met.program import build
-from met.units import parse_unit
+from met.unit_parser import parse_unit
 from tests.ic.small_decks import experiment
 from tests.met.small_models import EVERY, SMALLEST, Use, smallest
 

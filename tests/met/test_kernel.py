@@ -45,7 +45,7 @@ from met.trace import (
     tanh,
     where,
 )
-from met.trace.graph import evaluate, live
+from met.trace.nodes import evaluate, live
 from met.trace.program import Every, Phase, Program, RecordPhase, RunPhase, Unless0, WhileAny
 from met.trace.recorder import record
 from tests.instruction_sets import RUNNABLE

@@ -9,7 +9,8 @@ from fractions import Fraction
 import pytest
 
 from met import units
-from met.units import UNITS, Dimension, parse_unit, same, text
+from met.unit_parser import parse_unit
+from met.units import UNITS, Dimension, same, text
 from tests.oracles.package import Package
 
 pint = Package("pint")

@@ -12,7 +12,8 @@ import re
 
 import pytest
 
-from met.units import UNITS, Dimension, counted, parse_unit, same
+from met.unit_parser import parse_unit
+from met.units import UNITS, Dimension, counted, same
 from tests.met.test_units import PINT_NAMES
 from tests.oracles.package import Package
 

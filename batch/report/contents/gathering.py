@@ -11,8 +11,11 @@ from typing import Any
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.groups import groups_named
 from batch.queries.pool import Pool, pools
+from batch.queries.step_errors.figures import figures, together
+from batch.queries.step_errors.words import about as about_errors
 from batch.report.contents import comparison
 from batch.report.contents.against import ComparedArchive, EarlierCases, of_groups
+from batch.report.contents.evidence import evidence_table
 from batch.report.contents.histories import MOST_VALUES, no_signals, signals
 from batch.report.contents.overview import overview
 from batch.report.contents.parameters import parameters, varied
@@ -111,13 +114,15 @@ def _section(
     except Problem as problem:
         trouble = trouble or "; ".join(diagnostic.message for diagnostic in problem.diagnostics)
     drawn = signals(pool, values, before)
+    errors = together(map(figures, pool.groups))
     return ReportSection(
         name=pool.name,
         lede=_lede(pool),
         facts=_facts(pool, own),
         varied=varied(pool, own),
-        metrics=metric_rows(pool, before),
+        metrics=metric_rows(pool, before, errors),
         structures=structures(pool, before),
+        evidence=evidence_table(pool),
         worst=worst(pool, archive, only, before),
         overview=overview(pool, before),
         signals=drawn,
@@ -127,6 +132,7 @@ def _section(
         trouble=trouble,
         notes=tuple(dict.fromkeys(note for experiment in own.values() for note in experiment.notes)),
         single=pool.count == 1,
+        by_step="" if errors is None else about_errors(errors),
     )
 
 

@@ -84,5 +84,5 @@ def ruler(found: Levels) -> Ruler:
 def _steps(low: float, high: float) -> np.ndarray:
     """Five to twelve round numbers by equal steps."""
     size = 10.0 ** np.floor(np.log10((high - low) / 5))
-    step = next(each for each in (5 * size, 2 * size, size) if (high - low) / each >= 5)
+    step = next(each for each in (5 * size, 2 * size, size) if (high - low) / each > 4.999)  # of exactly 5, rounded
     return np.asarray(np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step)

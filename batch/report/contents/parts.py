@@ -134,6 +134,7 @@ class MetricRow:
     remark  how many values are infinite or missing
     bars    counts of equal stretches from `low` to `high`; none where there are too few values to show a shape
     limits  of requirements, in the metric's unit
+    by_step the error by the step, in `unit`; "" where the run was not verified
     before  the median of the other archive's cases, where one is compared with, and `bars_before` their counts
     """
 
@@ -146,6 +147,7 @@ class MetricRow:
     low: float = 0.0
     high: float = 0.0
     limits: tuple[float, ...] = ()
+    by_step: str = ""
     before: str = ""
     bars_before: tuple[int, ...] = ()
 
@@ -363,8 +365,10 @@ class ReportSection:
     """A run or sweep.
 
     name        as it is asked for;  lede  what it is, in a sentence
+    evidence    what the cases show of requirements over a share of cases;  None where there is none
     changes     against another archive, a structure each;  what one of them lacks is in `ArchiveChanges.alone`
     trouble     why parameters and stability are missing; "" where they are not
+    by_step     what the errors of metrics by the step rest on; "" where none was verified
     """
 
     name: str
@@ -372,6 +376,7 @@ class ReportSection:
     facts: tuple[Fact, ...]
     varied: tuple[VariedParameter, ...]
     metrics: tuple[MetricRow, ...]
+    evidence: TextTable | None
     structures: TextTable | None
     worst: WorstCaseTable | None
     overview: Overview | None
@@ -383,6 +388,7 @@ class ReportSection:
     notes: tuple[str, ...] = ()
     single: bool = False
     changes: tuple[RunChanges, ...] = ()
+    by_step: str = ""
 
 
 @frozen

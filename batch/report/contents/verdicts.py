@@ -6,7 +6,11 @@ import numpy as np
 
 from batch.queries.failures import failures, ranges
 from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
-from batch.queries.summary import spread
+from batch.queries.signals import deck_unit
+from batch.queries.step_errors.figures import Verification, figures
+from batch.queries.step_errors.limits import StepErrorVerdict, verdicts
+from batch.queries.step_errors.words import NONE, error_text
+from batch.queries.summary import spread, summary_of
 from batch.report.contents.against import EarlierCases
 from batch.report.contents.parts import FailureRow, MetricRow, OutcomeCount, RequirementCounts, Verdict
 from ic.printing.columns import count as counted
@@ -25,16 +29,21 @@ def verdict(pool: Pool, *, named: bool) -> Verdict:
     ended = np.bincount(pool.ended, minlength=len(ENDED))
     parts = tuple(OutcomeCount(word, int(n)) for word, n in zip(ENDED, ended, strict=True) if n)
     good = int(ended[ENDED.index("met")] + ended[ENDED.index("done")])
+    errors = [each for group in pool.groups for each in verdicts(group, figures(group))]
     return Verdict(
         kind="requirements",
         about=pool.name if named else "",
-        ok=good == pool.count,
+        ok=all(summary_of(group).ok for group in pool.groups),
         headline=_headline(pool, good),
         parts=parts,
         demands=tuple(_demand(pool, place, text) for place, text in enumerate(pool.requirements)),
         failing=_failing(pool),
-        notes=_notes(pool),
+        notes=(*_notes(pool), *map(_of_step_error, errors)),
     )
+
+
+def _of_step_error(each: StepErrorVerdict) -> str:
+    return f"{each.text}: {each.word}, {each.said}."
 
 
 def _headline(pool: Pool, good: int) -> str:
@@ -90,12 +99,27 @@ def _notes(pool: Pool) -> tuple[str, ...]:
     return (f"The load motor of a bed was at its limit{of}: there the run is not what the joint would do.",)
 
 
-def metric_rows(pool: Pool, before: EarlierCases | None = None) -> tuple[MetricRow, ...]:
-    """before: the cases of another archive to compare with."""
-    return tuple(_metric(column, None if before is None else before.values(column)) for column in pool.metrics())
+def metric_rows(
+    pool: Pool, before: EarlierCases | None = None, errors: Verification | None = None
+) -> tuple[MetricRow, ...]:
+    """before: the cases of another archive to compare with; errors: those by the step, where they are known."""
+    return tuple(
+        _metric(column, None if before is None else before.values(column), _by_step(pool, column, errors))
+        for column in pool.metrics()
+    )
 
 
-def _metric(column: CaseColumn, before: np.ndarray | None) -> MetricRow:
+def _by_step(pool: Pool, column: CaseColumn, errors: Verification | None) -> str:
+    """A metric's error by the step, in its column's unit."""
+    if errors is None:
+        return ""
+    name = column.key.partition(":")[2]
+    [variable, *_] = (group.variables[name] for group in pool.groups if name in group.variables)
+    found = error_text(errors.metrics.get(name), deck_unit(variable)[0])
+    return page_number(np.nan) if found == NONE else found
+
+
+def _metric(column: CaseColumn, before: np.ndarray | None, by_step: str) -> MetricRow:
     """Spread of the finite values; of how many there are others is said. before: the values of the other archive."""
     found, finite = spread(column.values), column.values[np.isfinite(column.values)]
     was = np.zeros(0) if before is None else np.sort(before[np.isfinite(before)])
@@ -103,7 +127,9 @@ def _metric(column: CaseColumn, before: np.ndarray | None) -> MetricRow:
     said = [f"infinite in {counted(found.infinite, 'case')}"] if found.infinite else []
     said += [f"no value in {counted(found.unknown, 'case')}"] if found.unknown else []
     if not len(finite):
-        return MetricRow(column.label, column.about, column.unit, found, ", ".join(said), before=was_text)
+        return MetricRow(
+            column.label, column.about, column.unit, found, ", ".join(said), by_step=by_step, before=was_text
+        )
     low, middle, high = found.minimum, found.median, found.maximum
     bars: tuple[int, ...] = ()
     bars_before: tuple[int, ...] = ()
@@ -124,6 +150,7 @@ def _metric(column: CaseColumn, before: np.ndarray | None) -> MetricRow:
         low=from_,
         high=to,
         limits=limits if bars else (),
+        by_step=by_step,
         before=was_text,
         bars_before=bars_before,
     )

@@ -282,10 +282,12 @@ def metrics(section: ReportSection) -> Html | None:
     values = [*(each.page_head for each in SPREAD_COLUMNS), *(["median before"] if compared else [])]
     if section.single:
         values = ["before", "now"] if compared else ["value"]
+    verified = any(each.by_step for each in section.metrics)
+    values += ["± by the step"] if verified else []
     heads = ["metric", *values, "unit"]
     heads += [] if section.single else ["how often"]
     remarks = any(each.remark for each in section.metrics)
-    rows = [el("tr", _metric(each, section.single, remarks, compared)) for each in section.metrics]
+    rows = [el("tr", _metric(each, section.single, remarks, compared, verified)) for each in section.metrics]
     numbers = range(1, len(values) + 1)
     head = el(
         "tr",
@@ -297,13 +299,15 @@ def metrics(section: ReportSection) -> Html | None:
     made = el("table", el("thead", head), el("tbody", lines(rows)), cls="few" if section.single else None)
     outline = any(each.bars_before for each in section.metrics)
     said = el("p", "Bars: how often now. Outline: before.", cls="said") if outline else None
-    return join([scrolling(made, "Metrics"), said])
+    by_step = el("p", f"{section.by_step}.", cls="said") if section.by_step else None
+    return join([scrolling(made, "Metrics"), said, by_step])
 
 
-def _metric(each: MetricRow, single: bool, remarks: bool, compared: bool) -> list[Html]:
+def _metric(each: MetricRow, single: bool, remarks: bool, compared: bool, verified: bool) -> list[Html]:
     before = [each.before] if compared else []
     spread = [page_number(getattr(each.spread, column.field)) for column in SPREAD_COLUMNS]
     values = [*before, page_number(each.spread.median)] if single else [*spread, *before]
+    values += [each.by_step] if verified else []
     cells = [el("th", el("code", breaking(each.name)), el("span", each.about, cls="under"), scope="row")]
     cells += [el("td", value, cls="right") for value in values]
     cells.append(el("td", each.unit))

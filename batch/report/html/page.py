@@ -91,6 +91,7 @@ def _links(number: int, section: ReportSection, report: Report) -> list[tuple[st
     found = [
         ("run", "What was run", True),
         ("overview", "Cases", section.overview is not None),
+        ("evidence", "Evidence", section.evidence is not None),
         ("worst", "Worst cases", section.worst is not None),
         ("signals", "Signals", section.signals is not None),
         ("structures", "Structures", section.structures is not None),
@@ -164,6 +165,10 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
         )
     elif table is not None:
         out.append(part("overview", "Metrics", table))
+    if section.evidence is not None:
+        note = "The confidence is that of each verdict by itself; of all together it is less."
+        shown = tables.table(section.evidence, "Evidence")
+        out.append(part("evidence", "Evidence", shown, said=note))
     if section.structures is not None:
         out.append(part("structures", "Structures side by side", tables.table(section.structures, "Structures")))
     if section.worst is not None:

@@ -20,6 +20,7 @@ from met.diagnostic import Label, Place
 from met.frozen import frozen
 from met.instants import has_come
 from met.plan import EnvironmentUse, Schedule, ServoUse, Substitution
+from met.plan.uses import quantities
 
 
 @frozen
@@ -115,7 +116,7 @@ def _wrong(
         return None
     head = f"environment.{use.name}"
     of, reads = scope.parameters.get(f"{head}.of"), scope.parameters.get(f"{head}.reads")
-    seen = list(models.quantities(ServoUse(joint, "", servo.servo.name, servo.command, 1, words=servo.words)))
+    seen = list(quantities(ServoUse(joint, "", servo.servo.name, servo.command, 1, words=servo.words)))
     if of is not None and str(of.value) not in seen:
         return f"{label} does not see `{of.value}`", known_words("it sees", seen), of.origin.place
     if continuous and reads is not None and reads.value == "last":

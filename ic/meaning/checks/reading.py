@@ -11,6 +11,7 @@ from ic.text.complaints import known_words
 from met import models
 from met.analysis.probe import reads
 from met.plan import ServoUse, Structure
+from met.plan.uses import quantities
 
 
 def remark_unread(scope: Scope, uses: Iterable[Use], structure: Structure) -> None:
@@ -23,7 +24,7 @@ def remark_unread(scope: Scope, uses: Iterable[Use], structure: Structure) -> No
             continue
         label = f"the law of servo `{use.definition}` ({servo.model})"
         under = f" under a {servo.command.kind} command" if servo.command is not None else ""
-        known = [of for of in models.quantities(servo) if of in read]
+        known = [of for of in quantities(servo) if of in read]
         helps = known_words(f"it reads{under}", known) if known else f"it reads nothing of its joint{under}"
         for sensor in servo.sensors:
             if sensor.of not in read and sensor.place is not None and not _kept(structure, servo, sensor.of):

@@ -21,6 +21,7 @@ from met import models
 from met.diagnostic import Label
 from met.integrators.integrator import Motion, Slope
 from met.plan import Schedule
+from met.plan.uses import sensor_parts
 from met.trace import Real
 
 T = TypeVar("T")
@@ -141,7 +142,7 @@ def check_circuits(
         own, label = f"{path}.sensor.{sensor.of}", f"sensor `{sensor.of}` of servo `{use.definition}`"
         values = {
             p.name: scope.parameters[f"{own}.{p.name}"].value
-            for p in models.sensor_parts(sensor, "parameters")
+            for p in sensor_parts(sensor, "parameters")
             if f"{own}.{p.name}" in scope.parameters
         }
         check_sensor(scope, label, models.find("sensor", sensor.model), values, schedule, integrator, dynamics, own)

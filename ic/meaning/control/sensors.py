@@ -14,6 +14,7 @@ from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import did_you_mean
 from met.plan import SensorUse, ServoUse
+from met.plan.uses import quantities
 
 USAGE = "write `sensor QUANTITY = MODEL { ... }`"
 
@@ -41,7 +42,7 @@ def use_sensor(scope: Scope, servo: Owner, use: ServoUse, item: Item) -> SensorU
             help="leave the sensor out",
         )
         return None
-    known = models.quantities(use)
+    known = quantities(use)
     if item.name not in known:
         scope.complaints.error(
             "D245",

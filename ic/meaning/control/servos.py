@@ -31,13 +31,14 @@ from ic.meaning.parameters.owner import Owner, Settled
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from ic.text.files import library_defines
-from met import models, units
+from met import models
 from met.diagnostic import Label, Place, Problem, did_you_mean, error, meant
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Command, SensorUse, ServoUse
 from met.plan.channel import COMMAND_UNIT
 from met.trace import Scalar, where
+from met.unit_parser import parse_unit
 
 SLOWEST, FASTEST = 1e-3, 1e9
 APART, DIGITS = 1e-9, 1e-5
@@ -338,7 +339,7 @@ def differ_beyond_rounding(a: Any, b: Any) -> Any:
 
 def unit_written(found: Iterable[Settled], wanted: str) -> tuple[str, float]:
     """The unit that the deck wrote first of the dimension of `wanted`, and its size; `wanted`, in SI, where none is."""
-    dimension = units.parse_unit(wanted).dimension
+    dimension = parse_unit(wanted).dimension
     for each in found:
         written = each.expression.unit if isinstance(each.expression, (Number, WithUnit)) else None
         if written is not None and measure_of(written).dimension == dimension:

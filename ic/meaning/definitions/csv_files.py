@@ -25,6 +25,7 @@ from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.messages.other_units import suggest
+from met.unit_parser import parse_unit
 from met.units import PURE, Dimension, Measure
 
 LONGEST_NAME = 40  # characters of a column's name that a message shows
@@ -261,10 +262,10 @@ def _meaning(column: CsvColumn, remedy: str, also: Iterable[Label], dimension: D
     """The measure of a column's unit. remedy: where no unit like it is known; dimension: the one that is needed."""
     assert column.unit is not None
     try:
-        return units.parse_unit(column.unit)
+        return parse_unit(column.unit)
     except (ValueError, OverflowError, ZeroDivisionError):
         near = suggest(column.unit)
-        if near is not None and (dimension is None or units.same(units.parse_unit(near).dimension, dimension)):
+        if near is not None and (dimension is None or units.same(parse_unit(near).dimension, dimension)):
             remedy = f"did you mean `{column.name} [{near}]`?"
         known = remedy or f"the units: {', '.join(units.UNITS)}"
         raise Problem(error("D193", f"`{column.unit}` is not a unit", column.place, also=also, help=known)) from None

@@ -11,10 +11,11 @@ from ic.meaning.expressions.quantity import Value, measure_of
 from met import units
 from met.frozen import frozen
 from met.trace import Scalar
+from met.unit_parser import parse_unit
 from met.units import Dimension, Measure
 
 _RATE = Dimension(s=-1)
-_FLUX = units.parse_unit("V*s").dimension  # of a motor's constant: V*s/rad and N*m/A are one thing
+_FLUX = parse_unit("V*s").dimension  # of a motor's constant: V*s/rad and N*m/A are one thing
 
 
 @frozen

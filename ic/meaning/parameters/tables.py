@@ -20,6 +20,7 @@ from met.diagnostic import Label, Problem, did_you_mean, error
 from met.environments.environment import FILE, Environment
 from met.parameter import Parameter
 from met.plan import Origin
+from met.unit_parser import parse_unit
 
 TIME = "time"
 
@@ -105,7 +106,7 @@ def keep_column(
 def _alike(scope: Scope, owner: Owner, column: CsvColumn, by_column: Mapping[str, Parameter]) -> list[str]:
     """The columns that this one could be by its unit; all of them where it has none, or one that cannot be read."""
     try:
-        meant = units.parse_unit(column.unit or "").dimension
+        meant = parse_unit(column.unit or "").dimension
     except (ValueError, OverflowError, ZeroDivisionError):
         return list(by_column)
     return [name for name, wanted in by_column.items() if units.same(owner.unit(wanted)[1], meant)]

@@ -29,6 +29,7 @@ def experiment(
         notes,
         tolerances=resolved.tolerances,
         allowances=allowances,
+        step_errors=resolved.step_errors,
         **resolved.settings,
     )
 

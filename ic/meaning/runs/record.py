@@ -1,14 +1,12 @@
-"""The outputs of a run: recorded channels, metrics, and requirements on metrics."""
+"""The outputs of a run: recorded channels, and metrics."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import Literal
 
 from ic.grammar.places import place_of
-from ic.grammar.spell import spell
-from ic.grammar.syntax import Binary, Expression, List, Name, Statement
+from ic.grammar.syntax import Expression, List, Name
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
 from ic.meaning.parameters.not_sweepable import NotSweepable
@@ -17,17 +15,11 @@ from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import Label, Place, did_you_mean, nearest
-from met.frozen import frozen
-from met.parameter import Parameter
-from met.plan import MetricUse, Recorded, Requirement, Structure
+from met.plan import MetricUse, Recorded, Structure
 from met.plan.channel import FAMILIES, Channel, carries, channels, recordable
-from met.plan.outputs import metric_units
-from met.trace import Scalar
 
 OF_SERVO = frozenset({"servo", "bed", "law"})
 """Heads of channels that a joint has only with a servo, or with its motor on a bed."""
-
-FLIPPED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
 
 # Record
@@ -243,100 +235,3 @@ def _not_one(name: Name, structure: Structure) -> tuple[str, list[str]]:
     numbers = [f"`{path}`" for variable in known[name.text] for path in variable.channels]
     count = f"{len(numbers)} channel{'s' * (len(numbers) != 1)}"
     return f"`{name.text}` is {count}", [known_words("a metric watches one of them", numbers)]
-
-
-# Requirements
-
-
-@frozen
-class WrittenRequirement:
-    """A `require` with its metric on the left."""
-
-    statement: Statement
-    metric: str
-    operator: Literal["<", "<=", ">", ">="]
-    limit: Expression
-
-
-def read_requirements(scope: Scope, block: MergedBlock) -> list[WrittenRequirement]:
-    """Every `require` that compares a metric of the run with a limit; reports the others."""
-    written = {item.name for item in block.of_kind("metric")}
-    found = []
-    for position, statement in enumerate(block.statements):
-        if [word.text for word in statement.words] != ["require"]:
-            continue
-        comparison = statement.value
-        if not isinstance(comparison, Binary) or comparison.operator not in FLIPPED:
-            scope.complaints.error(
-                "D131",
-                "a requirement compares a metric with a limit",
-                place_of(comparison),
-                help="write `require METRIC < LIMIT;`, or <=, >, >=",
-            )
-            continue
-        removed = {
-            each.key.removeprefix("metric ")
-            for each in block.removed
-            if each.key.startswith("metric ") and position < each.before
-        }
-        operator, metric, limit = comparison.operator, comparison.left, comparison.right
-        if not _is_metric(metric, written | removed) and _is_metric(limit, written | removed):
-            operator, metric, limit = FLIPPED[operator], limit, metric
-        if not _is_metric(metric, written | removed):
-            name = spell(metric)
-            watch = []
-            if isinstance(metric, Name) and len(metric.path) > 1:
-                watch = [f"a metric of a channel is `metric NAME = max {{ of = {name}; }}`, and `require NAME < ...;`"]
-            scope.complaints.error(
-                "D132",
-                f"no metric `{name}`",
-                place_of(metric),
-                help=[*did_you_mean(name, written), known_words("metrics of this run", sorted(written)), *watch],
-            )
-        elif spell(metric) in removed:
-            scope.notes.append(
-                f"`require {spell(comparison)}` went with the metric `{spell(metric)}`, which is removed"
-            )
-        else:
-            found.append(WrittenRequirement(statement, spell(metric), operator, limit))  # type: ignore[arg-type]
-    return found
-
-
-def _is_metric(expression: Expression, metrics: set[str]) -> bool:
-    return isinstance(expression, Name) and expression.text in metrics
-
-
-def share_metrics(structure: Structure) -> set[str]:
-    """The metrics that are a share of something, such as an overshoot."""
-    return {use.name for use in structure.metrics if models.find("metric", use.model, use.place).share}
-
-
-def resolve_requirements(scope: Scope, read: list[WrittenRequirement], structure: Structure) -> tuple[Requirement, ...]:
-    """The requirements with their limits in SI."""
-    metrics = metric_units(structure)
-    shares = share_metrics(structure)
-    found = []
-    for each in read:
-        if each.metric not in metrics:
-            continue  # the metric failed (already reported)
-        owner = Owner("", each.statement.place, "require", called=f"the limit on `{each.metric}`")
-        wanted = Parameter(name="limit", unit=metrics[each.metric], doc="limit", share=each.metric in shares)
-        number = _limit(scope, owner, wanted, each.limit)
-        if number is not None:
-            text = spell(each.statement.value)
-            found.append(Requirement(text, each.metric, each.operator, number, each.statement.place))
-    return tuple(found)
-
-
-def _limit(scope: Scope, owner: Owner, wanted: Parameter, expression: Expression) -> float | None:
-    item = Item("", "limit", (), expression, None, place_of(expression))
-    number = scope.number(owner, wanted, item, record=False)
-    if isinstance(number, Scalar):
-        scope.complaints.error(
-            "D122",
-            "the limit of a requirement varies with the sweep",
-            place_of(expression),
-            help="it is the same for all cases: write a number that stands still",
-        )
-        return None
-    return number

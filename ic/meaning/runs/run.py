@@ -39,13 +39,15 @@ from ic.meaning.runs.environment import resolve_environment
 from ic.meaning.runs.initial import check_balanced, resolve_initial
 from ic.meaning.runs.keys import resolve_run_keys
 from ic.meaning.runs.rates import resolve_rates, resolve_schedule
-from ic.meaning.runs.record import read_requirements, resolve_metrics, resolve_record, resolve_requirements
+from ic.meaning.runs.record import resolve_metrics, resolve_record
+from ic.meaning.runs.requirements import read_requirements, resolve_requirements
+from ic.meaning.runs.step_errors import resolve_step_errors
 from ic.meaning.runs.tolerances import resolve_tolerances
 from ic.text.complaints import known_words, where_it_belongs
 from met import models
 from met.diagnostic import Place, did_you_mean
 from met.frozen import frozen
-from met.plan import Experiment, Requirement, Schedule, ServoUse, Structure, Tolerance
+from met.plan import Experiment, Requirement, Schedule, ServoUse, StepErrorLimit, Structure, Tolerance
 from met.trace import Real
 
 BLOCKS = ("servos", *(block.name for block in (INITIAL, ENVIRONMENT, RATES, TOLERANCES)))
@@ -62,6 +64,7 @@ class Resolved:
 
     structure: Structure
     requirements: tuple[Requirement, ...]
+    step_errors: tuple[StepErrorLimit, ...]
     tolerances: tuple[Tolerance, ...]
     seed: int
     stability: tuple[tuple[str, Real], ...]
@@ -168,10 +171,11 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     check_reach(scope, block, structure)
     scope.keep_setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure)
+    step_errors = resolve_step_errors(scope, block, structure)
     check_requirements(scope, requirements, structure)
     tolerances = resolve_tolerances(scope, body_of(scope, block.get("tolerances")), structure)
     settings = resolve_run_keys(scope, run, block, Experiment)
-    return Resolved(structure, requirements, tolerances, seed, stability, definition.place, settings)
+    return Resolved(structure, requirements, step_errors, tolerances, seed, stability, definition.place, settings)
 
 
 def _check_steps(

@@ -7,7 +7,7 @@ from ic.grammar.spell import spell
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
-from ic.meaning.runs.record import share_metrics
+from ic.meaning.runs.requirements import share_metrics
 from ic.text.complaints import known_words
 from met.diagnostic import did_you_mean
 from met.parameter import Parameter

@@ -20,7 +20,7 @@ from fractions import Fraction
 
 from met.backends.c.functions import HEAD, functions
 from met.frozen import frozen
-from met.trace.graph import OPERANDS, TRUTHS, Node
+from met.trace.nodes import OPERANDS, TRUTHS, Node
 from met.trace.primitives import bits_of
 from met.trace.program import Every, Unless0, WhileAny
 from met.trace.recording import Branch, CodeSection, RecordedControl, Recording, RecordSection, RunSection

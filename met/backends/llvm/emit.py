@@ -16,7 +16,7 @@ from met.backends.llvm.philox import PhiloxWriter
 from met.backends.llvm.pieces import CUT_ABOVE, LONGEST, SHORTEST, Piece, cut
 from met.backends.llvm.pieces import check as check_pieces
 from met.trace import check
-from met.trace.graph import OPERANDS, TRUTHS
+from met.trace.nodes import OPERANDS, TRUTHS
 from met.trace.recording import CodeSection, Recording
 
 _CALLS = {"sqrt": "llvm.sqrt", "floor": "llvm.floor", "rint": "llvm.roundeven", "abs": "llvm.fabs", "fma": "llvm.fma"}

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
-from met.trace.graph import LEAVES, OPERANDS
+from met.trace.nodes import LEAVES, OPERANDS
 from met.trace.recording import CodeSection
 
 # operations above which a section is cut, and the bounds of a piece

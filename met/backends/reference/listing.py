@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from met.trace.graph import show
+from met.trace.nodes import show
 from met.trace.program import Every, WhileAny
 from met.trace.recording import Branch, RecordedControl, Recording, RecordSection
 

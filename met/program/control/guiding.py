@@ -27,10 +27,10 @@ from met.guides.guide import Sight, Stance
 from met.integrators.integrator import Motion
 from met.plan import COMPONENTS, GuideUse
 from met.program import cell_names, cells
-from met.program.control.guided import own, owner
+from met.program.control.setpoints import own, owner
+from met.program.courses import rate_of_rpy, values_and_rates
 from met.program.motion import base, bodies, payloads
 from met.program.motion.base import BaseMotion
-from met.program.motion.courses import rate_of_rpy, values_and_rates
 from met.program.system import ReadCell, System
 from met.program.values import answer, returned
 from met.trace import Real

@@ -25,8 +25,8 @@ from met.dynamics.tree import Tree
 from met.frozen import frozen
 from met.integrators.integrator import Motion
 from met.plan import BASE
+from met.program.courses import TIME
 from met.program.motion.bodies import FreeBody, bodies, flight, place
-from met.program.motion.courses import TIME
 from met.program.system import PARAMETER, ReadCell, System
 from met.trace import Scalar
 from met.trace.program import Tape

@@ -31,7 +31,7 @@ from hw.beds.simulated import config_of
 from hw.build import build, qemu
 from met import cli
 from met.plan import Experiment
-from met.program.control.plant import bed_values, plant_c
+from met.plant import bed_values, plant_c
 
 FIGURE = Path(__file__).parents[3] / "docs" / "figures" / "bed_figures_7_8.png"
 SLOW, SEEDS = 0.03, 20

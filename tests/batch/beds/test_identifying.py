@@ -24,7 +24,7 @@ from met import cli
 from met.diagnostic import Problem
 from met.plan import Experiment, Plan
 from met.plan import file as plan_file
-from met.program.control.plant import Plant, bed_values
+from met.plant import Plant, bed_values
 from tests.hw.conftest import said
 
 pytestmark = pytest.mark.slow

@@ -16,9 +16,10 @@ import pytest
 
 import batch
 import ic
-from hw import conformance, ports
+from hw import conformance, drivers
 from hw.bed import BedDriver
-from hw.ports import Opening, Port
+from hw.beds import PORTS
+from hw.ports import Opening, Port, PortKind
 from met import cli, models
 from met.diagnostic import Problem
 from met.parameter import Memory, Parameter
@@ -124,7 +125,7 @@ def test_help_and_messages_name_the_second_driver(met_bed: Callable[..., tuple[i
     status, said, _ = met_bed("--help")
     assert status == cli.YES
     assert "  flywheel:INERTIA  A flywheel on both motors, in this process, in lock-step.\n" in said
-    assert ports.ports_in_words() == (
+    assert drivers.ports_in_words() == (
         "a serial line, `emulated`, `firmware`, `qemu`, `flywheel:INERTIA`, or a transcript"
     )
     status, _, complained = met_bed("probe", "--port", "flywheel:none")
@@ -137,7 +138,7 @@ class TestFlywheel(conformance.LockStep, conformance.Simulated):
 
     @pytest.fixture
     def bed(self, installed: None) -> Iterator[BedDriver]:
-        kind = ports.kind_of("flywheel:6e-5")
+        kind = drivers.kind_of("flywheel:6e-5")
         with kind.open(Opening(Port("flywheel:6e-5"))) as bed:
             yield bed
 
@@ -145,14 +146,14 @@ class TestFlywheel(conformance.LockStep, conformance.Simulated):
 @pytest.mark.parametrize("name", ["flywheel", "flywheel://host:1", "/dev/ttyUSB0", "socket://host:1", "emulated:x"])
 @pytest.mark.usefixtures("installed")
 def test_a_port_that_is_not_of_a_scheme_is_a_line(name: str) -> None:
-    assert ports.kind_of(name) is ports.own_kinds()[-1]
+    assert drivers.kind_of(name) is PORTS[-1]
 
 
 def test_a_case_goes_on_at_another_line_and_at_no_other_bed() -> None:
-    assert ports.same_bed("/dev/ttyUSB0", "socket://host:1")
-    assert ports.same_bed("firmware", "firmware")
-    assert not ports.same_bed("firmware", "qemu")
-    assert not ports.same_bed("firmware", "/dev/ttyUSB0")
+    assert drivers.same_bed("/dev/ttyUSB0", "socket://host:1")
+    assert drivers.same_bed("firmware", "firmware")
+    assert not drivers.same_bed("firmware", "qemu")
+    assert not drivers.same_bed("firmware", "/dev/ttyUSB0")
 
 
 def offered(monkeypatch: pytest.MonkeyPatch, module: Any, group: str, *objects: Any) -> None:
@@ -164,8 +165,8 @@ def offered(monkeypatch: pytest.MonkeyPatch, module: Any, group: str, *objects: 
     monkeypatch.setattr(module, "offered", lambda asked: points if asked == group else [])
 
 
-def kind_of(**fields: Any) -> ports.PortKind:
-    return ports.PortKind(doc="Mine.", open=lambda opening: None, **fields)  # type: ignore[arg-type, return-value]
+def kind_of(**fields: Any) -> PortKind:
+    return PortKind(doc="Mine.", open=lambda opening: None, **fields)  # type: ignore[arg-type, return-value]
 
 
 @pytest.mark.parametrize(
@@ -179,15 +180,15 @@ def kind_of(**fields: Any) -> ports.PortKind:
 def test_an_entry_point_that_offers_no_driver_is_said(
     objects: tuple[Any, ...], wrong: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    offered(monkeypatch, ports, "met.bed_ports", *objects)
+    offered(monkeypatch, drivers, "met.bed_ports", *objects)
     with pytest.raises(Problem) as caught:
-        ports.kind_of("mine")
+        drivers.kind_of("mine")
     [diagnostic] = caught.value.diagnostics
     assert diagnostic.code == "E215"
     assert diagnostic.message == (
         f"entry point `mine = my_bed:THIS` of my-bed-{len(objects) - 1} in group `met.bed_ports` {wrong}"
     )
-    assert ports.kind_of("/dev/ttyUSB0") is ports.own_kinds()[-1], "nobody else's port is hurt by it"
+    assert drivers.kind_of("/dev/ttyUSB0") is PORTS[-1], "nobody else's port is hurt by it"
 
 
 @pytest.mark.parametrize("bed", BEDS, ids=lambda bed: bed.name)

@@ -31,7 +31,7 @@ from hw.build import build
 from hw.pace import pace
 from met import cli
 from met.plan import Experiment
-from met.program.control.plant import bed_values, plant_c
+from met.plant import bed_values, plant_c
 
 pytestmark = [pytest.mark.alone, pytest.mark.slow]
 

@@ -18,10 +18,11 @@ from distributed import Client, LocalCluster, Reschedule
 
 import batch
 from batch.campaigns.campaign import prepare, values_sections
+from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder, beside
 from batch.campaigns.tasks import CampaignSection, Task
-from batch.executors import Outcome, dask_connection, dask_worker
 from batch.executors import dask as executor
+from batch.executors import dask_connection, dask_worker
 from batch.executors.child import Crew
 from batch.executors.choose import choose
 from batch.executors.dask import Dask

@@ -21,10 +21,12 @@ import ic
 from batch.archive.read import ArchiveFile
 from batch.campaigns import merge, resuming, shard, status, tasks
 from batch.campaigns.campaign import prepare
+from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.replaying import differences
-from batch.executors import Outcome, job, submitting
+from batch.executors import submitting
 from batch.executors.threads import Threads
+from batch.terminal import job
 from met import cli
 from met.diagnostic import Problem
 from met.plan import Plan

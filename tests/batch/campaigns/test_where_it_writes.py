@@ -12,6 +12,7 @@ import pytest
 import batch
 from batch.campaigns import campaign, tasks
 from batch.campaigns.performing import perform
+from batch.executors.threads import Threads
 from met.diagnostic import Problem
 from met.plan import file as plan_file
 from tests.batch import plans
@@ -169,7 +170,7 @@ class TestHowItEnds:
         def meanwhile(*arguments: Any, **options: Any) -> Any:
             monkeypatch.setattr(run, "run", plans.answer)
             with pytest.raises(Problem) as caught:
-                perform(second)
+                perform(second, executor=Threads())
             said.append(caught.value.diagnostics[0].message)
             return plans.answer(*arguments, **options)
 

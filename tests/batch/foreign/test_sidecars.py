@@ -19,7 +19,7 @@ from batch.beds.case_result import check_head
 from batch.beds.executor import OnBeds, Ports
 from batch.campaigns import shard
 from batch.campaigns.folder import Folder
-from batch.executors import job
+from batch.terminal import job
 from hw import records, transcript
 from hw.beds.replay import ReplayBed
 from met.diagnostic import Problem

@@ -15,6 +15,7 @@ from batch.queries.grids import column_levels
 from batch.queries.pool import ENDED, CaseColumn, Pool, pools
 from batch.report.contents import histories, overview, stability
 from batch.report.contents.gathering import gather
+from batch.report.contents.maps import _steps as round_steps
 from batch.report.contents.maps import ruler
 from batch.report.contents.parts import OutcomeCount, Report
 from batch.report.contents.thinning import thin, thin_clock
@@ -174,6 +175,12 @@ class TestMaps:
         assert found is not None
         [map_] = found.maps
         assert map_.counts.shape == (3, 48) and map_.counts.sum() == 300
+
+    @pytest.mark.parametrize("power", range(-6, 6))
+    def test_of_a_stretch_of_exactly_five_steps_are_five_steps(self, power: int) -> None:
+        for low in np.linspace(0.0, 3.0, 61) * 10.0**power:
+            for width in (1.0, 2.0, 5.0):
+                assert 5 <= len(round_steps(low, low + width * 10.0**power)) <= 13
 
     def test_of_many_values_have_round_numbers_where_these_lie(self) -> None:
         steps = ruler(column_levels(np.linspace(0.0, 70.0, 71)))

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from hw.build import CROSS_COMPILER, EMULATOR, build
-from met.program.control.plant import plant_c
+from met.plant import plant_c
 from tests.hw.firmware import wire
 from tests.hw.firmware.line import FREE, STEPPED, Line, behind_a_terminal, under_qemu
 from tests.substitution.hybrid import compiled, deck

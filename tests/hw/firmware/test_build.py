@@ -17,7 +17,8 @@ import pytest
 from hw import build as building
 from hw.bed import Capability
 from hw.build import Config, build, config_c, counted, guard, qemu
-from hw.ports import Port, opened
+from hw.drivers import opened
+from hw.ports import Port
 from met.diagnostic import Problem
 from met.host import cache
 from met.messages.render import render

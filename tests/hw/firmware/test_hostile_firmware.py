@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from hw import build as building
-from hw import ports
+from hw import drivers
 from hw.beds import greeting
 from hw.build import CROSS_COMPILER, Config, build, counted, guard
 from hw.ports import Port
@@ -132,7 +132,7 @@ def test_a_deadman_of_20_ms_is_one_that_the_host_takes(hz: int) -> None:
 def test_a_deck_s_bed_that_firmware_cannot_count_is_said(value: str) -> None:
     experiment = compiled(deck(bed=f"emulated({value})"), "on_bench")
     with pytest.raises(Problem) as caught:
-        ports.opened(Port("firmware"), experiment, "shoulder", 0, 1e-3)
+        drivers.opened(Port("firmware"), experiment, "shoulder", 0, 1e-3)
     assert [each.code for each in caught.value.diagnostics] == ["E404"]
 
 

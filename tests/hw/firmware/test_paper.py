@@ -19,8 +19,8 @@ from hw.bed import Capability, Scales
 from hw.build import Config, build
 from met.backends.llvm import kernel
 from met.plan import Experiment
+from met.plant import Plant, plant_c
 from met.program import build as build_kernel
-from met.program.control.plant import Plant, plant_c
 from met.run import inputs
 from tests.hw.firmware import wire
 from tests.hw.firmware.device import Device

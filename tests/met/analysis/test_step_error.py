@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from met.analysis.step_error import StepError, step_error
+from met.analysis.step_error import StepError, instant_error, step_error
 
 
 def differences(order: float, c: float, h: float, higher: float = 0.0) -> tuple[float, float, float]:
@@ -50,3 +50,18 @@ def test_rounding_has_no_order() -> None:
 def test_what_is_not_finite_has_no_error_that_could_be_met() -> None:
     assert step_error(math.nan, 1.0, 1.0, 2).error == math.inf
     assert step_error(1.0, np.inf, 1.0, 2).error == math.inf
+
+
+def test_an_instant_that_is_seen_at_whole_steps_is_bounded() -> None:
+    """The first step at or after an instant, where the integration errs by c h^2: never off by more than is said."""
+    random = np.random.default_rng(2)
+    for _ in range(500):
+        h, c, true = random.uniform(0.01, 0.1), random.normal(), random.uniform(1.0, 2.0)
+        values = [math.ceil((true + c * (h / n) ** 2) * n / h) * h / n for n in (1, 2, 4)]
+        first, second, both = (abs(values[a] - values[b]) for a, b in ((0, 1), (1, 2), (0, 2)))
+        found = instant_error(first, second, both, h / 4)
+        assert math.isnan(found.order)
+        assert abs(values[0] - true) <= found.error + abs(c) * (h / 4) ** 2
+    assert instant_error(0.0, 0.0, 0.0, 0.01) == StepError(0.01, pytest.approx(math.nan, nan_ok=True), True)
+    assert not instant_error(0.04, 0.08, 0.04, 0.01).clear
+    assert instant_error(math.inf, 0.0, 0.0, 0.01).error == math.inf

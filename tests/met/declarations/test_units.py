@@ -17,7 +17,8 @@ from ic.language.unit_words import units_of
 from met import models
 from met.diagnostic import Diagnostic
 from met.parameter import Parameter
-from met.units import PURE, UNITS, parse_unit, same
+from met.unit_parser import parse_unit
+from met.units import PURE, UNITS, same
 from tests.ic.small_decks import check, experiment, messages
 from tests.met.declarations.values import NUMBERS, holds, inner, paths, several, shaped
 from tests.met.small_models import EVERY, JOINTS, Use, Value, first_uses, smallest

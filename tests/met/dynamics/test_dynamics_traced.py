@@ -18,7 +18,7 @@ from met.dynamics.spatial import constant
 from met.dynamics.tree import Body, Tree
 from met.trace import Formulas, Graph, Real
 from met.trace.fuse import fused
-from met.trace.graph import live
+from met.trace.nodes import live
 from tests.oracles.random_tree import RandomArm, random_tree
 
 SEEDS = range(25)

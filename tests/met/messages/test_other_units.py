@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from met.messages.other_units import remedy, suggest
-from met.units import UNITS, parse_unit
+from met.unit_parser import parse_unit
+from met.units import UNITS
 from tests.oracles.package import Package
 
 pint = Package("pint")

@@ -11,8 +11,8 @@ import pytest
 import ic
 from met.backends.llvm import kernel
 from met.plan import REPEAT, Experiment
+from met.plant import Plant, plant_c
 from met.program import build
-from met.program.control.plant import Plant, plant_c
 from met.run import inputs
 from tests.met.trace.compiled import STRICT, answered, different, made, need
 

@@ -44,7 +44,7 @@ from met.trace import (
     where,
 )
 from met.trace.functions import philox
-from met.trace.graph import evaluate
+from met.trace.nodes import evaluate
 from met.trace.noise import Stream, normal_pair
 from met.trace.program import Every, Phase, Program, RecordPhase, RunPhase, Tape, Unless0, WhileAny
 from met.trace.recorder import record

@@ -12,7 +12,7 @@ import pytest
 from met import trace
 from met.diagnostic import Problem
 from met.trace import Formulas, Graph, cos, sin, where
-from met.trace.graph import TRUE
+from met.trace.nodes import TRUE
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from met.backends.llvm.kernel import from_recording
 from met.backends.llvm.pieces import cut, operations
 from met.backends.reference.plain import execute
 from met.trace import sin, where
-from met.trace.graph import OPERANDS
+from met.trace.nodes import OPERANDS
 from met.trace.program import CallPhase, Every, Phase, Program, RecordPhase, RunPhase, Unless0, WhileAny
 from met.trace.recorder import record
 
@@ -208,7 +208,7 @@ def test_fused_signs_are_right():
         one = program((), end=run(make), outputs=("x",))
         (section,) = record(one).sections
         assert ops(section) == ["fma"]
-        from met.trace.graph import evaluate
+        from met.trace.nodes import evaluate
 
         values = evaluate(section.nodes, section.order, lambda n: {"a": 2.0, "b": 3.0, "c": 4.0}[n[1]], arrays=False)
         ((_, ref),) = section.outputs

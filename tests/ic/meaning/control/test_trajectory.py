@@ -14,7 +14,7 @@ from met import models
 from met import run as engine
 from met.plan import Experiment
 from met.plan import file as plan_file
-from met.units import parse_unit
+from met.unit_parser import parse_unit
 from tests.ic.meaning.control.trajectories import MOVES, servo
 from tests.ic.small_decks import ARM, RUN, changed, check, experiment, messages
 

@@ -1,20 +1,34 @@
-"""The setpoint that a guide gives one of its joints, for the servo that follows it."""
+"""The setpoints that servos follow: of their own commands, or of the guides that command their joints."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from met import models
 from met.parameter import Parameter
 from met.plan import GuideUse
 from met.program import cell_names
+from met.program.system import Actuator, ReadCell, System
 from met.program.values import NamedValues, answer, parameters
 from met.servos.servo import Setpoint
 from met.trace import Real
 
-if TYPE_CHECKING:
-    from met.program.system import ReadCell, System
+
+def setpoint(system: System, actuator: Actuator, read: ReadCell, time: Real) -> Setpoint:
+    """The setpoint of a joint at a time; kind "none" where it has no command."""
+    if actuator.use.command is not None and actuator.use.command.guide:
+        guide = next(use for use in system.structure.guides if use.name == actuator.use.command.guide)
+        return _of_guide(system, actuator.use.joint, actuator.command_kind, guide, read, time)
+    if actuator.profile is None:
+        return Setpoint("none", 0.0, 0.0)
+    p = parameters(
+        f"command `{actuator.profile.name}` of {actuator.owner}",
+        f"{actuator.path}.command",
+        actuator.profile.parameters,
+        lambda path: system.value(path, read),
+    )
+    value, slope = answer(actuator.owner, actuator.profile.course, p, time)
+    return Setpoint(actuator.command_kind, value, slope)
 
 
 def owner(use: GuideUse) -> str:
@@ -33,7 +47,7 @@ def own(system: System, use: GuideUse, read: ReadCell) -> tuple[NamedValues, lis
     return values(f"guides.{use.name}", guide.parameters), joints
 
 
-def setpoint(system: System, joint: str, kind: str, use: GuideUse, read: ReadCell, time: Real) -> Setpoint:
+def _of_guide(system: System, joint: str, kind: str, use: GuideUse, read: ReadCell, time: Real) -> Setpoint:
     """The guide's setpoint of a joint at a time: between its ticks, the rate of the last one and where that leads."""
     guide = models.find("guide", use.model, use.place)
     if guide.course is None:

@@ -18,7 +18,7 @@ from met.program.build import build
 from met.program.control.substituted import Mounted, Substituted
 from met.program.system import PARAMETER, System
 from met.trace import Real
-from met.trace.graph import evaluate
+from met.trace.nodes import evaluate
 from met.trace.program import CallPhase, Phase, Program, Tape, Unless0
 from met.trace.recorder import record
 from met.trace.recording import RunSection

@@ -1,7 +1,7 @@
 """A job of a cluster's queue: its share of a campaign's cases, or the end of it.
 
-    python -m batch.executors.job FOLDER share K TASKS.json     the K-th share, by processes of its own
-    python -m batch.executors.job FOLDER together               the archive, when all shares are done
+    python -m batch.terminal.job FOLDER share K TASKS.json     the K-th share, by processes of its own
+    python -m batch.terminal.job FOLDER together               the archive, when all shares are done
 
 Jobs need nothing of one another but the folder. Each writes down how far it is (`status.K.json`), and what it says goes
 to its log. One that is cancelled, or out of time, leaves its shards; what it had not done is missing, and is submitted
@@ -110,19 +110,23 @@ def _left(wanted: Sequence[Task], there: Sequence[Task]) -> list[tuple[int, int]
 
 def merge_campaign(path: Path) -> int:
     """Merge a campaign whose cases are all done. Exit status 1 where cases failed or are missing."""
-    from batch import look
+    if not Folder(path).exists():
+        return _say_result(path.with_name(path.name.removesuffix(".campaign")))  # somebody else was first
+    campaign = described(Folder(path))
+    perform(campaign, executor=Threads(cores()), together=True, say=say)
+    return _say_result(campaign.output)
+
+
+def _say_result(path: Path) -> int:
+    """Say what an archive holds. Exit status 1 where cases failed, or do not meet what is required."""
+    from batch.archive.read import ArchiveFile
+    from batch.queries.summary import summarise
     from batch.terminal.verdict import short_result_lines
 
-    if not Folder(path).exists():
-        archive = look(path.with_name(path.name.removesuffix(".campaign")))  # somebody else was first
-        say("\n".join(short_result_lines(archive)))
-        return 0 if archive.ok else 1
-    campaign = described(Folder(path))
-    threads = cores()
-    performed = perform(campaign, executor=Threads(threads), together=True, say=say)
-    archive = look(campaign.output, performed.notes)
-    say("\n".join(short_result_lines(archive)))
-    return 0 if archive.ok else 1
+    with ArchiveFile(path) as file:
+        summaries = summarise(file)
+    say("\n".join(short_result_lines(path, summaries)))
+    return 0 if all(summary.ok for summary in summaries) else 1
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -1,0 +1,41 @@
+"""Requirements on errors by the step, as an archive keeps them: JSON in the attribute `step_errors` of an experiment's
+group, where its deck has any."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+
+from batch.archive.stored import StoredGroup, Unlike
+from met.host.files import parse_json
+from met.plan import StepErrorLimit
+
+ATTRIBUTE = "step_errors"
+
+FIELDS = {"text": str, "metric": str, "comparison": str, "limit": float, "share": bool}
+"""What is kept of each, and its type."""
+
+
+def written(limits: Iterable[StepErrorLimit], names: Mapping[str, str]) -> str:
+    """The attribute's value. names: of the metrics' variables, by the metrics' own."""
+    plain = [{name: getattr(each, name) for name in FIELDS} | {"metric": names[each.metric]} for each in limits]
+    return json.dumps(plain, sort_keys=True, separators=(",", ":"))
+
+
+def read(group: StoredGroup) -> tuple[StepErrorLimit, ...]:
+    """The requirements of a group; their metrics are names of variables. Raises Unlike."""
+    text = group.attributes.get(ATTRIBUTE, "[]")
+    try:
+        plain = parse_json(text) if isinstance(text, str) else None
+    except ValueError:
+        plain = None
+    if not isinstance(plain, list):
+        raise Unlike(f"attribute `{ATTRIBUTE}` is no list of requirements")
+    metrics = {variable.name for variable in group.role("metric")}
+    out = []
+    for each in plain:
+        good = isinstance(each, dict) and all(type(each.get(name)) is kind for name, kind in FIELDS.items())
+        if not good or each["metric"] not in metrics or each["comparison"] not in ("<", "<=") or not each["limit"] > 0:
+            raise Unlike(f"attribute `{ATTRIBUTE}` is no list of requirements")
+        out.append(StepErrorLimit(**{name: each[name] for name in FIELDS}))
+    return tuple(out)

@@ -1,0 +1,59 @@
+"""What of an archive is looked at before it is believed: a variable as it lies in the file, and a group of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from met.frozen import frozen
+
+
+class Unlike(ValueError):
+    """An archive lacks something that all archives have: what."""
+
+
+@frozen
+class Stored:
+    """One variable as it lies in the file."""
+
+    name: str
+    dims: tuple[str, ...]
+    role: str
+    unit: str
+    units_by_joint: tuple[str, ...]
+    long_name: str
+    attributes: dict[str, Any]
+
+    @property
+    def path(self) -> str:
+        """A coordinate's path in the deck, which is its name unless that was taken."""
+        return str(self.attributes.get("path", self.name))
+
+    @property
+    def of_joints(self) -> bool:
+        """True if a signal's third dimension holds joints."""
+        return any(dim == "joint" or dim.startswith("joint_of_") for dim in self.dims[2:3])
+
+
+class StoredGroup(Protocol):
+    """One experiment's group of an archive, as far as it is checked: `batch.archive.read.ArchiveGroup` is one."""
+
+    attributes: dict[str, Any]
+
+    @property
+    def variables(self) -> Mapping[str, Stored]:
+        """All variables, in the file's order."""
+
+    def role(self, role: str) -> tuple[Stored, ...]:
+        """The variables that are for this: `coordinate`, `metric`, `signal` ..."""
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        """Sizes of a variable along its dimensions."""
+
+    def type(self, name: str) -> str:
+        """A variable's type, as numpy writes it: `<f8`; `|O` of strings."""
+
+    def values(self, name: str) -> np.ndarray:
+        """All of a variable; strings as an array of str."""

@@ -1,0 +1,56 @@
+"""Runs chosen cases again with shorter steps of the dynamics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from batch.archive.verified import Verified
+from met import models
+from met import run as engine
+from met.analysis.refinement import refine
+from met.plan import Experiment
+from met.plan.channel import channels
+
+FACTORS = (2, 4)
+"""Steps in the place of one: so a case that is verified takes 2 + 4 times its steps besides."""
+
+
+def verify(experiment: Experiment, rows: np.ndarray, names: dict[str, str], threads: int | None = None) -> Verified:
+    """Run these rows of the case table at half and a quarter of the step; servos, sensors, beds and noise tick as they
+    did.
+
+    names  of the metrics' variables in the archive, by the metrics' own
+    """
+    structure = experiment.structure
+    metrics = {factor: _metrics(refine(experiment, factor), rows, threads) for factor in FACTORS}
+    half, quarter = (np.stack([metrics[factor][name] for name in names], axis=1) for factor in FACTORS)
+    return Verified(
+        cases=experiment.cases.table[rows],
+        metrics=tuple(names.values()),
+        half=half,
+        quarter=quarter,
+        instant=np.array([_instant(experiment, name) for name in names]),
+        order=models.find("integrator", structure.integrator).order,
+        step=structure.schedule.step,
+    )
+
+
+def _metrics(refined: Experiment, rows: np.ndarray, threads: int | None) -> dict[str, np.ndarray]:
+    """The metrics of these rows. Nothing is recorded, so that the program is as small as it can be."""
+    bare = replace(refined, structure=replace(refined.structure, record=()))
+    return engine.run(bare, rows, threads=threads, record=False).metrics
+
+
+def _instant(experiment: Experiment, name: str) -> float:
+    """A quarter of the step, s, where a metric is an instant that is seen at whole steps; else 0.
+
+    One of what a servo's computer holds is seen at its ticks, which stay as they are.
+    """
+    structure = experiment.structure
+    use = next(each for each in structure.metrics if each.name == name)
+    schedule = structure.schedule
+    seen_at_steps = channels(structure, [use.of])[use.of].divisor == schedule.dynamics
+    of_time = models.find("metric", use.model, use.place).unit == "s"
+    return schedule.step / FACTORS[-1] if of_time and seen_at_steps else 0.0

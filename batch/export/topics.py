@@ -1,0 +1,35 @@
+"""The topics of an MCAP file, the fields of their messages, and the frame under all others: what they are called."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+from batch.export import wire
+from batch.export.picking import ExportedCase, SignalColumn
+from batch.export.poses import PosedArm
+
+
+def root(arms: Sequence[PosedArm]) -> str:
+    """The frame that nothing moves: the first of these names that is no link's."""
+    taken = {arm.prefix + name for arm in arms for name in arm.poses}
+    names = itertools.chain(("world", "base", "ground"), (f"world_{number}" for number in itertools.count(2)))
+    return next(name for name in names if name not in taken)
+
+
+def topic(arm: PosedArm, name: str) -> str:
+    """The topic of a signal, in which dots would be taken for fields: `/case7/elbow/servo/voltage`."""
+    return f"/{arm.prefix}{name.replace('.', '/')}"
+
+
+def fields(columns: Sequence[SignalColumn]) -> tuple[wire.MessageField, ...]:
+    """The fields of a signal's messages: joints, components, or `value`."""
+    return wire.tree([column.parts or ("value",) for column in columns])
+
+
+def signals(case: ExportedCase) -> dict[str, list[SignalColumn]]:
+    """The columns of a case, by signal."""
+    out: dict[str, list[SignalColumn]] = {}
+    for column in case.columns:
+        out.setdefault(column.variable, []).append(column)
+    return out

@@ -1,0 +1,188 @@
+"""What the cases of an archive show of each requirement: rows of the table that a review asks for.
+
+A requirement of every case is met where all cases meet it. One of a share of cases is judged at each design point, the
+cases that share all that was chosen: with a confidence by an exact bound on the share of all cases that may be drawn
+there, else by the share of the cases that were run. A case that failed, or whose metric has no value, misses it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+
+from batch.archive.read import ArchiveGroup, Stored
+from batch.queries import requirements
+from batch.queries.requirements import GroupRequirement
+from batch.queries.signals import deck_unit, number_text
+from met.frozen import frozen
+from met.statistics import confidence as bounds
+from met.statistics.design_points import design_points
+
+Verdict = Literal["met", "missed", "demonstrated", "not shown", "refuted"]
+"""`met` and `missed` are of the cases that were run; the others are of all cases that may be drawn."""
+
+NOTHING_DRAWN = "no case was drawn at random: without a confidence"
+SOME_OF_THE_TABLE = "only some cases of the table were run: without a confidence"
+
+
+@frozen(kw_only=True)
+class EvidenceRow:
+    """What the cases of one design point show of one requirement.
+
+    requirement  with its limit in SI;  unit, scale: in which its deck writes the metric, shown = SI / scale
+    chosen       what was chosen at the design point: path -> text with its unit; empty where nothing was
+    cases        of the design point;  missed: of these, with those that failed or have no value
+    lower, upper bounds on the share of all cases that meet it, each with the confidence; None without one
+    bound        of the percentile, on the side of the limit, with the confidence, SI; None where there is none
+    worst        position in the group of the case that is nearest to the limit or furthest beyond it;  value: its, SI
+    margin       from the worst value to the limit, SI, negative where it is beyond
+    sigmas       from the mean of the values to the limit, in standard deviations of these; None where they are equal
+    verdict      what follows;  more: cases still needed to demonstrate it if none of these misses it, else 0
+    why          it was not judged as it asks for; "" where it was
+    """
+
+    requirement: GroupRequirement
+    unit: str
+    scale: float
+    chosen: dict[str, str]
+    cases: int
+    missed: int
+    worst: int
+    value: float
+    margin: float
+    sigmas: float | None
+    verdict: Verdict
+    lower: float | None = None
+    upper: float | None = None
+    bound: float | None = None
+    more: int = 0
+    why: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """True if the requirement is met, or demonstrated where it asks for a confidence."""
+        return self.verdict in ("met", "demonstrated")
+
+
+def evidence(group: ArchiveGroup) -> list[EvidenceRow]:
+    """The rows of every requirement of an experiment at each of its design points."""
+    found = requirements.group_requirements(group)
+    if not found:
+        return []
+    outcomes = requirements.outcomes(group)
+    everything = DesignPoint({}, np.arange(group.count))
+    points, why = _design_points(group) if any(each.share is not None for each in found) else ([everything], "")
+    out = []
+    for each in found:
+        values = group.values(each.metric)
+        scale, unit = deck_unit(group.variables[each.metric])
+        for point in points if each.share is not None else [everything]:
+            judged = _judged(each, values[point.cases], outcomes[point.cases, each.place], why)
+            worst = int(point.cases[judged.pop("worst")])
+            out.append(
+                EvidenceRow(requirement=each, unit=unit, scale=scale, chosen=point.chosen, worst=worst, **judged)
+            )
+    return out
+
+
+def over_cases(group: ArchiveGroup) -> list[EvidenceRow]:
+    """The rows of requirements over a share of cases; none, and nothing read, where there is no such requirement."""
+    asked = any(each.share is not None for each in requirements.group_requirements(group))
+    return [row for row in evidence(group) if row.requirement.share is not None] if asked else []
+
+
+@frozen
+class DesignPoint:
+    """What was chosen, path -> text with its unit, and the positions of the cases that share it."""
+
+    chosen: dict[str, str]
+    cases: np.ndarray
+
+
+def _design_points(group: ArchiveGroup) -> tuple[list[DesignPoint], str]:
+    """The design points of a group, and why no confidence can be had from them; "" where one can.
+
+    Where nothing was drawn there is one design point of all cases.
+    """
+    everything = [DesignPoint({}, np.arange(group.count))]
+    coordinates = group.role("coordinate")
+    drawn = [variable for variable in coordinates if variable.attributes.get("design")]
+    if not drawn and not int(group.values("repeat").max(initial=0)):
+        return everything, NOTHING_DRAWN
+    why = SOME_OF_THE_TABLE if group.count < int(group.attributes.get("cases_in_table", group.count)) else ""
+    chosen = [(variable, group.values(variable.name)) for variable in coordinates if variable not in drawn]
+    if not chosen:
+        return everything, why
+    points = design_points([values for _, values in chosen], group.count)
+    cases = np.split(np.argsort(points, kind="stable"), np.cumsum(np.bincount(points))[:-1])
+    return [DesignPoint({v.path: _shown(v, values[here[0]]) for v, values in chosen}, here) for here in cases], why
+
+
+def _shown(variable: Stored, value: float) -> str:
+    scale, unit = deck_unit(variable)
+    return f"{number_text(value / scale)} {unit}".removesuffix(" 1")
+
+
+def _judged(each: GroupRequirement, values: np.ndarray, outcomes: np.ndarray, why: str) -> dict[str, Any]:
+    """What the cases of a design point show, by the fields of `EvidenceRow`; `worst` is a place among these cases.
+
+    values  of the metric, SI;  outcomes: 1 met, 0 missed, -1 unknown;  why: no confidence can be had, "" where one can
+    """
+    cases, missed, unknown = len(values), int((outcomes != 1).sum()), outcomes == -1
+    worst = int(np.where(unknown, np.inf, requirements.beyond(values, each.comparison, each.limit)).argmax())
+    sign = 1.0 if each.comparison.startswith("<") else -1.0
+    finite = values[np.isfinite(values)]
+    deviation = float(finite.std(ddof=1)) if len(finite) > 1 else 0.0
+    found: dict[str, Any] = {
+        "cases": cases,
+        "missed": missed,
+        "worst": worst,
+        "value": float(values[worst]),
+        "margin": sign * (each.limit - float(values[worst])),
+        "sigmas": sign * (each.limit - float(finite.mean())) / deviation if deviation > 0.0 else None,
+    }
+    if each.share is None or each.confidence is None or why:
+        share = 1.0 if each.share is None or each.confidence is not None else each.share
+        verdict = "met" if cases - missed >= share * cases else "missed"
+        return {**found, "verdict": verdict, "why": why if each.confidence is not None else ""}
+    verdict = bounds.verdict(cases, missed, each.share, each.confidence)
+    return {
+        **found,
+        "lower": bounds.lower_bound(cases, missed, each.confidence),
+        "upper": bounds.upper_bound(cases, missed, each.confidence),
+        "bound": _percentile_bound(each, values, unknown),
+        "verdict": verdict,
+        "more": bounds.cases_needed(each.share, each.confidence, missed) - cases if verdict == "not shown" else 0,
+    }
+
+
+def _percentile_bound(each: GroupRequirement, values: np.ndarray, unknown: np.ndarray) -> float | None:
+    """The order statistic that bounds the percentile; None where there are too few cases, or it lies among those that
+    have no value."""
+    assert each.share is not None and each.confidence is not None
+    rank = bounds.percentile_rank(len(values), each.share, each.confidence)
+    if not rank:
+        return None
+    below = each.comparison.startswith("<")
+    known = np.where(unknown, np.inf if below else -np.inf, values)
+    found = float(np.sort(known)[rank - 1 if below else len(values) - rank])
+    return found if np.isfinite(found) else None
+
+
+def percent_below(share: float) -> str:
+    """A share in percent, rounded down, with two digits at least of what is missing from all: `99.9962 %`."""
+    return _percent(share, math.floor)
+
+
+def percent_above(share: float) -> str:
+    """A share in percent, rounded up."""
+    return _percent(share, math.ceil)
+
+
+def _percent(share: float, rounded: Callable[[float], int]) -> str:
+    rest = 100.0 * (1.0 - share)
+    digits = 2 if rest <= 0.0 else min(10, max(2, 1 - math.floor(math.log10(rest))))
+    return f"{rounded(100.0 * share * 10**digits) / 10**digits:.{digits}f} %"

@@ -1,0 +1,171 @@
+"""Errors by the step, from a metric's values at the step, half and a quarter of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from met.analysis.step_error import StepError, instant_error, step_error
+from met.frozen import frozen
+
+if TYPE_CHECKING:
+    from batch.archive.read import ArchiveGroup
+    from batch.archive.verified import Verified
+
+
+@frozen
+class CaseError:
+    """The error of a metric in a case; None where it cannot be known, and why.
+
+    case   position in the case table;  value, half, quarter: the metric at the step and these shares of it, SI
+    """
+
+    case: int
+    value: float
+    half: float
+    quarter: float
+    error: StepError | None
+    why: str = ""
+
+
+@frozen
+class MetricError:
+    """The error of a metric by the step over a campaign: the largest of its verified cases.
+
+    error    SI; not a number where it is known of none;  case: of which it is, position in the case table
+    order    observed there, not a number where none is;  clear: whether all have the order that they should
+    unknown  cases of which it is not known;  why: of the first of them
+    cases    each of the verified ones
+    """
+
+    error: float
+    case: int
+    order: float
+    clear: bool
+    unknown: int
+    why: str
+    cases: tuple[CaseError, ...]
+
+
+@frozen
+class Verification:
+    """How true an experiment's numbers are. cases: verified ones; order: the integrator's; step: s; metrics: by the
+    names of their variables."""
+
+    cases: int
+    order: int
+    step: float
+    metrics: Mapping[str, MetricError]
+
+
+def figures(group: ArchiveGroup, position: int | None = None) -> Verification | None:
+    """How true the numbers of an archive's experiment are, or of its case at this position; None where it was not
+    verified."""
+    found = group.verified
+    if found is None:
+        return None
+    cases = group.values("case")
+    places = np.searchsorted(cases, found.cases)
+    rows = range(len(places)) if position is None else np.flatnonzero(places == position).tolist()
+    if not rows:
+        return None
+    own = {name: group.at(name, places) for name in found.metrics}
+    return Verification(
+        len(rows),
+        found.order,
+        found.step,
+        {name: _of_metric(found, column, own[name], list(rows)) for column, name in enumerate(found.metrics)},
+    )
+
+
+def _of_metric(found: Verified, column: int, own: np.ndarray, rows: list[int]) -> MetricError:
+    half, quarter = found.half[:, column], found.quarter[:, column]
+    instant = float(found.instant[column])
+    each = tuple(
+        case_error(int(found.cases[n]), (float(own[n]), float(half[n]), float(quarter[n])), found.order, instant)
+        for n in rows
+    )
+    known = [(one.error, one.case) for one in each if one.error is not None]
+    lost = [one for one in each if one.error is None]
+    if not known:
+        return MetricError(math.nan, -1, math.nan, True, len(lost), lost[0].why, each)
+    worst, case = max(known, key=lambda pair: pair[0].error)
+    clear = all(error.clear for error, _ in known)
+    return MetricError(worst.error, case, worst.order, clear, len(lost), lost[0].why if lost else "", each)
+
+
+def case_error(case: int, values: tuple[float, float, float], order: int, instant: float) -> CaseError:
+    """The error of a metric in a case, from its values at the step, half and a quarter of it, SI.
+
+    order    of the integrator;  instant: s, a quarter of the step where the metric is an instant seen at whole steps
+    """
+    own, half, quarter = values
+    names = ("at the step", "at half the step", "at a quarter of the step")
+    for value, name in zip(values, names, strict=True):
+        if math.isnan(value):
+            return CaseError(case, own, half, quarter, None, f"no value {name}")
+    if math.isinf(own) and own == half == quarter:
+        return CaseError(case, own, half, quarter, None, "infinite at every step")
+    for value, name in zip(values, names, strict=True):
+        if math.isinf(value):
+            return CaseError(case, own, half, quarter, None, f"infinite {name}, and not at another")
+    first, second = abs(own - half), abs(half - quarter)
+    if instant:
+        return CaseError(case, own, half, quarter, instant_error(first, second, abs(own - quarter), instant))
+    return CaseError(case, own, half, quarter, step_error(first, second, abs(own), order))
+
+
+def together(found: Iterable[Verification | None]) -> Verification | None:
+    """The figures of several structures as those of one experiment: of each metric that of its worst case."""
+    those = [each for each in found if each is not None]
+    if len(those) < 2:
+        return those[0] if those else None
+    metrics: dict[str, MetricError] = {}
+    for one in those:
+        for name, each in one.metrics.items():
+            metrics[name] = _worse(metrics[name], each) if name in metrics else each
+    first = those[0]
+    return Verification(sum(one.cases for one in those), first.order, first.step, metrics)
+
+
+def _worse(one: MetricError, other: MetricError) -> MetricError:
+    worst = other if math.isnan(one.error) or other.error > one.error else one
+    return replace(
+        worst,
+        clear=one.clear and other.clear,
+        unknown=one.unknown + other.unknown,
+        why=one.why or other.why,
+        cases=one.cases + other.cases,
+    )
+
+
+def of_difference(a: Verification | None, b: Verification | None) -> dict[str, float]:
+    """The errors by the step of differences between two archives' metrics, SI: the sum of those that are known."""
+    known: dict[str, float] = {}
+    for found in (a, b):
+        for name, each in found.metrics.items() if found is not None else ():
+            if math.isfinite(each.error):
+                known[name] = known.get(name, 0.0) + each.error
+    return known
+
+
+def as_json(found: Verification | None) -> dict[str, Any] | None:
+    """Plain data of a verification; numbers that are none are not-a-number."""
+    if found is None:
+        return None
+    metrics = {
+        name: {
+            "error": each.error,
+            "case": None if each.case < 0 else each.case,
+            "order": each.order,
+            "clear": each.clear,
+            "unknown": each.unknown,
+            "why": each.why,
+        }
+        for name, each in found.metrics.items()
+    }
+    return {"cases": found.cases, "order": found.order, "step": found.step, "metrics": metrics}

@@ -1,0 +1,72 @@
+"""How requirements on errors by the step, `require step_error(settle) < 1 %;`, are met by verified cases."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from batch.queries.signals import deck_unit
+from batch.queries.step_errors.figures import CaseError, Verification
+from batch.queries.step_errors.words import rounded
+from met.frozen import frozen
+from met.plan import StepErrorLimit
+
+if TYPE_CHECKING:
+    from batch.archive.read import ArchiveGroup
+
+
+@frozen
+class StepErrorVerdict:
+    """Whether all verified cases meet a requirement on an error by the step; None where that is not known.
+
+    said  the worst of them, or why it is not known
+    """
+
+    text: str
+    met: bool | None
+    said: str
+
+    @property
+    def word(self) -> str:
+        """Whether it is met, in a word or two."""
+        return {True: "met", False: "missed", None: "not known"}[self.met]
+
+
+def verdicts(group: ArchiveGroup, found: Verification | None) -> tuple[StepErrorVerdict, ...]:
+    """How an experiment's requirements on errors by the step are met."""
+    return tuple(_verdict(group, each, found) for each in group.step_errors)
+
+
+def _verdict(group: ArchiveGroup, limit: StepErrorLimit, found: Verification | None) -> StepErrorVerdict:
+    if found is None:
+        return StepErrorVerdict(limit.text, None, "nothing is verified: `met run --verify some`")
+    metric = found.metrics.get(limit.metric)
+    cases = [each for each in metric.cases if not _has_none(each)] if metric is not None else []
+    if not cases:
+        return StepErrorVerdict(limit.text, None, "no verified case has a finite value")
+    worst = max(cases, key=lambda each: _size(each, limit.share))
+    size = _size(worst, limit.share)
+    met = size <= limit.limit if limit.comparison == "<=" else size < limit.limit
+    if worst.error is None:
+        said = worst.why
+    elif limit.share:
+        said = f"{rounded(100 * size)} %" if size < math.inf else "an error, and a value of 0"
+    else:
+        scale, unit = deck_unit(group.variables[limit.metric])
+        said = f"{rounded(size / abs(scale))} {unit}".removesuffix(" 1")
+    of = f", the worst of {len(cases):,} verified cases" if len(cases) > 1 else ""
+    return StepErrorVerdict(limit.text, met, f"{said} in case #{worst.case}{of}")
+
+
+def _has_none(case: CaseError) -> bool:
+    """True where nothing can be wrong by the step: no value, or the same infinite one whatever the step."""
+    return math.isnan(case.value) or (math.isinf(case.value) and case.value == case.half == case.quarter)
+
+
+def _size(case: CaseError, share: bool) -> float:
+    """The size of an error: SI, or as a share of the value; infinite where it is not known."""
+    if case.error is None or not math.isfinite(case.error.error):
+        return math.inf
+    if not share or not case.error.error:
+        return case.error.error
+    return case.error.error / abs(case.value) if case.value else math.inf

@@ -1,0 +1,170 @@
+"""What errors by the step mean for a campaign: warnings, each with the case, the metric and the step that would do."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from batch.queries.requirements import GroupRequirement, group_requirements
+from batch.queries.signals import deck_unit, number_text
+from batch.queries.step_errors.figures import CaseError, Verification, figures
+from batch.queries.step_errors.words import rounded
+from ic.printing.columns import count as counted
+from met.diagnostic import Diagnostic, Label, Place
+
+if TYPE_CHECKING:
+    from batch.archive.read import ArchiveGroup
+    from met.plan import Experiment
+
+MATTERS = 0.01
+"""Of a metric's largest value: an error that nothing explains is worth a word above it."""
+
+MOST_HALVINGS = 10
+"""Times a step is halved to make an error small; more is no remedy."""
+
+COMPARISONS = MappingProxyType({"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge})
+
+
+def campaign_warnings(groups: Iterable[ArchiveGroup], experiments: Mapping[str, Experiment]) -> list[Diagnostic]:
+    """The warnings of all experiments of an archive, with the places in the deck; alike ones of structures once."""
+    first: dict[object, Diagnostic] = {}
+    more: dict[object, int] = {}
+    for group in groups:
+        for each in warnings(group, experiments.get(group.name)):
+            key = (each.code, each.at if each.at is not None else each.message)
+            more[key] = more.get(key, -1) + 1
+            first.setdefault(key, each)
+    said = (
+        (each, f"the same of {counted(more[key], 'other structure')}, which `met show` lists" if more[key] else "")
+        for key, each in first.items()
+    )
+    return [replace(each, help=(*each.help, note)) if note else each for each, note in said]
+
+
+def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
+    """What the errors by the step of an archive's experiment call in question. experiment: of the plan, for places."""
+    found = figures(group)
+    if found is None:
+        return []
+    required = group_requirements(group)
+    out = [_undecided(group, found, each, experiment) for each in required if each.metric in found.metrics]
+    of_none = [name for name in found.metrics if all(each.metric != name for each in required)]
+    out += [_unclear(group, found, name, experiment) for name in of_none]
+    return [*_lost(found, experiment), *(each for each in out if each is not None)]
+
+
+def _undecided(
+    group: ArchiveGroup, found: Verification, required: GroupRequirement, experiment: Experiment | None
+) -> Diagnostic | None:
+    """The outcome of a requirement that another step may turn round."""
+    metric = found.metrics[required.metric]
+    those = [(each, turned) for each in metric.cases if (turned := _turned(each, required))]
+    if not those:
+        return None
+    case, turned = max(those, key=lambda pair: _excess(pair[0], required))
+    scale, unit = deck_unit(group.variables[required.metric])
+    unit = "" if unit == "1" else f" {unit}"
+    value = f"{number_text(case.value / scale)}{unit}"
+    if case.error is not None and math.isfinite(case.error.error):
+        said = f"{value} ± {rounded(case.error.error / abs(scale))}{unit} by the step"
+    else:
+        said = f"{value} at the step, {turned}"
+    margin = abs(case.value - required.limit)
+    helps = [_remedy(found, case, margin, f"an error below the {number_text(margin / abs(scale))}{unit} that are left")]
+    if len(those) > 1:
+        helps.append(f"so it is in {len(those):,} of the {found.cases:,} verified cases")
+    place = None if experiment is None else experiment.requirements[required.place].place
+    where = f"`{required.metric}` of case #{case.case} is {said}"
+    return _warning("D310", f"the step decides whether `{required.text}` is met: {where}", place, helps)
+
+
+def _turned(case: CaseError, required: GroupRequirement) -> str:
+    """How a shorter step, or an error as large as it may be, turns the outcome round; "" where none does."""
+    if math.isnan(case.value):
+        return ""
+    meets = COMPARISONS[required.comparison]
+    own = meets(case.value, required.limit)
+    for value, name in ((case.quarter, "a quarter of it"), (case.half, "half of it")):
+        if not math.isnan(value) and meets(value, required.limit) != own:
+            return f"{'infinite' if math.isinf(value) else 'another value'} at {name}"
+    if case.error is not None and case.error.error > abs(case.value - required.limit):
+        return "on either side of the limit"
+    return ""
+
+
+def _excess(case: CaseError, required: GroupRequirement) -> float:
+    """How much larger the error is than the margin."""
+    margin = abs(case.value - required.limit)
+    return math.inf if case.error is None or not margin else case.error.error / margin
+
+
+def _unclear(group: ArchiveGroup, found: Verification, name: str, experiment: Experiment | None) -> Diagnostic | None:
+    """A metric that changes much with the step, and not as the integrator does."""
+    values = group.values(name)
+    size = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+    those = [each for each in found.metrics[name].cases if each.error is not None and not each.error.clear]
+    those = [each for each in those if each.error is not None and MATTERS * size < each.error.error < math.inf]
+    if not those:
+        return None
+    case = max(those, key=lambda each: each.error.error if each.error is not None else 0.0)
+    assert case.error is not None
+    scale, unit = deck_unit(group.variables[name])
+    unit = "" if unit == "1" else f" {unit}"
+    seen = "is unclear" if math.isnan(case.error.order) else f"is {case.error.order:.1f}"
+    message = (
+        f"`{name}` of case #{case.case} is {number_text(case.value / scale)}{unit} ± "
+        f"{rounded(case.error.error / abs(scale))}{unit} by the step; the order of that {seen}, and should be "
+        f"{found.order}"
+    )
+    helps = [_remedy(found, case, MATTERS * size, f"an error below {100 * MATTERS:g} %")]
+    place = None
+    if experiment is not None:
+        path = group.variables[name].path
+        place = next((use.place for use in experiment.structure.metrics if use.name == path), None)
+    return _warning("D311", message, place, helps)
+
+
+def _lost(found: Verification, experiment: Experiment | None) -> list[Diagnostic]:
+    """Cases that have metrics at the step, and none with a shorter one."""
+    metrics = list(found.metrics.values())
+    those = []
+    for row, case in enumerate(metrics[0].cases):
+        of_case = [metric.cases[row] for metric in metrics]
+        if not all(math.isnan(each.value) for each in of_case):
+            halves, quarters = ([getattr(each, share) for each in of_case] for share in ("half", "quarter"))
+            shares = [share for share, values in ((2, halves), (4, quarters)) if all(map(math.isnan, values))]
+            those += [(case.case, shares[0])] if shares else []
+    if not those:
+        return []
+    position, factor = those[0]
+    helps = [f"`rates {{ dynamics = {_rate(found, factor)}; }}` shows why it fails"]
+    if len(those) > 1:
+        helps.append(f"so it is in {len(those):,} of the {found.cases:,} verified cases")
+    share = "half" if factor == 2 else "a quarter"
+    message = f"case #{position} reaches its end at the step of {1e3 * found.step:g} ms, and does not at {share} of it"
+    return [_warning("D312", message, None if experiment is None else experiment.place, helps)]
+
+
+def _remedy(found: Verification, case: CaseError, tolerance: float, wanted: str) -> str:
+    """The rate of the dynamics at which the error would be so small."""
+    if case.error is not None and math.isfinite(case.error.error) and tolerance > 0.0:
+        step = case.error.step_for(found.step, tolerance)
+        halvings = max(1, math.ceil(math.log2(found.step / step))) if step > 0.0 else MOST_HALVINGS + 1
+        if halvings <= MOST_HALVINGS:
+            return f"`rates {{ dynamics = {_rate(found, 2**halvings)}; }}` would do, for {wanted}"
+    return f"no step that can be said would do; `rates {{ dynamics = {_rate(found, 4)}; }}` shows more of it"
+
+
+def _rate(found: Verification, factor: int) -> str:
+    """So many times the rate of the dynamics."""
+    return f"{float(f'{factor / found.step:.12g}'):.12g} Hz"
+
+
+def _warning(code: str, message: str, place: Place | None, helps: list[str]) -> Diagnostic:
+    return Diagnostic(code, message, None if place is None else Label(place), (), tuple(helps), "warning")

@@ -1,0 +1,50 @@
+"""What the cases show of requirements over a share of cases, as lines of the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from batch.queries.evidence import EvidenceRow, percent_above, percent_below
+from batch.queries.signals import number_text
+
+MOST_POINTS = 12
+"""Design points of a requirement that are listed; of more, those that are not met come first."""
+
+
+def evidence_lines(rows: Sequence[EvidenceRow]) -> list[str]:
+    """Lines for each design point: the verdict, what it rests on, and what it would take."""
+    listed = sorted(rows, key=lambda row: row.ok)[:MOST_POINTS]
+    if len(rows) <= MOST_POINTS:
+        listed = list(rows)
+    wide = max((len(row.verdict) for row in listed), default=0)
+    heads = [", ".join(f"{path} = {text}" for path, text in row.chosen.items()) for row in listed]
+    widest = max(map(len, heads), default=0)
+    widest += 2 * (widest > 0)
+    lines = []
+    for head, row in zip(heads, listed, strict=True):
+        first, *more = _grounds(row)
+        lines.append(f"{head:<{widest}}{row.verdict:<{wide}}  {first}")
+        lines += [" " * (widest + wide + 2) + text for text in more]
+    if len(rows) > len(listed):
+        lines.append(f"{len(rows):,} design points in all, at {sum(row.ok for row in rows):,} of which it is met")
+    return lines
+
+
+def _grounds(row: EvidenceRow) -> list[str]:
+    """What a verdict rests on, and what it lacks."""
+    text = f"{row.cases - row.missed:,} of {row.cases:,} cases meet it"
+    if row.why:
+        return [f"{text}; {row.why}"]
+    if row.lower is None or row.upper is None:
+        return [text]
+    if row.verdict == "refuted":
+        return [f"{text}: at most {percent_above(row.upper)} of all do"]
+    lines = [f"{text}: at least {percent_below(row.lower)} of all do"]
+    if row.bound is not None:
+        side = "at most" if row.requirement.comparison.startswith("<") else "at least"
+        value = f"{number_text(row.bound / row.scale)} {row.unit}".removesuffix(" 1")
+        lines[0] += f"; in {100.0 * (row.requirement.share or 0.0):g} % of all it is {side} {value}"
+    if row.more:
+        these = "it does not miss it" if row.more == 1 else "none of these misses it"
+        lines.append(f"{row.more:,} more case{'s' * (row.more != 1)} would show it if {these}")
+    return lines

@@ -1,0 +1,205 @@
+"""The requirements of a run: conditions on its metrics, of every case or of a share of all cases."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from ic.grammar.places import place_of
+from ic.grammar.spell import spell
+from ic.grammar.syntax import Binary, Call, Expression, Name, OverCases, Statement
+from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.step_errors import FLIPPED, is_step_error
+from ic.text.complaints import known_words
+from met import models
+from met.diagnostic import did_you_mean
+from met.frozen import frozen
+from met.parameter import Parameter
+from met.plan import Requirement, Structure
+from met.plan.outputs import metric_units
+from met.trace import Scalar
+
+SHARE = Parameter(name="share", unit="1", doc="the share of all cases", share=True, above=0.0, at_most=1.0)
+CONFIDENCE = Parameter(name="confidence", unit="1", doc="the confidence", share=True, above=0.0, below=1.0)
+PERCENTILE = "percentile"
+"""The function that may stand in a metric's place: `percentile(volts, 99 %) < 40 V` says the same as `volts < 40 V in
+99 % of cases`, and `percentile(volts, 1 %) > 3 V` as `volts > 3 V in 99 % of cases`."""
+
+
+@frozen
+class WrittenRequirement:
+    """A `require` with its metric on the left.
+
+    share       of all cases, as written; None where every case is to meet it
+    percentile  True where the share is that of a percentile: below which so many of the values lie
+    confidence  as written; None where none is
+    """
+
+    statement: Statement
+    metric: str
+    operator: Literal["<", "<=", ">", ">="]
+    limit: Expression
+    share: Expression | None = None
+    percentile: bool = False
+    confidence: Expression | None = None
+
+
+def read_requirements(scope: Scope, block: MergedBlock) -> list[WrittenRequirement]:
+    """Every `require` that compares a metric of the run with a limit; reports the others."""
+    written = {item.name for item in block.of_kind("metric")}
+    found = []
+    for position, statement in enumerate(block.statements):
+        if [word.text for word in statement.words] != ["require"]:
+            continue
+        comparison, share, confidence = _over_cases(statement.value)
+        if not isinstance(comparison, Binary) or comparison.operator not in FLIPPED:
+            scope.complaints.error(
+                "D131",
+                "a requirement compares a metric with a limit",
+                place_of(comparison),
+                help="write `require METRIC < LIMIT;`, or <=, >, >=",
+            )
+            continue
+        if is_step_error(comparison):
+            if share is not None or confidence is not None:
+                message = "an error by the step is of a metric, not of a share of cases"
+                helps = f"write `require {spell(comparison)};`"
+                scope.complaints.error("D350", message, place_of(statement.value), help=helps)
+            continue  # `resolve_step_errors` reads it
+        removed = {
+            each.key.removeprefix("metric ")
+            for each in block.removed
+            if each.key.startswith("metric ") and position < each.before
+        }
+        operator, metric, limit = comparison.operator, comparison.left, comparison.right
+        if _is_percentile(limit) and not _is_percentile(metric):
+            operator, metric, limit = FLIPPED[operator], limit, metric
+        percentile = _is_percentile(metric)
+        if percentile:
+            found_share = _of_percentile(scope, metric, share)
+            if found_share is None:
+                continue
+            metric, share = found_share
+        elif confidence is not None and share is None:
+            scope.complaints.error(
+                "D350",
+                "a confidence without the share of cases that it is of",
+                place_of(statement.value),
+                help=f"write `require {spell(comparison)} in 99 % of cases with {spell(confidence)} confidence;`",
+            )
+            continue
+        if not _is_metric(metric, written | removed) and _is_metric(limit, written | removed):
+            operator, metric, limit = FLIPPED[operator], limit, metric
+        if not _is_metric(metric, written | removed):
+            name = spell(metric)
+            watch = []
+            if isinstance(metric, Name) and len(metric.path) > 1:
+                watch = [f"a metric of a channel is `metric NAME = max {{ of = {name}; }}`, and `require NAME < ...;`"]
+            scope.complaints.error(
+                "D132",
+                f"no metric `{name}`",
+                place_of(metric),
+                help=[*did_you_mean(name, written), known_words("metrics of this run", sorted(written)), *watch],
+            )
+        elif spell(metric) in removed:
+            scope.notes.append(
+                f"`require {spell(comparison)}` went with the metric `{spell(metric)}`, which is removed"
+            )
+        else:
+            found.append(
+                WrittenRequirement(statement, spell(metric), operator, limit, share, percentile, confidence)  # type: ignore[arg-type]
+            )
+    return found
+
+
+def _is_metric(expression: Expression, metrics: set[str]) -> bool:
+    return isinstance(expression, Name) and expression.text in metrics
+
+
+def _over_cases(value: Expression) -> tuple[Expression, Expression | None, Expression | None]:
+    """The comparison of a requirement, and its share and confidence where they are written."""
+    if isinstance(value, OverCases):
+        return value.comparison, value.share, value.confidence
+    return value, None, None
+
+
+def _is_percentile(expression: Expression) -> bool:
+    return isinstance(expression, Call) and expression.name.text == PERCENTILE
+
+
+def _of_percentile(scope: Scope, call: Expression, share: Expression | None) -> tuple[Expression, Expression] | None:
+    """The metric of `percentile(METRIC, SHARE)` and its share; None where it is written otherwise (reported here)."""
+    assert isinstance(call, Call)
+    usage = "write `require percentile(METRIC, 99 %) < LIMIT with 90 % confidence;`"
+    if len(call.positional) != 2 or call.named or call.body is not None:
+        scope.complaints.error("D350", "a percentile is of a metric and a share", place_of(call), help=usage)
+        return None
+    if share is not None:
+        scope.complaints.error("D350", "a percentile has its share in its brackets", place_of(share), help=usage)
+        return None
+    return call.positional[0], call.positional[1]
+
+
+def share_metrics(structure: Structure) -> set[str]:
+    """The metrics that are a share of something, such as an overshoot."""
+    return {use.name for use in structure.metrics if models.find("metric", use.model, use.place).share}
+
+
+def resolve_requirements(scope: Scope, read: list[WrittenRequirement], structure: Structure) -> tuple[Requirement, ...]:
+    """The requirements with their limits in SI."""
+    metrics = metric_units(structure)
+    shares = share_metrics(structure)
+    found = []
+    for each in read:
+        if each.metric not in metrics:
+            continue  # the metric failed (already reported)
+        owner = Owner("", each.statement.place, "require", called=f"the limit on `{each.metric}`")
+        wanted = Parameter(name="limit", unit=metrics[each.metric], doc="limit", share=each.metric in shares)
+        number = _constant(scope, owner, wanted, each.limit)
+        share = confidence = None
+        if each.share is not None:
+            share = _constant(
+                scope,
+                _owner(each, "share"),
+                replace(SHARE, below=1.0, at_most=None) if each.percentile else SHARE,
+                each.share,
+            )
+        if each.confidence is not None:
+            confidence = _constant(scope, _owner(each, "confidence"), CONFIDENCE, each.confidence)
+        if (each.share is not None and share is None) or (each.confidence is not None and confidence is None):
+            continue
+        if share is not None and each.percentile and each.operator.startswith(">"):
+            share = 1.0 - share
+        if share == 1.0 and confidence is not None:
+            scope.complaints.error(
+                "D350",
+                "no number of cases shows that all cases meet a requirement",
+                place_of(each.share) if each.share is not None else each.statement.place,
+                help="write a share below 100 %, or leave the confidence out: then all cases of the run are to meet it",
+            )
+            continue
+        if number is not None:
+            text = spell(each.statement.value)
+            found.append(Requirement(text, each.metric, each.operator, number, each.statement.place, share, confidence))
+    return tuple(found)
+
+
+def _owner(each: WrittenRequirement, what: str) -> Owner:
+    return Owner("", each.statement.place, "require", called=f"the {what} of the requirement on `{each.metric}`")
+
+
+def _constant(scope: Scope, owner: Owner, wanted: Parameter, expression: Expression) -> float | None:
+    """The number of an expression of a requirement, SI; None where it is none or varies (reported)."""
+    item = Item("", wanted.name, (), expression, None, place_of(expression))
+    number = scope.number(owner, wanted, item, record=False)
+    if isinstance(number, Scalar):
+        scope.complaints.error(
+            "D122",
+            f"the {wanted.name} of a requirement varies with the sweep",
+            place_of(expression),
+            help="it is the same for all cases: write a number that stands still",
+        )
+        return None
+    return number

@@ -1,0 +1,104 @@
+"""Requirements with a confidence: whether the cases of a sweep are drawn as a confidence needs it, and how many do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ic.sweeps.axes import Sweep, SweepAxis
+from ic.sweeps.reach import without_effect
+from ic.text.complaints import Complaints
+from met.diagnostic import Label
+from met.plan import SEED, Experiment, Requirement
+from met.statistics.confidence import cases_needed
+from met.statistics.design_points import design_points
+
+OF_CASES = "cases for a confidence: "
+"""How the notes on the number of cases begin."""
+
+
+def check_confidences(complaints: Complaints, sweep: Sweep, experiment: Experiment) -> tuple[str, ...]:
+    """Notes on how many cases each requirement with a confidence needs; reports those that no case could show.
+
+    A confidence needs cases of which each is drawn at random, without regard to the others. A sweep that draws nothing
+    has no share of cases: there each case is judged by itself.
+    """
+    wanted = [requirement for requirement in experiment.requirements if requirement.confidence is not None]
+    drawn = [axis for axis in sweep.axes if axis.design]
+    if not wanted or (not drawn and sweep.repeated is None):
+        return ()
+    before = complaints.error_count
+    for requirement in wanted:
+        with complaints.gather():
+            _check_draws(complaints, sweep, experiment, requirement, drawn)
+    if complaints.error_count > before:
+        return ()
+    each = _fewest_of_a_point(experiment)
+    return tuple(_note(complaints, requirement, each) for requirement in wanted)
+
+
+def _check_draws(
+    complaints: Complaints, sweep: Sweep, experiment: Experiment, requirement: Requirement, drawn: Sequence[SweepAxis]
+) -> None:
+    for axis in drawn:
+        if axis.design != "random":
+            complaints.error(
+                "D351",
+                f"`{axis.design}` does not draw cases each without regard to the others, which a confidence needs",
+                requirement.place,
+                also=[Label(axis.columns[0].place, f"drawn by `{axis.design}`")],
+                help=[f"write `sample random({axis.size}) {{ ... }}`", "or leave `with ... confidence` out"],
+            )
+            return
+    if len(drawn) > 1:
+        complaints.error(
+            "D351",
+            "the cases of two samples share their draws with one another, and a confidence needs draws of their own",
+            requirement.place,
+            also=[Label(axis.columns[0].place, "a sample") for axis in drawn],
+            help="draw all of it in one `sample random(N) { ... }`",
+        )
+    elif drawn and sweep.repeated is not None:
+        complaints.error(
+            "D351",
+            "the repeats of a case share its draws, and a confidence needs draws of their own",
+            requirement.place,
+            also=[Label(sweep.repeated, "repeated")],
+            help="leave `repeat` out and draw more cases: `seeds = independent;` gives each noise of its own",
+        )
+    elif sweep.independent is None and sweep.repeated is None and _has_noise(experiment):
+        complaints.error(
+            "D351",
+            "all cases feel the same noise, and a confidence needs draws of their own",
+            requirement.place,
+            help=f"write `seeds = independent;` in the sweep `{sweep.name}`",
+        )
+
+
+def _has_noise(experiment: Experiment) -> bool:
+    """Return True if the numbers of a case depend on the seed of its noise."""
+    return SEED not in without_effect(replace(experiment, cases=replace(experiment.cases, seeds="independent")))
+
+
+def _fewest_of_a_point(experiment: Experiment) -> int:
+    """The number of cases of the design point that has the fewest."""
+    cases = experiment.cases
+    chosen = [each.values for each in cases.coordinates if not each.design]
+    return int(np.bincount(design_points(chosen, cases.count)).min())
+
+
+def _note(complaints: Complaints, requirement: Requirement, each: int) -> str:
+    assert requirement.share is not None and requirement.confidence is not None
+    needed, more = (cases_needed(requirement.share, requirement.confidence, missed) for missed in (0, 1))
+    if each < needed:
+        complaints.remark(
+            "D352",
+            f"{each:,} cases cannot show this, were it met by all of them",
+            requirement.place,
+            help=f"draw {needed:,} cases or more for each design point; {more:,} show it where one misses it",
+        )
+    return (
+        f"{OF_CASES}`{requirement.text}` needs {needed:,} if none misses it, {more:,} if one does; there are {each:,}"
+    )

@@ -1,0 +1,24 @@
+"""Design points: cases that share all that was chosen, and differ in what was drawn at random alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+
+def design_points(chosen: Sequence[np.ndarray], cases: int) -> np.ndarray:
+    """The design point of each case, a number from 0 in the order in which they first appear.
+
+    chosen  what was chosen, an array of a value a case for each coordinate; with none there is one design point
+    """
+    points = np.zeros(cases, np.int64)
+    for values in chosen:
+        _, index = np.unique(np.asarray(values), return_inverse=True)
+        points = points * (int(index.max(initial=0)) + 1) + index.ravel()
+        _, points = np.unique(points, return_inverse=True)
+        points = points.ravel()
+    _, first, index = np.unique(points, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return np.asarray(rank[index.ravel()])

@@ -1,0 +1,87 @@
+"""Units as declarations, plans and command lines write them: `V*s/rad`, read by recursive descent."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from met.units import ONE, UNITS, Measure
+
+BIGGEST_EXPONENT = 9
+
+
+def parse_unit(written: str, names: Mapping[str, Measure] = MappingProxyType({})) -> Measure:
+    """The meaning of a unit as a model's declaration writes it: `V*s/rad`, `N*m/(rad*s)`, `m^2`, `1/s`, `1`.
+
+    names: further words and what they stand for here, such as `joint`. ValueError where it cannot be read: a
+    declaration is a programmer's text (a deck's units are read by ic).
+    """
+    return _UnitReader(written, names).whole()
+
+
+_PIECE = re.compile(r"\s*(?:(%|[A-Za-z_]+)|(-?\d+)|([*/^()]))")
+
+
+class _UnitReader:
+    """Recursive descent over a declaration's unit."""
+
+    def __init__(self, written: str, names: Mapping[str, Measure]) -> None:
+        self.written = written
+        self.names = names
+        self.pieces: list[str] = []
+        at = 0
+        while written[at:].strip():
+            match = _PIECE.match(written, at)
+            if match is None:
+                raise ValueError(f"unit `{written}`: cannot read `{written[at:].strip()}`")
+            self.pieces.append(match.group().strip())
+            at = match.end()
+        self.at = 0
+
+    def whole(self) -> Measure:
+        result = self.product()
+        if self.at < len(self.pieces):
+            raise ValueError(f"unit `{self.written}`: cannot read `{self.pieces[self.at]}`")
+        return result
+
+    def take(self) -> str:
+        if self.at >= len(self.pieces):
+            raise ValueError(f"unit `{self.written}` ends too early")
+        self.at += 1
+        return self.pieces[self.at - 1]
+
+    def next_is(self, *wanted: str) -> bool:
+        return self.at < len(self.pieces) and self.pieces[self.at] in wanted
+
+    def product(self) -> Measure:
+        result = self.factor()
+        while self.next_is("*", "/"):
+            sign = 1 if self.take() == "*" else -1
+            result = result * self.factor() ** sign
+        return result
+
+    def factor(self) -> Measure:
+        piece = self.take()
+        if piece == "(":
+            result = self.product()
+            if self.take() != ")":
+                raise ValueError(f"unit `{self.written}`: `)` is missing")
+        elif piece == "1":
+            result = ONE
+        elif piece in self.names:
+            result = self.names[piece]
+        elif piece in UNITS:
+            result = UNITS[piece].measure
+        else:
+            from met.messages.other_units import suggest  # for a message alone
+
+            near = suggest(piece)
+            raise ValueError(f"unit `{self.written}`: `{piece}` is not a unit" + (f"; `{near}`?" if near else ""))
+        if self.next_is("^"):
+            self.take()
+            exponent = self.take()
+            if not exponent.lstrip("-").isdigit() or abs(int(exponent)) > BIGGEST_EXPONENT:
+                raise ValueError(f"unit `{self.written}`: `{exponent}` is not a small whole exponent")
+            result = result ** int(exponent)
+        return result

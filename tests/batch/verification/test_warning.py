@@ -1,0 +1,183 @@
+"""Warnings of what the step decides: each whole, with case, metric, place and the step that would do."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import pytest
+
+import batch
+import ic
+from batch.archive.read import ArchiveFile
+from batch.queries.step_errors.warning import campaign_warnings, warnings
+from batch.queries.summary import as_json, summarise
+from batch.terminal.running import run_and_tell
+from batch.terminal.show import show
+from met.diagnostic import Diagnostic
+from met.plan import Plan
+
+DECK = """#include <two_link.ic>
+run brief like nominal {
+    duration = 3 s;
+    metric turn = final { of = elbow.q; }
+    require turn < 0.0721 rad;
+}
+sweep gain of brief { vary gearbox.kp = [0.02, 0.021, 0.03] V*s/rad; }
+"""
+
+
+def planned(here: Path, text: str = DECK, run: str = "brief") -> Plan:
+    deck = here / "d.ic"
+    deck.write_text(text)
+    return ic.compile(deck, select=[run])
+
+
+def warned(path: Path, plan: Plan | None = None) -> list[Diagnostic]:
+    with ArchiveFile(path) as file:
+        experiments = {} if plan is None else {each.name: each for each in plan.experiments}
+        return campaign_warnings(file.groups, experiments)
+
+
+def changed(path: Path, change: Callable[[h5py.Group], None]) -> Path:
+    with h5py.File(path, "r+") as file:
+        change(file["verification"])
+    return path
+
+
+def test_a_margin_below_the_error(tmp_path: Path) -> None:
+    plan = planned(tmp_path)
+    path = batch.run(plan, output=tmp_path / "a.h5", verify="some").path
+    [found] = warned(path, plan)
+    assert (found.code, found.severity) == ("D310", "warning")
+    assert found.message == (
+        "the step decides whether `turn < 0.0721 rad` is met: "
+        "`turn` of case #0 is 0.07208 rad ± 0.00015 rad by the step"
+    )
+    assert found.at is not None and (found.at.place.line, found.at.place.column) == (5, 5)
+    assert found.help == (
+        "`rates { dynamics = 100 Hz; }` would do, for an error below the 2.364e-05 rad that are left",
+    )
+
+
+def test_the_step_that_is_named_would_do(tmp_path: Path) -> None:
+    """At the rate that the warning names, there is none, and the metric is nearer to the truth than the margin was."""
+    refined = DECK.replace("duration", "rates { dynamics = 100 Hz; servos = 100 Hz; record = 25 Hz; } duration")
+    coarse = batch.run(planned(tmp_path), output=tmp_path / "a.h5", verify="none").path
+    path = batch.run(planned(tmp_path, refined), output=tmp_path / "b.h5", verify="some").path
+    assert warned(path) == []
+    with ArchiveFile(coarse) as first, ArchiveFile(path) as second:
+        a, b = (float(file.groups[0].values("turn")[0]) for file in (first, second))
+        known = file_error(second)
+    assert 0.0 < known < abs(0.0721 - b) and abs(a - b) < 4e-4
+
+
+def file_error(file: ArchiveFile) -> float:
+    [summary] = summarise(file)
+    assert summary.verified is not None
+    return summary.verified.metrics["turn"].error
+
+
+def test_a_limit_that_is_far_warns_of_nothing(tmp_path: Path) -> None:
+    plan = planned(tmp_path, DECK.replace("0.0721", "0.09"))
+    assert warned(batch.run(plan, output=tmp_path / "a.h5", verify="some").path, plan) == []
+
+
+def test_what_is_turned_round_by_another_step_is_told_of_the_worst_case(tmp_path: Path) -> None:
+    plan = planned(tmp_path, DECK.replace("0.0721", "0.09"), "gain")
+    path = batch.run(plan, output=tmp_path / "a.h5", verify="all").path
+
+    def never(node: h5py.Group) -> None:
+        column = list(node["verified_metric"].asstr()).index("settle")
+        node["half"][1:, column] = math.inf
+
+    [found] = warned(changed(path, never), plan)
+    assert found.code == "D310"
+    assert found.message == (
+        "the step decides whether `settle < 10 s` is met: "
+        "`settle` of case #1 is 2.28 s at the step, infinite at half of it"
+    )
+    assert found.help == (
+        "no step that can be said would do; `rates { dynamics = 100 Hz; }` shows more of it",
+        "so it is in 2 of the 3 verified cases",
+    )
+
+
+def test_an_order_that_is_not_the_integrator_s(tmp_path: Path) -> None:
+    plan = planned(tmp_path, DECK.replace("    require turn < 0.0721 rad;\n", ""))
+    path = batch.run(plan, output=tmp_path / "a.h5", verify="some").path
+
+    def grows(node: h5py.Group) -> None:
+        column = list(node["verified_metric"].asstr()).index("turn")
+        node["half"][0, column], node["quarter"][0, column] = 0.0715, 0.07
+
+    assert warned(path, plan) == []
+    [found] = warned(changed(path, grows), plan)
+    assert (found.code, found.severity) == ("D311", "warning")
+    assert found.message == (
+        "`turn` of case #0 is 0.07208 rad ± 0.0045 rad by the step; the order of that is -1.4, and should be 2"
+    )
+    assert found.at is not None and found.at.place.line == 4
+    assert found.help == ("`rates { dynamics = 200 Hz; }` would do, for an error below 1 %",)
+
+
+@pytest.mark.parametrize(("share", "said", "rate"), [("half", "half", 50), ("quarter", "a quarter", 100)])
+def test_a_case_that_fails_with_a_shorter_step(tmp_path: Path, share: str, said: str, rate: int) -> None:
+    plan = planned(tmp_path, DECK.replace("0.0721", "0.09"), "gain")
+    path = batch.run(plan, output=tmp_path / "a.h5", verify="all").path
+
+    def fails(node: h5py.Group) -> None:
+        node[share][1:] = math.nan
+
+    [found] = warned(changed(path, fails), plan)
+    assert (found.code, found.severity) == ("D312", "warning")
+    assert found.message == f"case #1 reaches its end at the step of 40 ms, and does not at {said} of it"
+    assert found.at is not None and found.at.place.line == 7
+    assert found.help == (
+        f"`rates {{ dynamics = {rate} Hz; }}` shows why it fails",
+        "so it is in 2 of the 3 verified cases",
+    )
+
+
+def test_a_case_that_fails_with_a_shorter_step_is_none_of_the_campaign_s_failures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from batch.campaigns.verification import verifying
+    from met import run as engine
+
+    runs = engine.run
+
+    def fails(experiment: object, *args: object, **options: object) -> object:
+        found = runs(experiment, *args, **options)  # type: ignore[arg-type]
+        for values in found.metrics.values():
+            values[:] = math.nan
+        return found
+
+    monkeypatch.setattr(verifying.engine, "run", fails)
+    archive = batch.run(planned(tmp_path), output=tmp_path / "a.h5", verify="some")
+    assert archive.ok and archive.summaries[0].failed == 0
+    assert [each.code for each in warned(archive.path)] == ["D312"]
+
+
+def test_people_and_programs_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    planned(tmp_path)
+    assert run_and_tell("d.ic", ("brief",), verify="some", no_picture=True)
+    said = capsys.readouterr()
+    assert "warning[D310]: the step decides" in said.err and " --> d.ic:5:5\n" in said.err
+    assert "D310" not in said.out
+    assert run_and_tell("d.ic", ("brief",), verify="some", no_picture=True, quiet=True)
+    assert "D310" not in capsys.readouterr().err
+    with ArchiveFile(tmp_path / "d.brief.h5") as file:
+        lines = show(file, plots=False)
+        [summary] = summarise(file)
+        assert warnings(file.groups[0]) == list(summary.warnings)
+    assert "  warning[D310]: the step decides whether `turn < 0.0721 rad` is met" in lines
+    assert [each["code"] for each in json.loads(json.dumps(as_json(summary)))["warnings"]] == ["D310"]
+    assert run_and_tell("d.ic", ("brief",), verify="none", no_picture=True, fresh=True)
+    assert "D310" not in capsys.readouterr().err
