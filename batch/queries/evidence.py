@@ -1,8 +1,8 @@
-"""What the cases of an archive show of each requirement: rows of the table that a review asks for.
+"""Evidence for requirements over a share of cases: rows of the table that a review asks for.
 
-A requirement of every case is met where all cases meet it. One of a share of cases is judged at each design point, the
-cases that share all that was chosen: with a confidence by an exact bound on the share of all cases that may be drawn
-there, else by the share of the cases that were run. A case that failed, or whose metric has no value, misses it.
+Each is judged at each design point, by the cases that share all that was chosen: with a confidence by an exact bound on
+the share of all cases that may be drawn there, else by the share of the cases that were run. A case that failed, or
+whose metric has no value, misses it.
 """
 
 from __future__ import annotations
@@ -24,13 +24,16 @@ from met.statistics.design_points import design_points
 Verdict = Literal["met", "missed", "demonstrated", "not shown", "refuted"]
 """`met` and `missed` are of the cases that were run; the others are of all cases that may be drawn."""
 
+ROUNDING = 1e-12
+"""Of a share: 7 % of 100 cases are 7.000000000000001 cases in floating point, and 7 of them are enough."""
+
 NOTHING_DRAWN = "no case was drawn at random: without a confidence"
 SOME_OF_THE_TABLE = "only some cases of the table were run: without a confidence"
 
 
 @frozen(kw_only=True)
 class EvidenceRow:
-    """What the cases of one design point show of one requirement.
+    """A requirement over a share of cases, and the evidence that the cases of one design point give for it.
 
     requirement  with its limit in SI;  unit, scale: in which its deck writes the metric, shown = SI / scale
     chosen       what was chosen at the design point: path -> text with its unit; empty where nothing was
@@ -68,30 +71,24 @@ class EvidenceRow:
 
 
 def evidence(group: ArchiveGroup) -> list[EvidenceRow]:
-    """The rows of every requirement of an experiment at each of its design points."""
-    found = requirements.group_requirements(group)
+    """The rows of an experiment's requirements over a share of cases, at each of its design points; none, and no values
+    are read, where it has no such requirement."""
+    found = [each for each in requirements.group_requirements(group) if each.share is not None]
     if not found:
         return []
     outcomes = requirements.outcomes(group)
-    everything = DesignPoint({}, np.arange(group.count))
-    points, why = _design_points(group) if any(each.share is not None for each in found) else ([everything], "")
+    points, why = _design_points(group)
     out = []
     for each in found:
         values = group.values(each.metric)
         scale, unit = deck_unit(group.variables[each.metric])
-        for point in points if each.share is not None else [everything]:
+        for point in points:
             judged = _judged(each, values[point.cases], outcomes[point.cases, each.place], why)
             worst = int(point.cases[judged.pop("worst")])
             out.append(
                 EvidenceRow(requirement=each, unit=unit, scale=scale, chosen=point.chosen, worst=worst, **judged)
             )
     return out
-
-
-def over_cases(group: ArchiveGroup) -> list[EvidenceRow]:
-    """The rows of requirements over a share of cases; none, and nothing read, where there is no such requirement."""
-    asked = any(each.share is not None for each in requirements.group_requirements(group))
-    return [row for row in evidence(group) if row.requirement.share is not None] if asked else []
 
 
 @frozen
@@ -127,7 +124,7 @@ def _shown(variable: Stored, value: float) -> str:
 
 
 def _judged(each: GroupRequirement, values: np.ndarray, outcomes: np.ndarray, why: str) -> dict[str, Any]:
-    """What the cases of a design point show, by the fields of `EvidenceRow`; `worst` is a place among these cases.
+    """The verdict at a design point and its grounds, by the fields of `EvidenceRow`; `worst` is a place in its cases.
 
     values  of the metric, SI;  outcomes: 1 met, 0 missed, -1 unknown;  why: no confidence can be had, "" where one can
     """
@@ -144,9 +141,10 @@ def _judged(each: GroupRequirement, values: np.ndarray, outcomes: np.ndarray, wh
         "margin": sign * (each.limit - float(values[worst])),
         "sigmas": sign * (each.limit - float(finite.mean())) / deviation if deviation > 0.0 else None,
     }
-    if each.share is None or each.confidence is None or why:
-        share = 1.0 if each.share is None or each.confidence is not None else each.share
-        verdict = "met" if cases - missed >= share * cases else "missed"
+    assert each.share is not None
+    if each.confidence is None or why:
+        share = each.share if each.confidence is None else 1.0
+        verdict = "met" if cases - missed >= share * cases * (1.0 - ROUNDING) else "missed"
         return {**found, "verdict": verdict, "why": why if each.confidence is not None else ""}
     verdict = bounds.verdict(cases, missed, each.share, each.confidence)
     return {

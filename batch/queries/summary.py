@@ -10,7 +10,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.archive.stored import Stored
-from batch.queries.evidence import EvidenceRow, over_cases
+from batch.queries.evidence import EvidenceRow, evidence
 from batch.queries.failures import FailureGroup, failures
 from batch.queries.signals import number_text
 from batch.queries.step_errors import figures
@@ -139,7 +139,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
     requirements: tuple[RequirementSummary, ...] = ()
     if "met" in group.variables:
         met, done = group.values("met")[here], group.values("status")[here] == 0
-        shares = over_cases(group) if position is None else []
+        shares = evidence(group) if position is None else []
         requirements = tuple(
             RequirementSummary(
                 str(text),

@@ -13,9 +13,7 @@ MOST_POINTS = 12
 
 def evidence_lines(rows: Sequence[EvidenceRow]) -> list[str]:
     """Lines for each design point: the verdict, what it rests on, and what it would take."""
-    listed = sorted(rows, key=lambda row: row.ok)[:MOST_POINTS]
-    if len(rows) <= MOST_POINTS:
-        listed = list(rows)
+    listed = list(rows) if len(rows) <= MOST_POINTS else sorted(rows, key=lambda row: row.ok)[:MOST_POINTS]
     wide = max((len(row.verdict) for row in listed), default=0)
     heads = [", ".join(f"{path} = {text}" for path, text in row.chosen.items()) for row in listed]
     widest = max(map(len, heads), default=0)
@@ -31,7 +29,7 @@ def evidence_lines(rows: Sequence[EvidenceRow]) -> list[str]:
 
 
 def _grounds(row: EvidenceRow) -> list[str]:
-    """What a verdict rests on, and what it lacks."""
+    """The grounds of a verdict: how many cases meet it, the bound that follows, and how many more cases it takes."""
     text = f"{row.cases - row.missed:,} of {row.cases:,} cases meet it"
     if row.why:
         return [f"{text}; {row.why}"]

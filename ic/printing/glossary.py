@@ -34,7 +34,7 @@ def entries() -> dict[str, tuple[str, str]]:
 
 
 def meaning(word: str) -> Iterator[str]:
-    """What the glossary says of a word, in one line; nothing where it does not know the word."""
+    """Return the glossary's meaning of a word, in one line; nothing where it does not know the word."""
     found = entries().get(word) or entries().get(word.removesuffix("s"))
     if found is not None:
         yield f"{found[0]}: {found[1]}"

@@ -37,7 +37,7 @@ class RunKey:
         return int(written) if self.parameter.whole else written
 
     def in_deck(self, kept: Any) -> str | float:
-        """What the deck says, in SI, for the plan's value."""
+        """Return the value that a deck writes, in SI, for the plan's value."""
         if self.true:
             return next(word for word in self.parameter.words if (word == self.true) is kept)
         return kept if isinstance(kept, str) else float(kept)

@@ -9,6 +9,7 @@ Hanson and B. B. Beard use them for launch vehicles (NASA/TP-2010-216447).
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from typing import Literal
 
 Verdict = Literal["demonstrated", "not shown", "refuted"]
@@ -46,7 +47,7 @@ def upper_bound(cases: int, missed: int, confidence: float) -> float:
 
 
 def verdict(cases: int, missed: int, share: float, confidence: float) -> Verdict:
-    """What these cases say of a requirement that at least this share of all cases is to meet."""
+    """The verdict of these cases on a requirement that at least this share of all cases is to meet."""
     if lower_bound(cases, missed, confidence) >= share:
         return "demonstrated"
     return "refuted" if upper_bound(cases, missed, confidence) < share else "not shown"
@@ -57,30 +58,19 @@ def cases_needed(share: float, confidence: float, missed: int = 0) -> int:
     more than `MOST_CASES` were needed."""
     if not 0.0 < share < 1.0:
         raise ValueError(f"a share of {share} cannot be demonstrated by any number of cases")
-    low, high = missed, max(1, 2 * missed)
+    high = max(1, 2 * missed)
     while lower_bound(high, missed, confidence) < share:
-        low, high = high, 2 * high
+        high *= 2
         if high > MOST_CASES:
             raise ValueError(f"more than {MOST_CASES} cases")
-    while high - low > 1:
-        middle = (low + high) // 2
-        if lower_bound(middle, missed, confidence) >= share:
-            high = middle
-        else:
-            low = middle
-    return high
+    numbers = range(missed + 1, high + 1)
+    return numbers[bisect_left(numbers, True, key=lambda cases: lower_bound(cases, missed, confidence) >= share)]
 
 
 def most_misses(cases: int, share: float, confidence: float) -> int:
     """The most cases that may miss the requirement and leave the share demonstrated; -1 where not even none."""
-    low, high = -1, cases
-    while high - low > 1:
-        middle = (low + high) // 2
-        if lower_bound(cases, middle, confidence) >= share:
-            low = middle
-        else:
-            high = middle
-    return low
+    numbers = range(cases + 1)
+    return bisect_left(numbers, True, key=lambda missed: lower_bound(cases, missed, confidence) < share) - 1
 
 
 def percentile_rank(cases: int, share: float, confidence: float) -> int:

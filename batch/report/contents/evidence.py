@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from batch.queries.evidence import EvidenceRow, over_cases, percent_above, percent_below
+from batch.queries.evidence import EvidenceRow, evidence, percent_above, percent_below
 from batch.queries.pool import Pool, page_number
 from batch.report.contents.parts import TextTable
 
@@ -20,7 +20,7 @@ def evidence_table(pool: Pool) -> TextTable | None:
     bound         of the percentile, with the confidence
     margin        from the worst value to the limit, and from the mean to the limit in standard deviations of the values
     """
-    found = [(row, int(group.values("case")[row.worst])) for group in pool.groups for row in over_cases(group)]
+    found = [(row, int(group.values("case")[row.worst])) for group in pool.groups for row in evidence(group)]
     texts = [row.requirement.text for row, _ in found]
     if not found:
         return None

@@ -265,7 +265,7 @@ def test_an_emulator_ends_with_who_drives_it(here: Path) -> None:
 
 def test_an_interrupt_of_identify_is_one() -> None:
     process = subprocess.Popen(
-        [*MET, "identify", "deck.ic", "wired", "--port", "firmware"],
+        [*MET, "identify", "deck.ic", "wired", "--port", "firmware", "--lock-step"],
         start_new_session=True,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

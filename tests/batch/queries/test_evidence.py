@@ -124,3 +124,15 @@ def test_shares_are_rounded_to_the_safe_side() -> None:
     assert (
         percent_below(0.9999699) == "99.9969 %" and percent_below(0.0) == "0.00 %" and percent_above(1.0) == "100.00 %"
     )
+
+
+def test_a_share_of_cases_is_not_missed_by_a_rounding(tmp_path: Path) -> None:
+    share = float(np.nextafter(np.nextafter(7 / 11, 1.0), 1.0))
+    assert share * 11 > 7
+    _, path = ran(tmp_path, "require late < 5 s in 7 % of cases;", sweep="grid")
+    for met, verdict in ((7, "met"), (6, "missed")):
+        with h5py.File(path, "r+") as file:
+            file["met"][...] = [[1]] * met + [[0]] * (11 - met)
+            file["requirement"].attrs["share"] = [share]
+        with ArchiveFile(path) as archive:
+            assert [(row.missed, row.verdict) for row in evidence(archive.groups[0])] == [(11 - met, verdict)]

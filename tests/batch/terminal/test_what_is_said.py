@@ -65,6 +65,7 @@ class TestWhatIsSaid:
             "missed": 1,
             "unknown": 0,
             "no_value": 0,
+            "evidence": [],
         }
 
     @pytest.mark.slow
