@@ -48,7 +48,8 @@ def check(
     find(deck, include_dirs)
     compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, set=settings, select="all")
     if form == "json":
-        complain(compiled.diagnostics, compiled.sources, json=True)
+        allowed = [(warning, allowance.because) for warning, allowance in compiled.allowed]
+        complain(compiled.diagnostics, compiled.sources, json=True, allowed=allowed)
         return YES if compiled.plan is not None else BAD_INPUT
     if compiled.diagnostics and (compiled.plan is None or not quiet):
         complain(compiled.diagnostics, compiled.sources)
@@ -59,7 +60,8 @@ def check(
 
         if verbose:
             _print(notes(compiled.plan))
-        say(verdict(compiled.plan, compiled.diagnostics))
+            _print(f"allowed: {warning.message} ({allowance})" for warning, allowance in compiled.allowed)
+        say(verdict(compiled.plan, compiled.diagnostics, len(compiled.allowed)))
     return YES
 
 

@@ -144,7 +144,8 @@ RUN = BlockDeclaration(
                   "`in 99 % of cases with 90 % confidence`; "
                   "`step_error(METRIC) < 1 %` is one on its error by the step"),
         Entry(name="allow", form="statement", written='allow CODE because "REASON";', default="none",
-              doc="a warning that is right, and not to be given: `allow D105 because \"the report's own rates\";`"),
+              doc="a warning that is right, and not to be given; its code is printed with it: "
+                  "`allow D105 because \"the report's own rates\";`"),
         Entry(name="tolerances", written="tolerances { ... }", default="none: not in a bit",
               doc="by how much another version may differ before `met diff` says so"),
         Entry(name="seed", written="seed = 7;", default="0", parameter=SEED, path="seed",

@@ -12,7 +12,7 @@ from ic.grammar.syntax import Deck, Expression, Name, Word, children
 from ic.meaning.checks.stops import check_stops
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.parameters.scope import Scope
-from ic.meaning.runs.allowances import places_of, read_allowances
+from ic.meaning.runs.allowances import allowances_of, places_of
 from ic.meaning.runs.experiment import experiment
 from ic.meaning.runs.run import resolve_run
 from ic.sweeps.axes import Sweep, read_sweep, varied_paths, whole_number
@@ -53,7 +53,7 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
     """The experiments of a run or sweep; none where something of it is wrong (already reported)."""
     if definition.kind == "run":
         definitions, run = source.settings.in_run(source.definitions, definition)
-        allowances = _allowances(definitions, run, source.complaints)
+        allowances = allowances_of(definitions, run, source.complaints)
         with source.complaints.allowing(places_of(allowances)):
             scope = Scope(definitions, source.complaints, settings=source.settings.numbers(definitions))
             resolved = resolve_run(scope, run)
@@ -68,18 +68,9 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
     if definition.parts:
         return _sum(source, definition, ())
     base = source.definitions.of_kind("run").get(definition.group.of.text if definition.group.of is not None else "")
-    allowances = _allowances(source.definitions, base, source.complaints, definition) if base is not None else ()
+    allowances = allowances_of(source.definitions, base, source.complaints, definition) if base is not None else ()
     with source.complaints.allowing(places_of(allowances)):  # a macro that the sweep chooses may change them
         return _Sweep(source, definition).groups()
-
-
-def _allowances(
-    definitions: Definitions, run: Definition, complaints: Complaints, sweep: Definition | None = None
-) -> tuple[Allowance, ...]:
-    """Warnings that a run allows, or a sweep of it."""
-    block = definitions.block(run)
-    statements = block.statements if block is not None else ()
-    return read_allowances(statements, sweep.group.body if sweep is not None else (), complaints=complaints)
 
 
 # Sweeps
@@ -179,7 +170,7 @@ class _Sweep:
         """The cases of one structure, with their rows of the product; and how many each `exclude when` drops."""
         read = self._with_macros(sweep, choices)
         definitions, run = with_choices(read.definitions, read.base, choices)
-        allowances = _allowances(definitions, run, self.complaints, read.definition)
+        allowances = allowances_of(definitions, run, self.complaints, read.definition)
         with self.complaints.allowing(places_of(allowances)):
             return self._group_of(read, definitions, run, choices, rows, allowances)
 

@@ -35,7 +35,7 @@ class Complaints:
         self._spots: set[tuple[str, int, int]] = set()  # where errors of syntax are reported
         self.known_missing: set[tuple[Place, str]] = set()  # definitions, and entries that they lack, already reported
         self._allowed: Mapping[str, Place] | None = None  # codes that the run at hand allows; None outside of runs
-        self._silenced: set[Diagnostic] = set()
+        self._silenced: dict[Diagnostic, Place] = {}
         self._of_no_run: set[Diagnostic] = set(self._found)
         self.needed_allowances: set[Place] = set()  # the places of each `allow` that silenced a warning
 
@@ -50,6 +50,11 @@ class Complaints:
     @property
     def warnings(self) -> tuple[Diagnostic, ...]:
         return tuple(d for d in self._found if d.severity == "warning")
+
+    @property
+    def allowed(self) -> Mapping[Diagnostic, Place]:
+        """The warnings that were allowed wherever they were found, each with the place of an `allow`."""
+        return {each: place for each, place in self._silenced.items() if each not in self._found}
 
     def add(self, *diagnostics: Diagnostic) -> None:
         for diagnostic in diagnostics:
@@ -193,7 +198,9 @@ class Complaints:
         allowed  the places of each `allow` by the code
         """
         for diagnostic in [each for each in self.warnings if each in self._of_no_run and each.code in allowed]:
-            self.needed_allowances.update(allowed[diagnostic.code])
+            places = tuple(allowed[diagnostic.code])
+            self.needed_allowances.update(places)
+            self._silenced[diagnostic] = places[0]
             del self._found[diagnostic]
 
     def _is_silenced(self, diagnostic: Diagnostic) -> bool:
@@ -204,7 +211,7 @@ class Complaints:
             self._of_no_run.add(diagnostic)
         elif diagnostic.code in self._allowed:
             self.needed_allowances.add(self._allowed[diagnostic.code])
-            self._silenced.add(diagnostic)
+            self._silenced.setdefault(diagnostic, self._allowed[diagnostic.code])
             return True
         else:
             self._of_no_run.discard(diagnostic)

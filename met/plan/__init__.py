@@ -316,7 +316,7 @@ class Tolerance:
 
 @frozen
 class Allowance:
-    """A warning that a run allows, by its code, and why; `because` as the deck wrote it."""
+    """A warning that a run allows, by its code, and why, in one line."""
 
     code: str
     because: str

@@ -151,6 +151,8 @@ def _check_allowances(experiment: Experiment, where: str) -> None:
     for index, allowance in enumerate(experiment.allowances):
         if not CODE.fullmatch(allowance.code):
             raise Damaged(f"{where}[{index}].code", f"{allowance.code!r} is no code of a warning")
+        if not allowance.because.strip() or "\n" in allowance.because:
+            raise Damaged(f"{where}[{index}].because", "a reason is one line, which is not empty")
     if len({allowance.code for allowance in experiment.allowances}) < len(experiment.allowances):
         raise Damaged(where, "a warning is allowed twice")
 

@@ -6,19 +6,33 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Entry, Name, Statement, String
+from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.text.codes import is_on_the_page
 from ic.text.complaints import Complaints
-from met.diagnostic import Label, Place, did_you_mean
+from met.diagnostic import Diagnostic, Label, Place, did_you_mean
 from met.messages.warning_codes import WARNINGS, WHILE_RUNNING
 from met.plan import Allowance, Experiment
 
 ALLOW = "allow"
 
 
-def read_allowances(*entries: Iterable[Entry], complaints: Complaints) -> tuple[Allowance, ...]:
-    """What the statements of a run, and then of a sweep of it, allow; reports each that is wrong, or there twice."""
+def allowances_of(
+    definitions: Definitions, run: Definition, complaints: Complaints, sweep: Definition | None = None
+) -> tuple[Allowance, ...]:
+    """What a run allows, or a sweep of it: a reason of its own takes the place of that of its base."""
+    runs = definitions.of_kind("run")
+    bodies = [runs[name].group.body for name in definitions.homes(run)[:-1]]
+    bodies += [run.group.body, *([sweep.group.body] if sweep is not None else [])]
     found: dict[str, Allowance] = {}
-    for entry in (entry for each in entries for entry in each):
+    for body in bodies:
+        found |= _read(body, complaints)
+    return tuple(found.values())
+
+
+def _read(body: Iterable[Entry], complaints: Complaints) -> dict[str, Allowance]:
+    """What the statements of one block allow, by code; reports each that is wrong, or there twice."""
+    found: dict[str, Allowance] = {}
+    for entry in body:
         if not isinstance(entry, Statement) or entry.words[0].text != ALLOW:
             continue
         words, value = entry.words[1:], entry.value
@@ -41,8 +55,8 @@ def read_allowances(*entries: Iterable[Entry], complaints: Complaints) -> tuple[
                 help="leave one of the two out",
             )
         else:
-            found[words[0].text] = Allowance(words[0].text, value.value, words[0].place)
-    return tuple(found.values())
+            found[words[0].text] = Allowance(words[0].text, " ".join(value.value.split()), words[0].place)
+    return found
 
 
 def places_of(allowances: Iterable[Allowance]) -> Mapping[str, Place]:
@@ -51,32 +65,72 @@ def places_of(allowances: Iterable[Allowance]) -> Mapping[str, Place]:
 
 
 def silence_of_all(experiments: Sequence[Experiment], complaints: Complaints) -> None:
-    """Leave out the warnings that are of no single run, such as of a macro, and that all experiments allow; then warn
-    of each `allow` that no experiment needed."""
-    everywhere = [
-        each for each in WARNINGS if experiments and all(experiment.allows(each) for experiment in experiments)
-    ]
-    places: dict[str, dict[Place, None]] = {}
+    """Leave out the warnings that are of no single run, such as of a macro, and that all experiments allow."""
+    if not all(each.allowances for each in experiments):
+        return
+    places: dict[str, list[Place]] = {}
     for allowance in (each for experiment in experiments for each in experiment.allowances):
-        if allowance.place is not None:
-            places.setdefault(allowance.code, {})[allowance.place] = None
-    complaints.silence({code: places.get(code, {}) for code in everywhere})
-    for code, each in places.items():
-        for place in each:
-            if place not in complaints.needed_allowances and code not in WHILE_RUNNING:
-                complaints.warn(
-                    "D333",
-                    f"`allow {code}` silences nothing here",
-                    place,
-                    help="leave it out: no such warning is given",
-                )
+        if allowance.place is not None and all(experiment.allows(allowance.code) for experiment in experiments):
+            places.setdefault(allowance.code, []).append(allowance.place)
+    complaints.silence(places)
+
+
+def allowed_warnings(
+    experiments: Iterable[Experiment], complaints: Complaints
+) -> tuple[tuple[Diagnostic, Allowance], ...]:
+    """The warnings that are not given, each with what allows it."""
+    found = {each.place: each for experiment in experiments for each in experiment.allowances}
+    return tuple((warning, found[place]) for warning, place in complaints.allowed.items() if place in found)
+
+
+def warn_of_unneeded(
+    definitions: Definitions, checked: Iterable[Definition], experiments: Iterable[Experiment], complaints: Complaints
+) -> None:
+    """Warn of each `allow` that silenced nothing, where that is certain: the deck itself writes it, no file that it
+    includes, and every run and sweep that it is in force for was checked, those that have it from a base, too."""
+    unneeded = {
+        allowance.place: allowance.code
+        for experiment in experiments
+        for allowance in experiment.allowances
+        if allowance.place is not None
+        and allowance.place not in complaints.needed_allowances
+        and allowance.code not in WHILE_RUNNING
+        and definitions.writes_at(allowance.place)
+    }
+    if not unneeded:
+        return
+    runs = definitions.of_kind("run")
+    names = _with_parts(definitions, checked)
+    for each in (*runs.values(), *definitions.of_kind("sweep").values()):
+        sweep = each if each.kind == "sweep" else None
+        run = each if sweep is None else runs.get(each.group.of.text if each.group.of is not None else "")
+        if each.name not in names and run is not None:
+            elsewhere = {allowance.place for allowance in allowances_of(definitions, run, Complaints(), sweep)}
+            unneeded = {place: code for place, code in unneeded.items() if place not in elsewhere}
+    for place, code in unneeded.items():
+        complaints.warn(
+            "D333", f"`allow {code}` silences nothing here", place, help="leave it out: no such warning is given"
+        )
+
+
+def _with_parts(definitions: Definitions, checked: Iterable[Definition]) -> set[str]:
+    """The names of these runs and sweeps, and of those that they are made of."""
+    names: set[str] = set()
+    waiting = list(checked)
+    while waiting:
+        each = waiting.pop()
+        if each.name not in names:
+            names.add(each.name)
+            known = {**definitions.of_kind("run"), **definitions.of_kind("sweep")}
+            waiting += (known[part.text] for part in each.parts if part.text in known)
+    return names
 
 
 def _refuse(code: str, place: Place, complaints: Complaints) -> None:
     if is_on_the_page(code):
         complaints.error(
             "D331",
-            f"`{code}` is an error, and no error is allowed",
+            f"`{code}` is no warning of a run, and nothing else is allowed",
             place,
             help=f"mend what it says, and leave this out: `met doc {code}`",
         )

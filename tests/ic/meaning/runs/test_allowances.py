@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from met import cli
 from met.diagnostic import Problem
 from met.plan import Allowance, Experiment
 from met.plan import file as plan_file
@@ -66,6 +68,97 @@ def test_what_is_of_no_run_is_silenced_where_all_runs_allow_it(tmp_path: Path) -
     assert codes(tmp_path, macro, ARM, SERVO, allowing, other, select="all") == ["D017", "D333"]
 
 
+def test_a_reason_of_ones_own_takes_the_place_of_that_of_the_base(tmp_path: Path) -> None:
+    like = 'run other like hold { allow D105 because "ours"; }\nrun last like other { duration = 2 s; }\n'
+    sweep = 'sweep gains of last { vary drive.kp = [0.1, 0.2] V*s/rad; allow D105 because "the sweep\'s"; }\n'
+    made = check(tmp_path, ARM, GEAR, ALLOWED, like, sweep, select="all")
+    assert made.plan is not None and not made.diagnostics
+    assert [[each.because for each in one.allowances] for one in made.plan.experiments] == [
+        ["the rates are the paper's"],
+        ["ours"],
+        ["ours"],
+        ["the sweep's"],
+    ]
+
+
+def test_a_reason_is_one_line(tmp_path: Path) -> None:
+    made = experiment(tmp_path, ARM, GEAR, ALLOWED.replace("the rates are", "the rates\\n\\tare"))
+    assert made.allowances[0].because == "the rates are the paper's"
+
+
+FAST = "run fast like hold { rates { dynamics = 1 kHz; servos = 1 kHz; } }\n"
+
+
+def test_one_that_a_run_has_from_its_base_need_not_be_of_use_to_it(tmp_path: Path) -> None:
+    """It is of use to the base; and where that is not looked at, it may be."""
+    assert codes(tmp_path, ARM, GEAR, ALLOWED, FAST, select="all") == []
+    assert codes(tmp_path, ARM, GEAR, ALLOWED, FAST, select=["fast"]) == []
+
+
+def test_one_that_only_a_run_like_this_one_needs_is_of_use(tmp_path: Path) -> None:
+    """It is said of the base alone that it is of no use where nothing else has it."""
+    stale = changed(FAST, ("{ rates", '{ allow D105 because "ours"; rates'))
+    slow = "run slow like fast { rates { dynamics = 100 Hz; servos = 100 Hz; } }\n"
+    assert codes(tmp_path, ARM, GEAR, SLOW, stale, select=["fast"]) == ["D333"]
+    assert codes(tmp_path, ARM, GEAR, SLOW, stale, slow, select=["fast"]) == []
+    assert codes(tmp_path, ARM, GEAR, SLOW, stale, slow, select=["fast", "slow"]) == []
+    assert codes(tmp_path, ARM, GEAR, SLOW, stale, slow, select="all") == ["D105"]  # of `hold`, which allows none
+
+
+def test_one_of_a_run_need_not_be_of_use_to_a_sweep_of_it(tmp_path: Path) -> None:
+    sweep = "sweep rates of hold { vary rates.dynamics = [500, 1000] Hz; }\n"
+    both = "sweep both = hold + rates;\n"
+    assert codes(tmp_path, ARM, GEAR, ALLOWED, sweep, select=["rates"]) == []
+    assert codes(tmp_path, ARM, GEAR, ALLOWED, sweep, select="all") == []
+    idle = changed(ALLOWED, ("D105", "D102"))
+    assert codes(tmp_path, ARM, GEAR, idle, sweep, select=["rates"]) == []
+    assert codes(tmp_path, ARM, GEAR, idle, sweep, both, select=["both"]) == ["D105", "D333"]
+
+
+def test_one_of_an_included_deck_need_not_be_of_use(tmp_path: Path) -> None:
+    (tmp_path / "base.ic").write_text(ARM + GEAR + changed(ALLOWED, ("D105", "D102")), encoding="utf-8")
+    include = '#include "base.ic"\n'
+    assert codes(tmp_path, include, select="all") == ["D105"]
+    assert codes(tmp_path, include, 'run mine like hold { allow D105 because "ours"; }\n', select=["mine"]) == []
+    own = 'run mine like hold { allow D105 because "ours"; allow D138 because "ours"; }\n'
+    assert codes(tmp_path, include, own, select="all") == ["D333", "D105"]
+
+
+def test_one_need_not_be_of_use_to_a_deck_that_the_command_line_changes(tmp_path: Path) -> None:
+    rates = changed(ALLOWED, ("dynamics = 100 Hz", "dynamics = RATE Hz"))
+    deck = ("#ifndef RATE\n#define RATE 100\n#endif\n", ARM, GEAR, rates)
+    assert not check(tmp_path, *deck).diagnostics
+    assert not check(tmp_path, *deck, defines=["RATE=500"]).diagnostics
+    assert not check(tmp_path, ARM, GEAR, ALLOWED, set=["rates.dynamics=500 Hz"]).diagnostics
+
+
+def test_one_that_only_a_run_can_need_is_not_called_idle(tmp_path: Path) -> None:
+    allowing = changed(RUN, ("record = [q];", 'record = [q]; allow D311 because "a blow of 1 ms";'))
+    assert codes(tmp_path, ARM, SERVO, allowing) == []
+
+
+def test_check_says_what_is_allowed_and_why(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    deck = tmp_path / "deck.ic"
+    deck.write_text(ARM + GEAR + ALLOWED, encoding="utf-8")
+    assert cli.main(["check", str(deck)]) == cli.YES
+    assert capsys.readouterr() == (f"{deck}: 1 run, 1 case: no errors, 1 warning allowed\n", "")
+    assert cli.main(["check", "-v", str(deck)]) == cli.YES
+    lines = capsys.readouterr().out.splitlines()
+    assert (
+        "allowed: servo `drive` is fast for the dynamics' step: h * lambda = 0.833 (D105, because the rates are the paper's)"
+        in lines
+    )
+    assert cli.main(["check", "--format", "json", str(deck)]) == cli.YES
+    said = json.loads(capsys.readouterr().out)
+    assert (said["warnings"], said["diagnostics"]) == (0, [])
+    assert [(each["code"], each["because"]) for each in said["allowed"]] == [("D105", "the rates are the paper's")]
+    sweep = 'sweep ends of hold { vary drive.kp = [0.1, 0.2] V*s/rad; allow D105 because "ours"; }\n'
+    deck.write_text(ARM + GEAR + SLOW + sweep, encoding="utf-8")
+    assert cli.main(["check", "--format", "json", str(deck)]) == cli.YES
+    said = json.loads(capsys.readouterr().out)
+    assert (said["warnings"], said["allowed"]) == (1, []), "its run is warned of it"
+
+
 def test_it_silences_no_error_that_has_come_of_the_warning(tmp_path: Path) -> None:
     assert codes(tmp_path, ARM, changed(SERVO, ("j_m = 1e-4", "j_m = 1e-8")), ALLOWED) == ["D104"]
 
@@ -88,6 +181,11 @@ def test_it_is_in_the_plans_file_and_in_no_key(tmp_path: Path) -> None:
     [
         ((Allowance("d105", "why"),), "experiments[0].allowances[0].code: 'd105' is no code of a warning"),
         ((Allowance("D105", "a"), Allowance("D105", "b")), "experiments[0].allowances: a warning is allowed twice"),
+        ((Allowance("D105", " "),), "experiments[0].allowances[0].because: a reason is one line, which is not empty"),
+        (
+            (Allowance("D105", "a\nD102, because b"),),
+            "experiments[0].allowances[0].because: a reason is one line, which is not empty",
+        ),
     ],
 )
 def test_a_plans_file_with_other_ones_is_damaged(
@@ -112,7 +210,7 @@ def test_whole_messages(tmp_path: Path) -> None:
     )
     assert messages(check(tmp_path, ARM, GEAR, wrong)) == (
         """\
-error[D331]: `D060` is an error, and no error is allowed
+error[D331]: `D060` is no warning of a run, and nothing else is allowed
   --> deck.ic:18:11
    |
 18 |     allow D060 because "no";
