@@ -206,7 +206,7 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
     KIND is servo, command, environment, metric, integrator, bed or law; MODEL one of them by name. Also: the blocks of
     a deck, such as `met doc run` or `joint`; `channels`, what can be recorded; `dh`, Denavit-Hartenberg numbers;
     `shapes`, of links; `units`; `functions`; `designs` and `distributions` of samples; the code of a message, as
-    in `met doc D060`; and a word of the glossary, such as `shard`.
+    in `met doc D060`; an entry of a block, such as `allow`; and a word of the glossary, such as `shard`.
     """
     from ic.language import BLOCKS
     from ic.printing import models as print_models
@@ -240,8 +240,9 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
         found = print_models.selected_models(words)
     except Problem:
         from ic.printing.glossary import meaning
+        from ic.printing.language import print_entries
 
-        lines = list(meaning(words[0])) if len(words) == 1 else []
+        lines = list(meaning(words[0])) or list(print_entries(words[0])) if len(words) == 1 else []
         if not lines:
             raise
         if form == "json":
