@@ -12,7 +12,6 @@ import errno
 import json
 import math
 import os
-import socket
 import stat
 from collections.abc import Iterator
 from io import BufferedReader, BufferedWriter
@@ -82,8 +81,10 @@ def whole_file(path: str | os.PathLike[str], *, mode: int | None = None) -> Iter
     """
     name = os.fspath(path)
     folder, base = os.path.split(name)
+    from socket import gethostname  # late: reading a file, as every start does, needs no network
+
     # hosts that share the folder have processes of one number
-    temporary = os.path.join(folder, f".{base}.{socket.gethostname()}.{os.getpid()}.tmp")
+    temporary = os.path.join(folder, f".{base}.{gethostname()}.{os.getpid()}.tmp")
     try:
         with new_file(temporary) as file:
             yield file

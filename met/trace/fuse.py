@@ -20,21 +20,27 @@ def fused(nodes: Sequence[Node], roots: Iterable[int], leading: Iterable[int] | 
     leading  those of the roots whose sums are decided as if there were no others, so that what is only watched never
              changes what is watched; None: all of them
     """
-    roots = list(roots)
     result = list(nodes)
+    decided: list[int] = []
     if leading is not None:
         leading = list(leading)
-        _fuse(nodes, leading, result, frozenset())
-        decided = frozenset(live(nodes, leading))
-    else:
-        decided = frozenset()
-    _fuse(nodes, roots, result, decided)
+        decided = live(nodes, leading)
+        _fuse(nodes, decided, leading, decided, result)
+    roots = list(roots)
+    order = live(nodes, roots)
+    if len(order) > len(decided):
+        known = frozenset(decided)
+        _fuse(nodes, order, roots, [i for i in order if i not in known], result)
     return result
 
 
-def _fuse(nodes: Sequence[Node], roots: Sequence[int], result: list[Node], decided: frozenset[int]) -> None:
-    """Fuse, in `result`, the sums that the roots need, all but those at positions that are decided already."""
-    order = live(nodes, roots)
+def _fuse(
+    nodes: Sequence[Node], order: Sequence[int], roots: Sequence[int], sums: Sequence[int], result: list[Node]
+) -> None:
+    """Fuse, in `result`, products into the sums among the positions `sums`.
+
+    order  positions of all nodes that the roots need: a product that two of them take is not fused
+    """
     # How often each node is used, by whom last; a product that leaves the section counts as used by others too.
     uses = [0] * len(nodes)
     user = [0] * len(nodes)
@@ -49,9 +55,9 @@ def _fuse(nodes: Sequence[Node], roots: Sequence[int], result: list[Node], decid
     def fusable(i: int) -> bool:
         return nodes[i][0] == "mul" and uses[i] == 1 and nodes[user[i]][0] in ("add", "sub")
 
-    for i in order:
+    for i in sums:
         node = nodes[i]
-        if node[0] not in ("add", "sub") or i in decided:
+        if node[0] not in ("add", "sub"):
             continue
         a, b = node[1], node[2] ^ (node[0] == "sub")
         if fusable(b >> 1):

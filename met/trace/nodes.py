@@ -294,15 +294,15 @@ class Nodes:
 def live(nodes: Sequence[Node], roots: Iterable[int]) -> list[int]:
     """Positions of all nodes that the references need, in order of creation."""
     needed = bytearray(len(nodes))
-    stack = [ref >> 1 for ref in roots]
-    while stack:
-        i = stack.pop()
-        if not needed[i]:
-            needed[i] = 1
+    last = -1
+    for ref in roots:
+        needed[ref >> 1] = 1
+        last = max(last, ref >> 1)
+    for i in range(last, -1, -1):  # a node stands after its operands
+        if needed[i]:
             node = nodes[i]
             for ref in node[1 : 1 + OPERANDS[node[0]]]:
-                if not needed[ref >> 1]:
-                    stack.append(ref >> 1)
+                needed[ref >> 1] = 1
     return [i for i, need in enumerate(needed) if need]
 
 

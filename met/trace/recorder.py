@@ -217,6 +217,8 @@ def _without_dead_stores(sections: list[CodeSection], asked: set[str]) -> list[C
 def _storing(section: CodeSection, read: set[str]) -> CodeSection:
     """The section with its stores to these cells alone."""
     stores = tuple(store for store in section.stores if store[0] in read)
+    if stores == section.stores:
+        return section
     return CodeSection(section.name, section.nodes, stores, section.records, section.outputs, section.parts)
 
 

@@ -16,7 +16,7 @@ from met.backends.llvm.philox import PhiloxWriter
 from met.backends.llvm.pieces import CUT_ABOVE, LONGEST, SHORTEST, Piece, cut
 from met.backends.llvm.pieces import check as check_pieces
 from met.trace import check
-from met.trace.nodes import OPERANDS, TRUTHS
+from met.trace.nodes import OPERANDS, TRUTHS, Node
 from met.trace.recording import CodeSection, Recording
 
 _CALLS = {"sqrt": "llvm.sqrt", "floor": "llvm.floor", "rint": "llvm.roundeven", "abs": "llvm.fabs", "fma": "llvm.fma"}
@@ -50,14 +50,16 @@ def emit(
     return _LlvmEmitter(recording, lanes, vector or lanes, width, inline, (above, shortest, longest)).text()
 
 
-_NAME = re.compile(r'[%@](?:"[^"]*"|[\w.$#-]+)|^[\w.$-]+(?=:)|  ;.*', re.MULTILINE)
-_KEPT = ("@llvm.", "@malloc", "@free", f"@{ENTRY}")
+_NAME = re.compile(r"[%@][\w.$#-]+|^[\w.$-]+(?=:)", re.MULTILINE)
+_REMARK = re.compile(r"  ;.*")
+_KEPT = ("@llvm.", "@malloc", "@free", f"@{ENTRY}", "@section.", "@table.")
 
 
 class _Numbers(dict[str, str]):
     """Names in a function, numbered in order of appearance.
 
-    symbols  what stands for the module's own names: one table for all functions. Names of LLVM and of C stay
+    symbols  what stands for the module's own names: one table for all functions. Names of LLVM and of C stay, and
+             those that are numbers as they are written
     """
 
     def __init__(self, symbols: dict[str, str]) -> None:
@@ -65,9 +67,7 @@ class _Numbers(dict[str, str]):
         self.locals: dict[str, str] = {}
 
     def __missing__(self, name: str) -> str:
-        if name.startswith("  ;"):
-            number = ""
-        elif name.startswith(_KEPT):
+        if name.startswith(_KEPT):
             number = name
         elif name[0] == "@":
             number = self.symbols.setdefault(name, f"@{len(self.symbols)}")
@@ -79,10 +79,15 @@ class _Numbers(dict[str, str]):
 
 
 def numbered(text: str) -> str:
-    """The text of a module without remarks, its names replaced by numbers: what decides the code that it becomes."""
+    """The text of a module without remarks, its names replaced by numbers: what decides the code that it becomes.
+
+    The code of sections has numbers for names as it is written, and is nearly all of the text.
+    """
     symbols: dict[str, str] = {}
 
     def of(part: str) -> str:
+        if part.startswith("private void @section."):
+            return _REMARK.sub("", part)
         names = _Numbers(symbols)
         return _NAME.sub(lambda match: names[match[0]], part)
 
@@ -117,21 +122,14 @@ class _LlvmEmitter:
         self.scratch = 0
 
     def text(self) -> str:
-        names: set[str] = set()
-        for section in self.recording.sections:
-            name = base = "".join(c if c.isascii() and (c.isalnum() or c in "._+") else "_" for c in section.name)
-            n = 1
-            while name in names:
-                n += 1
-                name = f"{base}.{n}"
-            names.add(name)
+        for n, section in enumerate(self.recording.sections):
             pieces = cut(section, *self.sizes)
             if check.wanted():
                 check_pieces(section, pieces)
             self.scratch = max(self.scratch, max(piece.slots for piece in pieces))
             self.calls.append([])
             for i, piece in enumerate(pieces):
-                symbol = f'@"{name}"' if len(pieces) == 1 else f'@"{name}#{i}"'
+                symbol = f"@section.{n}" if len(pieces) == 1 else f"@section.{n}.{i}"
                 self.calls[-1].append(symbol)
                 self.functions.append(self._function(symbol, section, piece))
         tables = [
@@ -171,14 +169,17 @@ class _LlvmEmitter:
         turned: dict[int, str] = {}
         drawn: dict[tuple[int, ...], PhiloxWriter] = {}
 
-        def slot(base: str, i: int, label: str) -> str:
-            put(f"  %{label} = getelementptr i8, ptr %{base}, i64 {8 * self.lanes * i}")
-            return f"%{label}"
+        def op(text: str, remark: str = "") -> str:
+            """The name of what an instruction makes: the number of its line."""
+            name = f"%v{len(lines)}"
+            put(f"  {name} = {text}{remark}")
+            return name
 
-        def load(base: str, i: int, label: str, name: str = "") -> str:
-            place = slot(base, i, f"{label}.p")
-            put(f"  %{label} = load {V}, ptr {place}, align {self.align}{_remark(name)}")
-            return f"%{label}"
+        def slot(base: str, i: int) -> str:
+            return op(f"getelementptr i8, ptr %{base}, i64 {8 * self.lanes * i}")
+
+        def load(base: str, i: int, name: str = "") -> str:
+            return op(f"load {V}, ptr {slot(base, i)}, align {self.align}", _remark(name))
 
         def plain(i: int) -> str:
             """The value at position i, loaded or spread over the lanes where it is not there yet."""
@@ -186,25 +187,22 @@ class _LlvmEmitter:
             if value is not None:
                 return value
             node = nodes[i]
-            op = node[0]
-            if op == "const":
+            kind = node[0]
+            if kind == "const":
                 value = f"splat (double {number(node[1])})"
-            elif op == "false":
+            elif kind == "false":
                 value = "zeroinitializer"
-            elif op == "input":
-                value = load("inputs", self.inputs[node[1]], f"v{i}", node[1])
-            elif op == "cell":
-                value = load("state", self.state[node[1]], f"v{i}", node[1])
-            elif op in ("tick", "time"):
-                put(f"  %v{i}.s = insertelement {V} poison, double %{op}, i64 0")
-                put(f"  %v{i} = shufflevector {V} %v{i}.s, {V} poison, <{L} x i32> zeroinitializer")
-                value = f"%v{i}"
-            elif op in TRUTHS:
-                held = load("scratch", piece.kept[i], f"v{i}.d")
-                put(f"  %v{i} = fcmp une {V} {held}, zeroinitializer")
-                value = f"%v{i}"
+            elif kind == "input":
+                value = load("inputs", self.inputs[node[1]], node[1])
+            elif kind == "cell":
+                value = load("state", self.state[node[1]], node[1])
+            elif kind in ("tick", "time"):
+                first = op(f"insertelement {V} poison, double %{kind}, i64 0")
+                value = op(f"shufflevector {V} {first}, {V} poison, <{L} x i32> zeroinitializer")
+            elif kind in TRUTHS:
+                value = op(f"fcmp une {V} {load('scratch', piece.kept[i])}, zeroinitializer")
             else:
-                value = load("scratch", piece.kept[i], f"v{i}")
+                value = load("scratch", piece.kept[i])
             have[i] = value
             return value
 
@@ -215,94 +213,87 @@ class _LlvmEmitter:
                 return plain(i)
             value = turned.get(i)
             if value is None:
-                op = nodes[i][0]
-                if op == "const":
+                kind = nodes[i][0]
+                if kind == "const":
                     value = f"splat (double {number(-nodes[i][1])})"
-                elif op == "false":
+                elif kind == "false":
                     value = "splat (i1 true)"
-                elif op in TRUTHS:
-                    put(f"  %n{i} = xor {truth} {plain(i)}, splat (i1 true)")
-                    value = f"%n{i}"
+                elif kind in TRUTHS:
+                    value = op(f"xor {truth} {plain(i)}, splat (i1 true)")
                 else:
-                    put(f"  %n{i} = fneg {V} {plain(i)}")
-                    value = f"%n{i}"
+                    value = op(f"fneg {V} {plain(i)}")
                 turned[i] = value
             return value
 
-        def pattern(value: str, label: str) -> str:
-            put(f"  %{label} = bitcast {V} {value} to {bits}")
-            return f"%{label}"
+        def pattern(value: str) -> str:
+            return op(f"bitcast {V} {value} to {bits}")
 
-        def compute(i: int) -> None:
-            node = nodes[i]
-            op = node[0]
-            operands = [of(ref) for ref in node[1 : 1 + OPERANDS[op]]]
-            to = f"%v{i}"
-            if op in _ARITHMETIC:
-                put(f"  {to} = {_ARITHMETIC[op]} {V} {operands[0]}, {operands[1]}")
-            elif op in _CALLS:
-                call = self._intrinsic(f"{_CALLS[op]}.{suffix}", V, *[V] * len(operands))
-                put(f"  {to} = call {V} {call}({', '.join(f'{V} {x}' for x in operands)})")
-            elif op in _COMPARE:
-                put(f"  {to} = fcmp {_COMPARE[op]} {V} {operands[0]}, {operands[1]}")
-            elif op == "and":
-                put(f"  {to} = and {truth} {operands[0]}, {operands[1]}")
-            elif op == "where":
-                put(f"  {to} = select {truth} {operands[0]}, {V} {operands[1]}, {V} {operands[2]}")
-            elif op == "bit":
+        def computed(node: Node) -> str:
+            kind = node[0]
+            operands = [of(ref) for ref in node[1 : 1 + OPERANDS[kind]]]
+            if kind in _ARITHMETIC:
+                return op(f"{_ARITHMETIC[kind]} {V} {operands[0]}, {operands[1]}")
+            if kind in _CALLS:
+                call = self._intrinsic(f"{_CALLS[kind]}.{suffix}", V, *[V] * len(operands))
+                return op(f"call {V} {call}({', '.join(f'{V} {x}' for x in operands)})")
+            if kind in _COMPARE:
+                return op(f"fcmp {_COMPARE[kind]} {V} {operands[0]}, {operands[1]}")
+            if kind == "and":
+                return op(f"and {truth} {operands[0]}, {operands[1]}")
+            if kind == "where":
+                return op(f"select {truth} {operands[0]}, {V} {operands[1]}, {V} {operands[2]}")
+            if kind == "bit":
                 mask = 1 << node[2] if node[2] < 63 else -1 << 63
-                put(f"  %v{i}.a = and {bits} {pattern(operands[0], f'v{i}.i')}, splat (i64 {mask})")
-                put(f"  {to} = icmp ne {bits} %v{i}.a, zeroinitializer")
-            elif op == "flip":
-                x, t = pattern(operands[0], f"v{i}.i"), pattern(operands[1], f"v{i}.t")
-                put(f"  %v{i}.l = shl {bits} {t}, splat (i64 {63 - node[3]})")
-                put(f"  %v{i}.a = and {bits} %v{i}.l, splat (i64 {-1 << 63})")
-                put(f"  %v{i}.x = xor {bits} {x}, %v{i}.a")
-                put(f"  {to} = bitcast {bits} %v{i}.x to {V}")
-            elif op == "pow2":
-                put(f"  %v{i}.s = fadd {V} {operands[0]}, splat (double {number(4503599627371519.0)})")
-                put(f"  %v{i}.l = shl {bits} {pattern(f'%v{i}.s', f'v{i}.i')}, splat (i64 52)")
-                put(f"  {to} = bitcast {bits} %v{i}.l to {V}")
-            elif op == "exponent":
-                put(f"  %v{i}.l = lshr {bits} {pattern(operands[0], f'v{i}.i')}, splat (i64 52)")
-                put(f"  %v{i}.a = and {bits} %v{i}.l, splat (i64 2047)")
-                put(f"  %v{i}.o = or {bits} %v{i}.a, splat (i64 {0x433 << 52})")
-                put(f"  %v{i}.d = bitcast {bits} %v{i}.o to {V}")
-                put(f"  {to} = fsub {V} %v{i}.d, splat (double {number(4503599627371519.0)})")
-            elif op == "significand":
-                put(f"  %v{i}.a = and {bits} {pattern(operands[0], f'v{i}.i')}, splat (i64 {(1 << 52) - 1})")
-                put(f"  %v{i}.o = or {bits} %v{i}.a, splat (i64 {1023 << 52})")
-                put(f"  {to} = bitcast {bits} %v{i}.o to {V}")
-            elif op == "philox":
+                masked = op(f"and {bits} {pattern(operands[0])}, splat (i64 {mask})")
+                return op(f"icmp ne {bits} {masked}, zeroinitializer")
+            if kind == "flip":
+                value, sign = pattern(operands[0]), pattern(operands[1])
+                shifted = op(f"shl {bits} {sign}, splat (i64 {63 - node[3]})")
+                masked = op(f"and {bits} {shifted}, splat (i64 {-1 << 63})")
+                flipped = op(f"xor {bits} {value}, {masked}")
+                return op(f"bitcast {bits} {flipped} to {V}")
+            if kind == "pow2":
+                total = op(f"fadd {V} {operands[0]}, splat (double {number(4503599627371519.0)})")
+                shifted = op(f"shl {bits} {pattern(total)}, splat (i64 52)")
+                return op(f"bitcast {bits} {shifted} to {V}")
+            if kind == "exponent":
+                shifted = op(f"lshr {bits} {pattern(operands[0])}, splat (i64 52)")
+                masked = op(f"and {bits} {shifted}, splat (i64 2047)")
+                joined = op(f"or {bits} {masked}, splat (i64 {0x433 << 52})")
+                number_of = op(f"bitcast {bits} {joined} to {V}")
+                return op(f"fsub {V} {number_of}, splat (double {number(4503599627371519.0)})")
+            if kind == "significand":
+                masked = op(f"and {bits} {pattern(operands[0])}, splat (i64 {(1 << 52) - 1})")
+                joined = op(f"or {bits} {masked}, splat (i64 {0x3FF << 52})")
+                return op(f"bitcast {bits} {joined} to {V}")
+            if kind == "philox":
                 refs, word = node[1:7], node[7]
                 if refs not in drawn:
-                    drawn[refs] = PhiloxWriter(put, f"r{i}", operands, L)
-                to = drawn[refs].word(word)
-            else:
-                assert op == "gather", op
-                gather(i, operands[0], node[2])
-            have[i] = to
+                    drawn[refs] = PhiloxWriter(op, operands, L)
+                return drawn[refs].word(word)
+            assert kind == "gather", kind
+            return gathered(operands[0], node[2])
 
-        def gather(i: int, index: str, table: tuple[float, ...]) -> None:
+        def gathered(index: str, table: tuple[float, ...]) -> str:
             symbol = self.tables.setdefault(table, f"@table.{len(self.tables)}")
             top = number(len(table) - 1.0)
-            put(f"  %v{i}.c = fcmp ogt {V} {index}, zeroinitializer")
-            put(f"  %v{i}.l = select {truth} %v{i}.c, {V} {index}, {V} zeroinitializer")
-            put(f"  %v{i}.e = fcmp olt {V} %v{i}.l, splat (double {top})")
-            put(f"  %v{i}.h = select {truth} %v{i}.e, {V} %v{i}.l, {V} splat (double {top})")
-            put(f"  %v{i}.i = fptosi {V} %v{i}.h to <{L} x i32>")
-            put(f"  %v{i}.p = getelementptr double, ptr {symbol}, <{L} x i32> %v{i}.i")
+            above = op(f"fcmp ogt {V} {index}, zeroinitializer")
+            low = op(f"select {truth} {above}, {V} {index}, {V} zeroinitializer")
+            below = op(f"fcmp olt {V} {low}, splat (double {top})")
+            held = op(f"select {truth} {below}, {V} {low}, {V} splat (double {top})")
+            whole = op(f"fptosi {V} {held} to <{L} x i32>")
+            place = op(f"getelementptr double, ptr {symbol}, <{L} x i32> {whole}")
             call = self._intrinsic(f"llvm.masked.gather.{suffix}.v{L}p0", V, f"<{L} x ptr>", "i32", truth, V)
-            put(f"  %v{i}.g = call {V} {call}(<{L} x ptr> %v{i}.p, i32 8, {truth} splat (i1 true), {V} poison)")
-            put(f"  %v{i}.n = fcmp uno {V} {index}, {index}")
-            put(f"  %v{i} = select {truth} %v{i}.n, {V} splat (double {number(float('nan'))}), {V} %v{i}.g")
+            there = op(f"call {V} {call}(<{L} x ptr> {place}, i32 8, {truth} splat (i1 true), {V} poison)")
+            nan = op(f"fcmp uno {V} {index}, {index}")
+            return op(f"select {truth} {nan}, {V} splat (double {number(float('nan'))}), {V} {there}")
 
         def keep(i: int) -> None:
             value = have[i]
             if nodes[i][0] in TRUTHS:
-                put(f"  %v{i}.k = select {truth} {value}, {V} splat (double {number(1.0)}), {V} zeroinitializer")
-                value = f"%v{i}.k"
-            put(f"  store {V} {value}, ptr {slot('scratch', piece.keep[i], f'v{i}.q')}, align {self.align}")
+                value = op(f"select {truth} {value}, {V} splat (double {number(1.0)}), {V} zeroinitializer")
+            place = slot("scratch", piece.keep[i])
+            put(f"  store {V} {value}, ptr {place}, align {self.align}")
 
         def leave(stores: Iterable[tuple[str, Any, int]]) -> None:
             ready = [(kind, where, of(ref)) for kind, where, ref in stores]
@@ -314,10 +305,11 @@ class _LlvmEmitter:
                 }[kind]
                 assert i is not None
                 name = _remark(where if kind == "cell" else "")
-                put(f"  store {V} {value}, ptr {slot(base, i, f'{base}.{i}')}, align {self.align}{name}")
+                place = slot(base, i)
+                put(f"  store {V} {value}, ptr {place}, align {self.align}{name}")
 
         for position, i in piece.body:
-            compute(i)
+            have[i] = computed(nodes[i])
             if i in piece.keep:
                 keep(i)
             leave(piece.stores.get(position, ()))
@@ -326,7 +318,8 @@ class _LlvmEmitter:
         return "\n".join(
             [
                 f"define private void {symbol}(ptr noalias %state, ptr noalias readonly %inputs, ptr noalias %scratch, "
-                f"ptr noalias %row, ptr noalias %outputs, double %tick, double %time) {attributes} {{",
+                f"ptr noalias %row, ptr noalias %outputs, double %tick, double %time) {attributes} {{"
+                f"{_remark(section.name)}",
                 *lines,
                 "  ret void",
                 "}",

@@ -13,18 +13,15 @@ _SHIFT_BITS = 0x433 << 52
 class PhiloxWriter:
     """The rounds over one set of operands, as LLVM IR over vectors of `lanes` doubles; `word` gives each of the four.
 
-    put       takes each line
-    label     what every name made here begins with
+    op        takes an instruction, and gives the name of what it makes
     operands  values of IR: four words of the counter, two of the key
 
     Integers have 64 bits, of which the low 32 count; so each product is one `vpmuludq`. They are made by a sum rather
     than a conversion, whose result is undefined out of range, and an operand is a word if it comes back unchanged.
     """
 
-    def __init__(self, put: Callable[[str], None], label: str, operands: Sequence[str], lanes: int) -> None:
-        self.put = put
-        self.label = label
-        self.made = 0
+    def __init__(self, op: Callable[[str], str], operands: Sequence[str], lanes: int) -> None:
+        self._op = op
         self.doubles, self.integers, self.truths = (f"<{lanes} x {kind}>" for kind in ("double", "i64", "i1"))
         words, valid = [], "splat (i1 true)"
         for x in operands:
@@ -41,12 +38,6 @@ class PhiloxWriter:
         value = self._double(self.words[n])
         nan = "splat (double 0x7FF8000000000000)"
         return self._op(f"select {self.truths} {self.valid}, {self.doubles} {value}, {self.doubles} {nan}")
-
-    def _op(self, text: str) -> str:
-        name = f"%{self.label}.{self.made}"
-        self.made += 1
-        self.put(f"  {name} = {text}")
-        return name
 
     def _low(self, x: str) -> str:
         return self._op(f"and {self.integers} {x}, splat (i64 {LOW})")
