@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Entry, Name, Statement, String
 from ic.meaning.definitions.resolve import Definition, Definitions
-from ic.text.codes import is_on_the_page
 from ic.text.complaints import Complaints
 from met.diagnostic import Diagnostic, Label, Place, did_you_mean
 from met.messages.warning_codes import WARNINGS, WHILE_RUNNING
@@ -127,6 +126,8 @@ def _with_parts(definitions: Definitions, checked: Iterable[Definition]) -> set[
 
 
 def _refuse(code: str, place: Place, complaints: Complaints) -> None:
+    from ic.text.codes import is_on_the_page
+
     if is_on_the_page(code):
         complaints.error(
             "D331",
