@@ -29,7 +29,7 @@ from ic.meaning.mechanics.arm import ResolvedArm, resolve_arm
 from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.payloads import check_payloads, resolve_payloads
 from ic.meaning.parameters.addresses import in_run
-from ic.meaning.parameters.models import body_of, find_bare_model, overriding_place, word_of
+from ic.meaning.parameters.models import body_of, find_bare_model, overriding_place, refuse_statements, word_of
 from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
@@ -271,6 +271,10 @@ def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> 
             helps = in_run(scope.definitions, block, item, RATES.keys) or [*near, known_words("a run has", RUN.keys)]
             scope.complaints.note_misspelling(definition.place, item.name, (*RUN.keys, *metrics))
             scope.complaints.error("D109", f"a run has no `{item.name}`", item.place, help=helps)
+    for key in ("servos", "initial", "rates"):
+        within = block.get(key)
+        if within is not None and within.body is not None:
+            refuse_statements(scope, within.body, f"`{key}`")
     for statement in block.statements:
         words = " ".join(word.text for word in statement.words)
         if words != "require" and statement.words[0].text != ALLOW:

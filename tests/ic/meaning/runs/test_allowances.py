@@ -265,3 +265,11 @@ warning[D333]: `allow D105` silences nothing here
 1 warning
 """
     )
+
+
+@pytest.mark.parametrize("block", ["servos", "initial", "rates"])
+def test_one_inside_a_block_of_the_run_is_refused(block: str, tmp_path: Path) -> None:
+    inside = f'run other like hold {{ {block} {{ allow D105 because "ours"; }} }}\n'
+    (found,) = check(tmp_path, ARM, SERVO, RUN, inside, select="all").diagnostics
+    assert (found.code, found.message) == ("D142", f"`allow` inside `{block}`")
+    assert found.help == ("it belongs to a run or a sweep",)
