@@ -48,7 +48,8 @@ def check(
     find(deck, include_dirs)
     compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, set=settings, select="all")
     if form == "json":
-        complain(compiled.diagnostics, compiled.sources, json=True)
+        allowed = [(warning, allowance.because) for warning, allowance in compiled.allowed]
+        complain(compiled.diagnostics, compiled.sources, json=True, allowed=allowed)
         return YES if compiled.plan is not None else BAD_INPUT
     if compiled.diagnostics and (compiled.plan is None or not quiet):
         complain(compiled.diagnostics, compiled.sources)
@@ -59,7 +60,8 @@ def check(
 
         if verbose:
             _print(notes(compiled.plan))
-        say(verdict(compiled.plan, compiled.diagnostics))
+            _print(f"allowed: {warning.message} ({allowance})" for warning, allowance in compiled.allowed)
+        say(verdict(compiled.plan, compiled.diagnostics, len(compiled.allowed)))
     return YES
 
 
@@ -204,7 +206,7 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
     KIND is servo, command, environment, metric, integrator, bed or law; MODEL one of them by name. Also: the blocks of
     a deck, such as `met doc run` or `joint`; `channels`, what can be recorded; `dh`, Denavit-Hartenberg numbers;
     `shapes`, of links; `units`; `functions`; `designs` and `distributions` of samples; the code of a message, as
-    in `met doc D060`; and a word of the glossary, such as `shard`.
+    in `met doc D060`; an entry of a block, such as `allow`; and a word of the glossary, such as `shard`.
     """
     from ic.language import BLOCKS
     from ic.printing import models as print_models
@@ -238,8 +240,9 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
         found = print_models.selected_models(words)
     except Problem:
         from ic.printing.glossary import meaning
+        from ic.printing.language import print_entries
 
-        lines = list(meaning(words[0])) if len(words) == 1 else []
+        lines = list(meaning(words[0])) or list(print_entries(words[0])) if len(words) == 1 else []
         if not lines:
             raise
         if form == "json":

@@ -245,12 +245,18 @@ def _run(arguments: list[str]) -> int:
         return DEFECT
 
 
-def complain(diagnostics: Sequence[Diagnostic], sources: Mapping[str, str], *, json: bool = False) -> None:
-    """Print diagnostics: for people on stderr, for programs as JSON on stdout."""
+def complain(
+    diagnostics: Sequence[Diagnostic],
+    sources: Mapping[str, str],
+    *,
+    json: bool = False,
+    allowed: Sequence[tuple[Diagnostic, str]] | None = None,
+) -> None:
+    """Print diagnostics: for people on stderr, for programs as JSON on stdout, with what a deck allows and why."""
     from met.messages import render
 
     if json:
-        print(render.to_json(diagnostics))
+        print(render.to_json(diagnostics, allowed))
         return
     print(render.render(diagnostics, sources, colour=render.wants_colour(sys.stderr)), end="", file=sys.stderr)
 

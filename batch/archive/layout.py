@@ -372,6 +372,7 @@ def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, 
         **_step_errors(experiment, variables),
         "frame": FRAME if structure.base is None else WHERE_IT_MOVES,
         "coordinates": " ".join(coordinates),
+        **({"allowed": "\n".join(map(str, experiment.allowances))} if experiment.allowances else {}),
     }
 
 

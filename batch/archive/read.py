@@ -51,6 +51,12 @@ class ArchiveGroup:
             self.step_errors = step_errors.read(self)
         self.name: str = self.attributes["experiment"]
         self.sweep: str = str(self.attributes.get("sweep", ""))
+        self.allowed: tuple[str, ...] = tuple(filter(None, str(self.attributes.get("allowed", "")).split("\n")))
+        """Warnings that were allowed, a line each: `D105, because the report's own rates`."""
+
+    def allows(self, code: str) -> bool:
+        """Return True if a warning with this code was allowed."""
+        return any(each.startswith(f"{code},") for each in self.allowed)
 
     @cached_property
     def variables(self) -> dict[str, Stored]:

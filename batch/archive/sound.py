@@ -30,7 +30,7 @@ ATTRIBUTES: dict[str, tuple[type, ...]] = {
 }
 """Attributes that every experiment's group has, with their types; numbers are above 0."""
 
-WORDED = ("sweep", "structure_key", "code_key", "frame", "coordinates")
+WORDED = ("sweep", "structure_key", "code_key", "frame", "coordinates", "allowed")
 """Attributes in words that an experiment's group may have besides."""
 
 VARIABLES = {"case": WHOLE, "case_id": WORDS, "cause": WORDS, "status": WHOLE, "n_valid": WHOLE}

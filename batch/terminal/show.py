@@ -171,6 +171,8 @@ def heading(group: ArchiveGroup, width: int) -> list[str]:
     else:
         lines = textwrap.wrap(text, width - indent)
     out = [f"{group.name}  {lines[0]}".rstrip(), *(" " * indent + rest for rest in lines[1:])]
+    for each in group.allowed:
+        out += textwrap.wrap(f"allowed: {each}", max(NARROWEST, width), initial_indent="  ", subsequent_indent="    ")
     for variable in group.role("choice"):
         out.append(f"  {variable.path} = {group.at(variable.name, [0])[0]}")
     for variable in group.role("coordinate"):

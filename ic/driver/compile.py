@@ -16,6 +16,7 @@ from ic.meaning.control.servos import check_servo_definition
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.mechanics.arm import check_arm, resolve_arm
 from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.allowances import allowed_warnings, silence_of_all, warn_of_unneeded
 from ic.read import in_order, read, read_again
 from ic.sweeps.effects import Effects
 from ic.sweeps.groups import DeckSource, ScopedExperiment, experiments_of
@@ -24,7 +25,7 @@ from ic.text.complaints import Complaints, known_words
 from ic.text.lexer import COMMAND_LINE
 from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
 from met.frozen import frozen
-from met.plan import Experiment, Plan
+from met.plan import Allowance, Experiment, Plan
 from met.plan import Source as File
 
 Select = Sequence[str] | Literal["all"] | None
@@ -32,12 +33,16 @@ Select = Sequence[str] | Literal["all"] | None
 
 @frozen
 class Compiled:
-    """A plan, None where an error stands in its way; all diagnostics, warnings too; every file's text by name."""
+    """A plan, None where an error stands in its way; all diagnostics, warnings too; every file's text by name.
+
+    allowed  the warnings that are not among the diagnostics, for a run allows them, each with what does
+    """
 
     plan: Plan | None
     diagnostics: tuple[Diagnostic, ...]
     sources: Mapping[str, str] = field(default_factory=dict)
     scopes: tuple[Scope, ...] = field(default=(), repr=False)  # one for each experiment: what `explain` looks into
+    allowed: tuple[tuple[Diagnostic, Allowance], ...] = ()
 
 
 def check(
@@ -68,6 +73,7 @@ def compile_deck(
 
     settings  `PATH=VALUE`, each as if the deck said so
     """
+    defines = tuple(defines)
     complaints = complaints if complaints is not None else Complaints(deck.warnings)
     complaints.note_unreadable(deck.unreadable)
     deck, entries = _with_settings(deck, settings, complaints)
@@ -75,6 +81,7 @@ def compile_deck(
     given = Settings(entries)
     written, definitions = definitions, given.in_definitions(definitions)
     source = DeckSource(definitions, complaints, partial(read_again, deck), given, Effects(given))
+    asked: list[Definition] = []
     experiments: list[Experiment] = []
     scopes: list[Scope] = []
     try:
@@ -111,6 +118,9 @@ def compile_deck(
     texts = {source.name: source.text for source in sources}
     if not complaints.errors:
         complaints.admit_remarks()
+        silence_of_all(experiments, complaints)
+        if not settings and not defines:  # which make another deck of it
+            warn_of_unneeded(definitions, asked, experiments, complaints)
     else:
         return Compiled(None, in_order(complaints.all, sources), texts)
     files = tuple(File(source.name, source.text, source.sha256) for source in sources)
@@ -120,6 +130,7 @@ def compile_deck(
         in_order(complaints.all, sources),
         texts,
         tuple(scopes),
+        allowed_warnings(experiments, complaints),
     )
 
 

@@ -143,6 +143,9 @@ RUN = BlockDeclaration(
               doc="a limit that counts for the exit code; also `<=`, `>`, `>=`; of a share of cases: "
                   "`in 99 % of cases with 90 % confidence`; "
                   "`step_error(METRIC) < 1 %` is one on its error by the step"),
+        Entry(name="allow", form="statement", written='allow CODE because "REASON";', default="none",
+              doc="a warning that is right, and not to be given; its code is printed with it: "
+                  "`allow D105 because \"the report's own rates\";`"),
         Entry(name="tolerances", written="tolerances { ... }", default="none: not in a bit",
               doc="by how much another version may differ before `met diff` says so"),
         Entry(name="seed", written="seed = 7;", default="0", parameter=SEED, path="seed",
@@ -167,6 +170,8 @@ SWEEP = BlockDeclaration(
               doc="each case so many times, with noise of its own"),
         Entry(name="exclude when", form="statement", written="exclude when CONDITION;", default="none",
               doc="leaves out the cases for which it holds"),
+        Entry(name="allow", form="statement", written='allow CODE because "REASON";', default="those of the run",
+              doc="a warning that is not to be given, beside those that the run allows"),
         Entry(name="seed", written="seed = 7;", default="the run's", parameter=SEED,
               doc="of the noise, and of what is drawn"),
         Entry(name="seeds", written="seeds = independent;", default="`common`",

@@ -20,8 +20,9 @@ def notes(plan: Plan) -> Iterator[str]:
         yield from (f"{experiment.name}: {note}" for note in experiment.notes if not note.startswith(STEP_SIZE))
 
 
-def verdict(plan: Plan, diagnostics: Sequence[Diagnostic]) -> str:
-    """`two_link.ic: 1 run, 1 sweep, 37 cases: no errors`; the cases are those of all runs and sweeps."""
+def verdict(plan: Plan, diagnostics: Sequence[Diagnostic], allowed: int = 0) -> str:
+    """`two_link.ic: 1 run, 1 sweep, 37 cases: no errors, 1 warning allowed`; the cases are those of all runs and
+    sweeps. allowed: the number of warnings that are not given."""
     sweeps = len({experiment.name_in_deck for experiment in plan.experiments if experiment.varies})
     runs = sum(1 for experiment in plan.experiments if not experiment.varies)
     parts = [count(runs, "run")] if runs else []
@@ -29,4 +30,5 @@ def verdict(plan: Plan, diagnostics: Sequence[Diagnostic]) -> str:
     parts.append(count(sum(experiment.cases.count for experiment in plan.experiments), "case"))
     warnings = sum(1 for diagnostic in diagnostics if diagnostic.severity == "warning")
     counted = f", {count(warnings, 'warning')}" if warnings else ""
+    counted += f", {count(allowed, 'warning')} allowed" if allowed else ""
     return f"{plan.deck.strip('<>')}: {', '.join(parts)}: no errors{counted}"

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 
+from ic.text.codes import PAGE
 from met.diagnostic import Problem, did_you_mean, error
-
-PAGE = Path(__file__).parents[1] / "pages" / "diagnostics.md"
 
 _ENTRY = re.compile(r"^### ([A-Z]\d{3}): .*?(?=^##)", re.MULTILINE | re.DOTALL)
 _ROW = re.compile(r"^\| ([A-Z]\d{3}) \| (.*?) \|", re.MULTILINE)  # of codes that no deck brings about

@@ -43,6 +43,16 @@ def print_block(block: BlockDeclaration) -> Iterator[str]:
         yield from columns(varying)
 
 
+def print_entries(word: str) -> Iterator[str]:
+    """The entries of blocks that begin with this word, such as `allow`, for a terminal; nothing where there is none."""
+    for block in BLOCKS.values():
+        for each in block.entries:
+            if each.name.split()[0] == word:
+                yield f"{each.written}  in {_an(block.name)}"
+                yield f"    {each.doc}"
+                yield f"    default: {default(each)}"
+
+
 def block_json(block: BlockDeclaration) -> list[dict[str, Any]]:
     """The entries of a block, for programs."""
     return [

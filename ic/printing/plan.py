@@ -118,6 +118,9 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
         yield from columns([(each.of, each.text) for each in experiment.tolerances])
     yield ""
     yield from _cases(experiment)
+    if experiment.allowances:
+        yield ""
+        yield from (f"allowed: {allowance}" for allowance in experiment.allowances)
     notes = [note for note in experiment.notes if not note.startswith(STEP_SIZE)]
     if notes:
         yield ""

@@ -22,6 +22,7 @@ from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, measure_of
+from ic.meaning.runs.allowances import ALLOW
 from ic.sweeps.choices import (
     MACRO,
     ChoiceColumn,
@@ -182,6 +183,8 @@ class _SweepReader:
                 self.excludes.append(entry)
             case Setting() if _is(entry, "seed"):
                 pass
+            case Statement() if words[0] == ALLOW:
+                pass  # read with those of the run
             case Setting() if _is(entry, "seeds"):
                 word = entry.value.text if isinstance(entry.value, Name) else ""
                 if word not in ("common", "independent"):

@@ -14,6 +14,7 @@ from ic.meaning.checks.steps import check_steps
 from ic.meaning.checks.stops import check_stops
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.allowances import allowances_of, places_of
 from ic.meaning.runs.experiment import experiment
 from ic.meaning.runs.run import resolve_run
 from ic.sweeps.axes import Sweep, read_sweep, varied_paths, whole_number
@@ -26,7 +27,7 @@ from ic.sweeps.table import columns, kept, repeats, structures
 from ic.text.complaints import Complaints, known_words
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
-from met.plan import Cases, Choice, Experiment, keys
+from met.plan import Allowance, Cases, Choice, Experiment, keys
 from met.trace import Formulas, Graph, Scalar
 
 ScopedExperiment = tuple[Experiment, Scope]
@@ -54,20 +55,27 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
     """The experiments of a run or sweep; none where something of it is wrong (already reported)."""
     if definition.kind == "run":
         definitions, run = source.settings.in_run(source.definitions, definition)
-        scope = Scope(definitions, source.complaints, settings=source.settings.numbers(definitions))
-        resolved = resolve_run(scope, run)
-        source.effects.note_run(scope, run)
-        if resolved is None:
-            return []
-        made = experiment(scope, run.name, run.place, resolved, Cases(1, (), resolved.seed))
-        source.effects.examine(scope, run, made)
-        if not source.complaints.errors:
-            check_stops(source.complaints, made)
-            check_balance(source.complaints, made)
-            made = check_steps(scope, made)
-        source.complaints.settle()
-        return [(made, scope)]
-    return _sum(source, definition, ()) if definition.parts else _Sweep(source, definition).groups()
+        allowances = allowances_of(definitions, run, source.complaints)
+        with source.complaints.allowing(places_of(allowances)):
+            scope = Scope(definitions, source.complaints, settings=source.settings.numbers(definitions))
+            resolved = resolve_run(scope, run)
+            source.effects.note_run(scope, run)
+            if resolved is None:
+                return []
+            made = experiment(scope, run.name, run.place, resolved, Cases(1, (), resolved.seed), allowances)
+            source.effects.examine(scope, run, made)
+            if not source.complaints.errors:
+                check_stops(source.complaints, made)
+                check_balance(source.complaints, made)
+                made = check_steps(scope, made)
+            source.complaints.settle()
+            return [(made, scope)]
+    if definition.parts:
+        return _sum(source, definition, ())
+    base = source.definitions.of_kind("run").get(definition.group.of.text if definition.group.of is not None else "")
+    allowances = allowances_of(source.definitions, base, source.complaints, definition) if base is not None else ()
+    with source.complaints.allowing(places_of(allowances)):  # a macro that the sweep chooses may change them
+        return _Sweep(source, definition).groups()
 
 
 # Sweeps
@@ -75,9 +83,10 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
 
 @frozen
 class _Read:
-    """A sweep as it is read with some macros: the deck's definitions, the run it is of, its axes over a graph."""
+    """A sweep as it is read with some macros: the deck's definitions, its own, that of its run, axes over a graph."""
 
     definitions: Definitions
+    definition: Definition
     base: Definition
     sweep: Sweep
     graph: Graph
@@ -158,15 +167,29 @@ class _Sweep:
         graph = Graph()
         sweep = read_sweep(definitions, self.complaints, definition, graph, seed=_seed_of(definitions, base))
         settings.check_sweep(sweep, self.complaints, definitions)
-        return _Read(definitions, base, sweep, graph)
+        return _Read(definitions, definition, base, sweep, graph)
 
     def _group(
         self, sweep: Sweep, choices: Choices, rows: np.ndarray
     ) -> tuple[tuple[ScopedExperiment, np.ndarray] | None, list[tuple[Place, int]]] | None:
         """The cases of one structure, with their rows of the product; and how many each `exclude when` drops."""
         read = self._with_macros(sweep, choices)
-        there = read.sweep
         definitions, run = with_choices(read.definitions, read.base, choices)
+        allowances = allowances_of(definitions, run, self.complaints, read.definition)
+        with self.complaints.allowing(places_of(allowances)):
+            return self._group_of(read, definitions, run, choices, rows, allowances)
+
+    def _group_of(
+        self,
+        read: _Read,
+        definitions: Definitions,
+        run: Definition,
+        choices: Choices,
+        rows: np.ndarray,
+        allowances: tuple[Allowance, ...],
+    ) -> tuple[tuple[ScopedExperiment, np.ndarray] | None, list[tuple[Place, int]]] | None:
+        """The same, of what was read and chosen for this structure."""
+        there = read.sweep
         scope = Scope(
             definitions,
             self.complaints,
@@ -196,7 +219,7 @@ class _Sweep:
             tuple(Choice(column.path, option.text, option.place) for column, option in choices),
             repeats(there, rows[keep]),
         )
-        made = experiment(scope, sweep.name, sweep.place, resolved, cases)
+        made = experiment(scope, there.name, there.place, resolved, cases, allowances)
         made = replace(made, notes=(*(axis.note for axis in there.axes if axis.note), *made.notes))
         if not self.complaints.errors:
             check_effects(self.complaints, there, made)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -43,6 +43,10 @@ class Complaints:
         self._lost: set[str] = set()  # names that what could not be read may have defined
         self._spots: set[tuple[str, int, int]] = set()  # where errors of syntax are reported
         self.known_missing: set[tuple[Place, str]] = set()  # definitions, and entries that they lack, already reported
+        self._allowed: Mapping[str, Place] | None = None  # codes that the run at hand allows; None outside of runs
+        self._silenced: dict[Diagnostic, Place] = {}
+        self._of_no_run: set[Diagnostic] = set(self._found)
+        self.needed_allowances: set[Place] = set()  # the places of each `allow` that silenced a warning
 
     @property
     def all(self) -> tuple[Diagnostic, ...]:
@@ -56,15 +60,24 @@ class Complaints:
     def warnings(self) -> tuple[Diagnostic, ...]:
         return tuple(d for d in self._found if d.severity == "warning")
 
+    @property
+    def allowed(self) -> Mapping[Diagnostic, Place]:
+        """The warnings that were allowed wherever they were found, each with the place of an `allow`."""
+        return {each: place for each, place in self._silenced.items() if each not in self._found}
+
     def add(self, *diagnostics: Diagnostic) -> None:
         for diagnostic in diagnostics:
-            self.error_count += diagnostic.severity == "error"
-            if (
-                len(self._found) < MOST_DIAGNOSTICS
-                and not self._is_known_at_this_place(diagnostic)
-                and not self._follows_from_unreadable(diagnostic)
-            ):
-                self._found.setdefault(diagnostic)
+            if diagnostic.severity != "warning" or not self._is_silenced(diagnostic):
+                self._record(diagnostic)
+
+    def _record(self, diagnostic: Diagnostic) -> None:
+        self.error_count += diagnostic.severity == "error"
+        if (
+            len(self._found) < MOST_DIAGNOSTICS
+            and not self._is_known_at_this_place(diagnostic)
+            and not self._follows_from_unreadable(diagnostic)
+        ):
+            self._found.setdefault(diagnostic)
 
     def note_unreadable(self, stretches: Sequence[UnreadableStretch]) -> None:
         """Note what could not be read, so that nothing is reported that follows from it, nor from the errors so far."""
@@ -128,7 +141,7 @@ class Complaints:
             if each.severity == "error":
                 self.add(each)
             else:
-                self._remarks.setdefault(each)
+                self._note_remark(each)
         return frozenset(each.code for each in kept)
 
     def note_misspelling(self, of: Place, word: str, known: Iterable[str]) -> None:
@@ -181,18 +194,61 @@ class Complaints:
         help: Iterable[str] | str = (),
     ) -> None:
         """A warning about what the deck means, which says something only once the deck has no errors."""
-        found = replace(error(code, message, at, also=also, help=help), severity="warning")
+        diagnostic = replace(error(code, message, at, also=also, help=help), severity="warning")
         if code in PROVISIONAL:
-            self._provisional.append(found)
-        elif code not in REMARKED_ONCE or all(
-            (each.code, each.at and each.at.place) != (code, found.at and found.at.place) for each in self._remarks
-        ):
-            self._remarks.setdefault(found)
+            self._provisional.append(diagnostic)
+        else:
+            self._note_remark(diagnostic)
+
+    def _note_remark(self, diagnostic: Diagnostic) -> None:
+        if self._is_silenced(diagnostic):
+            return
+        spot = (diagnostic.code, diagnostic.at and diagnostic.at.place)
+        if diagnostic.code not in REMARKED_ONCE or all((d.code, d.at and d.at.place) != spot for d in self._remarks):
+            self._remarks.setdefault(diagnostic)
 
     def admit_remarks(self) -> None:
         """Makes warnings of the remarks."""
-        self.add(*self._remarks)
+        for diagnostic in self._remarks:
+            self._record(diagnostic)
         self._remarks = {}
+
+    @contextmanager
+    def allowing(self, allowed: Mapping[str, Place]) -> Iterator[None]:
+        """Inside, where a run or sweep is looked at, warnings with the codes that it allows are left out.
+
+        allowed  the place of the `allow` by its code
+        """
+        before, self._allowed = self._allowed, allowed
+        try:
+            yield
+        finally:
+            self._allowed = before
+
+    def silence(self, allowed: Mapping[str, Iterable[Place]]) -> None:
+        """Leave out warnings that are of no single run, such as of a macro, with codes that all runs allow.
+
+        allowed  the places of each `allow` by the code
+        """
+        for diagnostic in [each for each in self.warnings if each in self._of_no_run and each.code in allowed]:
+            places = tuple(allowed[diagnostic.code])
+            self.needed_allowances.update(places)
+            self._silenced[diagnostic] = places[0]
+            del self._found[diagnostic]
+
+    def _is_silenced(self, diagnostic: Diagnostic) -> bool:
+        """Return True if the run that is looked at allows this warning, or if it is known from one that does."""
+        if self._allowed is None:
+            if diagnostic in self._silenced:
+                return True
+            self._of_no_run.add(diagnostic)
+        elif diagnostic.code in self._allowed:
+            self.needed_allowances.add(self._allowed[diagnostic.code])
+            self._silenced.setdefault(diagnostic, self._allowed[diagnostic.code])
+            return True
+        else:
+            self._of_no_run.discard(diagnostic)
+        return False
 
     def mark(self, since: int, *labels: Label) -> None:
         """Adds places, and what they say, to the errors found after the first `since` diagnostics."""

@@ -14,6 +14,7 @@ import math
 from typing import Any
 
 from met.commands.profile import Profile
+from met.content import NEVER, Content
 from met.parameter import Parameter
 from met.trace import Real, absolute, both, clip, cos, exp, log, sin, tanh, where
 
@@ -46,6 +47,15 @@ def _mean_of_exp(x: Real) -> Real:
     return where(small, near, (exp(x) - 1.0) / divisor)
 
 
+def content(p: Any, duration: float) -> Content:
+    """Its fastest swing is at one of its ends, or where the run ends before."""
+    if p.amplitude == 0.0:
+        return NEVER
+    done = min(max(duration - p.begin, 0.0) / p.over, 1.0)
+    last = p.f0 + (p.f1 - p.f0) * done if p.growth == "linear" else p.f0 * (p.f1 / p.f0) ** done
+    return Content(begins=p.begin, ends=p.begin + p.over, frequency=max(p.f0, last))
+
+
 PROFILE = Profile(
     name="chirp",
     doc=__doc__,
@@ -60,4 +70,5 @@ PROFILE = Profile(
         Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which it begins"),
     ),
     course=course,
+    content=content,
 )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Literal
 
+from met.content import Content
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.trace import Real
@@ -29,6 +30,8 @@ class Profile:
                 The slope at a jump is zero, at a kink the slope of what follows.
     jumps       what of the course may jump within a run: its value; the slope, so that it has kinks; none of the two.
                 What moves a base must not jump. (p) -> that, where a word decides
+    content     (p, duration) -> what it brings in a run of that length (s): a deck is warned where the instants that
+                sample it do not carry that, or the run ends before. Asked with numbers. None: nothing is known of it
     from_file   the lists `times` and `values` are columns of a CSV file: a deck writes `file` and `column` for them
     """
 
@@ -37,6 +40,7 @@ class Profile:
     parameters: tuple[Parameter, ...]
     course: Callable[[Any, Real], tuple[Real, Real]]
     jumps: Jump | Callable[[Any], Jump] = "rate"
+    content: Callable[[Any, float], Content] | None = None
     from_file: bool = False
 
     def jump(self, p: Any) -> Jump:

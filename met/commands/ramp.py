@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from met.commands.profile import Profile
+from met.content import NEVER, Content
 from met.parameter import Parameter
 from met.trace import Real, both, clip, where
 
@@ -14,6 +15,10 @@ def course(p: Any, t: Real) -> tuple[Real, Real]:
     share = clip((t - p.begin) / p.over, 0.0, 1.0)
     moving = both(t >= p.begin, t < p.begin + p.over)
     return p.start + (p.to - p.start) * share, where(moving, slope, 0.0)
+
+
+def content(p: Any, duration: float) -> Content:
+    return Content(begins=p.begin, ends=p.begin + p.over) if p.to != p.start else NEVER
 
 
 PROFILE = Profile(
@@ -26,4 +31,5 @@ PROFILE = Profile(
         Parameter(name="over", unit="s", above=0.0, doc="how long the ramp lasts"),
     ),
     course=course,
+    content=content,
 )

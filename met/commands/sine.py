@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from met.commands.profile import Profile
+from met.content import NEVER, Content
 from met.parameter import Parameter
 from met.trace import Real, cos, sin
 
@@ -14,6 +15,10 @@ def course(p: Any, t: Real) -> tuple[Real, Real]:
     omega = 2.0 * math.pi * p.frequency
     angle = omega * t + p.phase
     return p.offset + p.amplitude * sin(angle), p.amplitude * omega * cos(angle)
+
+
+def content(p: Any, duration: float) -> Content:
+    return Content(begins=0.0, ends=math.inf, frequency=p.frequency) if p.amplitude != 0.0 else NEVER
 
 
 PROFILE = Profile(
@@ -26,5 +31,6 @@ PROFILE = Profile(
         Parameter(name="phase", unit="rad", default=0.0, doc="angle at t = 0"),
     ),
     course=course,
+    content=content,
     jumps="none",
 )

@@ -6,6 +6,7 @@ from typing import Any
 
 from met.commands.points import linear
 from met.commands.profile import Profile
+from met.content import Content, content_of_points
 from met.parameter import Parameter
 from met.trace import Real
 
@@ -14,6 +15,10 @@ def course(p: Any, t: Real) -> tuple[Real, Real]:
     if len(p.times) == 1:
         return p.values[0], 0.0
     return linear(p.times, p.values, t)
+
+
+def content(p: Any, duration: float) -> Content:
+    return content_of_points(p.times, p.values)
 
 
 PROFILE = Profile(
@@ -26,4 +31,5 @@ PROFILE = Profile(
         ),
     ),
     course=course,
+    content=content,
 )

@@ -18,6 +18,7 @@ from typing import Any
 
 from met.commands.points import cubic, linear
 from met.commands.profile import Profile
+from met.content import Content, content_of_points
 from met.parameter import Parameter
 from met.trace import Real
 
@@ -25,6 +26,10 @@ from met.trace import Real
 def course(p: Any, t: Real) -> tuple[Real, Real]:
     curve = linear if p.interpolation == "linear" else cubic
     return curve(p.times, p.values, t - p.begin)
+
+
+def content(p: Any, duration: float) -> Content:
+    return content_of_points(p.times, p.values, p.begin)
 
 
 PROFILE = Profile(
@@ -44,5 +49,6 @@ PROFILE = Profile(
         Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="when the file's time 0 is"),
     ),
     course=course,
+    content=content,
     jumps=lambda p: "none" if p.interpolation == "cubic" else "rate",
 )

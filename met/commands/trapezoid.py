@@ -9,9 +9,11 @@ Not a limiter: it knows neither the joint's state nor what the servo can do. The
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from met.commands.profile import Profile
+from met.content import NEVER, Content
 from met.parameter import Parameter
 from met.trace import Real, absolute, clip, maximum, minimum, sqrt, where
 
@@ -35,6 +37,14 @@ def course(p: Any, t: Real) -> tuple[Real, Real]:
     return where(done < whole, value, p.to), slope
 
 
+def content(p: Any, duration: float) -> Content:
+    way = abs(p.to - p.start)
+    if way == 0.0:
+        return NEVER
+    peak = min(p.max_rate, math.sqrt(p.max_acceleration * way))
+    return Content(begins=p.begin, ends=p.begin + peak / p.max_acceleration + way / peak)
+
+
 PROFILE = Profile(
     name="trapezoid",
     doc=__doc__,
@@ -46,5 +56,6 @@ PROFILE = Profile(
         Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which the move begins"),
     ),
     course=course,
+    content=content,
     jumps="none",
 )

@@ -93,5 +93,6 @@ ENVIRONMENT = Environment(
     ),
     loads=loads,
     idle=idle,
+    alone=lambda p: f"the attitude of `{p.link}`",
     pushed_links=lambda p: ("link",),
 )

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import field
 from typing import Any, Protocol
 
+from met.content import Content
 from met.frozen import frozen
 from met.messages.renamed import old_fields
 from met.parameter import Parameter
@@ -110,6 +111,10 @@ class Environment:
            the ground is warned. None: it may act upon others
     initial_range  the two parameters that are the ends between which its joint should begin: a deck whose joint begins
            beyond is warned. (): there are none
+    content  (p, duration) -> what it brings in a run of that length (s), where the dynamics' steps see it at their ends
+           alone: a deck is warned where they do not carry that. Asked with numbers. None: nothing is known of it
+    alone  (p) -> what only one model of a run should give, in words, such as "gravity": a deck with two is warned. "":
+           nothing, with these numbers. None: several go together
     springs  the parameters that name a joint, and are the stiffness with which it is pushed back where it touches: a
            deck is warned where the dynamics' step is long for that (met/analysis/contact.py). (): there is none
     friction_joint  the parameter that names the one joint on which it puts dry friction. "": none does
@@ -142,6 +147,8 @@ class Environment:
     idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None
     pushed_links: Callable[[Any], tuple[str, ...]] | None = None
     initial_range: tuple[str, ...] = ()
+    content: Callable[[Any, float], Content] | None = None
+    alone: Callable[[Any], str] | None = None
     springs: tuple[str, ...] = ()
     friction_joint: str = ""
     servo_of: str = ""

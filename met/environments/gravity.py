@@ -17,4 +17,5 @@ ENVIRONMENT = Environment(
     doc=__doc__,
     parameters=(Parameter(name="g", unit="m/s^2", shape="vector", doc="acceleration of free fall, world axes"),),
     loads=loads,
+    alone=lambda p: "gravity" if any(p.g) else "",
 )

@@ -135,6 +135,7 @@ ENVIRONMENT = Environment(
         ),
     ),
     loads=loads,
+    alone=lambda p: "gravity",
     free_fall=free_fall,
     world_rate=world_rate,
 )

@@ -7,8 +7,8 @@
 Before its first row the first holds, after its last the last. A component that is not given is zero. The force acts at
 `point` of the link, which moves along with it; `axes = link`: force and moment turn with the link too. In the deck a
 component is a list of as many numbers as `times` has; in a file, which has the lists' place, it is a column of its
-name, and `time` is one. The table is read at every stage of a step, so rows that are closer together than steps are not
-all seen: of what jumps, `wrench` keeps the impulse.
+name, and `time` is one. The table is read at every stage of a step; a step within which a row lies sees its mean over
+the step at all of its stages, so the impulse is right however close together the rows are.
 """
 
 from __future__ import annotations
@@ -16,19 +16,22 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from met.commands.points import linear
+from met.commands.points import linear, segment
 from met.environments.environment import Environment, Force, Loads, World
 from met.environments.window import never
 from met.parameter import ZEROS, Parameter
-from met.trace import Real
+from met.trace import Real, Scalar, gather, where
 from met.vectors import Vector
+
+EARLY = 1e-7
+"""Share of a step by which a row may miss the step's end, and still be on it."""
 
 NAMES = tuple(f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz")
 
 
 def loads(p: Any, world: World) -> Loads:
     def given(kind: str) -> Vector:
-        x, y, z = (_at(p, getattr(p, f"{kind}_{axis}"), world.time) for axis in "xyz")
+        x, y, z = (_at(p, getattr(p, f"{kind}_{axis}"), world) for axis in "xyz")
         return world.to_world(p.link, (x, y, z)) if p.axes == "link" else (x, y, z)
 
     return Loads(forces=(Force(p.link, force=given("force"), moment=given("moment"), point=p.point),))
@@ -48,10 +51,39 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
     return (("begin", "times"), found[1]) if found is not None else None
 
 
-def _at(p: Any, values: tuple[float, ...], time: Real) -> Real:
+def _at(p: Any, values: tuple[float, ...], world: World) -> Real:
     if len(values) < 2:
         return values[0] if values else 0.0
-    return linear(p.times, values, time - p.begin)[0]
+    value = linear(p.times, values, world.time - p.begin)[0]
+    if _steps_meet_rows(p, world.step):
+        return value
+    begins, early = world.begin - p.begin, EARLY * world.step
+    ends = begins + world.step
+    # with held ends, so that the first and the last row lie between two segments too
+    times = (p.times[0] - 1.0, *p.times, p.times[-1] + 1.0)
+    held = (values[0], *values, values[-1])
+    mean = (_integral(times, held, ends) - _integral(times, held, begins)) / world.step
+    return where(segment(times, begins + early) < segment(times, ends - early), mean, value)
+
+
+def _steps_meet_rows(p: Any, step: float) -> bool:
+    """True where every row is known to lie on a step of the dynamics, so that lines are all that a step sees."""
+    if isinstance(p.begin, Scalar):
+        return False
+    places = [(p.begin + time) / step for time in p.times]
+    return all(abs(place - round(place)) <= EARLY for place in places)
+
+
+def _integral(times: tuple[float, ...], values: tuple[float, ...], time: Real) -> Real:
+    """The integral of the lines until this time, from a fixed one; the ends go on as they are."""
+    done = [0.0]
+    for k in range(len(times) - 1):
+        done.append(done[-1] + 0.5 * (values[k] + values[k + 1]) * (times[k + 1] - times[k]))
+    i = segment(times, time)
+    t_0, t_1 = gather(times, i), gather(times, i + 1.0)
+    v_0, v_1 = gather(values, i), gather(values, i + 1.0)
+    since = time - t_0
+    return gather(tuple(done), i) + since * (v_0 + 0.5 * since * ((v_1 - v_0) / (t_1 - t_0)))
 
 
 ENVIRONMENT = Environment(

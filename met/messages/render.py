@@ -73,29 +73,36 @@ def shown_place(place: Place) -> Place:
     return place if argument and place.included == use.included else use
 
 
-def to_json(diagnostics: Iterable[Diagnostic]) -> str:
-    """The diagnostics for programs: an object with `version`, `diagnostics`, `errors` and `warnings`."""
+def to_json(diagnostics: Iterable[Diagnostic], allowed: Iterable[tuple[Diagnostic, str]] | None = None) -> str:
+    """The diagnostics for programs: an object with `version`, `diagnostics`, `errors` and `warnings`.
+
+    allowed  the warnings of a deck that are not among them, for a run allows them, and why: `allowed` of the object
+    """
     found = tuple(diagnostics)
-    result = {
+    result: dict[str, Any] = {
         "version": JSON_VERSION,
         "errors": sum(d.severity == "error" for d in found),
         "warnings": sum(d.severity == "warning" for d in found),
-        "diagnostics": [
-            {
-                "code": d.code,
-                "severity": d.severity,
-                "message": d.message,
-                "shown": _place_json(shown_place(d.at.place)) if d.at else None,
-                "at": _label_json(d.at) if d.at else None,
-                "also": [_label_json(label) for label in d.also],
-                "help": list(d.help),
-            }
-            for d in found
-        ],
+        "diagnostics": [_diagnostic_json(d) for d in found],
     }
+    if allowed is not None:
+        result["allowed"] = [{**_diagnostic_json(d), "because": because} for d, because in allowed]
     import json
 
     return json.dumps(result, indent=1)
+
+
+def _diagnostic_json(diagnostic: Diagnostic) -> dict[str, Any]:
+    at = diagnostic.at
+    return {
+        "code": diagnostic.code,
+        "severity": diagnostic.severity,
+        "message": diagnostic.message,
+        "shown": _place_json(shown_place(at.place)) if at else None,
+        "at": _label_json(at) if at else None,
+        "also": [_label_json(label) for label in diagnostic.also],
+        "help": list(diagnostic.help),
+    }
 
 
 def _label_json(label: Label) -> dict[str, Any]:

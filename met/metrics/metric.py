@@ -6,6 +6,7 @@ its computer holds), whatever is recorded, so its value does not depend on the r
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -20,6 +21,12 @@ class Metric:
 
     unit    of the result: "of" is the channel's, "s" a time, "1" a pure number
     share   whether it is part of a whole, seldom above 1: a limit above that without a `%` is warned of
+    least   bound below which it never is; a requirement that cannot be missed, or met, is warned of
+    times   whether it is an instant of the run, or infinite: a limit after the run's end is warned of
+    target  the parameter that is the value to be reached, where there is one: a command that comes to it after the
+            run's end is warned of
+    undefined  (p, first) -> why it is no number where its channel begins with this value, in words; "": it is one.
+            None: it always is
     update  (p, held, x, t, dt) -> new memory: x the channel at time t (s), dt s since the sample before (0 at first)
     result  (p, held, t) -> the metric, at the run's last sample, time t
     """
@@ -28,6 +35,10 @@ class Metric:
     doc: str
     unit: str
     share: bool = False
+    least: float = -math.inf
+    times: bool = False
+    target: str = ""
+    undefined: Callable[[Any, float], str] | None = None
     parameters: tuple[Parameter, ...] = ()
     memory: tuple[Memory, ...]
     update: Callable[[Any, Any, Real, Real, Real], Mapping[str, Real]]

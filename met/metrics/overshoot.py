@@ -34,6 +34,9 @@ METRIC = Metric(
     doc=__doc__,
     unit="1",
     share=True,
+    least=0.0,
+    target="target",
+    undefined=lambda p, first: "it begins on its target" if first == p.target else "",
     parameters=(Parameter(name="target", unit="of", doc="value to be reached"),),
     memory=(
         Memory(name="first", unit="of", doc="first value"),

@@ -22,6 +22,7 @@ METRIC = Metric(
     name="peak",
     doc=__doc__,
     unit="of",
+    least=0.0,
     memory=(Memory(name="most", unit="of", doc="largest size so far"),),
     update=update,
     result=result,

@@ -22,6 +22,7 @@ METRIC = Metric(
     name="rms",
     doc=__doc__,
     unit="of",
+    least=0.0,
     memory=(
         Memory(name="squares", unit="1", doc="sum of squares"),
         Memory(name="count", unit="1", doc="samples"),

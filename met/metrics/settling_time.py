@@ -27,6 +27,9 @@ METRIC = Metric(
     name="settling_time",
     doc=__doc__,
     unit="s",
+    least=0.0,
+    times=True,
+    target="target",
     parameters=(
         Parameter(name="target", unit="of", doc="value to be reached"),
         Parameter(

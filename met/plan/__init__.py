@@ -315,6 +315,19 @@ class Tolerance:
 
 
 @frozen
+class Allowance:
+    """A warning that a run allows, by its code, and why, in one line."""
+
+    code: str
+    because: str
+    place: Place | None = None
+
+    def __str__(self) -> str:
+        """`D105, because the report's own rates`."""
+        return f"{self.code}, because {self.because}"
+
+
+@frozen
 class Schedule:
     """Rates as integer divisors of one base rate. A run of `ticks` base ticks has both ends, 0 and `ticks`.
 
@@ -518,6 +531,7 @@ class Experiment:
 
     formulas   from the coordinates (inputs, by path) to every parameter that varies (`Formula.output`)
     sweep      what a group is of; "" where the experiment is the whole of its run or sweep
+    allowances  warnings that are not given of it
     """
 
     name: str
@@ -531,6 +545,11 @@ class Experiment:
     sweep: str = ""
     tolerances: tuple[Tolerance, ...] = ()
     step_errors: tuple[StepErrorLimit, ...] = ()
+    allowances: tuple[Allowance, ...] = ()
+
+    def allows(self, code: str) -> bool:
+        """Return True if a warning with this code is not to be given of this experiment, at a check or at a run."""
+        return any(each.code == code for each in self.allowances)
 
     @property
     def name_in_deck(self) -> str:

@@ -47,6 +47,9 @@ MOST_SEED = 2**63 - 1
 ROUNDING = 1e-9
 """For rounding alone: an axis' length may be off by this, and a moment of inertia below zero by this share."""
 
+CODE = re.compile(r"[A-Z]\d{3}", re.ASCII)
+"""The code of a diagnostic."""
+
 CHUNK = 1 << 14
 """Cases whose varied numbers are tested at a time."""
 
@@ -62,6 +65,7 @@ def check(experiments: Iterable[Experiment]) -> None:
         _check_requirements(experiment, f"{where}.requirements")
         _check_step_errors(experiment, f"{where}.step_errors")
         _check_tolerances(experiment, f"{where}.tolerances")
+        _check_allowances(experiment, f"{where}.allowances")
         _check_cases(experiment, f"{where}.cases")
         _check_formulas(experiment, where)
         _check_parameters(experiment, f"{where}.parameters")
@@ -141,6 +145,16 @@ def _check_tolerances(experiment: Experiment, where: str) -> None:
             raise Damaged(f"{where}[{index}].value", "it should be a finite number, at least 0")
     if len({tolerance.of for tolerance in experiment.tolerances}) < len(experiment.tolerances):
         raise Damaged(where, "something has two tolerances")
+
+
+def _check_allowances(experiment: Experiment, where: str) -> None:
+    for index, allowance in enumerate(experiment.allowances):
+        if not CODE.fullmatch(allowance.code):
+            raise Damaged(f"{where}[{index}].code", f"{allowance.code!r} is no code of a warning")
+        if not allowance.because.strip() or "\n" in allowance.because:
+            raise Damaged(f"{where}[{index}].because", "a reason is one line, which is not empty")
+    if len({allowance.code for allowance in experiment.allowances}) < len(experiment.allowances):
+        raise Damaged(where, "a warning is allowed twice")
 
 
 def _check_cases(experiment: Experiment, where: str) -> None:

@@ -47,6 +47,18 @@ def test_a_field_may_have_any_name_that_code_of_its_own_might_use() -> None:
     assert made(*range(7)).__dict__ == dict(zip(names, range(7), strict=True))  # type: ignore[call-arg]
 
 
+def test_a_decorator_that_wraps_the_init_is_still_there_after_the_first_instance() -> None:
+    made: list[str] = []
+
+    @frozen
+    class Wrapped:
+        x: int
+
+    inner = Wrapped.__init__
+    Wrapped.__init__ = lambda self, x: made.append("wrapped") or inner(self, x)  # type: ignore[method-assign, func-returns-value]
+    assert (Wrapped(1).x, Wrapped(2).x, made) == (1, 2, ["wrapped", "wrapped"])
+
+
 def test_a_signature_is_that_of_the_fields_before_and_after_the_first_instance() -> None:
     before = str(inspect.signature(Keyed))
     assert before == "(*, first, second=2)"

@@ -48,7 +48,10 @@ def campaign_warnings(groups: Iterable[ArchiveGroup], experiments: Mapping[str, 
 
 
 def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
-    """What the errors by the step of an archive's experiment call in question. experiment: of the plan, for places."""
+    """What the errors by the step of an archive's experiment call in question, but for what its run allows.
+
+    experiment  of the plan, for places
+    """
     found = figures(group)
     if found is None:
         return []
@@ -56,7 +59,8 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
     out = [_undecided(group, found, each, experiment) for each in required if each.metric in found.metrics]
     of_none = [name for name in found.metrics if all(each.metric != name for each in required)]
     out += [_unclear(group, found, name, experiment) for name in of_none]
-    return [*_lost(found, experiment), *(each for each in out if each is not None)]
+    out = [*_lost(found, experiment), *out]
+    return [each for each in out if each is not None and not group.allows(each.code)]
 
 
 def _undecided(

@@ -394,7 +394,11 @@ class Definitions:
 
     def writes(self, definition: Definition) -> bool:
         """Return True if the deck itself, and no file that it includes, writes this definition."""
-        return shown_place(definition.place).file == self._file
+        return self.writes_at(definition.place)
+
+    def writes_at(self, place: Place) -> bool:
+        """Return True if what stands at this place stands in the deck itself, and in no file that it includes."""
+        return shown_place(place).file == self._file
 
     def default(self) -> Definition | None:
         """The run or sweep marked `default`: the deck's own, else that of the one included file that has one."""

@@ -115,15 +115,20 @@ def check_keys(
                     known_words("it has", known),
                 ],
             )
+    refuse_statements(scope, body, owner.label)
+    refuse_pending(body, scope.complaints)
+    scope.removed.update((owner.join(each.key), each.place) for each in body.removed if body.get(each.key) is None)
+
+
+def refuse_statements(scope: Scope, body: MergedBlock, label: str) -> None:
+    """Report each statement, such as `require`, in a block that has none. label: what to call the block."""
     for statement in body.statements:
         scope.complaints.error(
             "D142",
-            f"`{statement.words[0].text}` inside {owner.label}",
+            f"`{statement.words[0].text}` inside {label}",
             statement.place,
             help="it belongs to a run or a sweep",
         )
-    refuse_pending(body, scope.complaints)
-    scope.removed.update((owner.join(each.key), each.place) for each in body.removed if body.get(each.key) is None)
 
 
 def find_bare_model(scope: Scope, kind: models.Kind, item: Item, remedy: str) -> Any:

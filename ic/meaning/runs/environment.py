@@ -10,7 +10,7 @@ from ic.meaning.checks.idle import remark_idle, remark_kinds
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
+from ic.meaning.parameters.models import check_keys, find_model, refuse_statements, refuse_values, use_model, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
@@ -43,13 +43,7 @@ def resolve_environment(
             use = _environment_use(scope, item, arm, base, payloads, duration)
             if use is not None:
                 uses.append(use)
-    for statement in body.statements:
-        scope.complaints.error(
-            "D142",
-            f"`{statement.words[0].text}` inside the environment",
-            statement.place,
-            help="it belongs to a run or a sweep",
-        )
+    refuse_statements(scope, body, "the environment")
     return tuple(uses)
 
 

@@ -11,9 +11,13 @@ from ic.grammar.syntax import Call, Name, Word
 from ic.language.runs import DURATION, ENVIRONMENT, INITIAL, RATES, RUN, SEED, TOLERANCES
 from ic.meaning.checks.failures import check_failures, check_friction
 from ic.meaning.checks.idle import remark_beginnings
+from ic.meaning.checks.reach import check_reach
 from ic.meaning.checks.reading import remark_unread
+from ic.meaning.checks.requirements import check_requirements
+from ic.meaning.checks.sampling import check_sampling
 from ic.meaning.checks.spin import check_spins
 from ic.meaning.checks.swings import check_circuits, check_sensor
+from ic.meaning.checks.together import check_together
 from ic.meaning.control.guides import check_guides, name_guides, resolve_guides
 from ic.meaning.control.link_sensors import Sensing, resolve_link_sensors
 from ic.meaning.control.schedule import Rate, Ticks, check_stability, fastest_rate
@@ -25,10 +29,11 @@ from ic.meaning.mechanics.arm import ResolvedArm, resolve_arm
 from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.payloads import check_payloads, resolve_payloads
 from ic.meaning.parameters.addresses import in_run
-from ic.meaning.parameters.models import body_of, find_bare_model, overriding_place, word_of
+from ic.meaning.parameters.models import body_of, find_bare_model, overriding_place, refuse_statements, word_of
 from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.allowances import ALLOW
 from ic.meaning.runs.base import check_base, initial_base, resolve_base
 from ic.meaning.runs.environment import resolve_environment
 from ic.meaning.runs.initial import check_balanced, resolve_initial
@@ -158,9 +163,13 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     record = resolve_record(scope, run, block.get("record"), structure)
     structure = replace(structure, metrics=metrics, record=record)
     remark_unread(scope, uses, structure)
+    check_sampling(scope, structure)
+    check_together(scope, uses, structure)
+    check_reach(scope, block, structure)
     scope.keep_setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure)
     step_errors = resolve_step_errors(scope, block, structure)
+    check_requirements(scope, requirements, structure)
     tolerances = resolve_tolerances(scope, body_of(scope, block.get("tolerances")), structure)
     settings = resolve_run_keys(scope, run, block, Experiment)
     return Resolved(structure, requirements, step_errors, tolerances, seed, definition.place, settings)
@@ -253,9 +262,13 @@ def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> 
             helps = in_run(scope.definitions, block, item, RATES.keys) or [*near, known_words("a run has", RUN.keys)]
             scope.complaints.note_misspelling(definition.place, item.name, (*RUN.keys, *metrics))
             scope.complaints.error("D109", f"a run has no `{item.name}`", item.place, help=helps)
+    for key in ("servos", "initial", "rates"):
+        within = block.get(key)
+        if within is not None and within.body is not None:
+            refuse_statements(scope, within.body, f"`{key}`")
     for statement in block.statements:
         words = " ".join(word.text for word in statement.words)
-        if words != "require":
+        if words != "require" and statement.words[0].text != ALLOW:
             scope.complaints.error(
                 "D110",
                 f"`{words}` in a run",
@@ -265,7 +278,10 @@ def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> 
                 else ["write `metric NAME = MODEL { of = CHANNEL; }`"]
                 if words == "metric"
                 else where_it_belongs(words)
-                or [*did_you_mean(words, ("require", "remove")), "statements of a run: require, remove"],
+                or [
+                    *did_you_mean(words, ("require", ALLOW, "remove")),
+                    known_words("statements of a run", ("require", ALLOW, "remove")),
+                ],
             )
 
 

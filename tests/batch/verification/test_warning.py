@@ -63,6 +63,17 @@ def test_a_margin_below_the_error(tmp_path: Path) -> None:
     )
 
 
+def test_one_that_the_run_allows_is_not_given(tmp_path: Path) -> None:
+    plan = planned(tmp_path, DECK.replace("0.0721 rad;", '0.0721 rad; allow D310 because "the limit is soft";'))
+    given = ic.check(tmp_path / "d.ic").diagnostics
+    assert "D333" not in [each.code for each in given], "only the run itself shows whether it is needed"
+    path = batch.run(plan, output=tmp_path / "a.h5", verify="some").path
+    assert warned(path, plan) == warned(path) == []
+    with ArchiveFile(path) as file:
+        assert file.groups[0].allows("D310") and not file.groups[0].allows("D311")
+        assert "D310, because the limit is soft" in show(file, plots=False)
+
+
 def test_the_step_that_is_named_would_do(tmp_path: Path) -> None:
     """At the rate that the warning names, there is none, and the metric is nearer to the truth than the margin was."""
     refined = DECK.replace("duration", "rates { dynamics = 100 Hz; servos = 100 Hz; record = 25 Hz; } duration")

@@ -182,6 +182,21 @@ def test_a_word_of_the_glossary_is_explained(capsys: pytest.CaptureFixture[str])
     assert printed(capsys, "shard") == "task, shard: some cases that are run in one go; the file of what they gave\n"
 
 
+def test_an_entry_of_a_block_is_explained(capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        printed(capsys, "allow")
+        == """\
+allow CODE because "REASON";  in a run
+    a warning that is right, and not to be given; its code is printed with it: `allow D105 because "the report's own rates";`
+    default: none
+allow CODE because "REASON";  in a sweep
+    a warning that is not to be given, beside those that the run allows
+    default: those of the run
+"""
+    )
+    assert printed(capsys, "exclude").startswith("exclude when CONDITION;  in a sweep\n")
+
+
 def test_every_word_of_the_glossary_is_found() -> None:
     page = (Path(__file__).parents[3] / "docs" / "glossary.md").read_text(encoding="utf-8")
     rows = [line.split(" | ")[0].removeprefix("| ") for line in page.splitlines() if line.startswith("| ")]

@@ -602,7 +602,7 @@ BELONGS = "  = help: `substitute JOINT { ... }`, in a run, puts a joint's motor 
         (
             "sweep s of base_run { substitute one {} }",
             "error[D136]: no `substitute one` in a sweep",
-            "a sweep has: vary, zip, from, sample, repeat, exclude when, seed, seeds",
+            "a sweep has: vary, zip, from, sample, repeat, exclude when, allow, seed, seeds",
         ),
     ],
 )

@@ -40,7 +40,7 @@ on    = hand;
         grapple  = 3 s;
         release  = 8 s;
         position = [1, 2, 3] m;
-        velocity = [0, -1, 0] m/s;
+        velocity = [0, -1, -1] m/s;
 """
 FLIES = ("on    = hand;\n", FLIGHT)
 
@@ -413,7 +413,7 @@ def test_one_that_is_grappled_says_how_it_flies(tmp_path: Path) -> None:
         "grapple",
         "release",
     ]
-    assert [values[f"payloads.box.velocity.{axis}"] for axis in "xyz"] == [0.0, -1.0, 0.0]
+    assert [values[f"payloads.box.velocity.{axis}"] for axis in "xyz"] == [0.0, -1.0, -1.0]
     assert (values["payloads.box.grapple"], values["payloads.box.release"]) == (3.0, 8.0)
     (box,) = experiment(tmp_path, ARM, changed(RUN, FLIES)).structure.payloads
     assert (box.grappled, box.released) == (True, True)
@@ -623,7 +623,7 @@ error[D254]: the base moves freely and has no mass
 
 
 def test_a_payload_that_spins_too_fast_for_the_step_is_warned_of(tmp_path: Path) -> None:
-    spun = changed(RUN, FLIES, ("velocity = [0, -1, 0] m/s;", "rate = [0, 9, 250] rad/s;"))
+    spun = changed(RUN, FLIES, ("velocity = [0, -1, -1] m/s;", "rate = [0, 9, 250] rad/s;"))
     assert messages(check(tmp_path, ARM, spun)).startswith("""\
 warning[D300]: payload `box` turns by 0.25 rad in a step of the dynamics
   --> deck.ic:16:16

@@ -1,0 +1,116 @@
+"""Warnings of grapples from afar: where a payload flies when its link cannot be near, however the joints turn."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ic.meaning.definitions.merge import MergedBlock
+from ic.meaning.parameters.models import value_place
+from ic.meaning.parameters.scope import Scope
+from met import models
+from met.diagnostic import Place
+from met.plan import Payload, Structure
+from met.trace import Real
+
+FAR = 1.5
+"""Times the reach, beyond which a grapple is from afar: nothing is said of what is near."""
+
+
+def check_reach(scope: Scope, block: MergedBlock, structure: Structure) -> None:
+    """Warn of payloads that are grappled beyond the reach of their links: on a fixed base, with revolute joints."""
+    if structure.base is not None or scope.complaints.error_count:
+        return
+    items = {item.name: item for item in block.of_kind("payload")}
+    for payload in structure.payloads:
+        joints = _way_to(structure, payload.link)
+        if payload.grappled and joints is not None and not _is_pushed(scope, structure, payload):
+            item = items[payload.name]
+            grapple = item.body.get("grapple") if item.body is not None else None
+            gravity = [f"environment.{load.name}.g" for load in structure.environment if load.model == "gravity"]
+            offsets, place = [f"{joint}.at" for joint in joints], value_place(grapple or item)
+            _observe(scope, payload, offsets, gravity, structure.schedule.duration, place)
+
+
+def _way_to(structure: Structure, link: str) -> list[str] | None:
+    """The joints between a link and the base; None where one of them slides, so that its reach has no end."""
+    carrying = {joint.child: joint for joint in structure.joints}
+    found = []
+    while link in carrying:
+        joint = carrying[link]
+        if joint.kind == "prismatic":
+            return None
+        found.append(joint.name)
+        link = joint.parent
+    return found
+
+
+def _is_pushed(scope: Scope, structure: Structure, payload: Payload) -> bool:
+    """Return True if something but uniform gravity may act on a payload while it flies."""
+    known = models.find_own("environment")
+    for load in structure.environment:
+        model = models.find("environment", load.model, load.place)
+        links = [each.name for each in model.parameters if each.names == "link"]
+        named = [scope.parameters.get(f"environment.{load.name}.{each}") for each in links]
+        if load.model not in known or model.free_fall is not None:
+            return True
+        if any(each is not None and each.value == payload.name for each in named):
+            return True
+    return False
+
+
+def _observe(
+    scope: Scope, payload: Payload, joints: list[str], gravity: list[str], duration: float, place: Place
+) -> None:
+    """joints, gravity: paths of the vectors from joint to joint, and of the accelerations of free fall."""
+    head = f"payloads.{payload.name}"
+    link = f"links.{payload.link}" if f"links.{payload.link}.mass" in scope.parameters else head
+    sizes = ("mass", *(f"inertia.{x}{x}" for x in "xyz"))
+    numbers = [f"{head}.grapple", *(f"{each}.{name}" for each in (head, link) for name in sizes)]
+    vectors = [*(f"{head}.{name}" for name in _OF_PAYLOAD), f"{link}.com", *gravity, *joints]
+    settled = [scope.parameters.get(path) for path in (*numbers, *(f"{each}.{x}" for each in vectors for x in "xyz"))]
+    values: list[Real] = [each.value for each in settled if each is not None]  # type: ignore[misc]  # they are numbers
+    if len(values) < len(settled):
+        return  # one that lacks is already reported
+
+    def warn(rows: np.ndarray) -> None:
+        if scope.complaints.error_count:
+            return  # a number may be out of its range
+        time, own, of_link = rows[:, 0], rows[:, 1:5], rows[:, 5:9]
+        at, position, velocity, rate, com, middle, *others = np.moveaxis(rows[:, 9:].reshape(len(rows), -1, 3), 1, 0)
+        g = sum(others[: len(gravity)], np.zeros_like(at))
+        away = _length(position + velocity * time[:, None] + 0.5 * g * (time * time)[:, None])
+        reach = sum((_length(each) for each in others[len(gravity) :]), _length(at))
+        reach = reach + 2.0 * _length(middle) + _size(of_link)
+        # its frame goes round its centre, which flies straight; and as far again as its body is large
+        loose = _length(com) * (2.0 + _length(rate) * time) + _size(own)
+        far = np.flatnonzero((away > FAR * (reach + loose)) & (time <= duration))
+        if far.size:
+            row = far[np.argmax(away[far])]
+            scope.complaints.remark(
+                "D339",
+                f"link `{payload.link}` grapples payload `{payload.name}` from afar: at {time[row]:.6g} s it flies "
+                f"{away[row]:.4g} m from the base, and no part of the link is ever further than {reach[row]:.4g} m",
+                place,
+                help=[
+                    "let it be at the link by then: change `position`, `velocity` or `grapple`",
+                    f"`{head}.distance` is how far it is from its place",
+                ],
+            )
+
+    scope.checks.observe(tuple(values), warn, place, needs=(head,))
+
+
+def _size(rows: np.ndarray) -> np.ndarray:
+    """How far a body goes from its centre at most, of usual shapes, m; rows: mass, and moments of inertia (kg m^2)."""
+    mass, largest = rows[:, 0], rows[:, 1:].max(axis=1)
+    return np.asarray(3.0 * np.sqrt(largest / np.where(mass > 0.0, mass, math.inf)))
+
+
+def _length(vectors: np.ndarray) -> np.ndarray:
+    return np.asarray(np.linalg.norm(vectors, axis=1))
+
+
+_OF_PAYLOAD = ("at", "position", "velocity", "rate", "com")
+"""Vectors of a payload, in the order of the rows' columns."""

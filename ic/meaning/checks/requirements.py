@@ -1,0 +1,156 @@
+"""Warnings of requirements that say nothing: that no run can miss or meet, or whose metric this run cannot show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ic.meaning.parameters.scope import Scope
+from met import models
+from met.diagnostic import Label, Place
+from met.metrics.metric import Metric
+from met.plan import MetricUse, Requirement, Structure
+from met.trace import Scalar
+
+NEAR = 0.02
+"""Share of its way within which a command has come to its target: as a settling time's band is by default."""
+
+FOLLOWED = {"q": "position", "qd": "rate"}
+"""The kind of command that a joint's channel is to follow."""
+
+
+def check_requirements(scope: Scope, requirements: Sequence[Requirement], structure: Structure) -> None:
+    """Warn of requirements that are decided before the run, and of metrics that this run cannot show."""
+    if scope.complaints.error_count:
+        return
+    uses = {use.name: use for use in structure.metrics}
+    for requirement in requirements:
+        use = uses[requirement.metric]
+        metric: Metric = models.find("metric", use.model, use.place)
+        place, duration = requirement.place, structure.schedule.duration
+        if place is not None:  # the first that is so: one warning is enough
+            _ = (
+                _remark_bound(scope, requirement, metric, place)
+                or _remark_begin(scope, requirement, use, metric, place)
+                or _remark_target(scope, requirement, use, metric, structure, place)
+                or _remark_times(scope, requirement, metric, duration, place)
+            )
+    _remark_contradictions(scope, requirements)
+
+
+def _remark_bound(scope: Scope, requirement: Requirement, metric: Metric, place: Place) -> bool:
+    """Return True, with a warning, if the limit is where the metric cannot be."""
+    upper, strict = requirement.comparison.startswith("<"), not requirement.comparison.endswith("=")
+    beyond = requirement.limit < metric.least or (requirement.limit == metric.least and strict is upper)
+    if beyond:
+        scope.complaints.remark(
+            "D340",
+            f"`require {requirement.text}` cannot be {'met' if upper else 'missed'}: a metric `{metric.name}` is never "
+            f"below {metric.least:g}",
+            place,
+            help="write a limit that it may pass, or leave it out",
+        )
+    return beyond
+
+
+def _remark_contradictions(scope: Scope, requirements: Iterable[Requirement]) -> None:
+    """Report two requirements of which one is missed always."""
+    lowest: dict[str, Requirement] = {}
+    highest: dict[str, Requirement] = {}
+    for each in requirements:
+        upper = each.comparison.startswith("<")
+        kept = (highest if upper else lowest).setdefault(each.metric, each)
+        if (each.limit < kept.limit) if upper else (each.limit > kept.limit):
+            (highest if upper else lowest)[each.metric] = each
+    for name in lowest.keys() & highest.keys():
+        low, high = lowest[name], highest[name]
+        strict = "=" not in low.comparison or "=" not in high.comparison
+        if (low.limit > high.limit or (low.limit == high.limit and strict)) and low.place and high.place:
+            scope.complaints.remark(
+                "D340",
+                f"`require {low.text}` and `require {high.text}` cannot both be met",
+                low.place,
+                also=[Label(high.place, "the other")],
+                help="leave one of them out, or let the limits meet",
+            )
+
+
+def _remark_times(scope: Scope, requirement: Requirement, metric: Metric, duration: float, place: Place) -> bool:
+    """Return True, with a warning, for a time after the run's end."""
+    late = metric.times and duration < requirement.limit < math.inf
+    if late:
+        scope.complaints.remark(
+            "D341",
+            f"`require {requirement.text}` looks beyond this run, which ends at {duration:.9g} s: what a metric "
+            f"`{metric.name}` does not see by then is infinite",
+            place,
+            help="let the run last longer, or write an earlier limit",
+        )
+    return late
+
+
+def _remark_begin(scope: Scope, requirement: Requirement, use: MetricUse, metric: Metric, place: Place) -> bool:
+    """Return True, with a warning, for a metric that is no number from where its channel begins."""
+    first, p = scope.parameters.get(f"initial.{use.of}"), _parameters(scope, use, metric)
+    if metric.undefined is None or first is None or not isinstance(first.value, float) or p is None:
+        return False
+    why = metric.undefined(p, first.value)
+    if why:
+        scope.complaints.remark(
+            "D341",
+            f"`require {requirement.text}` cannot be told from this run: `{use.name}` is no number, for {why}",
+            place,
+            help=f"let `{use.of}` begin elsewhere, or choose another metric",
+        )
+    return bool(why)
+
+
+def _remark_target(
+    scope: Scope, requirement: Requirement, use: MetricUse, metric: Metric, structure: Structure, place: Place
+) -> bool:
+    """Return True, with a warning, for a target to which the joint's command comes after the run's end."""
+    joint, _, quantity = use.of.rpartition(".")
+    servo = next((each for each in structure.servos if each.joint == joint), None)
+    command = servo.command if servo is not None else None
+    if not metric.target or command is None or not command.model or command.kind != FOLLOWED.get(quantity):
+        return False
+    profile = models.find("command", command.model)
+    p, course = _parameters(scope, use, metric), _numbers(scope, f"{joint}.servo.command", profile.parameters)
+    if profile.content is None or p is None or course is None:
+        return False
+    duration, target = structure.schedule.duration, getattr(p, metric.target)
+    ends = profile.content(course, duration).ends
+    if not duration < ends < math.inf:
+        return False
+    begin, now, last = (_value_at(profile.course, course, t) for t in (0.0, duration, ends))
+    way = abs(target - begin)
+    late = abs(last - target) <= NEAR * way < abs(now - target)
+    if late:
+        scope.complaints.remark(
+            "D341",
+            f"`require {requirement.text}` cannot be told from this run: the command of joint `{joint}` comes to the "
+            f"target of `{use.name}` at {ends:.6g} s, and the run ends at {duration:.9g} s",
+            place,
+            help="let the run last longer, or the command come there earlier",
+        )
+    return late
+
+
+def _value_at(course: Callable[[Any, float], tuple[Any, Any]], p: Any, t: float) -> float:
+    return float(np.asarray(course(p, t)[0]))
+
+
+def _parameters(scope: Scope, use: MetricUse, metric: Metric) -> SimpleNamespace | None:
+    """The metric's parameters; None where one of them varies."""
+    return _numbers(scope, f"metrics.{use.name}", metric.parameters)
+
+
+def _numbers(scope: Scope, head: str, declared: Iterable[Any]) -> SimpleNamespace | None:
+    settled = {each.name: scope.parameters.get(f"{head}.{each.name}") for each in declared}
+    if any(each is None or isinstance(each.value, Scalar) for each in settled.values()):
+        return None
+    return SimpleNamespace(**{name: each.value for name, each in settled.items() if each is not None})

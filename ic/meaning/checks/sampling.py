@@ -1,0 +1,161 @@
+"""Warnings of commands, courses and loads that the instants that sample them do not carry, or that the run is too short
+for (`met.content`)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ic.meaning.parameters.scope import Scope
+from met import models
+from met.content import Content
+from met.diagnostic import Place
+from met.frozen import frozen
+from met.plan import BASE, Schedule, Structure
+from met.trace import Real
+
+MOST_ROWS = 1000
+"""Different cases of a sweep that are looked at, evenly spread."""
+
+ROUNDING = 1e-9
+"""Share of an interval by which an instant may miss what it is at."""
+
+ENOUGH = 10
+"""Instants in a swing that show its shape, and not only that it swings."""
+
+
+@frozen
+class Sampled:
+    """What a model brings in time, and the instants that see it.
+
+    label     whose it is, in words;  path: of its parameters
+    declared  its parameters;  content: what it brings (`Profile.content`, `Environment.content`)
+    interval  s between instants;  by: what they are, in words, as in "its servo ticks"
+    """
+
+    label: str
+    path: str
+    declared: tuple[Any, ...]
+    content: Callable[[Any, float], Content]
+    interval: float
+    by: str
+    place: Place | None
+
+
+def check_sampling(scope: Scope, structure: Structure) -> None:
+    """Warn of what begins after the run's end, and of swings and pulses that fall between the instants that see it."""
+    if scope.complaints.error_count:
+        return  # a table may lack numbers, and no warning is given
+    for sampled in _all_sampled(structure):
+        _observe(scope, sampled, structure.schedule)
+
+
+def _all_sampled(structure: Structure) -> Iterator[Sampled]:
+    schedule = structure.schedule
+
+    def course(label: str, path: str, model: str, interval: float, by: str, place: Place | None) -> Iterator[Sampled]:
+        profile = models.find("command", model, place)
+        if profile.content is not None:
+            yield Sampled(label, path, profile.parameters, profile.content, interval, by, place)
+
+    steps = "the dynamics steps"
+    for use in structure.servos:
+        if use.command is not None and use.command.model:
+            interval = schedule.step if use.continuous else use.divisor / schedule.base_hz
+            by = steps if use.continuous else "its servo ticks"
+            label = f"the command of servo `{use.definition}`"
+            yield from course(label, f"{use.joint}.servo.command", use.command.model, interval, by, use.place)
+    for guide in structure.guides:
+        interval = guide.divisor / schedule.base_hz
+        for each in guide.courses:
+            label, path = f"`{each.component}` of guide `{guide.name}`", f"guides.{guide.name}.{each.component}"
+            yield from course(label, path, each.model, interval, "the guide ticks", guide.place)
+    for each in structure.base.courses if structure.base is not None else ():
+        path = f"{BASE}.{each.component}"
+        yield from course(f"`{each.component}` of the base", path, each.model, schedule.step, steps, None)
+    for load in structure.environment:
+        model = models.find("environment", load.model, load.place)
+        if model.content is not None:
+            label, path = f"environment `{load.name}`", f"environment.{load.name}"
+            yield Sampled(label, path, model.parameters, model.content, schedule.step, steps, load.place)
+
+
+def _observe(scope: Scope, sampled: Sampled, schedule: Schedule) -> None:
+    settled = {each.name: scope.parameters.get(f"{sampled.path}.{each.name}") for each in sampled.declared}
+    known = {name: each.value for name, each in settled.items() if each is not None}
+    if len(known) < len(settled):
+        return  # what it has no number for is already reported
+    fixed = {name: value for name, value in known.items() if isinstance(value, str | tuple)}
+    numbers: dict[str, Real] = {name: value for name, value in known.items() if name not in fixed}  # type: ignore[misc]
+    timed = ("s", "Hz")
+    place = next(
+        (each.origin.place for each in settled.values() if each and each.unit in timed and each.origin.place),
+        sampled.place,
+    )
+    if place is None:
+        return
+
+    def warn(rows: np.ndarray) -> None:
+        if scope.complaints.error_count:
+            return  # a number may be out of its range
+        rows = np.unique(rows, axis=0)
+        if len(rows) > MOST_ROWS:
+            rows = rows[np.linspace(0, len(rows) - 1, MOST_ROWS).astype(int)]
+        found = [
+            sampled.content(SimpleNamespace(**fixed, **dict(zip(numbers, row, strict=True))), schedule.duration)
+            for row in rows.tolist()
+        ]
+        _remark(scope, sampled, found, schedule.duration, place)
+
+    scope.checks.observe(tuple(numbers.values()), warn, place, needs=(sampled.path,))
+
+
+def _remark(scope: Scope, sampled: Sampled, found: list[Content], duration: float, place: Place) -> None:
+    first = min(found, key=lambda each: each.begins)
+    if duration <= first.begins < math.inf:
+        scope.complaints.remark(
+            "D334",
+            f"{sampled.label} does nothing in this run: it first changes at {first.begins:.9g} s, and the run ends at "
+            f"{duration:.9g} s",
+            place,
+            help="let it begin earlier, or the run last longer; or write the value that it keeps",
+        )
+        return
+    hz = 1.0 / sampled.interval
+    fastest = max(each.frequency for each in found)
+    if 2.0 * fastest >= hz * (1.0 - ROUNDING):
+        seen = abs(fastest - round(fastest / hz) * hz)
+        scope.complaints.remark(
+            "D335",
+            f"{sampled.label} swings at {fastest:.6g} Hz, and {sampled.by} at {hz:.6g} Hz: "
+            f"what is seen of it swings at {seen:.6g} Hz",
+            place,
+            help=f"let it swing slower than {0.5 * hz:.6g} Hz; or give what sees it {ENOUGH * fastest:.6g} Hz, "
+            f"{ENOUGH} instants a swing",
+        )
+    lost = [pulse for each in found for pulse in _lost(each.pulses, sampled.interval, duration)]
+    if lost:
+        begins, ends = min(lost, key=lambda pulse: pulse[1] - pulse[0])
+        before = math.floor(begins * hz)
+        times = f"{before * sampled.interval:.9g} s and {(before + 1) * sampled.interval:.9g} s"
+        rate = [f"or give what sees it {math.ceil(1.0 / (ends - begins)):.6g} Hz"] if ends > begins else []
+        others = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
+        scope.complaints.remark(
+            "D336",
+            f"{sampled.label} has a pulse that is not seen{others}: it is beyond half of its height "
+            f"from {begins:.9g} s to {ends:.9g} s, and {sampled.by} at {times}",
+            place,
+            help=[f"let it last longer than {sampled.interval:.6g} s", *rate],
+        )
+
+
+def _lost(pulses: Iterable[tuple[float, float]], interval: float, duration: float) -> Iterator[tuple[float, float]]:
+    """The pulses within the run in which no instant lies."""
+    for begins, ends in pulses:
+        after = math.ceil(begins / interval - ROUNDING)
+        if 0.0 <= begins < duration and after > ends / interval + ROUNDING:
+            yield begins, ends

@@ -1,0 +1,144 @@
+"""Warnings that a run allows: `allow D105 because "the report's own rates";`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from ic.grammar.places import place_of
+from ic.grammar.syntax import Entry, Name, Statement, String
+from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.text.complaints import Complaints
+from met.diagnostic import Diagnostic, Label, Place, did_you_mean
+from met.messages.warning_codes import WARNINGS, WHILE_RUNNING
+from met.plan import Allowance, Experiment
+
+ALLOW = "allow"
+
+
+def allowances_of(
+    definitions: Definitions, run: Definition, complaints: Complaints, sweep: Definition | None = None
+) -> tuple[Allowance, ...]:
+    """What a run allows, or a sweep of it: a reason of its own takes the place of that of its base."""
+    runs = definitions.of_kind("run")
+    bodies = [runs[name].group.body for name in definitions.homes(run)[:-1]]
+    bodies += [run.group.body, *([sweep.group.body] if sweep is not None else [])]
+    found: dict[str, Allowance] = {}
+    for body in bodies:
+        found |= _read(body, complaints)
+    return tuple(found.values())
+
+
+def _read(body: Iterable[Entry], complaints: Complaints) -> dict[str, Allowance]:
+    """What the statements of one block allow, by code; reports each that is wrong, or there twice."""
+    found: dict[str, Allowance] = {}
+    for entry in body:
+        if not isinstance(entry, Statement) or entry.words[0].text != ALLOW:
+            continue
+        words, value = entry.words[1:], entry.value
+        if len(words) != 2 or words[1].text != "because" or not isinstance(value, String) or not value.value.strip():
+            code = words[0].text if words else value.text if isinstance(value, Name) else "CODE"
+            complaints.error(
+                "D330",
+                "an `allow` names a warning and says why",
+                words[0].place if words else place_of(value),
+                help=f'write `allow {code} because "REASON";`',
+            )
+        elif words[0].text not in WARNINGS:
+            _refuse(words[0].text, words[0].place, complaints)
+        elif (first := found.get(words[0].text)) is not None and first.place is not None:
+            complaints.error(
+                "D332",
+                f"`{first.code}` is allowed twice",
+                Label(words[0].place, "again"),
+                also=[Label(first.place, "first")],
+                help="leave one of the two out",
+            )
+        else:
+            found[words[0].text] = Allowance(words[0].text, " ".join(value.value.split()), words[0].place)
+    return found
+
+
+def places_of(allowances: Iterable[Allowance]) -> Mapping[str, Place]:
+    """The place of each by its code, as `Complaints.allowing` takes them."""
+    return {each.code: each.place for each in allowances if each.place is not None}
+
+
+def silence_of_all(experiments: Sequence[Experiment], complaints: Complaints) -> None:
+    """Leave out the warnings that are of no single run, such as of a macro, and that all experiments allow."""
+    if not all(each.allowances for each in experiments):
+        return
+    places: dict[str, list[Place]] = {}
+    for allowance in (each for experiment in experiments for each in experiment.allowances):
+        if allowance.place is not None and all(experiment.allows(allowance.code) for experiment in experiments):
+            places.setdefault(allowance.code, []).append(allowance.place)
+    complaints.silence(places)
+
+
+def allowed_warnings(
+    experiments: Iterable[Experiment], complaints: Complaints
+) -> tuple[tuple[Diagnostic, Allowance], ...]:
+    """The warnings that are not given, each with what allows it."""
+    found = {each.place: each for experiment in experiments for each in experiment.allowances}
+    return tuple((warning, found[place]) for warning, place in complaints.allowed.items() if place in found)
+
+
+def warn_of_unneeded(
+    definitions: Definitions, checked: Iterable[Definition], experiments: Iterable[Experiment], complaints: Complaints
+) -> None:
+    """Warn of each `allow` that silenced nothing, where that is certain: the deck itself writes it, no file that it
+    includes, and every run and sweep that it is in force for was checked, those that have it from a base, too."""
+    unneeded = {
+        allowance.place: allowance.code
+        for experiment in experiments
+        for allowance in experiment.allowances
+        if allowance.place is not None
+        and allowance.place not in complaints.needed_allowances
+        and allowance.code not in WHILE_RUNNING
+        and definitions.writes_at(allowance.place)
+    }
+    if not unneeded:
+        return
+    runs = definitions.of_kind("run")
+    names = _with_parts(definitions, checked)
+    for each in (*runs.values(), *definitions.of_kind("sweep").values()):
+        sweep = each if each.kind == "sweep" else None
+        run = each if sweep is None else runs.get(each.group.of.text if each.group.of is not None else "")
+        if each.name not in names and run is not None:
+            elsewhere = {allowance.place for allowance in allowances_of(definitions, run, Complaints(), sweep)}
+            unneeded = {place: code for place, code in unneeded.items() if place not in elsewhere}
+    for place, code in unneeded.items():
+        complaints.warn(
+            "D333", f"`allow {code}` silences nothing here", place, help="leave it out: no such warning is given"
+        )
+
+
+def _with_parts(definitions: Definitions, checked: Iterable[Definition]) -> set[str]:
+    """The names of these runs and sweeps, and of those that they are made of."""
+    names: set[str] = set()
+    waiting = list(checked)
+    while waiting:
+        each = waiting.pop()
+        if each.name not in names:
+            names.add(each.name)
+            known = {**definitions.of_kind("run"), **definitions.of_kind("sweep")}
+            waiting += (known[part.text] for part in each.parts if part.text in known)
+    return names
+
+
+def _refuse(code: str, place: Place, complaints: Complaints) -> None:
+    from ic.text.codes import is_on_the_page
+
+    if is_on_the_page(code):
+        complaints.error(
+            "D331",
+            f"`{code}` is no warning of a run, and nothing else is allowed",
+            place,
+            help=f"mend what it says, and leave this out: `met doc {code}`",
+        )
+        return
+    complaints.error(
+        "D331",
+        f"no warning has the code `{code}`",
+        place,
+        help=[*did_you_mean(code, sorted(WARNINGS)), "a code is printed with its warning, as in `warning[D105]`"],
+    )

@@ -1,0 +1,116 @@
+"""Requirements that say nothing are warned of: decided before the run, or about what the run cannot show."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from met import models
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, messages
+
+METRICS = """\
+    metric most   = peak { of = hinge.qd; }
+    metric end    = final { of = hinge.qd; }
+    metric settle = settling_time { of = hinge.qd; target = 0.1 rad/s; }
+    metric over   = overshoot { of = hinge.qd; target = 0.1 rad/s; }
+"""
+
+
+def requiring(text: str) -> str:
+    """The run with metrics, and with this before its end."""
+    return changed(RUN, ("[q];\n", f"[q];\n{METRICS}    {text}\n"))
+
+
+def shown(folder: Path, *parts: str) -> str:
+    """What is said of a deck, without the counting line."""
+    return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
+
+
+def test_a_limit_where_the_metric_never_is(tmp_path: Path) -> None:
+    assert (
+        shown(tmp_path, ARM, SERVO, requiring("require most >= 0 rad/s;"))
+        == """\
+warning[D340]: `require most >= 0 rad/s` cannot be missed: a metric `peak` is never below 0
+  --> deck.ic:21:5
+   |
+21 |     require most >= 0 rad/s;
+   |     ^^^^^^^
+   = help: write a limit that it may pass, or leave it out
+"""
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("require most < 0 rad/s;", ["D340"]),
+        ("require most <= -1 rad/s;", ["D340"]),
+        ("require most > -1 rad/s;", ["D340"]),
+        ("require most <= 0 rad/s;", []),
+        ("require most > 0 rad/s;", []),
+        ("require end > -1 rad/s; require end < 0 rad/s;", []),
+        ("require end > 1 rad/s; require end < 0 rad/s;", ["D340"]),
+        ("require end >= 1 rad/s; require end <= 1 rad/s;", []),
+        ("require end >= 1 rad/s; require end < 1 rad/s;", ["D340"]),
+        ("require settle < 1 s;", []),
+        ("require settle < 1.1 s;", ["D341"]),
+        ("require over < 2 %;", []),
+    ],
+)
+def test_what_is_told(tmp_path: Path, text: str, expected: list[str]) -> None:
+    assert codes(tmp_path, ARM, SERVO, requiring(text)) == expected
+
+
+def test_a_metric_that_begins_on_its_target(tmp_path: Path) -> None:
+    run = changed(requiring("require over < 2 %;"), ("duration", "initial { hinge.qd = 0.1 rad/s; }\n    duration"))
+    assert (
+        shown(tmp_path, ARM, SERVO, run)
+        == """\
+warning[D341]: `require over < 2 %` cannot be told from this run: `over` is no number, for it begins on its target
+  --> deck.ic:22:5
+   |
+22 |     require over < 2 %;
+   |     ^^^^^^^
+   = help: let `hinge.qd` begin elsewhere, or choose another metric
+"""
+    )
+
+
+def test_a_command_that_comes_to_the_target_after_the_end(tmp_path: Path) -> None:
+    slow = changed(SERVO, ("rate(0.1 rad/s)", "rate(ramp(to = 0.1 rad/s, over = 3 s))"))
+    assert (
+        shown(tmp_path, ARM, slow, requiring("require settle < 0.5 s;"))
+        == """\
+warning[D341]: `require settle < 0.5 s` cannot be told from this run: the command of joint `hinge` comes to the target \
+of `settle` at 3 s, and the run ends at 1 s
+  --> deck.ic:21:5
+   |
+21 |     require settle < 0.5 s;
+   |     ^^^^^^^
+   = help: let the run last longer, or the command come there earlier
+"""
+    )
+    for over in ("1 s", "1.01 s"):  # there, or within two hundredths of it
+        quick = changed(SERVO, ("rate(0.1 rad/s)", f"rate(ramp(to = 0.1 rad/s, over = {over}))"))
+        assert codes(tmp_path, ARM, quick, requiring("require settle < 0.5 s;")) == []
+    elsewhere = changed(SERVO, ("rate(0.1 rad/s)", "rate(ramp(to = 0.4 rad/s, over = 3 s))"))
+    assert codes(tmp_path, ARM, elsewhere, requiring("require settle < 0.5 s;")) == []
+
+
+@pytest.mark.parametrize("name", ["peak", "rms", "overshoot", "settling_time", "final", "min", "max"])
+def test_a_metric_is_never_below_its_bound_and_no_number_where_it_says_so(name: str) -> None:
+    metric = models.find_own("metric")[name]
+    p = SimpleNamespace(target=-0.5, band=0.02, within=0.0)
+    for first in (-2.0, -0.5, 0.0, 1.0):
+        held = SimpleNamespace(**{each.name: each.start for each in metric.memory})
+        for k, x in enumerate(np.array((first, 0.3, -1.0))):
+            held = SimpleNamespace(**{**vars(held), **metric.update(p, held, x, 0.1 * k, 0.1 * min(k, 1))})
+        with np.errstate(all="ignore"):
+            found = float(metric.result(p, held, np.float64(0.2)))
+        why = metric.undefined(p, first) if metric.undefined is not None else ""
+        assert math.isnan(found) == bool(why)
+        assert math.isnan(found) or found >= metric.least
