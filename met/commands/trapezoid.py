@@ -42,7 +42,8 @@ def content(p: Any, duration: float) -> Content:
     if way == 0.0:
         return NEVER
     peak = min(p.max_rate, math.sqrt(p.max_acceleration * way))
-    return Content(begins=p.begin, ends=p.begin + peak / p.max_acceleration + way / peak)
+    # a move that is too slow for any number has no end
+    return Content(begins=p.begin, ends=p.begin + peak / p.max_acceleration + way / peak if peak > 0.0 else math.inf)
 
 
 PROFILE = Profile(

@@ -55,14 +55,14 @@ def _at(p: Any, values: tuple[float, ...], world: World) -> Real:
     if len(values) < 2:
         return values[0] if values else 0.0
     value = linear(p.times, values, world.time - p.begin)[0]
-    if _steps_meet_rows(p, world.step):
+    step, begins = world.step, world.begin - p.begin
+    if _steps_meet_rows(p, step):
         return value
-    begins, early = world.begin - p.begin, EARLY * world.step
-    ends = begins + world.step
+    ends, early = begins + step, EARLY * step
     # with held ends, so that the first and the last row lie between two segments too
     times = (p.times[0] - 1.0, *p.times, p.times[-1] + 1.0)
     held = (values[0], *values, values[-1])
-    mean = (_integral(times, held, ends) - _integral(times, held, begins)) / world.step
+    mean = (_integral(times, held, ends) - _integral(times, held, begins)) / step
     return where(segment(times, begins + early) < segment(times, ends - early), mean, value)
 
 

@@ -152,7 +152,7 @@ SMALLEST: dict[tuple[str, str], Small] = {
     ("environment", "free_swinging"): Small({"from": 0.05, "until": 0.1}, beside=DRIVEN),
     ("environment", "runaway"): Small({"level": 0.5, "from": 0.05, "until": 0.1}, beside=DRIVEN),
     ("environment", "gravity"): Small({"g": (0.0, 0.0, -9.81)}, beside={"gravity": ""}),
-    ("environment", "gravity_gradient"): Small({"radius": 6.778e6, "frame": "orbital"}),
+    ("environment", "gravity_gradient"): Small({"radius": 6.778e6, "frame": "orbital"}, beside={"gravity": ""}),
     ("environment", "joint_damping"): Small({"damping": 1.0}),
     ("environment", "joint_stop"): Small({
         "lower": -1e-3, "upper": 5e-3, "stiffness": 900.0, "dissipation": 0.5,

@@ -77,6 +77,8 @@ def _replayed(function: Callable[..., Any]) -> Callable[..., Any]:
     def same(*numbers: Any) -> Any:
         if any(isinstance(x, Scalar) for x in numbers):
             return function(*numbers)
+        if any(np.ndim(x) for x in numbers):  # over lanes of cases
+            return np.vectorize(same)(*numbers)
         return np.float64(formulas.replay(dict(zip(names, map(float, numbers), strict=True)))[0])
 
     return same
@@ -186,7 +188,16 @@ def calls(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], Any
     return {name: call for name, call in known.items() if getattr(model, name) is not None}
 
 
-NOT_TRACED = {("environment", "idle"), ("environment", "pushed_links"), ("guide", "idle"), ("command", "jumps")}
+NOT_TRACED = {
+    ("environment", "idle"),
+    ("environment", "pushed_links"),
+    ("environment", "content"),
+    ("environment", "alone"),
+    ("guide", "idle"),
+    ("command", "jumps"),
+    ("command", "content"),
+    ("metric", "undefined"),
+}
 """Functions that are asked only where all numbers are constants, or about words alone."""
 
 
