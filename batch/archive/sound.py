@@ -139,6 +139,8 @@ def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
     scale = variable.attributes.get("deck_scale", 1.0)
     if not isinstance(scale, int | float) or not math.isfinite(scale) or not scale:
         raise Unlike(f"variable `{name}` has no scale")
+    if not isinstance(variable.attributes.get("code_key", ""), str):
+        raise Unlike(f"variable `{name}` has a key that is no word")
 
 
 def _requirements(group: StoredGroup) -> None:

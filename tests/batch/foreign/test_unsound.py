@@ -65,6 +65,7 @@ UNSOUND: dict[str, tuple[Change, str]] = {
     "a rate of nothing": (said("open", "record_hz", 0.0), "attribute `record_hz` is 0.0"),
     "no scale": (said("open/end", "deck_scale", 0.0), "variable `end` has no scale"),
     "a scale in words": (said("open/end", "deck_scale", "deg"), "variable `end` has no scale"),
+    "a key that is a number": (said("open/end", "code_key", 99.0), "variable `end` has a key that is no word"),
     "limits of others": (said("open/requirement", "limit", [1.0, 2.0]),
                          "attribute `limit` of `requirement` is not of each"),
     "a metric of integers": (whole_numbers, "variable `end` is of another type"),

@@ -98,13 +98,19 @@ def test_the_pages_table_is_what_becomes_of_the_files() -> None:
     assert table == list(rows())
 
 
+FAST = ("xarm7", "z1")
+"""Robots with a joint whose damping is too fast for the step of the deck that is made, 1 kHz. These runs do not show
+it, for its dry friction holds that joint: to 1e-6 rad they are those of 50 kHz."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "ur5_robot", "kinova", "xarm7", "so100", "z1", "baxter", "cartpole"])
 def test_the_deck_of_a_published_robot_holds_its_arm_and_lets_it_fall(name: str, tmp_path: Path) -> None:
     path = next(path for path in files() if path.stem == name)
     (tmp_path / "arm.ic").write_text(import_robot(str(path), "free"), encoding="utf-8")
     compiled = ic.check(tmp_path / "arm.ic")
-    assert compiled.plan is not None and compiled.diagnostics == ()
+    assert compiled.plan is not None
+    assert [each.code for each in compiled.diagnostics] == ["D317"] * (name in FAST)
     for experiment in compiled.plan.experiments:
         assert (run.run(experiment).status == 0).all(), experiment.name
 
