@@ -1,6 +1,19 @@
 """Metrics, one a file. To add one: write its file, add it to `METRICS`."""
 
-from met.metrics import final, max, min, overshoot, peak, rms, settling_time
+from met.metrics import (
+    always,
+    eventually,
+    final,
+    holds_for,
+    max,
+    min,
+    never,
+    overshoot,
+    peak,
+    rms,
+    settling_time,
+    share_of_time,
+)
 from met.metrics.metric import Metric
 
 METRICS: tuple[Metric, ...] = (
@@ -11,4 +24,9 @@ METRICS: tuple[Metric, ...] = (
     peak.METRIC,
     rms.METRIC,
     settling_time.METRIC,
+    always.METRIC,
+    eventually.METRIC,
+    holds_for.METRIC,
+    never.METRIC,
+    share_of_time.METRIC,
 )
