@@ -296,7 +296,7 @@ class _CampaignWork:
         from batch.campaigns.verification.verifying import verify
 
         experiment = self.campaign.parts[number].experiment
-        outcomes = CaseOutcomes(writer.values(number, "case")["status"], writer.values(number, "metric"))
+        outcomes = CaseOutcomes(*writer.put_before(number))
         places = np.flatnonzero(outcomes.status == DONE) if way == "all" else chosen(experiment, outcomes)
         if len(places):
             threads = getattr(self.driver and self.driver.executor, "threads", None)
