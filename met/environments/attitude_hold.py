@@ -30,6 +30,14 @@ def loads(p: Any, world: World) -> Loads:
     return _moment(p, world.to_world(p.link, _clipped(p, error, own)))  # type: ignore[arg-type]
 
 
+def held(p: Any) -> str:
+    """The attitude that it gives: about the axes along which it has a stiffness; a damping alone gives none."""
+    about = [axis for axis, stiffness in zip("xyz", p.stiffness, strict=True) if stiffness]
+    if not about:
+        return ""
+    return f"the attitude of `{p.link}`" + (f" about {' and '.join(about)}" if len(about) < 3 else "")
+
+
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
     """Why these numbers make it nothing, with the parameters that say so."""
     if not any((*p.stiffness, *p.damping)):
@@ -93,6 +101,6 @@ ENVIRONMENT = Environment(
     ),
     loads=loads,
     idle=idle,
-    alone=lambda p: f"the attitude of `{p.link}`",
+    alone=held,
     pushed_links=lambda p: ("link",),
 )
