@@ -18,10 +18,10 @@ Dimensions, each with its coordinate variable:
     requirement     texts of the requirements
 
 A variable says what it is by its attribute `role`: dimension, case, coordinate, choice (what decides the structure, in
-words), limit (share of time at one), extreme (limit that was reached at a metric's), metric, requirement, recorded or
-signal. In a sweep, `recorded.case_id` and `recorded.<path>` repeat names and varied parameters along recorded_case, for
-a variable has one set of dimensions only: so a signal that is taken out by itself still says what its cases are
-(`q.where(q["recorded.gearbox.kp"] > 0.02, drop=True)`).
+words), limit (share of time at one), excess (the largest over one), extreme (limit that was reached at a metric's),
+metric, requirement, recorded or signal. In a sweep, `recorded.case_id` and `recorded.<path>` repeat names and varied
+parameters along recorded_case, for a variable has one set of dimensions only: so a signal that is taken out by itself
+still says what its cases are (`q.where(q["recorded.gearbox.kp"] > 0.02, drop=True)`).
 """
 
 from __future__ import annotations
@@ -46,9 +46,8 @@ from met.unit_parser import parse_unit
 SCHEMA = "met.archive"
 VERSION = 1
 
-Role = Literal[
-    "dimension", "case", "coordinate", "choice", "limit", "extreme", "metric", "requirement", "recorded", "signal"
-]
+OfLimit = Literal["limit", "excess", "extreme"]
+Role = Literal["dimension", "case", "coordinate", "choice", OfLimit, "metric", "requirement", "recorded", "signal"]
 Kind = Literal["float64", "float32", "int64", "int8", "str"]
 
 WIDTHS: Mapping[Kind, int] = {"float64": 8, "float32": 4, "int64": 8, "int8": 1, "str": 48}
@@ -73,9 +72,9 @@ EVENTS = {
 }
 """Counts of friction's events in a case (`met.run.Run.events`): variables `friction_...`."""
 
-AT_LIMIT, EXTREME_AT = "at_limit.", "extreme_at."
-"""Prefixes of variables along `case`: the share of a run's time at the limit of this path, and the limit that was
-reached where the extreme of this metric fell."""
+AT_LIMIT, EXCESS, EXTREME_AT = "at_limit.", "excess.", "extreme_at."
+"""Prefixes of variables along `case`: the share of a run's time at the limit of this path, the largest excess over it,
+and the limit that was reached where the extreme of this metric fell."""
 
 LIMITED = "ticks at which the load motor of a bed was at its limit"
 
@@ -280,19 +279,24 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
 
 
 def _limits(experiment: Experiment) -> list[Variable]:
-    """Shares of time at limits, and limits at extremes, by their own names."""
+    """Shares of time at limits, largest excesses, and limits at extremes, by their own names."""
+    limits = limits_of(experiment.structure, experiment.parameters)
     found = [
         Variable(
             AT_LIMIT + use.path,
             "float64",
             ("case",),
             "limit",
-            f"share of the time at {use.path}" if use.machine else f"share of the time beyond the ends of {use.path}",
+            f"share of the time {'at' if use.machine else 'beyond'} {use.path}",
             "1",
             {"of": use.path},
         )
-        for use in limits_of(experiment.structure, experiment.parameters)
+        for use in limits
     ]
+    for use in limits:
+        if use.bound:
+            unit, words = experiment.parameters[use.path].unit, f"largest excess over {use.path}"
+            found.append(Variable(EXCESS + use.path, "float64", ("case",), "excess", words, unit, {"of": use.path}))
     for metric, uses in extremes(experiment).items():
         told = {
             "of": metric,

@@ -53,6 +53,7 @@ OF_ROLES: dict[str, str | tuple[str, ...]] = {
     "coordinate": ("<f8",),
     "metric": ("<f8",),
     "limit": ("<f8",),
+    "excess": ("<f8",),
     "extreme": ("<i8",),
     "signal": ("<f8", "<f4"),
     "choice": WORDS,
@@ -129,7 +130,7 @@ def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
     wanted = OF_ROLES.get(variable.role, NUMBERS + WORDS)
     if kinds[name] not in wanted and types[name] not in wanted:
         raise Unlike(f"variable `{name}` is of another type")
-    if variable.role in ("coordinate", "metric", "choice", "limit", "extreme", "case") and dims != ("case",):
+    if variable.role in ("coordinate", "metric", "choice", "limit", "excess", "extreme", "case") and dims != ("case",):
         raise Unlike(f"variable `{name}` is not over cases")
     if variable.role == "signal":
         if dims[:2] != ("recorded_case", "time"):

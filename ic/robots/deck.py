@@ -12,10 +12,9 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Setting
 from ic.robots.attributes import shown
-from ic.robots.entries import ArmEntries, RobotEntry, spelled
+from ic.robots.entries import ArmEntries, RobotEntry, limits, spelled
 from ic.robots.names import word
 from ic.robots.robot import MOVING, Inertial, Joint
-from ic.robots.warnings import limits
 
 WIDE = 100  # columns of a block on one line
 WIDEST = 120  # with what is said of it behind
@@ -96,21 +95,9 @@ def _joint_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> li
     if joint.followed is not None:
         law = f" ({joint.law})" if joint.law else ""
         notes.append((HELD if joint.type.text == "fixed" else FREE).format(shown(joint.followed.text), law))
-    notes += _limit_notes(joint)
     if joint.type.text in MOVING:
         notes += [f"{name} {spelled(value)}" for name, value in joint.friction.items() if value]
     return notes
-
-
-def _limit_notes(joint: Joint) -> Iterator[str]:
-    found = limits(joint)
-    length, effort = ("m", "N") if joint.type.text == "prismatic" else ("rad", "N*m")
-    if "lower" in found:
-        yield f"from {spelled(found['lower'])} to {spelled(found['upper'])} {length}"
-    if "velocity" in found:
-        yield f"at most {spelled(found['velocity'])} {length}/s"
-    if "effort" in found:
-        yield f"at most {spelled(found['effort'])} {effort}"
 
 
 def _called(part: RobotEntry, kind: str, changed: Mapping[tuple[str, str], str]) -> list[str]:

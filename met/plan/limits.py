@@ -4,6 +4,8 @@
     environment.end.upper           of an environment model, by its declaration (`Environment.limits`)
     shoulder.servo.command.times    of a command's course, likewise: beyond the ends of its table
 
+    shoulder.q_max                  of a joint, by the deck: it is watched, and keeps the joint from nothing
+
 A limit that is infinite in every case is none, and neither are the ends of a table of one row.
 """
 
@@ -29,7 +31,8 @@ class LimitUse:
     channels  of its servo, whose size never exceeds it; none of other models
     declared  of an environment model or a command's course; None of a servo
     owner     the name of the environment model in the deck; "" of others
-    machine   whether it is one of a machine, and not the end of a table
+    bound     name of a joint's own limit: `q_min`, `q_max`, `qd_max` or `tau_max`; "" of a model's
+    machine   whether a machine stays within it, so that it cuts what a metric sees
     """
 
     path: str
@@ -37,12 +40,18 @@ class LimitUse:
     channels: tuple[str, ...] = ()
     declared: Limit | None = None
     owner: str = ""
+    bound: str = ""
     machine: bool = True
 
 
 def limits(structure: Structure, parameters: Mapping[str, Quantity]) -> tuple[LimitUse, ...]:
-    """All limits that can be reached in a case: of servos joint by joint, of commands, of environment models."""
-    found = (*_of_servos(structure), *_of_commands(structure), *_of_environment(structure, parameters))
+    """All limits that can be reached in a case: of joints, of their servos and commands, of environment models."""
+    found = (
+        *_of_joints(structure),
+        *_of_servos(structure),
+        *_of_commands(structure),
+        *_of_environment(structure, parameters),
+    )
     return tuple(each for each in found if _is_one(parameters.get(each.path)))
 
 
@@ -67,6 +76,12 @@ def _is_one(quantity: Quantity | None) -> bool:
     if isinstance(value, tuple):
         return len(value) > 1
     return not (isinstance(value, float | int) and math.isinf(value))
+
+
+def _of_joints(structure: Structure) -> Iterator[LimitUse]:
+    for joint in structure.moving:
+        for name in joint.limits:
+            yield LimitUse(f"{joint.name}.{name}", joint.name, bound=name, machine=False)
 
 
 def _of_servos(structure: Structure) -> Iterator[LimitUse]:

@@ -175,6 +175,7 @@ class Builder:
             tape.write(cell_names.SEEN(actuator.use.joint, of), sensing.true_value(seen, of))
 
     def end(self, tape: Tape) -> None:
+        self.limits.keep_excess(tape)
         for name in (*OUTPUTS, *self.watched):
             tape.output(name, tape.read(name))
         for name, metric, _ in self.system.metrics:

@@ -67,6 +67,7 @@ BODY_ORIENTATION = CellFamily("{}:orientation.{}", "unit quaternion at the step'
 
 # Limits, by the path of the parameter that sets one, and by metric.
 AT_LIMIT = CellFamily("at_limit:{}", "steps that began at the limit", "1")
+EXCESS = CellFamily("excess:{}", "largest excess over a limit of a joint so far", "of the limit")
 EXTREME_AT = CellFamily("extreme:{}:at_limit", "number of the limit where the metric's extreme fell, 0: none", "1")
 
 # Motors on beds, by joint; the shaft's side of the gearbox but for Lambda and b_0.

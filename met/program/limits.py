@@ -10,13 +10,14 @@ from met import models
 from met.plan.limits import LimitUse, extremes, limits
 from met.program import cell_names, cells
 from met.program.control.setpoints import course_values
+from met.program.joint_limits import excess
 from met.program.motion.base import base_of
 from met.program.motion.payloads import tree_with_payloads
 from met.program.motion.world import ArmWorld, environment_values
 from met.program.step import StepPhases
 from met.program.system import System
 from met.program.values import answer
-from met.trace import Real, Truth, absolute, any_of, where
+from met.trace import Real, Truth, absolute, any_of, maximum, where
 from met.trace.program import CallPhase, Control, Phase, RunPhase, Tape, WhileAny
 
 ANY = "at_any_limit"
@@ -33,9 +34,11 @@ class LimitPhases:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Outputs: steps that began at each limit; of each metric that is judged, the limit at its extreme."""
+        """Outputs: steps that began at each limit; largest excesses over joints' own; of each metric that is judged the
+        limit at its extreme."""
         counts = (cell_names.AT_LIMIT(use.path) for use in self.uses)
-        return (*counts, *(cell_names.EXTREME_AT(name) for name in self.extremes))
+        most = (cell_names.EXCESS(use.path) for use in self.uses if use.bound)
+        return (*counts, *most, *(cell_names.EXTREME_AT(name) for name in self.extremes))
 
     def counting(self) -> tuple[Control, ...]:
         """Phases that count the limits at which the step that ends now began; run before that step is finished."""
@@ -52,6 +55,17 @@ class LimitPhases:
     def _count(self, tape: Tape) -> None:
         for path, reached in self._at_begin(tape):
             cells.count(tape, reached, cell_names.AT_LIMIT(path))
+        self.keep_excess(tape)
+
+    def keep_excess(self, tape: Tape) -> None:
+        """Keep the largest excess over each limit of a joint, this instant's too."""
+        for use in self.uses:
+            if use.bound:
+                cell = cell_names.EXCESS(use.path)
+                tape.write(cell, maximum(tape.read(cell), self._excess(tape, use)))
+
+    def _excess(self, tape: Tape, use: LimitUse) -> Real:
+        return excess(use.joint, use.bound, self.system.value(use.path, tape.read), tape.read)
 
     def _at_begin(self, tape: Tape) -> list[tuple[str, Truth]]:
         """Paths of limits, and whether the step that ends now began there."""
@@ -68,6 +82,8 @@ class LimitPhases:
 
     def _reached(self, tape: Tape, use: LimitUse, time: Real) -> Truth:
         system = self.system
+        if use.bound:
+            return self._excess(tape, use) > 0.0
         if use.channels:
             most = system.value(use.path, tape.read)
             return any_of([absolute(tape.read(channel)) >= most for channel in use.channels])

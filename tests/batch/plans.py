@@ -236,9 +236,9 @@ def answer(
         events={name: np.zeros(len(rows), dtype=np.int64) for name in ("splits", "clamped", "undecided")},
         limited=np.zeros(len(rows), dtype=np.int64),
         at_limit={
-            use.path: np.where(failed, math.nan, 0.0)
-            for use in limits(experiment.structure, experiment.parameters)
+            use.path: np.where(failed, math.nan, 0.0) for use in limits(experiment.structure, experiment.parameters)
         },
+        excess={},
         extreme_at={name: np.zeros(len(rows), dtype=np.int64) for name in extremes(experiment)},
         warning=[""] * len(rows),
     )
