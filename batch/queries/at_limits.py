@@ -76,13 +76,11 @@ def _judged_at_a_limit(group: ArchiveGroup, experiment: Experiment | None) -> Di
     far = np.where(at > 0, beyond(group.values(required.metric), required.comparison, required.limit), -np.inf)
     worst, cases = int(far.argmax()), int((at > 0).sum())
     path = str(variable.attributes["flag_meanings"]).split()[at[worst]]
-    many = (
-        f", in {cases:,} of {group.count:,} cases, worst in #{group.values('case')[worst]}" if group.count > 1 else ""
-    )
+    many = f", in {cases:,} of {group.count:,} cases, worst in #{group.values('case')[worst]}"
     told = group.variables[required.metric].attributes
     message = (
         f"the {told.get('model')} of {told.get('of')} that `require {required.text}` judges fell while `{path}` was "
-        f"reached{many}"
+        f"reached{many if group.count > 1 else ''}"
     )
     helps = [f"raise `{path}`, or ask for a motion that does not come to it"]
     if len(judged) > 1:
