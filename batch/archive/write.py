@@ -99,10 +99,11 @@ class ArchiveWriter:
             gathered[here] = values[name][group.part.kept[here] - first]
         self._sink.check()
 
-    def values(self, number: int, role: str) -> dict[str, np.ndarray]:
-        """What was put of an experiment's cases: its variables of this role along `case`, by the engine's names."""
+    def put_before(self, number: int) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Return what was put of an experiment's cases: the status of each, and the metrics by the engine's names."""
         group = self.groups[number]
-        return {each.key: group.node[each.name][...] for each in group.layout.variables if each.role == role}
+        metrics = {each.key: group.node[each.name][...] for each in group.layout.role("metric")}
+        return group.node["status"][...], metrics
 
     def put_verified(self, number: int, found: verified.Verified) -> None:
         """What shorter steps gave for some cases of an experiment, in a group of its own."""

@@ -199,7 +199,13 @@ def answering(monkeypatch: Any) -> None:
 
 
 def answer(
-    experiment: Any, cases: Any = None, *, threads: Any = None, record: bool = True, fails: frozenset[int] = frozenset()
+    experiment: Any,
+    cases: Any = None,
+    *,
+    threads: Any = None,
+    record: bool = True,
+    progress: Any = None,
+    fails: frozenset[int] = frozenset(),
 ) -> Any:
     """What `met.run.run` gives back, by closed formulas: first-order rise of the rates; cases in `fails` break off."""
     from met.plan.limits import extremes, limits
