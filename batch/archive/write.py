@@ -18,7 +18,7 @@ import numpy as np
 from batch.archive import layout as archive_layout
 from batch.archive import verified
 from batch.archive.hdf5 import LIBVER, h5py
-from batch.archive.layout import Layout, Variable
+from batch.archive.layout import AT_LIMIT, EXCESS, EXTREME_AT, Layout, Variable
 from batch.archive.provenance import Revision, version
 from batch.archive.sink import Sink
 from met import backends
@@ -219,7 +219,12 @@ def _values(group: OpenGroup, run: Run) -> dict[str, Any]:
         **{f"friction_{name}": count for name, count in run.events.items()},
         **{variable.name: run.coordinates[variable.key] for variable in group.layout.role("coordinate")},
         **{variable.name: run.metrics[variable.key] for variable in group.layout.role("metric")},
+        **{AT_LIMIT + path: share for path, share in run.at_limit.items()},
+        **{EXCESS + path: most for path, most in run.excess.items()},
+        **{EXTREME_AT + metric: number for metric, number in run.extreme_at.items()},
     }
+    for role in ("limit", "excess", "extreme"):  # by the name that is free
+        values |= {variable.name: values[variable.key] for variable in group.layout.role(role)}
     for choice, variable in zip(experiment.cases.choices, group.layout.role("choice"), strict=True):
         values[variable.name] = [choice.value] * len(rows)
     for name in ("case_id", "case_key", "cause", "warning"):

@@ -22,6 +22,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
 METRIC = Metric(
     name="max",
     doc=__doc__,
+    extreme="most",
     unit="of",
     memory=(Memory(name="most", unit="of", doc="largest so far", start=-math.inf),),
     update=update,

@@ -25,6 +25,8 @@ class Metric:
     times   whether it is an instant of the run, or infinite: a limit after the run's end is warned of
     target  the parameter that is the value to be reached, where there is one: a command that comes to it after the
             run's end is warned of
+    extreme  the memory that has another value where the channel comes to a new extreme, which is what the metric says;
+            "": it says no extreme
     undefined  (p, first) -> why it is no number where its channel begins with this value, in words; "": it is one.
             None: it always is
     update  (p, held, x, t, dt) -> new memory: x the channel at time t (s), dt s since the sample before (0 at first)
@@ -38,6 +40,7 @@ class Metric:
     least: float = -math.inf
     times: bool = False
     target: str = ""
+    extreme: str = ""
     undefined: Callable[[Any, float], str] | None = None
     parameters: tuple[Parameter, ...] = ()
     memory: tuple[Memory, ...]

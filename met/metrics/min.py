@@ -22,6 +22,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
 METRIC = Metric(
     name="min",
     doc=__doc__,
+    extreme="least",
     unit="of",
     memory=(Memory(name="least", unit="of", doc="smallest so far", start=math.inf),),
     update=update,

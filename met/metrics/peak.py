@@ -21,6 +21,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
 METRIC = Metric(
     name="peak",
     doc=__doc__,
+    extreme="most",
     unit="of",
     least=0.0,
     memory=(Memory(name="most", unit="of", doc="largest size so far"),),

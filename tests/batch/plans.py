@@ -208,6 +208,7 @@ def answer(
     fails: frozenset[int] = frozenset(),
 ) -> Any:
     """What `met.run.run` gives back, by closed formulas: first-order rise of the rates; cases in `fails` break off."""
+    from met.plan.limits import extremes, limits
     from met.run import Run
 
     schedule = experiment.structure.schedule
@@ -240,5 +241,10 @@ def answer(
         coordinates=values,
         events={name: np.zeros(len(rows), dtype=np.int64) for name in ("splits", "clamped", "undecided")},
         limited=np.zeros(len(rows), dtype=np.int64),
+        at_limit={
+            use.path: np.where(failed, math.nan, 0.0) for use in limits(experiment.structure, experiment.parameters)
+        },
+        excess={},
+        extreme_at={name: np.zeros(len(rows), dtype=np.int64) for name in extremes(experiment)},
         warning=[""] * len(rows),
     )
