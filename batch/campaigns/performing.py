@@ -293,15 +293,19 @@ class _CampaignWork:
         if way == "none":
             return
         from batch.campaigns.verification.choosing import chosen
-        from batch.campaigns.verification.verifying import verify
+        from batch.campaigns.verification.verifying import FACTORS, verify
 
         experiment = self.campaign.parts[number].experiment
-        outcomes = CaseOutcomes(writer.values(number, "case")["status"], writer.values(number, "metric"))
+        outcomes = CaseOutcomes(*writer.put_before(number))
         places = np.flatnonzero(outcomes.status == DONE) if way == "all" else chosen(experiment, outcomes)
         if len(places):
             threads = getattr(self.driver and self.driver.executor, "threads", None)
             names = {each.key: each.name for each in writer.groups[number].layout.role("metric")}
-            writer.put_verified(number, verify(experiment, section.rows[places], names, threads))
+            self.reporter.begin(f"{section.name}, with shorter steps", len(FACTORS) * len(places), 0, 0, "")
+            found = verify(
+                experiment, section.rows[places], names, threads, lambda runs: self.reporter.advance(runs, 0)
+            )
+            writer.put_verified(number, found)
 
     def _timings(self) -> list[dict[str, Any]]:
         counts = self.driver.counts if self.driver else {}

@@ -23,6 +23,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
 METRIC = Metric(
     name="max",
     doc=__doc__,
+    extreme="most",
     unit="of",
     over_joints=OverJoints("max", lambda values: reduce(maximum, values)),
     memory=(Memory(name="most", unit="of", doc="largest so far", start=-math.inf),),

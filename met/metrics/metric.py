@@ -37,6 +37,8 @@ class Metric:
     times   whether it is an instant of the run, or infinite: a limit after the run's end is warned of
     target  the parameter that is the value to be reached, where there is one: a command that comes to it after the
             run's end is warned of
+    extreme  the memory that has another value where the channel comes to a new extreme, which is what the metric says;
+            "": it says no extreme
     undefined  (p, first) -> why it is no number where its channel begins with this value, in words; "": it is one.
             None: it always is
     condition    whether it watches the margin of a condition, at least 0 where that holds. Where it is no `share` it is
@@ -53,6 +55,7 @@ class Metric:
     least: float = -math.inf
     times: bool = False
     target: str = ""
+    extreme: str = ""
     undefined: Callable[[Any, float], str] | None = None
     condition: bool = False
     over_joints: OverJoints | None = None

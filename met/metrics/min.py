@@ -23,6 +23,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
 METRIC = Metric(
     name="min",
     doc=__doc__,
+    extreme="least",
     unit="of",
     over_joints=OverJoints("min", lambda values: reduce(minimum, values)),
     memory=(Memory(name="least", unit="of", doc="smallest so far", start=math.inf),),

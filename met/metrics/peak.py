@@ -22,6 +22,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
 METRIC = Metric(
     name="peak",
     doc=__doc__,
+    extreme="most",
     unit="of",
     least=0.0,
     over_joints=OverJoints("peak", lambda values: reduce(maximum, map(absolute, values))),

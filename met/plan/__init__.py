@@ -13,6 +13,7 @@ Parameters are named by paths, the ones a deck uses inside a run:
     <joint>.rpy.x|y|z                      rad, fixed x-y-z (R = Rz Ry Rx)
     <joint>.axis.x|y|z                     unit vector in the joint frame
     <joint>.pivot.x|y|z                    m, joint frame: a point of a revolute joint's axis; not there: the origin
+    <joint>.q_min|q_max|qd_max|tau_max     rad, rad/s, N m (m, m/s, N): limits of the joint, those that it has
     <joint>.servo.<parameter>              as the servo declares
     <joint>.servo.command.<parameter>      as the command declares
     <joint>.servo.sensor.<of>.<parameter>  as the sensor declares through which the servo's law sees a quantity
@@ -104,13 +105,15 @@ class Link:
 
 @frozen
 class Joint:
-    """Connects `parent` (a link, the base too) to `child`, along or about its axis."""
+    """Connects `parent` (a link, the base too) to `child`, along or about its axis. limits: that it has, of `q_min`,
+    `q_max`, `qd_max` and `tau_max`."""
 
     name: str
     kind: JointKind
     parent: str
     child: str
     place: Place | None = keyed("never", default=None)
+    limits: tuple[str, ...] = keyed("where set", default=())
 
 
 @frozen

@@ -7,7 +7,7 @@ program by themselves, which take the derivative anew: so no bit of another chan
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, reduce
 
 from met.dynamics.effective_inertia import effective_inertia
 from met.dynamics.energy import Energy, energy
@@ -18,10 +18,11 @@ from met.dynamics.spatial import Vector, add, choose, dot
 from met.integrators.integrator import Motion
 from met.plan.channel import XYZ, Channel
 from met.program.evaluation import Derivative
+from met.program.joint_limits import excess
 from met.program.motion import payloads
 from met.program.motion.base import BaseMotion, motions
 from met.program.system import ReadCell, System
-from met.trace import Real, sqrt
+from met.trace import Real, minimum, sqrt
 from met.vectors import Quaternion, quaternion
 
 
@@ -74,6 +75,8 @@ class Observed:
         return quaternion((self.motions if kind == "links" else self.seen)[own].pose.R)
 
     def _of_joint(self, joint: str, parts: list[str]) -> Real:
+        if parts == ["limit_margin"]:
+            return self._margin(joint)
         i, solved = self.joints.index(joint), self.derivative.solved
         match parts:
             case ["tau_load"]:
@@ -112,9 +115,23 @@ class Observed:
                 return self.energy.kinetic + self.derivative.stored[0]
             case ["energy", "potential"]:
                 return self.energy.potential + self.derivative.stored[1]
+            case ["limits", "margin"]:
+                return reduce(minimum, [self._margin(each.name) for each in self.system.joints if each.limits])
             case ["momentum", kind, axis]:
                 return (self.energy.linear if kind == "linear" else self.energy.angular)[XYZ.index(axis)]
         raise KeyError(".".join(parts))
+
+    def _margin(self, joint: str) -> Real:
+        """The smallest margin of a joint to its limits, each as a share of the range, or of the limit."""
+        [limits] = [each.limits for each in self.system.joints if each.name == joint]
+        value = {name: self.system.value(f"{joint}.{name}", self.read) for name in limits}
+        shares = [
+            excess(joint, name, value[name], self.read) / (value["q_min"] - value["q_max"])
+            if name in ("q_min", "q_max")
+            else excess(joint, name, value[name], self.read) / -value[name]
+            for name in limits
+        ]
+        return reduce(minimum, shares)
 
     def _jacobian(self, link: str) -> tuple[tuple[Vector, Vector], ...]:
         if link not in self._jacobians:

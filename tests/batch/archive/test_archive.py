@@ -62,6 +62,11 @@ def test_every_variable_has_a_long_name_and_every_number_its_unit(here: Path, en
         assert units == {
             "gearbox.kp": "V*s/rad",
             "links.lower.mass": "kg",
+            **{
+                f"at_limit.{joint}.servo.{name}": "1"
+                for joint in ("shoulder", "elbow")
+                for name in ("v_max", "tau_max")
+            },
             "settle": "s",
             "volts": "V",
             "time": "s",
