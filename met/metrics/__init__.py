@@ -14,7 +14,9 @@ from met.metrics import (
     settling_time,
     share_of_time,
 )
-from met.metrics.metric import Metric
+from met.metrics.metric import Metric, OverJoints
+
+__all__ = ["METRICS", "Metric", "OverJoints"]
 
 METRICS: tuple[Metric, ...] = (
     final.METRIC,

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from met import run as engine
+from met.diagnostic import Problem
 from met.plan import CHANNEL_INPUT, Experiment, Plan
 from met.plan import file as plan_file
 from met.plan.outputs import metric_units
@@ -291,3 +292,17 @@ def test_conditions_of_several_units_are_counted(tmp_path: Path) -> None:
     holds = (of(result, "hinge.qd") > 0.05) & (of(result, "hinge.servo.voltage") > 1) | (of(result, "knee.q") > 1e-3)
     assert result.metrics["part"][0] == holds.mean()
     assert 0.0 < holds.mean() < 1.0
+
+
+@pytest.mark.parametrize(("old", "new", "why"), [
+    ('"channel:hinge.qd"', '"channel:hinge.speed"', "there is no channel `hinge.speed`"),
+    ('"channel:hinge.qd"', '"limit"', "it is computed of no channel"),
+    ('"name":"signals.a"', '"name":"hinge.q"', "there is a channel `hinge.q` already"),
+    ('"outputs":[', '"outputs":[0,', "it should have one output, a number"),
+])  # fmt: skip
+def test_a_plan_whose_expressions_are_damaged_is_refused(tmp_path: Path, old: str, new: str, why: str) -> None:
+    text = plan_file.dumps(Plan("deck.ic", (made(tmp_path, "signal a = 2 * hinge.qd;"),)))
+    start = text.index('"expressions"')
+    assert old in text[start:]
+    with pytest.raises(Problem, match=re.escape(why)):
+        plan_file.loads(text[:start] + text[start:].replace(old, new))
