@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from met import run as engine
+from met.backends.reference.plain import execute
 from met.diagnostic import Problem
 from met.plan import CHANNEL_INPUT, Experiment, Plan
 from met.plan import file as plan_file
 from met.plan.outputs import metric_units
+from met.program import build
+from met.program.build import METRIC
 from tests.ic.small_decks import SERVO, changed, check, experiment, messages
 
 ARM = """\
@@ -306,3 +309,25 @@ def test_a_plan_whose_expressions_are_damaged_is_refused(tmp_path: Path, old: st
     assert old in text[start:]
     with pytest.raises(Problem, match=re.escape(why)):
         plan_file.loads(text[:start] + text[start:].replace(old, new))
+
+
+def test_the_reference_and_the_kernel_agree(tmp_path: Path) -> None:
+    more = "sweep both of hold { vary limit = [0.2, 0.4] rad/s; }\n"
+    found = made(
+        tmp_path,
+        "signal a = atan2(hinge.qd, 1 rad/s) * links.arm.position.x;",
+        "record += [signals.a];",
+        "require always(abs(hinge.qd) < limit, after = 0.1 s);",
+        "require holds_for(hinge.qd > 0 rad/s and not knee.servo.voltage > 2 V, 0.1 s);",
+        "metric most = rms { of = *.servo.voltage; }",
+        more=more,
+        select="both",
+    )
+    result, program = engine.run(found), build(found)
+    for case, limit in enumerate((0.2, 0.4)):
+        rows, outputs = execute(program, {"limit": limit}, found.structure.schedule.ticks)
+        column = sum(len(each.channels) for each in found.structure.record[:-1])
+        # sines of the kernel and of the C library differ in the last place
+        np.testing.assert_allclose(rows[:, column], result.signals["signals.a"][case], rtol=1e-10, atol=1e-14)
+        for name, values in result.metrics.items():
+            assert outputs[METRIC + name] == pytest.approx(values[case], rel=1e-10, abs=1e-12)
