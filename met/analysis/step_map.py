@@ -40,10 +40,10 @@ SMALL_STATE = 1e-9
 
 @frozen
 class StepMap:
-    """The linearised step of some cases of one experiment, each as it is at the start, and at rest in that pose.
+    """The linearised step of some cases of one experiment, each as it is at an instant, and at rest in that pose.
 
     case     rows of the case table
-    loose    whether it is at rest there, without drive, and no dry friction holds anything; else as the run begins
+    loose    whether it is at rest there, without drive, and no dry friction holds anything; else as the run has it
     names    of what is changed: `shoulder.q`, `shoulder.qd`, states of servos and sensors
     counts   of these, positions (and as many rates); the rest are states
     slope    A: [lane, name, name], 1/s
@@ -183,10 +183,14 @@ ZERO = np.float64(0.0)
 
 
 class Linearizer:
-    """The program of an experiment at its first instant, for several cases at once: each as it begins, where what is
-    at rest and rubs is held, and loose. A motor on a bed lets its joint turn on as it does."""
+    """The program of an experiment at an instant, the first one or another, for several cases at once: each as it is
+    there, where what is at rest and rubs is held, and loose. A motor on a bed lets its joint turn on as it does."""
 
-    def __init__(self, experiment: Experiment, cases: Sequence[int]) -> None:
+    def __init__(
+        self, experiment: Experiment, cases: Sequence[int], memory: Mapping[str, np.ndarray] | None = None
+    ) -> None:
+        """memory: cells of these cases at instants that they pass, [lane]; a case may be there several times. None:
+        where they begin."""
         self.system = System(replace(experiment, structure=replace(experiment.structure, metrics=())))
         self.builder = Builder(self.system)
         self.cases = np.asarray(cases, dtype=np.int64)
@@ -199,6 +203,8 @@ class Linearizer:
             self.builder.start(begun)
             begun.follow((*step.grapple.events(), *self.builder.computers()))
             step.modes(begun)
+        if memory is not None:
+            begun.cells.update({name: memory[name] for name in begun.cells if name in memory})
         self.tape, self.loose = begun.spread(2), np.tile([False, True], lanes)
         self._loosen()
         self.cells = tuple(f"{name}.{part}" for part in ("q", "qd") for name in step.coordinates) + step.states
