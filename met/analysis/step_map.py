@@ -40,9 +40,10 @@ SMALL_STATE = 1e-9
 
 @frozen
 class StepMap:
-    """The linearised step of some cases of one experiment, each as it is at an instant, and at rest in that pose.
+    """The linearised step of some cases of one experiment, each as it is at an instant, and at rest in that pose: two
+    lanes, one after the other.
 
-    case     rows of the case table
+    case     rows of the case table: [lane]
     loose    whether it is at rest there, without drive, and no dry friction holds anything; else as the run has it
     names    of what is changed: `shoulder.q`, `shoulder.qd`, states of servos and sensors
     counts   of these, positions (and as many rates); the rest are states
@@ -80,7 +81,7 @@ class SampledLaw:
 
 @frozen
 class Sampled:
-    """Loose arms with the laws that tick on them.
+    """Arms, loose or as the run has them, with the laws that tick on them.
 
     case    rows of the case table
     states  how many cells are of the state, positions first;  held: cells of the laws' memory
@@ -229,20 +230,21 @@ class Linearizer:
             M = self._of_stages() if stages else linear_step(system.integrator, A, positions, h)
         return StepMap(np.repeat(self.cases, 2), self.loose, self.cells, positions, A, M, rate, h)
 
-    def sampled(self) -> Sampled | None:
-        """The cases loose, with their laws that tick; None where none does, or one is on a bed."""
+    def sampled(self, *, loose: bool = True) -> Sampled | None:
+        """The cases with their laws that tick, loose or as the run has them; None where none does, or one is on a
+        bed."""
         if not self.laws:
             return None
         step, schedule = self.builder.step, self.builder.step.schedule
         with np.errstate(all="ignore"):
-            laws = tuple(self._law(each) for each in self.laws)
+            laws = tuple(self._law(each, self.loose == loose) for each in self.laws)
         return Sampled(
-            self.cases, len(self.cells), len(step.coordinates), self.held, self.slope[self.loose], laws,
+            self.cases, len(self.cells), len(step.coordinates), self.held, self.slope[self.loose == loose], laws,
             self.system.integrator, schedule.step, schedule.dynamics, schedule.base_hz,
         )  # fmt: skip
 
-    def _law(self, actuator: Actuator) -> SampledLaw:
-        """A law's slopes, under a command that its joint be as it is."""
+    def _law(self, actuator: Actuator, lanes: np.ndarray) -> SampledLaw:
+        """A law's slopes in these lanes, under a command that its joint be as it is."""
         joint, parts, moved = actuator.use.joint, actuator.parts, self.moved
         p = self.system.servo_values(actuator, self.wide.read)
         states: dict[str, Any] = {each.name: moved[f"{actuator.path}.{each.name}"] for each in parts.natural}
@@ -257,7 +259,7 @@ class Linearizer:
         after: dict[str, Any] = {f"{actuator.path}.{name}": value for name, value in found.outputs.items()}
         after |= {f"{actuator.path}.{name}": held[name] + seen.period * x for name, x in found.slopes.items()}
         memory = tuple(f"{actuator.path}.{part.name}" for part in parts.memory)
-        slope = _differences(after, memory, self.sizes)[self.loose]
+        slope = _differences(after, memory, self.sizes)[lanes]
         return SampledLaw(joint, actuator.use.divisor, memory, len(parts.outputs), slope)
 
     @property
