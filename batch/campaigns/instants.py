@@ -13,6 +13,7 @@ import numpy as np
 
 from batch.campaigns.keep import CaseOutcomes, worst
 from batch.campaigns.tasks import GRANULE, CampaignSection
+from ic.meaning.checks.beds import bed_warning
 from ic.meaning.checks.step_words import fault_warning, from_instants, loop_warning
 from met import models
 from met import run as engine
@@ -23,7 +24,7 @@ from met.passing import Memories, even_ticks
 from met.plan import Experiment
 from met.run import DONE
 
-CODES = ("D317", "D318", "D319", "D320")
+CODES = ("D317", "D318", "D319", "D320", "D321")
 
 SHARE = 0.03
 """Of a campaign's steps: so much more is done to look at some of its cases again. A block is run, whatever is in it."""
@@ -73,8 +74,14 @@ def step_warnings(section: CampaignSection, outcomes: CaseOutcomes, threads: int
         engine.compute(section.prepared, missing, record=False, threads=threads, memories=again)
     try:
         at = _passed(section, memories, cases)
-        found = passed.lasting(experiment, at) if len(at.case) else ()
-        return [each for one in found if not experiment.allows((each := _warning(experiment, one)).code)]
+        if not len(at.case):
+            return []
+        said = [_warning(experiment, one) for one in passed.lasting(experiment, at)]
+        said += [
+            bed_warning(each, f"reckoned with the arm as it stands {from_instants(experiment, each.case, since)}")
+            for each, since in passed.lasting_beds(experiment, at)
+        ]
+        return [each for each in said if not experiment.allows(each.code)]
     except Problem:  # a program that cannot be put together but for a kernel
         return []
 

@@ -243,6 +243,14 @@ class Linearizer:
             self.system.integrator, schedule.step, schedule.dynamics, schedule.base_hz,
         )  # fmt: skip
 
+    def loads(self) -> np.ndarray:
+        """Effective inertias of the joints whose motors are on beds, as the run has them, kg m^2 (prismatic: kg):
+        [lane, joint, joint]; all other joints keep their modes."""
+        with np.errstate(all="ignore"):
+            Lambda, _ = self.builder.step.loads(self.tape)
+        of_lanes: list[list[Any]] = [[np.broadcast_to(np.asarray(x), self.tape.lanes) for x in row] for row in Lambda]
+        return np.moveaxis(np.array(of_lanes, dtype=float), -1, 0)[~self.loose]
+
     def _law(self, actuator: Actuator, lanes: np.ndarray) -> SampledLaw:
         """A law's slopes in these lanes, under a command that its joint be as it is."""
         joint, parts, moved = actuator.use.joint, actuator.parts, self.moved

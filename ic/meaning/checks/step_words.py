@@ -33,10 +33,10 @@ def at_the_start(experiment: Experiment, case: int) -> str:
     return "at the start" + (f" of {_case(experiment, case)}" if experiment.cases.count > 1 else "")
 
 
-def from_instants(experiment: Experiment, case: int, at: float, until: float) -> str:
-    """An instant of a case and how long it stays so, in words; both in s from the start of the run."""
+def from_instants(experiment: Experiment, case: int, at: float, until: float | None = None) -> str:
+    """An instant of a case and how long it stays so, where that is known, in words; in s from the start of the run."""
     of = f" of {_case(experiment, case)}" if experiment.cases.count > 1 else ""
-    return f"at t = {at:.4g} s{of}, and so it is until {until:.4g} s"
+    return f"at t = {at:.4g} s{of}" + (f", and so it is until {until:.4g} s" if until is not None else "")
 
 
 def _case(experiment: Experiment, case: int) -> str:

@@ -139,3 +139,54 @@ def test_of_a_large_campaign_cases_are_run_again(tmp_path: Path) -> None:
     short = replace(section, rows=section.rows[:1000])
     (section,) = instants.with_memories([short])
     assert section.memories is not None and 0 in section.memories.cases and len(section.memories.cases) <= 8
+
+
+FOLDS = """\
+arm folds {
+    link bar { mass = 1 kg;  com = [0, 0, 0] m;  inertia = [0.01, 0.01, 0.01] kg*m^2; }
+    joint swing revolute { parent = base;  child = bar;  axis = z; }
+    link out { mass = 1 kg;  com = [0, 0, 0] m;  inertia = [0.001, 0.001, 0.001] kg*m^2; }
+    joint reach prismatic { parent = bar;  child = out;  axis = x; }
+}
+servo turn {
+    model = rigid_gearbox;  ratio = 50;  kp = 0.3 V*s/rad;  ki = 0.1 V/rad;  v_max = 30 V;  resistance = 1 ohm;
+    kt = 0.05 N*m/A;  tau_max = 3 N*m;  j_m = 1e-5 kg*m^2;  command = rate(0.01 rad/s);
+}
+servo slide { model = ideal;  bandwidth = 20 1/s;  command = position(table(times = [0, 2] s, values = [1, 0] m)); }
+run folding {
+    arm = folds;  servos { swing = turn;  reach = slide; }  initial { reach.q = 1 m; }
+    rates { dynamics = 1 kHz;  servos = 100 Hz;  record = 100 Hz; }  duration = 4 s;  record = [q];
+}
+"""
+
+
+def test_a_loop_is_told_that_only_a_folded_arm_makes_unstable(tmp_path: Path) -> None:
+    """The pose in which the run begins is quiet, and the check silent; the one in which it ends is not."""
+    (tmp_path / "deck.ic").write_text(FOLDS)
+    assert [each.code for each in ic.check(tmp_path / "deck.ic").diagnostics] == []
+    found = performed(made(tmp_path, FOLDS), tmp_path / "a.h5")
+    assert codes(found) == ["D320"] and "on joint `swing`" in found.warned[0].message
+    assert " s, and so it is until 3.883 s, within all limits" in found.warned[0].help[-1]
+    folded = changed(FOLDS, ("reach.q = 1 m", "reach.q = 0 m"), ("values = [1, 0] m", "values = [0, 0] m"))
+    (tmp_path / "deck.ic").write_text(folded)
+    assert [each.code for each in ic.check(tmp_path / "deck.ic").diagnostics] == ["D320"]
+    assert codes(performed(made(tmp_path, folded), tmp_path / "b.h5")) == []
+
+
+def test_a_bed_is_told_that_only_an_arm_which_reaches_out_makes_unstable(tmp_path: Path) -> None:
+    deck = FOLDS[: FOLDS.index("servo turn")].replace("0.01, 0.01, 0.01", "700, 700, 700")
+    deck = "#include <servos/rigid_gearbox.ic>\n" + deck.replace("link out { mass = 1 kg", "link out { mass = 40 kg")
+    deck += """\
+servo turn like rigid_gearbox { command = rate(0.03 rad/s); }
+servo slide { model = ideal;  bandwidth = 20 1/s;  command = position(table(times = [0, 2] s, values = [0, 8] m)); }
+run bench {
+    arm = folds;  servos { swing = turn;  reach = slide; }
+    substitute swing { bed = emulated;  law = measured_acceleration; }
+    rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }  duration = 2 s;  record = [q];
+}
+"""
+    (tmp_path / "deck.ic").write_text(deck)
+    assert [each.code for each in ic.check(tmp_path / "deck.ic").diagnostics] == []
+    found = performed(made(tmp_path, deck), tmp_path / "a.h5")
+    assert codes(found) == ["D321"] and "the arm is too heavy for it, r = 19" in found.warned[0].message
+    assert found.warned[0].help[-1] == "reckoned with the arm as it stands at t = 1.937 s"
