@@ -93,8 +93,9 @@ def telling(experiment: Experiment, memory: np.ndarray, cells: Sequence[str], co
     for joint in experiment.structure.moving:
         q, qd = (memory[fine, places[f"{joint.name}.{part}"]] for part in ("q", "qd"))
         wanted += [int(np.argmax(np.abs(qd))), int(np.argmin(q)), int(np.argmax(q))]
-    pairs = list(dict.fromkeys(each // 2 for each in wanted))[: count // 4]
-    even = np.linspace(0, len(fine) // 2 - 1, max(1, count // 2 - len(pairs))).astype(int).tolist()
+    last = len(fine) // 2 - 1
+    pairs = list(dict.fromkeys(min(each // 2, last) for each in wanted))[: count // 4]
+    even = np.linspace(0, last, max(1, count // 2 - len(pairs))).astype(int).tolist()
     return fine[sorted({place for pair in {*pairs, *even} for place in (2 * pair, 2 * pair + 1)})]
 
 
