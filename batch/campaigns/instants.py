@@ -78,7 +78,9 @@ def step_warnings(section: CampaignSection, outcomes: CaseOutcomes, threads: int
             return []
         said = [_warning(experiment, one) for one in passed.lasting(experiment, at)]
         said += [
-            bed_warning(each, f"reckoned with the arm as it stands {from_instants(experiment, each.case, since)}")
+            bed_warning(
+                experiment, each, f"reckoned with the arm as it stands {from_instants(experiment, each.case, since)}"
+            )
             for each, since in passed.lasting_beds(experiment, at)
         ]
         return [each for each in said if not experiment.allows(each.code)]

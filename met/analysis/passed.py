@@ -15,7 +15,7 @@ import numpy as np
 
 from met import models
 from met.analysis.loops import LEAST, Unstable, blamed, frame_growths
-from met.analysis.margin import UnstableBed, ends_of_motion, rotor_inertias, unstable_beds
+from met.analysis.margin import Margin, ends_of_motion, margins, rotor_inertias
 from met.analysis.modes import FAST, TELLING, Mode, modes
 from met.analysis.step_map import Linearizer, Sampled, StepMap
 from met.analysis.step_size import Fault, Remedy, chosen_cases, owner_of, remedy, step_size
@@ -213,33 +213,28 @@ def _over(growths: Sequence[float], times: np.ndarray, length: float) -> float:
     return float(np.sum(np.minimum(growths[1:], growths[:-1]) * np.diff(times)) / length)
 
 
-def lasting_beds(experiment: Experiment, passed: Passed) -> list[tuple[UnstableBed, float]]:
-    """The joints on beds that are unstable with the heaviest or the lightest arm that neighbouring instants both show,
-    and the first of these, s; none where one is with the arm of the pose in which its case begins."""
+def lasting_beds(experiment: Experiment, passed: Passed) -> list[tuple[Margin, float]]:
+    """The joints on beds that are unstable with the heaviest or the lightest arm that neighbouring instants of a case
+    both show, and the first of these, s; none that are with the arm of the pose in which the case begins."""
     if not experiment.structure.substitutions:
         return []
     Lambda = Linearizer(experiment, passed.case.tolist(), passed.memory).loads()
-    times = passed.tick / experiment.structure.schedule.base_hz
-    found: list[tuple[UnstableBed, float]] = []
-    ends: dict[tuple[int, bool], tuple[float, int]] = {}
+    found: dict[str, tuple[Margin, float]] = {}
     for first, last in _stretches(passed):
-        rotors = rotor_inertias(experiment, int(passed.case[first]))
+        case = int(passed.case[first])
+        rotors = rotor_inertias(experiment, case)
         motions = np.array([ends_of_motion(each, rotors) for each in Lambda[first : last + 1]])
-        light, heavy = (np.maximum(*_pairs(motions[:, 0])), np.minimum(*_pairs(motions[:, 1])))
-        for heaviest, of, best in ((True, heavy, np.argmax), (False, light, np.argmin)):
-            if len(of) and np.isfinite(of).all():
-                at = first + int(best(of))
-                ends[first, heaviest] = float(of[at - first]), at
-    for heaviest in (True, False):
-        several = [end for (_, heavy), end in ends.items() if heavy == heaviest]
-        if several:
-            r, at = max(several) if heaviest else min(several)
-            case = int(passed.case[at])
-            begun = {each.joint for each in unstable_beds(experiment, case)}
-            those = [each for each in unstable_beds(experiment, case, (r, r)) if each.joint not in begun]
-            known = {each.joint for each, _ in found}
-            found += [(each, float(times[at])) for each in those if each.joint not in known]
-    return found
+        if last == first or not np.isfinite(motions).all():
+            continue
+        least, most = np.maximum(*_pairs(motions[:, 0])), np.minimum(*_pairs(motions[:, 1]))
+        (begun,) = margins(experiment, [case])
+        for one in begun:
+            for at in (int(np.argmax(most)), int(np.argmin(least))):
+                then = replace(one, least=float(least[at]), together=float(most[at]))
+                if one.stable and not then.stable and one.joint not in found:
+                    time = float(passed.tick[first + at]) / experiment.structure.schedule.base_hz
+                    found[one.joint] = then, time
+    return list(found.values())
 
 
 def _pairs(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -188,5 +188,5 @@ run bench {
     (tmp_path / "deck.ic").write_text(deck)
     assert [each.code for each in ic.check(tmp_path / "deck.ic").diagnostics] == []
     found = performed(made(tmp_path, deck), tmp_path / "a.h5")
-    assert codes(found) == ["D321"] and "the arm is too heavy for it, r = 19" in found.warned[0].message
+    assert codes(found) == ["D321"] and "r = 19.7, and it is stable up to 5.35" in found.warned[0].message
     assert found.warned[0].help[-1] == "reckoned with the arm as it stands at t = 1.937 s"
