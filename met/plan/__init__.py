@@ -262,6 +262,32 @@ class Payload:
 
 
 @frozen
+class SignalExpression:
+    """A number that a run computes of its channels at their samples; it is a channel of its own.
+
+    name     path of that channel: `signals.NAME`, or the expression as the deck wrote it
+    unit     of its value, SI; of a condition that of its margin, by which it holds (at least 0) or does not
+    formula  one output; inputs are channels, their paths behind `CHANNEL_INPUT`, and coordinates of the sweep
+    text     the expression as the deck wrote it
+    """
+
+    name: str
+    unit: str
+    formula: Formulas
+    text: str = keyed("never", default="")
+    place: Place | None = keyed("never", default=None)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Paths of the channels that it is computed of."""
+        return tuple(name.removeprefix(CHANNEL_INPUT) for name in self.formula.inputs if name.startswith(CHANNEL_INPUT))
+
+
+CHANNEL_INPUT = "channel:"
+"""Prefix of the inputs of a `SignalExpression` that are channels."""
+
+
+@frozen
 class MetricUse:
     """A metric under a name of the deck's, watching one channel (`Channel.path`)."""
 
@@ -431,6 +457,7 @@ class Structure:
     payloads: tuple[Payload, ...] = keyed("where set", default=())
     guides: tuple[GuideUse, ...] = keyed("where set", default=())
     sensors: tuple[LinkSensor, ...] = keyed("where set", default=())
+    expressions: tuple[SignalExpression, ...] = keyed("where set", default=())
     balanced: bool = run_key(BALANCED)
 
     @property

@@ -29,11 +29,17 @@ Derived, that is computed from the state only where a record or a metric asks fo
     payloads.<payload>.distance     from the point `at` of its link to its frame
     payloads.<payload>.carried      1 while its link carries it, 0 while it flies
 
+Computed of other channels, at each instant of the dynamics or tick at which one of these is sampled:
+
+    signals.<name>                  an expression under a name of the deck's
+    <expression>                    what a metric watches, as the deck wrote it
+
 A vector is one channel a component: `links.tip.position.x`, `links.tip.orientation.w`.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 
@@ -231,7 +237,8 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
         add(path, unit, f"what the {on_link.model} reads", on_link.divisor, "")
         for state in sensor_parts(on_link, "states"):
             add(f"{path}.{state.name}", watched_unit(state.unit, unit), state.doc, dynamics, "")
-    mentions = (*names, *(recorded.name for recorded in structure.record), *(metric.of for metric in structure.metrics))
+    mentions = [*names, *(recorded.name for recorded in structure.record), *(use.of for use in structure.metrics)]
+    mentions += [path for expression in structure.expressions for path in expression.channels]
     mentioned = {name.split(".")[1] for name in mentions if name.startswith("links.")}
     mentioned |= {link.name for link in structure.links[:1]}
     for link in structure.links:
@@ -251,6 +258,9 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
     for name, unit, doc, components, frame in OF_ARM:
         if limited or name != "limits.margin":
             derive(name, unit, doc, components, frame)
+    for expression in structure.expressions:
+        divisor = math.gcd(*(found[path].divisor for path in expression.channels)) or dynamics
+        add(expression.name, expression.unit, expression.text, divisor, "")
     return found
 
 
@@ -278,7 +288,7 @@ def channel_paths(name: str, joints: tuple[str, ...], components: tuple[str, ...
 
 def joint_of(name: str) -> str:
     """The joint that a variable of one thing belongs to, by its name; none where that is no joint."""
-    if name.startswith(("links.", "payloads.", "guides.", "sensors.", *(own for own, *_ in OF_ARM))):
+    if name.startswith(("links.", "payloads.", "guides.", "sensors.", "signals.", *(own for own, *_ in OF_ARM))):
         return ""
     return name.partition(".")[0]
 

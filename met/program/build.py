@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from met.plan import Experiment
+from met.plan import CHANNEL_INPUT, Experiment
 from met.plan.channel import Channel
 from met.program import balancing, cell_names, holding, orientations, plausible
 from met.program.control import failing, guiding, link_sensors, sensing, setpoints
@@ -72,6 +72,9 @@ class Builder:
         tick += self.step.begin()
         if held:
             tick.append(Every(instant, (CallPhase(Phase("observe", self._observe(held))),)))
+        for divisor in sorted({self.system.channels[each.name].divisor for each in self.system.structure.expressions}):
+            phase = Phase(f"expressions_{divisor}", self._expressions(divisor))
+            tick.append(Every(divisor, (RunPhase(phase),)))
         for divisor in sorted({channel.divisor for _, _, channel in self.system.metrics}):
             tick.append(Every(divisor, (RunPhase(Phase(f"metrics_{divisor}", self._metrics(divisor))),)))
         if not self.step.beds.wire:
@@ -319,6 +322,23 @@ class Builder:
                         tape.write(f"{METRIC}{name}.{memory}", value)
             for name, new_extreme in is_new.items():  # last, so that the metrics' own code is what it is without
                 self.limits.at_extreme(tape, name, new_extreme)
+
+        return body
+
+    def _expressions(self, divisor: int) -> Body:
+        """Signals that are computed of channels, which are as they were last sampled."""
+
+        def body(tape: Tape) -> None:
+            for each in self.system.structure.expressions:
+                if self.system.channels[each.name].divisor == divisor:
+                    values = {
+                        name: tape.read(name.removeprefix(CHANNEL_INPUT))
+                        if name.startswith(CHANNEL_INPUT)
+                        else tape.input(name)
+                        for name in each.formula.inputs
+                    }
+                    (value,) = each.formula.replay(values)
+                    tape.write(each.name, value)
 
         return body
 

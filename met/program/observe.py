@@ -29,11 +29,14 @@ from met.vectors import Quaternion, quaternion
 def derived(system: System) -> tuple[list[Channel], list[Channel]]:
     """The derived channels that are asked for: those computed at every instant, and those at recorded rows alone.
 
-    A metric sees every instant. So does a record whose rows lie between instants, for they show the last one's value.
+    A metric and an expression see every instant. So does a record whose rows lie between instants, for they show the
+    last one's value.
     """
     structure = system.structure
     paths = [path for recorded in structure.record for path in recorded.channels]
     watched = [channel for _, _, channel in system.metrics if channel.derived]
+    parts = (system.channels[path] for expression in structure.expressions for path in expression.channels)
+    watched += [channel for channel in parts if channel.derived]
     recorded = [channel for channel in map(system.channels.__getitem__, paths) if channel.derived]
     between = structure.schedule.record % structure.schedule.dynamics != 0
     held = {channel.path: channel for channel in (watched + recorded if between else watched)}
