@@ -20,7 +20,7 @@ from met.messages.visible import say
 )
 @loudness_options
 def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet: bool, verbose: bool) -> None:
-    """Make a deck from a URDF file: the arm, with limits and friction as comments, and runs to begin with.
+    """Make a deck from a URDF file: the arm with its limits, friction as comments, and runs to begin with.
 
     `met import panda.urdf -o panda.ic`, then `met run panda.ic`. A deck can also take the file as it is:
     `arm panda from urdf("panda.urdf") { ... }`.

@@ -43,6 +43,7 @@ ORDER = (
     "plot",
     "report",
     "diff",
+    "sensitivity",
     "export",
     "profile",
     "margin",

@@ -10,9 +10,9 @@ and `of` (the unit of the channel that a metric watches, of what a sensor is of)
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 from met.frozen import frozen
 from met.messages.renamed import old_fields
@@ -139,3 +139,15 @@ class Signal:
     doc: str
     only: Only | None = None
     limit: str = ""
+
+
+@frozen(kw_only=True)
+class Limit:
+    """A limit of a model that is reached in a run, by the parameter that sets it: `upper`; `limit.x` of a vector's.
+
+    reached  of an environment (p, world) -> whether it is reached in a state; of a command profile (p, t) -> whether at
+             the time t, s. A truth that may be traced
+    """
+
+    parameter: str
+    reached: Callable[[Any, Any], Any]

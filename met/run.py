@@ -16,7 +16,8 @@ from met.frozen import frozen
 from met.judging import judge
 from met.passing import Memories, run_past
 from met.plan import REPEAT, Experiment, keys
-from met.program import plausible
+from met.plan.limits import extremes, limits
+from met.program import cell_names, plausible
 from met.program.build import COORDINATE, METRIC, build
 from met.program.control.substituted import LIMITED
 from met.program.step import EVENTS
@@ -47,6 +48,11 @@ class Run:
     coordinates  the varied parameters as the engine used them, by path, SI
     events       friction events by name: splits, clamped, undecided (docs/physics.md, section 6)
     limited      ticks at which the load motor of a bed was at its limit
+    at_limit     share of the run's time at each limit, by the path of its parameter; not-a-number where the case failed
+    excess       largest excess over each limit of a joint, by its path, in the limit's unit; 0 within, not-a-number
+                 where the case failed
+    extreme_at   of required metrics that keep an extreme: the number of the limit that was reached there, from 1 in the
+                 order of `met.plan.limits.extremes`; 0 where none was, or the case failed
     warning      what makes a case that is done doubtful, in words, empty where nothing does
     """
 
@@ -61,6 +67,9 @@ class Run:
     coordinates: dict[str, np.ndarray]
     events: dict[str, np.ndarray]
     limited: np.ndarray
+    at_limit: dict[str, np.ndarray]
+    excess: dict[str, np.ndarray]
+    extreme_at: dict[str, np.ndarray]
     warning: list[str]
 
 
@@ -240,6 +249,7 @@ def results(
     """
     experiment, program = prepared.experiment, prepared.program
     schedule = experiment.structure.schedule
+    steps, watched = schedule.ticks // schedule.dynamics, limits(experiment.structure, experiment.parameters)
     out = {name: outputs[:, column] for column, name in enumerate(program.outputs)}
     failed = out["failure"] != 0.0
     n_valid = np.where(failed, np.ceil(out["failure.tick"] / schedule.record), schedule.rows).astype(np.int64)
@@ -285,6 +295,12 @@ def results(
         coordinates={c.path: out[COORDINATE + c.path] for c in experiment.cases.coordinates},
         events={name.split(".")[1]: out[name].astype(np.int64) for name in EVENTS},
         limited=out[LIMITED].astype(np.int64),
+        at_limit={use.path: np.where(failed, math.nan, out[cell_names.AT_LIMIT(use.path)] / steps) for use in watched},
+        excess={use.path: np.where(failed, math.nan, out[cell_names.EXCESS(use.path)]) for use in watched if use.bound},
+        extreme_at={
+            name: np.where(failed, 0, out[cell_names.EXTREME_AT(name)]).astype(np.int64)
+            for name in extremes(experiment)
+        },
         warning=warnings,
     )
 

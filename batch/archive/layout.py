@@ -18,9 +18,10 @@ Dimensions, each with its coordinate variable:
     requirement     texts of the requirements
 
 A variable says what it is by its attribute `role`: dimension, case, coordinate, choice (what decides the structure, in
-words), metric, requirement, recorded or signal. In a sweep, `recorded.case_id` and `recorded.<path>` repeat names and
-varied parameters along recorded_case, for a variable has one set of dimensions only: so a signal that is taken out by
-itself still says what its cases are (`q.where(q["recorded.gearbox.kp"] > 0.02, drop=True)`).
+words), limit (share of time at one), excess (the largest over one), extreme (limit that was reached at a metric's),
+metric, requirement, recorded or signal. In a sweep, `recorded.case_id` and `recorded.<path>` repeat names and varied
+parameters along recorded_case, for a variable has one set of dimensions only: so a signal that is taken out by itself
+still says what its cases are (`q.where(q["recorded.gearbox.kp"] > 0.02, drop=True)`).
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -37,13 +38,16 @@ from batch.archive import limits, step_errors
 from met.frozen import frozen
 from met.plan import Coordinate, Experiment, Plan, Recorded
 from met.plan.channel import DIMENSIONS, channels
+from met.plan.limits import extremes
+from met.plan.limits import limits as limits_of
 from met.plan.outputs import metric_units
 from met.unit_parser import parse_unit
 
 SCHEMA = "met.archive"
 VERSION = 1
 
-Role = Literal["dimension", "case", "coordinate", "choice", "metric", "requirement", "recorded", "signal"]
+OfLimit = Literal["limit", "excess", "extreme"]
+Role = Literal["dimension", "case", "coordinate", "choice", OfLimit, "metric", "requirement", "recorded", "signal"]
 Kind = Literal["float64", "float32", "int64", "int8", "str"]
 
 WIDTHS: Mapping[Kind, int] = {"float64": 8, "float32": 4, "int64": 8, "int8": 1, "str": 48}
@@ -67,6 +71,10 @@ EVENTS = {
     "undecided": "decisions at rest that the passes left open",
 }
 """Counts of friction's events in a case (`met.run.Run.events`): variables `friction_...`."""
+
+AT_LIMIT, EXCESS, EXTREME_AT = "at_limit.", "excess.", "extreme_at."
+"""Prefixes of variables along `case`: the share of a run's time at the limit of this path, the largest excess over it,
+and the limit that was reached where the extreme of this metric fell."""
 
 LIMITED = "ticks at which the load motor of a bed was at its limit"
 
@@ -208,7 +216,7 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         variable("repeat", "int64", "number of the repeat"),
         variable("seed", "int64", "seed of the case's noise"),
     ]
-    taken = RESERVED | {recorded.name for recorded in experiment.structure.record}
+    taken = set(RESERVED) | {recorded.name for recorded in experiment.structure.record}
     taken |= {*joint_dimensions(experiment).values(), *component_dimensions(experiment).values()}
     paths = [coordinate.path for coordinate in experiment.cases.coordinates]
     paths += [choice.path for choice in experiment.cases.choices]
@@ -233,6 +241,10 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         *([variable("bed_limited", "int64", LIMITED)] if experiment.structure.substitutions else []),
     ]
     taken |= set(names.values())
+    for each in _limits(experiment):
+        name = _apart(each.name, "limits", taken, ())
+        taken.add(name)
+        out.append(replace(each, name=name, source=each.name))
     units = metric_units(experiment.structure)
     named: dict[str, str] = {}
     for use in experiment.structure.metrics:
@@ -264,6 +276,36 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
             ),
         ]
     return out
+
+
+def _limits(experiment: Experiment) -> list[Variable]:
+    """Shares of time at limits, largest excesses, and limits at extremes, by their own names."""
+    limits = limits_of(experiment.structure, experiment.parameters)
+    found = [
+        Variable(
+            AT_LIMIT + use.path,
+            "float64",
+            ("case",),
+            "limit",
+            f"share of the time {'at' if use.machine else 'beyond'} {use.path}",
+            "1",
+            {"of": use.path},
+        )
+        for use in limits
+    ]
+    for use in limits:
+        if use.bound:
+            unit, words = experiment.parameters[use.path].unit, f"largest excess over {use.path}"
+            found.append(Variable(EXCESS + use.path, "float64", ("case",), "excess", words, unit, {"of": use.path}))
+    for metric, uses in extremes(experiment).items():
+        told = {
+            "of": metric,
+            "flag_values": np.arange(len(uses) + 1),
+            "flag_meanings": " ".join(["none", *(use.path for use in uses)]),
+        }
+        words = f"limit that was reached where {metric} took its value"
+        found.append(Variable(EXTREME_AT + metric, "int64", ("case",), "extreme", words, "", told))
+    return found
 
 
 def _over_cases(experiment: Experiment) -> dict[str, np.ndarray]:

@@ -11,6 +11,8 @@ from met.unit_parser import parse_unit
 
 # what a unit may stand behind: a number, or the end of a sum in parentheses
 _NUMBER = re.compile(r"\d[\d.]*(?:[eE][-+]?\d+)?|\)")
+_OVER_TIME = re.compile(r"(?:\w+: )?\w+\(")
+_COMPARED = re.compile(r"[<>]=?\s*\(?[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*([A-Za-z][\w/*^]*)")
 
 
 def deck_unit(metric: str, unit: str, requirements: Iterable[Requirement]) -> tuple[str, float]:
@@ -22,7 +24,8 @@ def deck_unit(metric: str, unit: str, requirements: Iterable[Requirement]) -> tu
 
 
 def written_unit(text: str, unit: str) -> tuple[str, float] | None:
-    """The unit at the end of a requirement's text and its size in SI; None where no unit of this dimension is there."""
+    """The unit at the end of a requirement's text and its size in SI, of one over time that of a comparison in it; None
+    where no unit of this dimension is there."""
     try:
         wanted = parse_unit(unit).dimension
     except ValueError:
@@ -36,4 +39,11 @@ def written_unit(text: str, unit: str) -> tuple[str, float] | None:
             continue
         if units.same(measure.dimension, wanted):
             return written, measure.scale
+    for compared in _COMPARED.finditer(text) if _OVER_TIME.match(text) else ():
+        try:
+            measure = parse_unit(compared[1])
+        except ValueError:
+            continue
+        if units.same(measure.dimension, wanted):
+            return compared[1], measure.scale
     return None

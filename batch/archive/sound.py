@@ -52,6 +52,9 @@ OTHERS: dict[str, tuple[tuple[str, ...], str]] = {
 OF_ROLES: dict[str, str | tuple[str, ...]] = {
     "coordinate": ("<f8",),
     "metric": ("<f8",),
+    "limit": ("<f8",),
+    "excess": ("<f8",),
+    "extreme": ("<i8",),
     "signal": ("<f8", "<f4"),
     "choice": WORDS,
 }
@@ -127,7 +130,7 @@ def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
     wanted = OF_ROLES.get(variable.role, NUMBERS + WORDS)
     if kinds[name] not in wanted and types[name] not in wanted:
         raise Unlike(f"variable `{name}` is of another type")
-    if variable.role in ("coordinate", "metric", "choice", "case") and dims != ("case",):
+    if variable.role in ("coordinate", "metric", "choice", "limit", "excess", "extreme", "case") and dims != ("case",):
         raise Unlike(f"variable `{name}` is not over cases")
     if variable.role == "signal":
         if dims[:2] != ("recorded_case", "time"):
@@ -188,6 +191,8 @@ def _values(group: StoredGroup) -> None:
         recorded = group.values("recorded_case")
         if not _rises(recorded) or not np.isin(recorded, cases).all():
             raise Unlike("its recorded cases are none of its cases")
+    for variable in group.role("extreme"):
+        _within(group, variable.name, 0, len(str(variable.attributes.get("flag_meanings", "")).split()) - 1)
     for variable in group.role("signal"):
         for dim in variable.dims[2:]:
             names = group.values(dim).tolist()

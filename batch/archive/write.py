@@ -18,7 +18,7 @@ import numpy as np
 from batch.archive import layout as archive_layout
 from batch.archive import verified
 from batch.archive.hdf5 import LIBVER, h5py
-from batch.archive.layout import Layout, Variable
+from batch.archive.layout import AT_LIMIT, EXCESS, EXTREME_AT, Layout, Variable
 from batch.archive.provenance import Revision, version
 from batch.archive.sink import Sink
 from met import backends
@@ -99,10 +99,11 @@ class ArchiveWriter:
             gathered[here] = values[name][group.part.kept[here] - first]
         self._sink.check()
 
-    def values(self, number: int, role: str) -> dict[str, np.ndarray]:
-        """What was put of an experiment's cases: its variables of this role along `case`, by the engine's names."""
+    def put_before(self, number: int) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Return what was put of an experiment's cases: the status of each, and the metrics by the engine's names."""
         group = self.groups[number]
-        return {each.key: group.node[each.name][...] for each in group.layout.variables if each.role == role}
+        metrics = {each.key: group.node[each.name][...] for each in group.layout.role("metric")}
+        return group.node["status"][...], metrics
 
     def put_verified(self, number: int, found: verified.Verified) -> None:
         """What shorter steps gave for some cases of an experiment, in a group of its own."""
@@ -218,7 +219,12 @@ def _values(group: OpenGroup, run: Run) -> dict[str, Any]:
         **{f"friction_{name}": count for name, count in run.events.items()},
         **{variable.name: run.coordinates[variable.key] for variable in group.layout.role("coordinate")},
         **{variable.name: run.metrics[variable.key] for variable in group.layout.role("metric")},
+        **{AT_LIMIT + path: share for path, share in run.at_limit.items()},
+        **{EXCESS + path: most for path, most in run.excess.items()},
+        **{EXTREME_AT + metric: number for metric, number in run.extreme_at.items()},
     }
+    for role in ("limit", "excess", "extreme"):  # by the name that is free
+        values |= {variable.name: values[variable.key] for variable in group.layout.role(role)}
     for choice, variable in zip(experiment.cases.choices, group.layout.role("choice"), strict=True):
         values[variable.name] = [choice.value] * len(rows)
     for name in ("case_id", "case_key", "cause", "warning"):

@@ -266,7 +266,7 @@ class _CampaignWork:
                     histories.get(number),
                     lambda cases: self.reporter.advance(cases, 0),
                 )
-                outcomes = CaseOutcomes(writer.values(number, "case")["status"], writer.values(number, "metric"))
+                outcomes = CaseOutcomes(*writer.put_before(number))
                 self._verify(writer, number, section, outcomes)
                 for each in instants.step_warnings(section, outcomes, self._threads):
                     self.warned.setdefault((each.code, each.at), each)
@@ -304,13 +304,17 @@ class _CampaignWork:
         if way == "none":
             return
         from batch.campaigns.verification.choosing import chosen
-        from batch.campaigns.verification.verifying import verify
+        from batch.campaigns.verification.verifying import FACTORS, verify
 
         experiment = self.campaign.parts[number].experiment
         places = np.flatnonzero(outcomes.status == DONE) if way == "all" else chosen(experiment, outcomes)
         if len(places):
             names = {each.key: each.name for each in writer.groups[number].layout.role("metric")}
-            writer.put_verified(number, verify(experiment, section.rows[places], names, self._threads))
+            self.reporter.begin(f"{section.name}, with shorter steps", len(FACTORS) * len(places), 0, 0, "")
+            found = verify(
+                experiment, section.rows[places], names, self._threads, lambda runs: self.reporter.advance(runs, 0)
+            )
+            writer.put_verified(number, found)
 
     def _timings(self) -> list[dict[str, Any]]:
         counts = self.driver.counts if self.driver else {}

@@ -26,6 +26,7 @@ from batch.differences.compare import (
 )
 from batch.differences.demands import compare_requirements
 from batch.differences.matching import MatchedCases
+from batch.differences.paired import judge_pairs
 from batch.differences.provenance import provenance_changes
 from batch.differences.result import Diff, DiffPlace, EndingDiff, ExperimentDiff, RankedCase, SignalDiff
 from batch.differences.samples import samples
@@ -127,6 +128,7 @@ def _experiment(
     if not out.signals:
         out.notes.append("neither has a metric or a history: nothing is compared but how cases end")
     compare_requirements(a, b, matched, out)
+    judge_pairs(out)
     _counts(a, b, matched, out)
     out.worst = scores.ranked(a, b, matched, out.signals)
     out.cases_different = int(scores.beyond.sum())
@@ -268,6 +270,7 @@ def _metric(
         (values_a.view(np.int64) != values_b.view(np.int64)) & ~(np.isnan(values_a) & np.isnan(values_b))
     )
     scores.unlike[unlike] = True
+    out.higher, out.lower = int((values_b > values_a).sum()), int((values_b < values_a).sum())
     out.identical = out.compared - len(unlike)
     out.different = found.beyond
     out.equivalent = len(unlike) - found.beyond

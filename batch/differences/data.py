@@ -52,6 +52,7 @@ def _experiment(found: ExperimentDiff) -> dict[str, Any]:
                 "gained": each.gained,
                 "lost": each.lost,
                 "other": each.other,
+                "chance": each.chance,
             }
             for each in found.requirements
         ],
@@ -77,6 +78,9 @@ def _signal(found: SignalDiff) -> dict[str, Any]:
         "first_beyond",
         "used",
         "nan",
+        "higher",
+        "lower",
+        "chance",
         "why",
         "by_step",
     )

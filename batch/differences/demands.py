@@ -10,6 +10,8 @@ from batch.differences.result import ExperimentDiff, RequirementDiff
 from batch.differences.words import distinct_texts
 from batch.queries import requirements
 from batch.queries.signals import deck_unit
+from batch.queries.step_errors.figures import figures
+from batch.queries.step_errors.limits import verdicts
 
 
 def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, out: ExperimentDiff) -> None:
@@ -49,12 +51,27 @@ def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases
                 out.notes.append(
                     f"require {now[text]} is met by as many as before, but by others: {lost:,} no more, {gained:,} now"
                 )
+    _compare_step_errors(a, b, out)
     for known, others, path in ((met_a, now, a.path), (met_b, now.values(), b.path)):
         for text, met in known.items():
             if text not in others:
                 said = f"require {text} is only in {path}, met by {int(met.sum()):,} of {matched.count:,}"
                 out.notes.append(said)
                 out.required_in_one.append(said)
+
+
+def _compare_step_errors(a: ArchiveGroup, b: ArchiveGroup, out: ExperimentDiff) -> None:
+    """Note requirements on errors by the step that are met otherwise than before, or are required in one archive."""
+    before, now = ({each.text: each for each in verdicts(group, figures(group))} for group in (a, b))
+    for text in [*before, *(text for text in now if text not in before)]:
+        one, other = before.get(text), now.get(text)
+        if one is not None and other is not None:
+            if one.word != other.word:
+                out.notes.append(f"require {text} was {one.word} ({one.said}), now {other.word} ({other.said})")
+        elif found := one or other:
+            said = f"require {text} is only in {(b if one is None else a).path}, {found.word} ({found.said})"
+            out.notes.append(said)
+            out.required_in_one.append(said)
 
 
 def _met(group: ArchiveGroup, cases: np.ndarray) -> dict[str, np.ndarray]:

@@ -41,6 +41,8 @@ class SignalDiff:
     first        s, the earliest time of a difference, in whichever case; first_beyond: by more than is allowed
     used         the largest share of the tolerance that was needed
     nan          values that are not-a-number in one archive alone
+    higher       of a metric, cases in which b has the larger value;  lower: the smaller
+    chance       the probability of pairs as one-sided by chance, corrected; not a number where it was not tested
     by_step      of a metric, the sum of both archives' errors by the step; not a number where neither was verified
     """
 
@@ -62,6 +64,9 @@ class SignalDiff:
     first_beyond: float = float("inf")
     used: float = 0.0
     nan: int = 0
+    higher: int = 0
+    lower: int = 0
+    chance: float = float("nan")
     why: str = ""
     note: str = ""
     low: float = float("inf")
@@ -133,6 +138,7 @@ class RequirementDiff:
     gained, lost         how many meet it in b alone, and in a alone
     other                whether its limit or its comparison is another
     limits               its limits in a and in b, where they differ and the text does not; else ""
+    chance               the probability of pairs as one-sided by chance, corrected; not a number where not tested
     """
 
     before: str
@@ -143,6 +149,7 @@ class RequirementDiff:
     lost: int = 0
     other: bool = False
     limits: tuple[str, str] = ("", "")
+    chance: float = float("nan")
 
     @property
     def has_changed(self) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 from batch.archive.read import ArchiveGroup
 from batch.queries.summary import spread
 from met.frozen import frozen
+from met.statistics.significance import holm
 
 LEVEL = 0.01
 """Probability of a false alarm among all metrics of an experiment."""
@@ -64,13 +65,3 @@ def samples(a: ArchiveGroup, b: ArchiveGroup) -> list[MetricSamples]:
         MetricSamples(variable.name, variable.unit, sizes, (medians[0], medians[1]), lost, distance, chance)
         for (variable, sizes, medians, lost, distance, _), chance in zip(found, corrected, strict=True)
     ]
-
-
-def holm(chances: list[float]) -> list[float]:
-    """Probabilities of several tests, each as if it were the only one, corrected for their number."""
-    order = sorted(range(len(chances)), key=lambda i: chances[i])
-    out, largest = [1.0] * len(chances), 0.0
-    for rank, i in enumerate(order):
-        largest = max(largest, min(1.0, (len(chances) - rank) * chances[i]))
-        out[i] = largest
-    return out

@@ -60,6 +60,7 @@ def _experiment(found: Diff, experiment: ExperimentDiff, cut: Shortening) -> lis
     out += [f"  {line}" for line in words.tolerance_lines(found, experiment)]
     out += [f"  {line}" for line in words.requirement_lines(experiment)]
     out += _signals(experiment.signals)
+    out += _paired(experiment)
     out += _samples(experiment)
     out += _worst(found, experiment, cut)
     return out
@@ -88,6 +89,12 @@ def _signals(signals: Sequence[SignalDiff]) -> list[str]:
             heads.append("")
             fields.append(column.unit)
     return columns([heads, *([getattr(row, field) for field in fields] for row in found)], right=right)
+
+
+def _paired(experiment: ExperimentDiff) -> list[str]:
+    """Metrics as pairs of the same cases."""
+    lines = words.paired_metrics(experiment)
+    return ["", "  metrics, case by case:", *(f"    {line}" for line in lines)] if lines else []
 
 
 def _samples(experiment: ExperimentDiff) -> list[str]:

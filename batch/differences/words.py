@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
+from batch.differences import paired
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE
 from batch.differences.result import Diff, EndingDiff, ExperimentDiff, RankedCase, RequirementDiff, SignalDiff
 from batch.differences.samples import LEVEL, MetricSamples
@@ -15,6 +16,9 @@ from batch.queries.signals import number_text
 from met.frozen import frozen
 from met.messages.visible import visible
 from met.outputs import quoted
+
+SMALLEST = 1e-9
+"""Probabilities below this one are not told apart."""
 
 SAME = "made from the same: deck, parameters, models and versions"
 
@@ -77,10 +81,33 @@ def requirement_lines(experiment: ExperimentDiff) -> list[str]:
     """Lines about requirements that are others, or are met by another number of cases."""
     count = experiment.cases.count
     return [
-        f"require {requirement_text(each)}  {met_by_text(each.met_before, each.met_now, count)}"
+        f"require {requirement_text(each)}  {met_by_text(each.met_before, each.met_now, count)}{pairs_text(each)}"
         for each in experiment.requirements
         if each.has_changed
     ]
+
+
+def pairs_text(each: RequirementDiff) -> str:
+    """The end of a line: how many cases meet it in one archive alone, and whether that is more than chance."""
+    if math.isnan(each.chance) or not each.gained + each.lost:
+        return ""
+    return f"; {each.gained:,} gained, {each.lost:,} lost: {_chance(each.chance)}"
+
+
+def paired_metrics(experiment: ExperimentDiff) -> list[str]:
+    """For each metric that differs in several cases, in how many it rose and fell, and whether that is more than
+    chance."""
+    return [
+        f"{each.name} rose in {each.higher:,} of {each.compared:,}, fell in {each.lower:,}: {_chance(each.chance)}"
+        for each in experiment.signals
+        if not math.isnan(each.chance) and each.higher + each.lower
+    ]
+
+
+def _chance(chance: float) -> str:
+    """A probability by chance, and whether the difference is shown by it: `not shown (p = 0.25)`."""
+    size = f"= {chance:.2g}" if chance >= SMALLEST else f"< {SMALLEST:g}"
+    return f"{'shown' if chance < paired.LEVEL else 'not shown'} (p {size})"
 
 
 def requirement_text(each: RequirementDiff) -> str:

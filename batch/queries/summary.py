@@ -10,13 +10,14 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.archive.stored import Stored
+from batch.queries.at_limits import LimitSummary, limit_summaries
 from batch.queries.evidence import EvidenceRow, evidence
 from batch.queries.failures import FailureGroup, failures
 from batch.queries.signals import number_text
 from batch.queries.step_errors import figures
 from batch.queries.step_errors.figures import Verification
 from batch.queries.step_errors.limits import StepErrorVerdict, verdicts
-from batch.queries.step_errors.warning import warnings
+from batch.queries.warnings import warnings
 from met.diagnostic import Diagnostic
 from met.frozen import frozen
 
@@ -95,7 +96,8 @@ class Summary:
     limited   cases in which the load motor of a bed was at its limit at some tick
     verified  how true the metrics are, by the names of their variables; None where that is not known
     step_errors  what is required of errors by the step; of a case alone, nothing
-    warnings  of what that calls in question; of a case alone, none
+    warnings  of what that, or a limit of a machine, calls in question; of a case alone, none
+    limits    of machines and tables, with the share of time at each
     doubts    of cases that are done and doubtful all the same, by what makes them so
     """
 
@@ -112,6 +114,7 @@ class Summary:
     step_errors: tuple[StepErrorVerdict, ...] = ()
     warnings: tuple[Diagnostic, ...] = ()
     doubts: tuple[FailureGroup, ...] = ()
+    limits: tuple[LimitSummary, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -167,6 +170,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
         step_errors=verdicts(group, verified) if position is None else (),
         warnings=tuple(warnings(group)) if position is None else (),
         doubts=_doubts(group, here),
+        limits=limit_summaries(group, here),
         limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
     )
 

@@ -21,9 +21,9 @@ from batch.executors.choose import choose
 from batch.executors.threads import Threads
 from batch.export import Exported
 from batch.export.from_run import archive_and_export, check, export_command, export_run
-from batch.queries.step_errors.warning import campaign_warnings
 from batch.queries.structures import structures
 from batch.queries.summary import Summary, summarise
+from batch.queries.warnings import campaign_warnings
 from batch.terminal.progress import Bar
 from batch.terminal.verdict import WorstCaseLines, announcement, result_lines, verdict_json, worst_cases, writing
 from met.diagnostic import Diagnostic, Problem, error
@@ -53,7 +53,7 @@ class RunResult:
     tables   of sweeps of several structures
     picture  its file; None where there is none
     excuse   why there can be none, in words
-    warned   what the errors by the step, or the steps themselves, call in question, with the places in the deck
+    warned   what errors by the step, the steps themselves and limits of machines call in question, with their places
     """
 
     summaries: tuple[Summary, ...]

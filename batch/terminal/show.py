@@ -10,6 +10,7 @@ from typing import Any
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries import cases, ordering
+from batch.queries.at_limits import reached_texts
 from batch.queries.deck_units import DeckUnits
 from batch.queries.failures import failure_lines
 from batch.queries.groups import cases_named
@@ -193,6 +194,7 @@ def verdict(summary: Summary, width: int) -> list[str]:
         of = "" if summary.cases == 1 else f" in {summary.limited:,} of {summary.cases:,} cases"
         out.append(f"  note: the load motor of a bed was at its limit{of}: the run is not what the joint would do")
         out.append("  what gives it more: `i_max` and `kt_load` of the bed; what asks less: the arm, or its command")
+    out += [f"  {text}" for text in reached_texts(summary.limits, summary.cases)]
     if summary.metrics:
         out += _metric_table(summary)
     if summary.verified is not None:

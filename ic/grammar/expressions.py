@@ -33,6 +33,9 @@ _LEVEL = {
 }  # fmt: skip
 _NOT, _COMPARISON, _SIGN = 3, 4, 7
 _WORDS = {"||": "or", "&&": "and", "!": "not"}
+EVERY_JOINT = "*"
+"""The first word of a path that names every joint: `*.servo.voltage`."""
+
 _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
 
 
@@ -115,7 +118,7 @@ class Expressions(Quantities):
         token = self.token
         if token.kind in NUMBERS:
             return self.number()
-        if token.kind == NAME:
+        if token.kind == NAME or (token.text == EVERY_JOINT and self.following.text == "."):
             return self.name_or_call()
         if token.kind == STRING:
             return self.string()

@@ -6,7 +6,7 @@ where they stand: what a run of names means is decided by what comes behind it, 
 
     names =  or  +=      a setting; all names but the last are words
     names {              a group
-    names value ;        a statement
+    names value ;        a statement;  require name: value ;  one with a name
 """
 
 from __future__ import annotations
@@ -190,6 +190,8 @@ class _Parser(Expressions):
             self.fail("D032", "there is one base only", self.token, help="a definition takes after one other")
         if text in ("-=", "*=", "/="):
             self.fail("D023", f"there is no `{text}`", self.token, help="`=` sets a value, `+=` appends to a list")
+        if text == ":" and len(names) == 2 and names[0].text == "require" and not tail:
+            return self.named_requirement(names)
         if text == ":":
             self.unexpected("`=`", help="a deck writes `name = value;`")
         if text == "==" and len(names) == 1 and not tail:
@@ -353,13 +355,22 @@ class _Parser(Expressions):
         value = self.value()
         if words[0].text == "sample" and self.token.text == "{":
             self.unexpected("`;`", help="a sample names its design: `sample lhs(200) { ... }`")
-        if words[0].text == "require" and self.token.text in ("in", "with") and not self.on_new_line(self.at):
+        if words[0].text == "require":
             value = self.over_cases(value)
         self.semicolon(value)
         return Statement(_words(words), value, span(words[0], words[-1]))
 
+    def named_requirement(self, names: list[Token]) -> Statement:
+        """`require NAME: COMPARISON;`"""
+        self.advance()
+        value = self.over_cases(self.value())
+        self.semicolon(value)
+        return Statement(_words(names[:1]), value, span(names[0], names[-1]), _word(names[1]))
+
     def over_cases(self, comparison: Expression) -> Expression:
-        """`in SHARE of cases` and `with CONFIDENCE confidence`, one of them or both, behind a comparison."""
+        """`in SHARE of cases` and `with CONFIDENCE confidence`, one of them or both, behind a comparison or not."""
+        if self.token.text not in ("in", "with") or self.on_new_line(self.at):
+            return comparison
         first = self.token
         share = confidence = None
         if self.token.text == "in":

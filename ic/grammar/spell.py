@@ -78,4 +78,5 @@ def _entry(entry: Entry) -> str:
         return " ".join([*(word.text for word in entry.words), _body(entry.body)])
     if isinstance(entry, Let):
         return f"let {entry.name.text} = {spell(entry.value)};"
-    return " ".join([*(word.text for word in entry.words), f"{spell(entry.value)};"])
+    named = [f"{entry.name.text}:"] if entry.name is not None else []
+    return " ".join([*(word.text for word in entry.words), *named, f"{spell(entry.value)};"])

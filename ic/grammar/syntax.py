@@ -17,11 +17,15 @@ what may stand where is decided when the tree is resolved. So a joint may be cal
     sample lhs(200) { ... }                                 Statement, words ("sample",), value a Call with a body
     require settle < 10 s;                                  Statement, words ("require",), value
     require settle < 10 s in 99 % of cases;                 Statement, words ("require",), value an OverCases
+    require quick: settle < 10 s;                           Statement, words ("require",), name "quick", value
     exclude when kp > 3 V*s/rad and m > 5 kg;               Statement, words ("exclude", "when"), value
     remove settle;                                          Statement, words ("remove",), value a Name
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
 
 from ic.text.source import SourceFile, UnreadableStretch
 from met.diagnostic import Diagnostic, Place
@@ -63,7 +67,7 @@ class String:
 
 @frozen
 class Name:
-    """A reference: `slow`, `gearbox.kp`, `shoulder.servo.voltage`, `on`."""
+    """A reference: `slow`, `gearbox.kp`, `shoulder.servo.voltage`, `on`; `*.servo.voltage`, of every joint."""
 
     path: tuple[Word, ...]
     place: Place
@@ -166,6 +170,28 @@ def children(expression: Expression) -> tuple[Expression, ...]:
     return ()
 
 
+def mapped(expression: Expression, change: Callable[[Expression], Expression]) -> Expression:
+    """The expression with others in place of those that it is made of (`children`)."""
+    match expression:
+        case List(items=items):
+            return replace(expression, items=tuple(map(change, items)))
+        case WithUnit(inner=inner):
+            return replace(expression, inner=change(inner))
+        case Range(first=first, last=last, step=step):
+            return replace(expression, first=change(first), last=change(last), step=change(step))
+        case Unary(operand=operand):
+            return replace(expression, operand=change(operand))
+        case Binary(left=left, right=right):
+            return replace(expression, left=change(left), right=change(right))
+        case OverCases(comparison=comparison, share=share, confidence=confidence):
+            share, confidence = (change(each) if each is not None else None for each in (share, confidence))
+            return replace(expression, comparison=change(comparison), share=share, confidence=confidence)
+        case Call(positional=positional, named=named):
+            made = tuple((word, change(value)) for word, value in named)
+            return replace(expression, positional=tuple(map(change, positional)), named=made)
+    return expression
+
+
 @frozen
 class Let:
     name: Word
@@ -184,9 +210,12 @@ class Setting:
 
 @frozen
 class Statement:
+    """`words value;`, or of a requirement with a name `words name: value;`."""
+
     words: tuple[Word, ...]
     value: Expression
     place: Place
+    name: Word | None = None
 
 
 @frozen

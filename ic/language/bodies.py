@@ -32,6 +32,13 @@ AT = Parameter(name="at", unit="m", shape="vector", default=ZEROS, doc="origin o
 RPY = Parameter(name="rpy", unit="rad", shape="vector", default=ZEROS, doc="turn of the joint frame, fixed x-y-z")
 AXIS = Parameter(name="axis", unit="1", shape="vector", doc="axis of motion, joint frame")
 
+Q_MIN = Parameter(name="q_min", unit="joint", less_than="q_max", doc="lower end of the joint's range")
+Q_MAX = Parameter(name="q_max", unit="joint", doc="upper end of the joint's range")
+QD_MAX = Parameter(name="qd_max", unit="joint/s", above=0.0, doc="largest rate of the joint, either way")
+TAU_MAX = Parameter(name="tau_max", unit="effort", above=0.0, doc="largest torque on the joint, either way")
+JOINT_LIMITS = (Q_MIN, Q_MAX, QD_MAX, TAU_MAX)
+"""What a joint should stay within: watched in every run, and nothing that keeps it there."""
+
 JOINT_KINDS = ("revolute", "prismatic", "fixed")
 
 JOINT = BlockDeclaration(
@@ -50,6 +57,14 @@ JOINT = BlockDeclaration(
               default="needed unless fixed", doc="x, y, z, -x, ..., or a direction `[0, 3, 4]`, in the joint's frame"),
         Entry(name="dh", written="dh = classic(a = 0.4 m, alpha = 90 deg);", default="none", path="JOINT.dh",
               doc="Denavit-Hartenberg numbers, in place of the three above: `met doc dh`"),
+        Entry(name="q_min", written="q_min = -170 deg;", parameter=Q_MIN, varies="number", path="JOINT.q_min",
+              default="none", doc="the lower end of its range, which a run is warned to pass; with `q_max`"),
+        Entry(name="q_max", written="q_max = 170 deg;", parameter=Q_MAX, varies="number", path="JOINT.q_max",
+              default="none", doc="the upper end; what stops it there is a `joint_stop` of the environment"),
+        Entry(name="qd_max", written="qd_max = 2.6 rad/s;", parameter=QD_MAX, varies="number", path="JOINT.qd_max",
+              default="none", doc="the largest rate, either way, likewise"),
+        Entry(name="tau_max", written="tau_max = 87 N*m;", parameter=TAU_MAX, varies="number", path="JOINT.tau_max",
+              default="none", doc="the largest torque of its servo on it, either way, likewise"),
     ),
 )  # fmt: skip
 

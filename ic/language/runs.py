@@ -85,11 +85,19 @@ SUBSTITUTE = BlockDeclaration(
 
 METRIC = BlockDeclaration(
     name="metric",
-    written="metric NAME = MODEL { of = CHANNEL; ... }",
+    written="metric NAME = MODEL { of = EXPRESSION; ... }",
     within="run",
     head="metrics",
-    doc="One number of a case, of a channel that it watches.",
-    entries=(Entry(name="of", written="of = swing.q;", path="", doc="the channel: `met doc channels`"),),
+    doc="One number of a case, of what it watches.",
+    entries=(
+        Entry(
+            name="of",
+            written="of = swing.q;",
+            path="",
+            doc="a channel, `met doc channels`, or an expression of some: `abs(swing.q - swing.servo.command)`; "
+            "`*.q` is that of every joint; of `always` and its like a condition",
+        ),
+    ),
     free="parameters of the model: `met doc metric` lists the models",
 )
 
@@ -137,12 +145,15 @@ RUN = BlockDeclaration(
               doc="a whole number of steps of the dynamics"),
         Entry(name="record", written="record = [...];", default="needed; `[]` keeps metrics alone",
               doc="channels to keep"),
+        Entry(name="signal", form="named", written="signal NAME = EXPRESSION;", default="none",
+              doc="a number computed of channels; a record and a metric call it `signals.NAME`"),
         Entry(name="metric", form="named", written="metric NAME = MODEL { ... }", default="none",
               path="metrics.NAME", doc="one number of a case"),
         Entry(name="require", form="statement", written="require METRIC < LIMIT;", default="none",
               doc="a limit that counts for the exit code; also `<=`, `>`, `>=`; of a share of cases: "
                   "`in 99 % of cases with 90 % confidence`; "
-                  "`step_error(METRIC) < 1 %` is one on its error by the step"),
+                  "`step_error(METRIC) < 1 %` is one on its error by the step; over time: "
+                  "`always(CONDITION, after = 1 s)`; with a name: `require NAME: ...;`"),
         Entry(name="allow", form="statement", written='allow CODE because "REASON";', default="none",
               doc="a warning that is right, and not to be given; its code is printed with it: "
                   "`allow D105 because \"the report's own rates\";`"),

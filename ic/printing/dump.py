@@ -181,6 +181,7 @@ def _block(block: MergedBlock, indent: str) -> Iterator[str]:
         yield from _item(item, indent)
     for statement in block.statements:
         words = " ".join(word.text for word in statement.words)
+        words += f" {statement.name.text}:" if statement.name is not None else ""
         yield f"{indent}{words} {spell(statement.value)}{_written(statement.place)}"
 
 

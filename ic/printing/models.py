@@ -126,6 +126,8 @@ def rows(parameters: Iterable[Parameter]) -> list[tuple[str, str, str, str, str]
 def where_written(kind: models.Kind, model: Any) -> str:
     """The place in a deck where this model is written, in words."""
     usage = ON_LINK if kind == "sensor" and model.measures is not None else WHERE_WRITTEN[kind]
+    if kind == "metric" and model.condition:
+        usage = usage.replace("CHANNEL", "CONDITION")
     return usage.replace("MODEL", model.name)
 
 

@@ -21,6 +21,9 @@ OF_FUNCTIONS: Mapping[str, str] = MappingProxyType({
     "min": "least of values of one dimension, two or more", "max": "greatest of values of one dimension, two or more",
     "linspace": "evenly spaced values, both ends included",
     "logspace": "values in one ratio, both ends included (ends, not exponents)",
+    "abs": "size, whatever the sign", "tan": "of an angle, as sin", "asin": "angle of a sine", "acos": "of a cosine",
+    "atan": "of a tangent", "atan2": "angle of the point (x, y), both of one dimension",
+    "exp": "of a pure number, as log and tanh", "log": "natural logarithm", "tanh": "hyperbolic tangent",
 })  # fmt: skip
 
 OF_DESIGNS: Mapping[str, str] = MappingProxyType(

@@ -12,10 +12,9 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Setting
 from ic.robots.attributes import shown
-from ic.robots.entries import ArmEntries, RobotEntry, spelled
+from ic.robots.entries import LIMITS, ArmEntries, RobotEntry, limits, spelled
 from ic.robots.names import word
 from ic.robots.robot import MOVING, Inertial, Joint
-from ic.robots.warnings import limits
 
 WIDE = 100  # columns of a block on one line
 WIDEST = 120  # with what is said of it behind
@@ -60,9 +59,7 @@ def _block(part: RobotEntry, notes: list[str]) -> Iterator[str]:
     entries = [entry for entry in part.entry.body if isinstance(entry, Setting)]
     settings = [(entry.path[0].text, f"{spell(entry.value)};") for entry in entries]
     note = f"// {'; '.join(map(_safe, notes))}" if notes else ""
-    ends = [each for each in settings if each[0] in ("parent", "child")]
-    others = settings[len(ends) :]
-    head = "  ".join(f"{key} = {value}" for key, value in ends)
+    rows = _rows(settings)
     line = f"    {words} {{ {'  '.join(f'{key} = {value}' for key, value in settings)} }}"
     first = line if len(line) <= WIDE else f"    {words} {{"
     if note and len(f"{first}  {note}") > WIDEST:
@@ -71,12 +68,19 @@ def _block(part: RobotEntry, notes: list[str]) -> Iterator[str]:
     yield f"{first}  {note}".rstrip()
     if first == line:
         return
-    if head:
-        yield f"        {head}"
-    width = max((len(key) for key, _ in [*ends[:1], *others]), default=0)
-    for key, value in others:
-        yield f"        {key:{width}} = {value}"
+    width = max((len(row[0][0]) for row in rows), default=0)
+    for (key, value), *rest in rows:
+        yield "  ".join((f"        {key:{width}} = {value}", *(f"{other} = {text}" for other, text in rest)))
     yield "    }"
+
+
+def _rows(settings: list[tuple[str, str]]) -> list[list[tuple[str, str]]]:
+    """The settings of a block, by line: what a joint holds on what, and its limits, each on one if that is short."""
+    limited = [each for each in settings if each[0] in LIMITS.values()]
+    ends = [each for each in settings if each[0] in ("parent", "child")]
+    others = [[each] for each in settings if each not in ends and each not in limited]
+    short = sum(len(f"  {key} = {value}") for key, value in limited) <= WIDE
+    return [*([ends] if ends else []), *others, *([limited] if limited and short else [[each] for each in limited])]
 
 
 def _link_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> list[str]:
@@ -96,21 +100,9 @@ def _joint_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> li
     if joint.followed is not None:
         law = f" ({joint.law})" if joint.law else ""
         notes.append((HELD if joint.type.text == "fixed" else FREE).format(shown(joint.followed.text), law))
-    notes += _limit_notes(joint)
     if joint.type.text in MOVING:
         notes += [f"{name} {spelled(value)}" for name, value in joint.friction.items() if value]
     return notes
-
-
-def _limit_notes(joint: Joint) -> Iterator[str]:
-    found = limits(joint)
-    length, effort = ("m", "N") if joint.type.text == "prismatic" else ("rad", "N*m")
-    if "lower" in found:
-        yield f"from {spelled(found['lower'])} to {spelled(found['upper'])} {length}"
-    if "velocity" in found:
-        yield f"at most {spelled(found['velocity'])} {length}/s"
-    if "effort" in found:
-        yield f"at most {spelled(found['effort'])} {effort}"
 
 
 def _called(part: RobotEntry, kind: str, changed: Mapping[tuple[str, str], str]) -> list[str]:

@@ -13,12 +13,23 @@ import math
 
 from ic.grammar.syntax import Entry, Expression, Group, List, Name, Number, Setting, Unary, Unit, WithUnit, Word
 from ic.robots.names import DeckNames, deck_names
-from ic.robots.robot import Inertial, Joint, Link, Numbers, Robot, Written
+from ic.robots.robot import MOVING, Inertial, Joint, Link, Numbers, Robot, Written
 from met.diagnostic import Place
 from met.frozen import frozen
 
 AXES = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
-UNITS = {"kg": (("kg", 1),), "m": (("m", 1),), "rad": (("rad", 1),), "kg*m^2": (("kg", 1), ("m", 2))}
+UNITS = {
+    "kg": (("kg", 1),),
+    "m": (("m", 1),),
+    "rad": (("rad", 1),),
+    "kg*m^2": (("kg", 1), ("m", 2)),
+    "m/s": (("m", 1), ("s", -1)),
+    "rad/s": (("rad", 1), ("s", -1)),
+    "N": (("N", 1),),
+    "N*m": (("N", 1), ("m", 1)),
+}
+LIMITS = {"lower": "q_min", "upper": "q_max", "velocity": "qd_max", "effort": "tau_max"}
+"""Limits of a URDF file's joint, and what they are in a deck."""
 NOISE = 1e-15  # of sines and cosines of right angles, whose size is 1: cos(pi/2) is 6e-17 in doubles
 
 
@@ -108,10 +119,24 @@ def _joint(joint: Joint, names: DeckNames) -> Group:
     if kind in ("revolute", "prismatic"):
         axis = joint.axis or Numbers((1.0, 0.0, 0.0), joint.name.place)  # URDF's default
         settings.append(_setting("axis", _axis(axis), axis.place))
+    way, effort = ("m", "N") if kind == "prismatic" else ("rad", "N*m")
+    units = {"lower": way, "upper": way, "velocity": f"{way}/s", "effort": effort}
+    for name, value in limits(joint).items():
+        place = joint.limits_at or joint.name.place
+        settings.append(_setting(LIMITS[name], _signed(value, units[name], place), place))
     if joint.mimic is not None:
         followed = names.joints.get(joint.mimic.text, joint.mimic.text)
         settings.append(_setting("mimic", _name(followed, joint.mimic.place), joint.mimic.place))
     return _group("joint", names.joints[joint.name.text], Word(kind, joint.type.place), settings, joint.name.place)
+
+
+def limits(joint: Joint) -> dict[str, float]:
+    """The limits that the joint has: none of position where it is continuous, and what is zero or less says nothing."""
+    if joint.type.text not in MOVING:
+        return {}
+    lower, upper = joint.limits.get("lower", 0.0), joint.limits.get("upper", 0.0)
+    found = {"lower": lower, "upper": upper} if joint.type.text != "continuous" and lower < upper else {}
+    return found | {name: x for name in ("velocity", "effort") if (x := joint.limits.get(name, 0.0)) > 0.0}
 
 
 def _end(key: str, link: Written, names: DeckNames) -> Setting:
@@ -148,6 +173,10 @@ def _vector(key: str, numbers: Numbers, unit: str) -> Setting:
 
 def _number(value: float, unit: str, place: Place) -> Number:
     return Number(value, _unit(unit, place), place, spelled(value))
+
+
+def _signed(value: float, unit: str, place: Place) -> Expression:
+    return _number(value, unit, place) if value >= 0.0 else Unary("-", _number(-value, unit, place), place)
 
 
 def _bare(value: float, place: Place) -> Number:

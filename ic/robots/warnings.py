@@ -22,7 +22,7 @@ def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
             f"not all that `{body.robot.file}` says is in this arm",
             Label(named),
             tuple(labels),
-            ("`met import` makes a deck of such a file, with limits and friction beside each joint",),
+            ("`met import` makes a deck of such a file, with friction beside each joint",),
             "warning",
         )
     changed = body.names.changed
@@ -48,9 +48,6 @@ def _left_out(body: ArmEntries) -> Iterator[Label]:
     root = robot.root.inertial
     if root is not None and root.mass.values[0] != 0.0:
         yield Label(root.place, f"the inertia of `{shown(robot.root.name.text)}`: it is `base`, the ground")
-    limited = [joint for joint in robot.joints if limits(joint)]
-    if limited and limited[0].limits_at is not None:
-        yield Label(limited[0].limits_at, f"limits of {_joints(body, limited)}: an arm has none")
     rubbing = [joint for joint in robot.joints if joint.friction_at is not None and joint.type.text in MOVING]
     if rubbing and rubbing[0].friction_at is not None:
         yield Label(
@@ -62,17 +59,6 @@ def _left_out(body: ArmEntries) -> Iterator[Label]:
         counts = [f"{len(places)} `{shown(tag)}`" for tag, places in kinds[:MOST_NAMED]]
         more = f" and {len(kinds) - MOST_NAMED} kinds more" if len(kinds) > MOST_NAMED else ""
         yield Label(kinds[0][1][0], f"not read: {', '.join(counts)}{more}")
-
-
-def limits(joint: Joint) -> dict[str, float]:
-    """The limits that the joint has: none of position where it is continuous, and what is zero or less says nothing."""
-    if joint.type.text not in MOVING:
-        return {}
-    found = {name: value for name, value in joint.limits.items() if name in ("effort", "velocity") and value > 0.0}
-    lower, upper = joint.limits.get("lower", 0.0), joint.limits.get("upper", 0.0)
-    if joint.type.text != "continuous" and lower < upper:
-        found |= {"lower": lower, "upper": upper}
-    return found
 
 
 def _joints(body: ArmEntries, joints: Sequence[Joint]) -> str:

@@ -57,6 +57,7 @@ WORK = {
     "carry": "integrator",
     "slope": "further stages",
     "split": "friction splits",
+    "expressions_": "expressions",
     "metrics_": "metrics",
     "record": "recorder",
 }

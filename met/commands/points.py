@@ -7,9 +7,12 @@ which all commands with this table share.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
-from met.trace import Real, both, clip, gather, minimum, where
+from met.instants import has_come
+from met.parameter import Limit
+from met.trace import Real, Truth, both, clip, either, gather, minimum, not_, where
 
 Numbers = tuple[float, ...]
 
@@ -74,6 +77,16 @@ def clamped_slopes(times: Sequence[float], values: Sequence[float]) -> Numbers:
     for k in range(n - 2, 0, -1):
         slopes[k] = right[k] - above[k] * slopes[k + 1]
     return tuple(slopes)
+
+
+def ends(of: Callable[[Any, Any], Real]) -> Limit:
+    """The limit of a model with points at `p.times`: it is beyond them. of: (p, t or world) -> time in the table, s."""
+
+    def beyond(p: Any, at: Any) -> Truth:
+        time = of(p, at)
+        return either(not_(has_come(time, p.times[0])), has_come(time, p.times[-1]))
+
+    return Limit(parameter="times", reached=beyond)
 
 
 def _held(times: Numbers, values: Numbers, t: Real, value: Real, slope: Real) -> tuple[Real, Real]:

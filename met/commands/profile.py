@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from met.content import Content
 from met.frozen import frozen
-from met.parameter import Parameter
+from met.parameter import Limit, Parameter
 from met.trace import Real
 
 FILE = Parameter(name="file", shape="text", doc="CSV file")
@@ -32,6 +32,7 @@ class Profile:
                 What moves a base must not jump. (p) -> that, where a word decides
     content     (p, duration) -> what it brings in a run of that length (s): a deck is warned where the instants that
                 sample it do not carry that, or the run ends before. Asked with numbers. None: nothing is known of it
+    limits      those that it has, such as a table's ends: how much of a run is spent at each is kept of every case
     from_file   the lists `times` and `values` are columns of a CSV file: a deck writes `file` and `column` for them
     """
 
@@ -41,6 +42,7 @@ class Profile:
     course: Callable[[Any, Real], tuple[Real, Real]]
     jumps: Jump | Callable[[Any], Jump] = "rate"
     content: Callable[[Any, float], Content] | None = None
+    limits: tuple[Limit, ...] = ()
     from_file: bool = False
 
     def jump(self, p: Any) -> Jump:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from met.commands.points import linear
+from met.commands.points import ends, linear
 from met.commands.profile import Profile
 from met.content import Content, content_of_points
 from met.parameter import Parameter
@@ -32,4 +32,5 @@ PROFILE = Profile(
     ),
     course=course,
     content=content,
+    limits=(ends(lambda p, t: t),),
 )

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from met.commands.points import cubic, linear
+from met.commands.points import cubic, ends, linear
 from met.commands.profile import Profile
 from met.content import Content, content_of_points
 from met.parameter import Parameter
@@ -50,5 +50,6 @@ PROFILE = Profile(
     ),
     course=course,
     content=content,
+    limits=(ends(lambda p, t: t - p.begin),),
     jumps=lambda p: "none" if p.interpolation == "cubic" else "rate",
 )

@@ -13,21 +13,45 @@ import math
 from typing import Any
 
 from met.environments.environment import Environment, Force, Loads, Vector, World
-from met.parameter import Parameter
-from met.trace import clip, where
+from met.parameter import Limit, Parameter
+from met.trace import Real, absolute, clip, where
 from met.vectors import composed, quaternion, quaternion_rpy
 
 
 def loads(p: Any, world: World) -> Loads:
+    x, y, z = (clip(wanted, -limit, limit) for wanted, limit in zip(_wanted(p, world), p.limit, strict=True))
+    moment = (x, y, z) if p.axes == "world" else world.to_world(p.link, (x, y, z))
+    return Loads(forces=(Force(p.link, moment=moment),))
+
+
+def _wanted(p: Any, world: World) -> list[Real]:
+    """The moment without its limit about x, y and z of `axes`, N m."""
     R, rate = world.orientation(p.link), world.rate(p.link)
     w, x, y, z = quaternion_rpy(*p.rpy)
     w, x, y, z = composed((w, -x, -y, -z), quaternion(R))
     short = where(w < 0.0, -2.0, 2.0)
-    error = (short * x, short * y, short * z)  # along n, which is the same in the axes of both attitudes
+    error: Vector = (short * x, short * y, short * z)  # along n, which is the same in the axes of both attitudes
     if p.axes == "world":
-        return _moment(p, _clipped(p, world.to_world(p.link, error), rate))
-    own = tuple(sum(R[i][j] * rate[i] for i in range(3)) for j in range(3))
-    return _moment(p, world.to_world(p.link, _clipped(p, error, own)))  # type: ignore[arg-type]
+        error = world.to_world(p.link, error)
+    else:
+        rate = tuple(sum(R[i][j] * rate[i] for i in range(3)) for j in range(3))  # type: ignore[assignment]
+    numbers = zip(p.stiffness, p.damping, error, rate, strict=True)
+    return [-stiffness * e - damping * w for stiffness, damping, e, w in numbers]
+
+
+def _limit(number: int) -> Limit:
+    return Limit(
+        parameter=f"limit.{'xyz'[number]}",
+        reached=lambda p, world: absolute(_wanted(p, world)[number]) >= p.limit[number],
+    )
+
+
+def held(p: Any) -> str:
+    """The attitude that it gives: about the axes along which it has a stiffness; a damping alone gives none."""
+    about = [axis for axis, stiffness in zip("xyz", p.stiffness, strict=True) if stiffness]
+    if not about:
+        return ""
+    return f"the attitude of `{p.link}`" + (f" about {' and '.join(about)}" if len(about) < 3 else "")
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
@@ -37,18 +61,6 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
     if not any(p.limit):
         return ("limit",), "its moment is limited to nothing"
     return None
-
-
-def _clipped(p: Any, error: Vector, rate: Vector) -> Vector:
-    x, y, z = (
-        clip(-stiffness * e - damping * w, -limit, limit)
-        for stiffness, damping, limit, e, w in zip(p.stiffness, p.damping, p.limit, error, rate, strict=True)
-    )
-    return x, y, z
-
-
-def _moment(p: Any, moment: Vector) -> Loads:
-    return Loads(forces=(Force(p.link, moment=moment),))
 
 
 ZERO = (0.0, 0.0, 0.0)
@@ -92,7 +104,8 @@ ENVIRONMENT = Environment(
         ),
     ),
     loads=loads,
+    limits=tuple(map(_limit, range(3))),
     idle=idle,
-    alone=lambda p: f"the attitude of `{p.link}`",
+    alone=held,
     pushed_links=lambda p: ("link",),
 )

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from met.content import Content
 from met.frozen import frozen
 from met.messages.renamed import old_fields
-from met.parameter import Parameter
+from met.parameter import Limit, Parameter
 from met.trace import Real
 from met.vectors import Matrix, Vector
 
@@ -117,6 +117,7 @@ class Environment:
            nothing, with these numbers. None: several go together
     springs  the parameters that name a joint, and are the stiffness with which it is pushed back where it touches: a
            deck is warned where the dynamics' step is long for that (met/analysis/contact.py). (): there is none
+    limits  those that it has: how much of a run is spent at each is kept of every case. (): there are none
     friction_joint  the parameter that names the one joint on which it puts dry friction. "": none does
 
     What it may do to the servo of one joint, such as to let it fail:
@@ -150,6 +151,7 @@ class Environment:
     content: Callable[[Any, float], Content] | None = None
     alone: Callable[[Any], str] | None = None
     springs: tuple[str, ...] = ()
+    limits: tuple[Limit, ...] = ()
     friction_joint: str = ""
     servo_of: str = ""
     decoupling: Callable[[Any, Any], Real] | None = None

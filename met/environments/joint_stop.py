@@ -22,7 +22,7 @@ import math
 from typing import Any
 
 from met.environments.environment import Environment, Loads, World
-from met.parameter import Parameter
+from met.parameter import Limit, Parameter
 from met.trace import Real, maximum, where
 
 
@@ -71,5 +71,9 @@ ENVIRONMENT = Environment(
     loads=loads,
     springs=("joint", "stiffness"),
     idle=idle,
+    limits=(
+        Limit(parameter="lower", reached=lambda p, world: world.q(p.joint) < p.lower),
+        Limit(parameter="upper", reached=lambda p, world: world.q(p.joint) > p.upper),
+    ),
     initial_range=("lower", "upper"),
 )

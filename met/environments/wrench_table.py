@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from met.commands.points import linear, segment
+from met.commands.points import ends, linear, segment
 from met.environments.environment import Environment, Force, Loads, World
 from met.environments.window import never
 from met.parameter import ZEROS, Parameter
@@ -117,4 +117,5 @@ ENVIRONMENT = Environment(
     loads=loads,
     idle=idle,
     pushed_links=lambda p: ("link",),
+    limits=(ends(lambda p, world: world.time - p.begin),),
 )

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import reduce
 from typing import Any
 
-from met.metrics.metric import Metric
+from met.metrics.metric import Metric, OverJoints
 from met.parameter import Memory
 from met.trace import Real, maximum
 
@@ -22,7 +23,9 @@ def result(p: Any, held: Any, t: Real) -> Real:
 METRIC = Metric(
     name="max",
     doc=__doc__,
+    extreme="most",
     unit="of",
+    over_joints=OverJoints("max", lambda values: reduce(maximum, values)),
     memory=(Memory(name="most", unit="of", doc="largest so far", start=-math.inf),),
     update=update,
     result=result,

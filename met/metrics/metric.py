@@ -15,6 +15,18 @@ from met.parameter import Memory, Parameter
 from met.trace import Real
 
 
+@frozen
+class OverJoints:
+    """What a metric watches where it is asked for several joints: one number of theirs, at each sample.
+
+    word  what it is called: `max(*.servo.voltage)`
+    of    the joints' numbers, one or more -> that number
+    """
+
+    word: str
+    of: Callable[[list[Real]], Real]
+
+
 @frozen(kw_only=True)
 class Metric:
     """The declaration of a metric; one a file.
@@ -25,8 +37,13 @@ class Metric:
     times   whether it is an instant of the run, or infinite: a limit after the run's end is warned of
     target  the parameter that is the value to be reached, where there is one: a command that comes to it after the
             run's end is warned of
+    extreme  the memory that has another value where the channel comes to a new extreme, which is what the metric says;
+            "": it says no extreme
     undefined  (p, first) -> why it is no number where its channel begins with this value, in words; "": it is one.
             None: it always is
+    condition    whether it watches the margin of a condition, at least 0 where that holds. Where it is no `share` it is
+                 a margin itself: a requirement without a limit is that it is at least 0
+    over_joints  what it watches of several joints; None: it watches one channel
     update  (p, held, x, t, dt) -> new memory: x the channel at time t (s), dt s since the sample before (0 at first)
     result  (p, held, t) -> the metric, at the run's last sample, time t
     """
@@ -38,7 +55,10 @@ class Metric:
     least: float = -math.inf
     times: bool = False
     target: str = ""
+    extreme: str = ""
     undefined: Callable[[Any, float], str] | None = None
+    condition: bool = False
+    over_joints: OverJoints | None = None
     parameters: tuple[Parameter, ...] = ()
     memory: tuple[Memory, ...]
     update: Callable[[Any, Any, Real, Real, Real], Mapping[str, Real]]

@@ -32,6 +32,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
 METRIC = Metric(
     name="overshoot",
     doc=__doc__,
+    extreme="beyond",
     unit="1",
     share=True,
     least=0.0,

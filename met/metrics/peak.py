@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import reduce
 from typing import Any
 
-from met.metrics.metric import Metric
+from met.metrics.metric import Metric, OverJoints
 from met.parameter import Memory
 from met.trace import Real, absolute, maximum
 
@@ -21,8 +22,10 @@ def result(p: Any, held: Any, t: Real) -> Real:
 METRIC = Metric(
     name="peak",
     doc=__doc__,
+    extreme="most",
     unit="of",
     least=0.0,
+    over_joints=OverJoints("peak", lambda values: reduce(maximum, map(absolute, values))),
     memory=(Memory(name="most", unit="of", doc="largest size so far"),),
     update=update,
     result=result,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from met.metrics.metric import Metric
+from met.metrics.metric import Metric, OverJoints
 from met.parameter import Memory
 from met.trace import Real, sqrt
 
@@ -18,11 +18,20 @@ def result(p: Any, held: Any, t: Real) -> Real:
     return sqrt(held.squares / held.count)
 
 
+def root_mean_square(values: list[Real]) -> Real:
+    """That of the joints at one sample: so that of all samples is over joints, too."""
+    total: Real = 0.0
+    for value in values:
+        total = total + value * value
+    return sqrt(total / len(values))
+
+
 METRIC = Metric(
     name="rms",
     doc=__doc__,
     unit="of",
     least=0.0,
+    over_joints=OverJoints("rms", root_mean_square),
     memory=(
         Memory(name="squares", unit="1", doc="sum of squares"),
         Memory(name="count", unit="1", doc="samples"),

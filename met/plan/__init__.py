@@ -13,6 +13,7 @@ Parameters are named by paths, the ones a deck uses inside a run:
     <joint>.rpy.x|y|z                      rad, fixed x-y-z (R = Rz Ry Rx)
     <joint>.axis.x|y|z                     unit vector in the joint frame
     <joint>.pivot.x|y|z                    m, joint frame: a point of a revolute joint's axis; not there: the origin
+    <joint>.q_min|q_max|qd_max|tau_max     rad, rad/s, N m (m, m/s, N): limits of the joint, those that it has
     <joint>.servo.<parameter>              as the servo declares
     <joint>.servo.command.<parameter>      as the command declares
     <joint>.servo.sensor.<of>.<parameter>  as the sensor declares through which the servo's law sees a quantity
@@ -104,13 +105,15 @@ class Link:
 
 @frozen
 class Joint:
-    """Connects `parent` (a link, the base too) to `child`, along or about its axis."""
+    """Connects `parent` (a link, the base too) to `child`, along or about its axis. limits: that it has, of `q_min`,
+    `q_max`, `qd_max` and `tau_max`."""
 
     name: str
     kind: JointKind
     parent: str
     child: str
     place: Place | None = keyed("never", default=None)
+    limits: tuple[str, ...] = keyed("where set", default=())
 
 
 @frozen
@@ -256,6 +259,32 @@ class Payload:
     def flies(self) -> bool:
         """True where the payload moves freely for a time; otherwise it is a part of its link."""
         return self.grappled or self.released
+
+
+@frozen
+class SignalExpression:
+    """A number that a run computes of its channels at their samples; it is a channel of its own.
+
+    name     path of that channel: `signals.NAME`, or the expression as the deck wrote it
+    unit     of its value, SI; of a condition that of its margin, by which it holds (at least 0) or does not
+    formula  one output; inputs are channels, their paths behind `CHANNEL_INPUT`, and coordinates of the sweep
+    text     the expression as the deck wrote it
+    """
+
+    name: str
+    unit: str
+    formula: Formulas
+    text: str = keyed("never", default="")
+    place: Place | None = keyed("never", default=None)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Paths of the channels that it is computed of."""
+        return tuple(name.removeprefix(CHANNEL_INPUT) for name in self.formula.inputs if name.startswith(CHANNEL_INPUT))
+
+
+CHANNEL_INPUT = "channel:"
+"""Prefix of the inputs of a `SignalExpression` that are channels."""
 
 
 @frozen
@@ -428,6 +457,7 @@ class Structure:
     payloads: tuple[Payload, ...] = keyed("where set", default=())
     guides: tuple[GuideUse, ...] = keyed("where set", default=())
     sensors: tuple[LinkSensor, ...] = keyed("where set", default=())
+    expressions: tuple[SignalExpression, ...] = keyed("where set", default=())
     balanced: bool = run_key(BALANCED)
 
     @property

@@ -20,6 +20,7 @@ Derived, that is computed from the state only where a record or a metric asks fo
 
     <joint>.tau_load .J_eff .b      what the arm takes, tau_load = J_eff qdd + b, all other joints in their modes
     <joint>.mode                    1 in torque mode, 0 in acceleration mode
+    <joint>.limit_margin            room to the nearest of the joint's limits, a share; limits.margin: the least of all
     <joint>.reaction.moment|force   what the link takes from its parent: about its frame's origin, in its axes
     links.<link>.position, .orientation, .velocity, .rate       of the link's frame, in world axes
     links.<link>.jacobian.angular|linear.<joint>                rate and velocity for each unit of the joint's rate
@@ -28,11 +29,17 @@ Derived, that is computed from the state only where a record or a metric asks fo
     payloads.<payload>.distance     from the point `at` of its link to its frame
     payloads.<payload>.carried      1 while its link carries it, 0 while it flies
 
+Computed of other channels, at each instant of the dynamics or tick at which one of these is sampled:
+
+    signals.<name>                  an expression under a name of the deck's
+    <expression>                    what a metric watches, as the deck wrote it
+
 A vector is one channel a component: `links.tip.position.x`, `links.tip.orientation.w`.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 
@@ -80,6 +87,18 @@ OF_PAYLOAD = (
     ("distance", "m", "from its point of the link to the payload's frame", (), ""),
     ("carried", "1", "1 while the link carries it, 0 while it flies", (), ""),
 )
+JOINT_LIMITS = {"q_min": "joint", "q_max": "joint", "qd_max": "joint/s", "tau_max": "effort"}
+"""Limits that a joint may have, with their declared units."""
+
+LIMIT_MARGIN = (
+    "limit_margin",
+    "1",
+    "room to the nearest of its limits, as a share of the range, rate or torque; below 0 beyond",
+    (),
+    "",
+)
+"""As `OF_JOINT` has it: of joints with limits alone."""
+
 JACOBIAN = (
     ("jacobian.angular", "angular", "rate of the link by the joint's rate"),
     ("jacobian.linear", "linear", "velocity of the link by the joint's rate"),
@@ -87,6 +106,7 @@ JACOBIAN = (
 OF_ARM = (
     ("energy.kinetic", "J", "kinetic energy, rotors and motors included", (), ""),
     ("energy.potential", "J", "potential energy in gravity, and of gears that are wound up", (), ""),
+    ("limits.margin", "1", "the smallest `limit_margin` of all joints that have limits", (), ""),
     ("momentum.linear", "kg*m/s", "momentum", XYZ, WORLD_AXES),
     ("momentum.angular", "kg*m^2/s", "angular momentum about the origin", XYZ, WORLD_AXES),
 )
@@ -183,7 +203,7 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
     for joint in structure.moving:
         for name, unit, doc in MOTION:
             add(f"{joint.name}.{name}", joint_unit(unit, joint), doc, dynamics, joint.name, JOINT_AXIS)
-        for name, unit, doc, components, frame in OF_JOINT:
+        for name, unit, doc, components, frame in (*OF_JOINT, *([LIMIT_MARGIN] if joint.limits else [])):
             derive(f"{joint.name}.{name}", joint_unit(unit, joint), doc, components, frame, joint.name)
         use = servos.get(joint.name)
         if use is None:
@@ -217,7 +237,8 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
         add(path, unit, f"what the {on_link.model} reads", on_link.divisor, "")
         for state in sensor_parts(on_link, "states"):
             add(f"{path}.{state.name}", watched_unit(state.unit, unit), state.doc, dynamics, "")
-    mentions = (*names, *(recorded.name for recorded in structure.record), *(metric.of for metric in structure.metrics))
+    mentions = [*names, *(recorded.name for recorded in structure.record), *(use.of for use in structure.metrics)]
+    mentions += [path for expression in structure.expressions for path in expression.channels]
     mentioned = {name.split(".")[1] for name in mentions if name.startswith("links.")}
     mentioned |= {link.name for link in structure.links[:1]}
     for link in structure.links:
@@ -233,8 +254,13 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
     for payload in structure.payloads:
         for name, unit, doc, several, frame in OF_PAYLOAD:
             derive(f"payloads.{payload.name}.{name}", unit, doc, several, frame)
+    limited = any(joint.limits for joint in structure.moving)
     for name, unit, doc, components, frame in OF_ARM:
-        derive(name, unit, doc, components, frame)
+        if limited or name != "limits.margin":
+            derive(name, unit, doc, components, frame)
+    for expression in structure.expressions:
+        divisor = math.gcd(*(found[path].divisor for path in expression.channels)) or dynamics
+        add(expression.name, expression.unit, expression.text, divisor, "")
     return found
 
 
@@ -262,7 +288,7 @@ def channel_paths(name: str, joints: tuple[str, ...], components: tuple[str, ...
 
 def joint_of(name: str) -> str:
     """The joint that a variable of one thing belongs to, by its name; none where that is no joint."""
-    if name.startswith(("links.", "payloads.", "guides.", "sensors.", *(own for own, *_ in OF_ARM))):
+    if name.startswith(("links.", "payloads.", "guides.", "sensors.", "signals.", *(own for own, *_ in OF_ARM))):
         return ""
     return name.partition(".")[0]
 

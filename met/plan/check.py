@@ -397,6 +397,10 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
     for joint in structure.moving:
         axis = [f"{joint.name}.axis.{letter}" for letter in "xyz"]
         tests.append((f"{joint.name}.axis", axis, _is_axis, "its length should be 1"))
+        ends = [f"{joint.name}.q_min", f"{joint.name}.q_max"]
+        tests.append((ends[0], ends, _in_order, "it should be less than `q_max`"))
+        for path in (f"{joint.name}.qd_max", f"{joint.name}.tau_max"):
+            tests.append((path, [path], _is_some, "it should be above 0"))
     if structure.free:
         masses = [f"links.{name}.mass" for name in structure.ground]
         tests.append((f"links.{BASE}.mass", masses, _is_some, "the base moves freely and has no mass"))

@@ -8,7 +8,7 @@ from met import models
 from met.diagnostic import Place, nearest
 from met.parameter import Parameter, under
 from met.plan import COMPONENTS, Course, Experiment, Joint, Origin, Quantity, Structure
-from met.plan.channel import channels, joint_unit, watched_unit
+from met.plan.channel import JOINT_LIMITS, channels, joint_unit, watched_unit
 from met.plan.uses import quantities, sensor_parts, servo_parts
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
@@ -95,6 +95,8 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
             for axis in "xyz":
                 yield f"{joint.name}.{name}.{axis}", unit, None, None
     for joint in structure.moving:
+        for limit in joint.limits:
+            yield f"{joint.name}.{limit}", joint_unit(JOINT_LIMITS[limit], joint), None, None
         yield f"initial.{joint.name}.q", joint_unit("joint", joint), None, None
         yield f"initial.{joint.name}.qd", joint_unit("joint/s", joint), None, None
     yield from _of_base(structure)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 
 from met import models
 from met.parameter import WORLD
@@ -13,6 +14,7 @@ from met.plan import guides as guides
 from met.plan.channel import COMMAND_UNIT, DIMENSIONS, channel_paths, channels
 from met.plan.codec import Damaged
 from met.plan.uses import quantities
+from met.trace.nodes import TRUTHS
 
 NAME = re.compile(r"[^\W\d]\w*")
 """A name in a deck: it is part of paths, of messages, of files' names."""
@@ -160,6 +162,7 @@ def _check_uses(structure: Structure, where: str) -> None:
         names.append(guide.name)
     _check_link_sensors(structure, f"{where}.sensors")
     names = []
+    _check_expressions(structure, f"{where}.expressions")
     known_channels = channels(structure) if structure.metrics else {}
     for index, metric in enumerate(structure.metrics):
         check_name(metric.name, f"{where}.metrics[{index}].name", names)
@@ -168,6 +171,24 @@ def _check_uses(structure: Structure, where: str) -> None:
             raise Damaged(f"{where}.metrics[{index}].of", f"there is no channel `{metric.of}`")
     models.find("integrator", structure.integrator)
     _check_substitutions(structure, where)
+
+
+def _check_expressions(structure: Structure, where: str) -> None:
+    """Expressions are each computed of channels that are there, and have names of their own and one output."""
+    known = channels(replace(structure, expressions=())) if structure.expressions else {}
+    names: list[str] = []
+    for index, each in enumerate(structure.expressions):
+        path = f"{where}[{index}]"
+        if each.name in known or each.name in names:
+            raise Damaged(f"{path}.name", f"there is a channel `{each.name}` already")
+        names.append(each.name)
+        if not each.channels:
+            raise Damaged(f"{path}.formula", "it is computed of no channel")
+        for channel in each.channels:
+            if channel not in known:
+                raise Damaged(f"{path}.formula", f"there is no channel `{channel}`")
+        if len(each.formula.outputs) != 1 or each.formula.nodes[each.formula.outputs[0] >> 1][0] in TRUTHS:
+            raise Damaged(f"{path}.formula", "it should have one output, a number")
 
 
 def _check_sensors(use: ServoUse, path: str) -> None:

@@ -10,19 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from met.plan import Experiment
+from met.plan import CHANNEL_INPUT, Experiment
 from met.plan.channel import Channel
 from met.program import balancing, cell_names, holding, orientations, plausible
 from met.program.control import failing, guiding, link_sensors, sensing, setpoints
 from met.program.control.substituted import LIMITED
 from met.program.evaluation import gravity, law
+from met.program.limits import LimitPhases
 from met.program.motion import base, bodies, payloads
 from met.program.observe import derived
 from met.program.step import EVENTS, FAILURE, StepPhases
 from met.program.system import PARAMETER, Actuator, System
 from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.servo import Seen, Setpoint
-from met.trace import Real, both, floor, where
+from met.trace import Real, Truth, both, floor, where
 from met.trace.program import CallPhase, Control, Every, Phase, Program, RecordPhase, RunPhase, Tape, Unless0
 
 Body = Callable[[Tape], None]
@@ -56,17 +57,24 @@ class Builder:
         self.schedule = system.structure.schedule
         self.joints = tuple(joint.name for joint in system.joints)
         self.step = StepPhases(system, wire=wire, late=late)
+        self.limits = LimitPhases(system, self.step)
 
     def program(self) -> Program:
         instant = self.schedule.dynamics
         columns = [channel for recorded in self.system.structure.record for channel in recorded.channels]
         held, at_rows = derived(self.system)
-        tick: list[Control] = [Unless0((Every(instant, self.step.finish()),)), *self.step.grapple.events()]
+        tick: list[Control] = [
+            Unless0((Every(instant, (*self.limits.counting(), *self.step.finish())),)),
+            *self.step.grapple.events(),
+        ]
         tick += self.step.beds.before_servos()
         tick += self.computers()
         tick += self.step.begin()
         if held:
             tick.append(Every(instant, (CallPhase(Phase("observe", self._observe(held))),)))
+        for divisor in sorted({self.system.channels[each.name].divisor for each in self.system.structure.expressions}):
+            phase = Phase(f"expressions_{divisor}", self._expressions(divisor))
+            tick.append(Every(divisor, (RunPhase(phase),)))
         for divisor in sorted({channel.divisor for _, _, channel in self.system.metrics}):
             tick.append(Every(divisor, (RunPhase(Phase(f"metrics_{divisor}", self._metrics(divisor))),)))
         if not self.step.beds.wire:
@@ -91,15 +99,15 @@ class Builder:
                 *self.step.beds.wire_outputs,
             ),
             state_outputs=(*OUTPUTS, *self.step.beds.wire_outputs),
-            counters=(*EVENTS, LIMITED, *plausible.OUTPUTS[1:]),
+            counters=(*EVENTS, LIMITED, *plausible.OUTPUTS[1:], *self.limits.outputs),
         )
 
     @property
     def watched(self) -> tuple[str, ...]:
         """Outputs that say what became of a run without being part of its state."""
         if self.step.beds.wire:
-            return ()
-        return (*plausible.OUTPUTS, *([UNHELD] if self.system.structure.balanced else []))
+            return self.limits.outputs
+        return (*plausible.OUTPUTS, *([UNHELD] if self.system.structure.balanced else []), *self.limits.outputs)
 
     def computers(self) -> list[Control]:
         """What ticks by clocks of its own, in this order: sensors of links, guides, servos."""
@@ -170,6 +178,7 @@ class Builder:
             tape.write(cell_names.SEEN(actuator.use.joint, of), sensing.true_value(seen, of))
 
     def end(self, tape: Tape) -> None:
+        self.limits.keep_excess(tape)
         for name in (*OUTPUTS, *self.watched):
             tape.output(name, tape.read(name))
         for name, metric, _ in self.system.metrics:
@@ -299,6 +308,7 @@ class Builder:
         period = divisor / self.schedule.base_hz
 
         def body(tape: Tape) -> None:
+            is_new: dict[str, Truth] = {}
             dt = where(tape.tick == 0.0, 0.0, period)
             for name, metric, channel in self.system.metrics:
                 if channel.divisor == divisor:
@@ -306,8 +316,29 @@ class Builder:
                     owner = f"metric `{name}` (model {metric.name})"
                     new = answer(owner, metric.update, p, held, tape.read(channel.path), tape.time, dt)
                     returned(owner, "update", new, (memory.name for memory in metric.memory))
+                    if name in self.limits.extremes:
+                        is_new[name] = new[metric.extreme] != getattr(held, metric.extreme)
                     for memory, value in new.items():
                         tape.write(f"{METRIC}{name}.{memory}", value)
+            for name, new_extreme in is_new.items():  # last, so that the metrics' own code is what it is without
+                self.limits.at_extreme(tape, name, new_extreme)
+
+        return body
+
+    def _expressions(self, divisor: int) -> Body:
+        """Signals that are computed of channels, which are as they were last sampled."""
+
+        def body(tape: Tape) -> None:
+            for each in self.system.structure.expressions:
+                if self.system.channels[each.name].divisor == divisor:
+                    values = {
+                        name: tape.read(name.removeprefix(CHANNEL_INPUT))
+                        if name.startswith(CHANNEL_INPUT)
+                        else tape.input(name)
+                        for name in each.formula.inputs
+                    }
+                    (value,) = each.formula.replay(values)
+                    tape.write(each.name, value)
 
         return body
 

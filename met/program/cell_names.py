@@ -65,6 +65,11 @@ RELEASING = CellFamily("payload:{}:releasing", "1 at the instant of its release,
 # Bodies that move freely, by their prefix; their coordinates are `met.program.motion.bodies.FreeBody.coordinates`.
 BODY_ORIENTATION = CellFamily("{}:orientation.{}", "unit quaternion at the step's beginning, w x y z", "1")
 
+# Limits, by the path of the parameter that sets one, and by metric.
+AT_LIMIT = CellFamily("at_limit:{}", "steps that began at the limit", "1")
+EXCESS = CellFamily("excess:{}", "largest excess over a limit of a joint so far", "of the limit")
+EXTREME_AT = CellFamily("extreme:{}:at_limit", "number of the limit where the metric's extreme fell, 0: none", "1")
+
 # Motors on beds, by joint; the shaft's side of the gearbox but for Lambda and b_0.
 READ = CellFamily("{}:read", "filtered rate of the shaft that was read at this tick", "rad/s")
 READ_BEFORE = CellFamily("{}:before", "filtered rate that was read at the tick before", "rad/s")

@@ -7,7 +7,7 @@ program by themselves, which take the derivative anew: so no bit of another chan
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, reduce
 
 from met.dynamics.effective_inertia import effective_inertia
 from met.dynamics.energy import Energy, energy
@@ -18,21 +18,25 @@ from met.dynamics.spatial import Vector, add, choose, dot
 from met.integrators.integrator import Motion
 from met.plan.channel import XYZ, Channel
 from met.program.evaluation import Derivative
+from met.program.joint_limits import excess
 from met.program.motion import payloads
 from met.program.motion.base import BaseMotion, motions
 from met.program.system import ReadCell, System
-from met.trace import Real, sqrt
+from met.trace import Real, minimum, sqrt
 from met.vectors import Quaternion, quaternion
 
 
 def derived(system: System) -> tuple[list[Channel], list[Channel]]:
     """The derived channels that are asked for: those computed at every instant, and those at recorded rows alone.
 
-    A metric sees every instant. So does a record whose rows lie between instants, for they show the last one's value.
+    A metric and an expression see every instant. So does a record whose rows lie between instants, for they show the
+    last one's value.
     """
     structure = system.structure
     paths = [path for recorded in structure.record for path in recorded.channels]
     watched = [channel for _, _, channel in system.metrics if channel.derived]
+    parts = (system.channels[path] for expression in structure.expressions for path in expression.channels)
+    watched += [channel for channel in parts if channel.derived]
     recorded = [channel for channel in map(system.channels.__getitem__, paths) if channel.derived]
     between = structure.schedule.record % structure.schedule.dynamics != 0
     held = {channel.path: channel for channel in (watched + recorded if between else watched)}
@@ -71,6 +75,8 @@ class Observed:
         return quaternion((self.motions if kind == "links" else self.seen)[own].pose.R)
 
     def _of_joint(self, joint: str, parts: list[str]) -> Real:
+        if parts == ["limit_margin"]:
+            return self._margin(joint)
         i, solved = self.joints.index(joint), self.derivative.solved
         match parts:
             case ["tau_load"]:
@@ -109,9 +115,23 @@ class Observed:
                 return self.energy.kinetic + self.derivative.stored[0]
             case ["energy", "potential"]:
                 return self.energy.potential + self.derivative.stored[1]
+            case ["limits", "margin"]:
+                return reduce(minimum, [self._margin(each.name) for each in self.system.joints if each.limits])
             case ["momentum", kind, axis]:
                 return (self.energy.linear if kind == "linear" else self.energy.angular)[XYZ.index(axis)]
         raise KeyError(".".join(parts))
+
+    def _margin(self, joint: str) -> Real:
+        """The smallest margin of a joint to its limits, each as a share of the range, or of the limit."""
+        [limits] = [each.limits for each in self.system.joints if each.name == joint]
+        value = {name: self.system.value(f"{joint}.{name}", self.read) for name in limits}
+        shares = [
+            excess(joint, name, value[name], self.read) / (value["q_min"] - value["q_max"])
+            if name in ("q_min", "q_max")
+            else excess(joint, name, value[name], self.read) / -value[name]
+            for name in limits
+        ]
+        return reduce(minimum, shares)
 
     def _jacobian(self, link: str) -> tuple[tuple[Vector, Vector], ...]:
         if link not in self._jacobians:

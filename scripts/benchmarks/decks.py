@@ -40,7 +40,7 @@ class Variant:
     command      what each joint is told, "" for a servo that takes no command
     environment  entries besides gravity;  base: of a run;  body: mass and inertia of the base's link
     payload      keys of a payload that the run has, "" for none;  sensor: a sensor of a link, likewise
-    rate         of dynamics and servos
+    rate         of dynamics and servos;  run: further entries of the run
     """
 
     servo: str = ""
@@ -51,6 +51,7 @@ class Variant:
     payload: str = ""
     sensor: str = ""
     rate: str = "1 kHz"
+    run: str = ""
     body: str = "mass = 1000 kg; inertia = [900, 1000, 1100] kg*m^2;"
 
 
@@ -86,7 +87,7 @@ def experiment(arm: Arm, command: str, record: bool = False, variant: Variant | 
             states.append(f"{body.joint}.qd = {start} rad/s;")
             poses.append(f"initial.{body.joint}.q = linspace({-3.0 + 0.1 * i:g}, {3.0 - 0.07 * i:g}, {CASES}) rad;")
     lines += [
-        "}", "run one {", "    arm = measured;",
+        "}", "run one {", "    arm = measured;", f"    {of.run}",
         f"    servos {{ {' '.join(uses)} }}",
         f"    initial {{ {' '.join(states)} }}",
         f"    environment {{ gravity = [{', '.join(map(str, GRAVITY))}] m/s^2; {of.environment} }}",

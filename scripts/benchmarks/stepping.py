@@ -30,16 +30,27 @@ _BOUNDS = {"2R": 11.0, "7R": 125.0, "30R": 1150.0}
 FEW = 0.1  # events a step and block, in what is called a run with few
 
 
+OVER_TIME = (
+    "always(abs({0}.qd - {0}.servo.command) < 1 rad/s, after = 0.5 s)",
+    "eventually(abs({0}.q) < 1 deg, within = 1 s)",
+    "never(abs({0}.servo.voltage) > 900 V)",
+    "holds_for({0}.qd > 0 rad/s and {0}.qd < 2 rad/s, 0.2 s)",
+)
+"""Requirements of each joint, of which each watches a signal of its own."""
+
+
 @cache
-def _made(arm: Arm, command: str) -> tuple[Any, np.ndarray]:
-    """The kernel, and the inputs of all cases."""
-    experiment = decks.experiment(arm, command)
+def _made(arm: Arm, command: str, watched: bool = False) -> tuple[Any, np.ndarray]:
+    """The kernel, and the inputs of all cases. watched: with requirements over time, `OVER_TIME`."""
+    joints = [body.joint for body in arm.bodies() if body.kind != "fixed"]
+    run = " ".join(f"require {text.format(joint)};" for joint in joints for text in OVER_TIME)
+    experiment = decks.experiment(arm, command, variant=decks.Variant(run=run) if watched else None)
     inputs = np.stack([coordinate.values for coordinate in experiment.cases.coordinates], axis=1)
     return kernel.compile(build(experiment)), np.ascontiguousarray(inputs)
 
 
-def _step(arm: Arm, command: str) -> Callable[[], float]:
-    made, inputs = _made(arm, command)
+def _step(arm: Arm, command: str, watched: bool = False) -> Callable[[], float]:
+    made, inputs = _made(arm, command, watched)
     steps = STEPS[arm.name]
 
     def measure() -> float:
@@ -107,5 +118,9 @@ BENCHMARKS: tuple[Benchmark | Derived, ...] = (
         )
         for arm in ARMS
     ),
+    Benchmark("watched.7R", "step.7R with four requirements over time on each joint", "ns",
+              partial(_step, SEVEN, "steady", True)),
+    Derived("over_time.7R", "a requirement over time, of a signal of its own", "ns", ("watched.7R", "step.7R"),
+            lambda watched, bare: (watched - bare) / (len(OVER_TIME) * 7), Target(1.0)),
     Benchmark("hot.7R", "one step of one case, called from Python: the Panda", "us", partial(_hot, SEVEN)),
 )  # fmt: skip

@@ -206,9 +206,16 @@ def answering(monkeypatch: Any) -> None:
 
 
 def answer(
-    experiment: Any, cases: Any = None, *, threads: Any = None, record: bool = True, fails: frozenset[int] = frozenset()
+    experiment: Any,
+    cases: Any = None,
+    *,
+    threads: Any = None,
+    record: bool = True,
+    progress: Any = None,
+    fails: frozenset[int] = frozenset(),
 ) -> Any:
     """What `met.run.run` gives back, by closed formulas: first-order rise of the rates; cases in `fails` break off."""
+    from met.plan.limits import extremes, limits
     from met.run import Run
 
     schedule = experiment.structure.schedule
@@ -241,5 +248,10 @@ def answer(
         coordinates=values,
         events={name: np.zeros(len(rows), dtype=np.int64) for name in ("splits", "clamped", "undecided")},
         limited=np.zeros(len(rows), dtype=np.int64),
+        at_limit={
+            use.path: np.where(failed, math.nan, 0.0) for use in limits(experiment.structure, experiment.parameters)
+        },
+        excess={},
+        extreme_at={name: np.zeros(len(rows), dtype=np.int64) for name in extremes(experiment)},
         warning=[""] * len(rows),
     )

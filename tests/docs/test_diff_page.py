@@ -36,7 +36,8 @@ def test_the_mended_servo_stops_at_once(folder: Path) -> None:
     assert found.verdict == "different" and not found.changed.meaning and not found.changed.decks
     [experiment] = found.experiments
     assert experiment.cases.count == 28 and not experiment.ended
-    assert experiment.requirements == [RequirementDiff("creep < 0.001 rad/s", "creep < 0.001 rad/s", 20, 23, 3, 0)]
+    creep = "creep < 0.001 rad/s"
+    assert experiment.requirements == [RequirementDiff(creep, creep, 20, 23, 3, 0, chance=0.25)]
     before, after = (batch.open(folder / name).sel(recorded_case=27, joint="shoulder").qd for name in
                      ("before.h5", "after.h5"))  # fmt: skip
     at_rest = [float(qd.time[np.abs(qd) > 0.01][-1]) for qd in (before, after)]

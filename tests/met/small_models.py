@@ -186,6 +186,11 @@ SMALLEST: dict[tuple[str, str], Small] = {
     ("metric", "peak"): Small(of="qdd"),
     ("metric", "rms"): Small(),
     ("metric", "settling_time"): Small({"target": 0.1, "within": 0.05}, of="q"),
+    ("metric", "always"): Small({"after": 0.1, "within": 0.05}),
+    ("metric", "eventually"): Small({"after": 0.1, "within": 0.05}),
+    ("metric", "never"): Small({"after": 0.1, "within": 0.05}),
+    ("metric", "holds_for"): Small({"time": 0.02, "after": 0.1, "within": 0.05}),
+    ("metric", "share_of_time"): Small({"after": 0.1, "within": 0.05}),
     **{("integrator", name): Small() for name in models.find_own("integrator")},
     **{(kind, name): Small() for kind in ("bed", "law") for name in models.find_own(kind)},
 }  # fmt: skip
@@ -416,7 +421,9 @@ class Use:
         if self.kind == "environment":
             return {"environment": f"used = {self.name} {block};"}
         if self.kind == "metric":
-            return {"metric": f"{self.name} {{ of = {self.joint}.{self.small.of}; {block[2:-2]} }}"}
+            of = f"{self.joint}.{self.small.of}"
+            of = f"{of} < 0.5 * {of}" if models.find("metric", self.name).condition else of
+            return {"metric": f"{self.name} {{ of = {of}; {block[2:-2]} }}"}
         return {"integrator": self.name}
 
     def _guide(self, entries: Mapping[str, str]) -> dict[str, str]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -17,14 +19,24 @@ FACTORS = (2, 4)
 """Steps in the place of one: so a case that is verified takes 2 + 4 times its steps besides."""
 
 
-def verify(experiment: Experiment, rows: np.ndarray, names: dict[str, str], threads: int | None = None) -> Verified:
+def verify(
+    experiment: Experiment,
+    rows: np.ndarray,
+    names: dict[str, str],
+    threads: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Verified:
     """Run these rows of the case table at half and a quarter of the step; servos, sensors, beds and noise tick as they
     did.
 
-    names  of the metrics' variables in the archive, by the metrics' own
+    names     of the metrics' variables in the archive, by the metrics' own
+    progress  called with the number of runs done so far, of `len(FACTORS)` for each row
     """
     structure = experiment.structure
-    metrics = {factor: _metrics(refine(experiment, factor), rows, threads) for factor in FACTORS}
+    metrics = {}
+    for number, factor in enumerate(FACTORS):
+        told = progress and partial(_add, progress, number * len(rows))
+        metrics[factor] = _metrics(refine(experiment, factor), rows, threads, told)
     half, quarter = (np.stack([metrics[factor][name] for name in names], axis=1) for factor in FACTORS)
     return Verified(
         cases=experiment.cases.table[rows],
@@ -37,10 +49,16 @@ def verify(experiment: Experiment, rows: np.ndarray, names: dict[str, str], thre
     )
 
 
-def _metrics(refined: Experiment, rows: np.ndarray, threads: int | None) -> dict[str, np.ndarray]:
+def _add(progress: Callable[[int], None], before: int, done: int) -> None:
+    progress(before + done)
+
+
+def _metrics(
+    refined: Experiment, rows: np.ndarray, threads: int | None, progress: Callable[[int], None] | None
+) -> dict[str, np.ndarray]:
     """The metrics of these rows. Nothing is recorded, so that the program is as small as it can be."""
     bare = replace(refined, structure=replace(refined.structure, record=()))
-    return engine.run(bare, rows, threads=threads, record=False).metrics
+    return engine.run(bare, rows, threads=threads, record=False, progress=progress).metrics
 
 
 def _instant(experiment: Experiment, name: str) -> float:

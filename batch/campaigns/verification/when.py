@@ -18,8 +18,9 @@ WORDS: tuple[Verify, ...] = ("auto", "none", "some", "all")
 SHARE = 0.03
 """Of the campaign's steps: so much more is not asked about."""
 
-PREPARING = 25_000
-"""Steps of one case that take as long as making a program does, whatever its size; measured on the decks shipped."""
+PREPARING = 250_000
+"""Steps of a campaign's cases, side by side in vectors, that take as long as making a program whose machine code is
+kept, whatever its size: 12 to 20 ms; measured on the decks shipped."""
 
 SHORT_OPERATIONS, SHORT_PROGRAM = 40_000_000, 1_500
 """Operations of the steps that are added to a single case, about 30 ms; operations of a program, made in about 25."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -15,7 +13,6 @@ from batch.queries.requirements import GroupRequirement, group_requirements
 from batch.queries.signals import deck_unit, number_text
 from batch.queries.step_errors.figures import CaseError, Verification, figures
 from batch.queries.step_errors.words import rounded
-from ic.printing.columns import count as counted
 from met.diagnostic import Diagnostic, Label, Place
 
 if TYPE_CHECKING:
@@ -29,22 +26,6 @@ MOST_HALVINGS = 10
 """Times a step is halved to make an error small; more is no remedy."""
 
 COMPARISONS = MappingProxyType({"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge})
-
-
-def campaign_warnings(groups: Iterable[ArchiveGroup], experiments: Mapping[str, Experiment]) -> list[Diagnostic]:
-    """The warnings of all experiments of an archive, with the places in the deck; alike ones of structures once."""
-    first: dict[object, Diagnostic] = {}
-    more: dict[object, int] = {}
-    for group in groups:
-        for each in warnings(group, experiments.get(group.name)):
-            key = (each.code, each.at if each.at is not None else each.message)
-            more[key] = more.get(key, -1) + 1
-            first.setdefault(key, each)
-    said = (
-        (each, f"the same of {counted(more[key], 'other structure')}, which `met show` lists" if more[key] else "")
-        for key, each in first.items()
-    )
-    return [replace(each, help=(*each.help, note)) if note else each for each, note in said]
 
 
 def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:

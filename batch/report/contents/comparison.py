@@ -60,7 +60,7 @@ def _run_changes(found: Diff, experiment: ExperimentDiff, several: bool) -> RunC
         word=experiment.verdict,
         alone=tuple(alone),
         endings=tuple(words.endings(experiment)),
-        notes=tuple(experiment.notes),
+        notes=(*experiment.notes, *words.paired_metrics(experiment)),
         allowed=tuple(allowed),
         signals=tuple(map(words.signal_row, experiment.signals)),
         samples=tuple(map(words.distribution, experiment.samples)),
@@ -126,6 +126,8 @@ def _flows(pool: Pool, before: EarlierCases, *, named: bool) -> list[Requirement
         was = before.there & (before.pool.outcomes[before.place, column] == 1)
         now = before.there & (pool.outcomes[:, place] == 1)
         met = words.met_by_text(int(was.sum()), int(now.sum()), int(before.there.sum()))
+        if len(before.pairs) == 1:
+            met += words.pairs_text(pairs[text])
         said = words.requirement_text(pairs[text])
         gained, lost = (ranges(pool.cases[which].tolist()) for which in (now & ~was, was & ~now))
         out.append(RequirementFlow(f"{pool.name}: {said}" if named else said, met, gained, lost))

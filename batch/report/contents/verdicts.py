@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from batch.queries.at_limits import limit_summaries, reached_texts
 from batch.queries.failures import failures, ranges
 from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
 from batch.queries.signals import deck_unit
@@ -97,6 +98,10 @@ def _notes(pool: Pool) -> tuple[str, ...]:
     if limited:
         of = "" if pool.count == 1 else f" in {limited:,} of {pool.count:,} cases"
         notes.append(f"The load motor of a bed was at its limit{of}: there the run is not what the joint would do.")
+    for group in pool.groups:
+        told = reached_texts(limit_summaries(group), group.count)
+        named = f" of {group.name}" if len(pool.groups) > 1 else ""
+        notes += [f"{text[0].upper()}{text[1:]}{named}." for text in told]
     return (*notes, *_warnings(pool))
 
 

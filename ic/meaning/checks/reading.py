@@ -45,9 +45,10 @@ def remark_unread(scope: Scope, uses: Iterable[Use], structure: Structure) -> No
 
 
 def _kept(structure: Structure, servo: ServoUse, of: str) -> bool:
-    """Return True if this sensor's reading of `of` is recorded or watched by a metric."""
+    """Return True if this sensor's reading of `of` is recorded, watched by a metric or in an expression."""
     path = f"{servo.joint}.servo.sensor.{of}"
     channels = [channel for each in structure.record for channel in each.channels]
+    channels += [channel for expression in structure.expressions for channel in expression.channels]
     return any(f"{each}.".startswith(f"{path}.") for each in (*channels, *(each.of for each in structure.metrics)))
 
 

@@ -13,6 +13,7 @@ from ic.meaning.parameters.scope import Scope
 from met import models
 from met.diagnostic import Label, Place
 from met.metrics.metric import Metric
+from met.metrics.window import ROUNDING
 from met.plan import MetricUse, Requirement, Structure
 from met.trace import Scalar
 
@@ -38,6 +39,7 @@ def check_requirements(scope: Scope, requirements: Sequence[Requirement], struct
                 or _remark_begin(scope, requirement, use, metric, place)
                 or _remark_target(scope, requirement, use, metric, structure, place)
                 or _remark_times(scope, requirement, metric, duration, place)
+                or _remark_window(scope, requirement, use, metric, duration, place)
             )
     _remark_contradictions(scope, requirements)
 
@@ -91,6 +93,24 @@ def _remark_times(scope: Scope, requirement: Requirement, metric: Metric, durati
             help="let the run last longer, or write an earlier limit",
         )
     return late
+
+
+def _remark_window(
+    scope: Scope, requirement: Requirement, use: MetricUse, metric: Metric, duration: float, place: Place
+) -> bool:
+    """Return True, with a warning, for a window that begins or ends after the run's end."""
+    p = _parameters(scope, use, metric) if metric.condition else None
+    after, within = getattr(p, "after", 0.0), getattr(p, "within", math.inf)
+    if after <= duration and (within == math.inf or after + within <= duration * (1.0 + ROUNDING)):
+        return False
+    what = f"begins at {after:.9g} s" if after > duration else f"ends at {after + within:.9g} s"
+    scope.complaints.remark(
+        "D341",
+        f"`require {requirement.text}` looks beyond this run, which ends at {duration:.9g} s: its window {what}",
+        place,
+        help="let the run last longer, or the window end earlier",
+    )
+    return True
 
 
 def _remark_begin(scope: Scope, requirement: Requirement, use: MetricUse, metric: Metric, place: Place) -> bool:

@@ -109,12 +109,13 @@ def _observe(scope: Scope, sampled: Sampled, schedule: Schedule) -> None:
             sampled.content(SimpleNamespace(**fixed, **dict(zip(numbers, row, strict=True))), schedule.duration)
             for row in rows.tolist()
         ]
-        _remark(scope, sampled, found, schedule.duration, place)
+        _remark(scope, sampled, found, schedule, place)
 
     scope.checks.observe(tuple(numbers.values()), warn, place, needs=(sampled.path,))
 
 
-def _remark(scope: Scope, sampled: Sampled, found: list[Content], duration: float, place: Place) -> None:
+def _remark(scope: Scope, sampled: Sampled, found: list[Content], schedule: Schedule, place: Place) -> None:
+    duration, base = schedule.duration, schedule.base_hz
     first = min(found, key=lambda each: each.begins)
     if duration <= first.begins < math.inf:
         scope.complaints.remark(
@@ -129,20 +130,21 @@ def _remark(scope: Scope, sampled: Sampled, found: list[Content], duration: floa
     fastest = max(each.frequency for each in found)
     if 2.0 * fastest >= hz * (1.0 - ROUNDING):
         seen = abs(fastest - round(fastest / hz) * hz)
+        enough = _fitting(ENOUGH * fastest, base)
         scope.complaints.remark(
             "D335",
             f"{sampled.label} swings at {fastest:.6g} Hz, and {sampled.by} at {hz:.6g} Hz: "
             f"what is seen of it swings at {seen:.6g} Hz",
             place,
-            help=f"let it swing slower than {0.5 * hz:.6g} Hz; or give what sees it {ENOUGH * fastest:.6g} Hz, "
-            f"{ENOUGH} instants a swing",
+            help=f"let it swing slower than {0.5 * hz:.6g} Hz; or give what sees it {enough:.6g} Hz, "
+            f"{ENOUGH} instants a swing or more",
         )
     lost = [pulse for each in found for pulse in _lost(each.pulses, sampled.interval, duration)]
     if lost:
         begins, ends = min(lost, key=lambda pulse: pulse[1] - pulse[0])
         before = math.floor(begins * hz)
         times = f"{before * sampled.interval:.9g} s and {(before + 1) * sampled.interval:.9g} s"
-        rate = [f"or give what sees it {math.ceil(1.0 / (ends - begins)):.6g} Hz"] if ends > begins else []
+        rate = [f"or give what sees it {_fitting(1.0 / (ends - begins), base):.6g} Hz"] if ends > begins else []
         others = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
         scope.complaints.remark(
             "D336",
@@ -151,6 +153,13 @@ def _remark(scope: Scope, sampled: Sampled, found: list[Content], duration: floa
             place,
             help=[f"let it last longer than {sampled.interval:.6g} s", *rate],
         )
+
+
+def _fitting(wanted: float, base: float) -> float:
+    """The slowest rate from `wanted` Hz on that divides the base rate, or that the base rate divides, Hz."""
+    if wanted <= base:
+        return base / math.floor(base / wanted * (1.0 + ROUNDING))
+    return base * math.ceil(wanted / base * (1.0 - ROUNDING))
 
 
 def _lost(pulses: Iterable[tuple[float, float]], interval: float, duration: float) -> Iterator[tuple[float, float]]:

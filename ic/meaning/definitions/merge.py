@@ -1,7 +1,7 @@
 """Blocks merged: what a base has with what is written upon it, each entry with its history.
 
 An entry with a kind (`metric settle = ...`, `link upper { ... }`) adds; one without overrides what the base has under
-that name. `+=` appends, `remove` takes away.
+that name. `+=` appends, `remove` takes away. Of two requirements of one name the later one stands.
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ from ic.grammar.syntax import Call, Entry, Expression, Group, Let, Name, Setting
 from ic.text.complaints import Complaints, known_words
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error, meant
 from met.frozen import frozen
+
+REQUIREMENT = "requirement"
+"""What messages call the one statement that may have a name."""
 
 
 @frozen
@@ -121,7 +124,7 @@ class _Merger:
             if entry.words[0].text == "remove":
                 self._remove(entry)
             else:
-                self.statements.append(entry)
+                self._state(entry)
             return
         if isinstance(entry, Setting):
             words, name = entry.words, ".".join(word.text for word in entry.path)
@@ -163,6 +166,28 @@ class _Merger:
         self.written[key] = entry.place
         self.names.setdefault(name, []).append(key) if earlier is None else None
         self.items[key] = self._made(entry, kind, name, detail, earlier)
+
+    def _state(self, entry: Statement) -> None:
+        """Take a statement in, one with a name in the place of the base's of that name."""
+        if entry.name is not None:
+            name = entry.name.text
+            key = f"{REQUIREMENT} {name}"
+            if key in self.written:
+                raise Problem(defined_twice(REQUIREMENT, name, entry.place, self.written[key]))
+            self.written[key] = entry.place
+            earlier = self._stated(name)
+            if earlier is not None:
+                self._drop(earlier)
+        self.statements.append(entry)
+
+    def _stated(self, name: str) -> Statement | None:
+        """The statement of a name."""
+        return next((each for each in self.statements if each.name is not None and each.name.text == name), None)
+
+    def _drop(self, statement: Statement) -> None:
+        at = next(at for at, each in enumerate(self.statements) if each is statement)
+        del self.statements[at]
+        self.removed = [replace(each, before=each.before - (at < each.before)) for each in self.removed]
 
     def _made(
         self, entry: Setting | Group, kind: str, name: str, detail: tuple[Word, ...], earlier: Item | None
@@ -243,10 +268,19 @@ class _Merger:
                 error("D057", "`remove` takes a name, and nothing else", entry.place, help=f"write `remove {meant};`")
             )
         name = entry.value.text
-        earlier = self._earlier("", name, entry.value.place)
+        earlier, stated = self._earlier("", name, entry.value.place), self._stated(name)
+        if earlier is not None and stated is not None:
+            message = f"`{name}` may be the {earlier.kind or 'entry'} `{name}` or the {REQUIREMENT} `{name}`"
+            also = [Label(earlier.place, earlier.kind or "entry"), Label(stated.place, REQUIREMENT)]
+            helps = "give them different names in the base"
+            raise Problem(error("D055", message, entry.value.place, also=also, help=helps))
+        if stated is not None:
+            self._drop(stated)
+            self.written.pop(f"{REQUIREMENT} {name}", None)
+            return
         if earlier is None:
             if not self.upon_name:
-                raise Problem(_nothing(entry, self.items))
+                raise Problem(_nothing(entry, [*self.items.values(), *filter(_name_of, self.statements)]))
             self.pending.append(entry)
             return
         del self.items[earlier.key]
@@ -263,9 +297,16 @@ def _meant(entry: Statement) -> Name:
     return entry.value
 
 
-def _nothing(entry: Statement, items: Mapping[str, Item]) -> Diagnostic:
+def _name_of(each: Item | Statement) -> str:
+    """The name of an entry; "" of a statement that has none."""
+    if isinstance(each, Item):
+        return each.name
+    return each.name.text if each.name is not None else ""
+
+
+def _nothing(entry: Statement, there: Iterable[Item | Statement]) -> Diagnostic:
     """Says of a `remove` that there is nothing of its name."""
-    name, known = _meant(entry), [item.name for item in items.values()]
+    name, known = _meant(entry), [_name_of(each) for each in there]
     return error(
         "D058",
         f"nothing named `{name.text}` to remove",
@@ -284,7 +325,7 @@ def overlay(base: MergedBlock, over: MergedBlock, complaints: Complaints) -> Mer
             del items[named.key]
             removed.append(Removed(named.key, len(base.statements), entry.place))
         elif not any(each.key == _meant(entry).text for each in over.removed):
-            complaints.add(_nothing(entry, items))
+            complaints.add(_nothing(entry, items.values()))
     for item in over.items.values():
         earlier = items.get(item.key) if item.kind else _of_name(items, item.name)
         if earlier is None:
@@ -330,7 +371,7 @@ def with_meant_names(block: MergedBlock, keys: Iterable[str], kinds: Iterable[st
 def refuse_pending(block: MergedBlock, complaints: Complaints) -> None:
     """Report each `remove` of a block upon a name that turned out to have no entries of its own, such as a model's."""
     for entry in block.pending:
-        complaints.add(_nothing(entry, block.items))
+        complaints.add(_nothing(entry, block.items.values()))
 
 
 def open_call(value: Expression, home: str | None, complaints: Complaints) -> tuple[Expression, MergedBlock | None]:

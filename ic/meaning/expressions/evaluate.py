@@ -36,14 +36,39 @@ from ic.meaning.expressions.ranges import range_of, spaced
 from ic.text.complaints import known_words
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
-from met.trace import Scalar, cos, maximum, minimum, sin, sqrt
+from met.trace import (
+    Real,
+    Scalar,
+    absolute,
+    acos,
+    asin,
+    atan,
+    atan2,
+    cos,
+    exp,
+    log,
+    maximum,
+    minimum,
+    sin,
+    sqrt,
+    tan,
+    tanh,
+)
 from met.units import PURE, Dimension
 
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 BIGGEST_EXPONENT = 16
 
-FUNCTIONS = ("sqrt", "sin", "cos", "min", "max", "linspace", "logspace")
+RESERVED = ("sqrt", "sin", "cos", "min", "max", "linspace", "logspace")
+"""Functions whose names may not name a `let`; those of the others may, in decks that are older than they are."""
+
+FUNCTIONS = (*RESERVED, "abs", "tan", "asin", "acos", "atan", "atan2", "exp", "log", "tanh")
+
 CONSTANTS = {"pi": math.pi}
+
+_OF_ANGLE = {"sin": sin, "cos": cos, "tan": tan}
+_TO_ANGLE = {"asin": asin, "acos": acos, "atan": atan}
+_OF_NUMBER = {"exp": exp, "log": log, "tanh": tanh}
 
 
 Lookup = Callable[[Name], Value | ValueList]
@@ -340,11 +365,33 @@ def _call(call: Call, lookup: Lookup) -> Value | ValueList:
             bare = result.bare and other.bare
             result = Value(as_float(number), first.dimension, call.place, bare, first.unit, hertz=first.hertz)
         return replace(result, place=call.place)
-    if first.dimension not in (PURE, Dimension(rad=1)):
-        raise Problem(
-            error("D061", f"`{name}` of {in_words(first)}", first.place, help="an angle is needed, as 30 deg")
-        )
-    return Value(as_float(sin(first.number) if name == "sin" else cos(first.number)), PURE, call.place)
+    if name == "abs":
+        return replace(first, number=as_float(absolute(first.number)), place=call.place, decimal="")
+    if name == "atan2":
+        other = arguments[1]
+        if not units.same(first.dimension, other.dimension):
+            message = f"`atan2` of {in_words(first)} and {in_words(other)}"
+            raise Problem(error("D063", message, other.place, help="both must be of one dimension"))
+        return Value(as_float(atan2(first.number, other.number)), Dimension(rad=1), call.place)
+    if name in _OF_ANGLE:
+        if first.dimension not in (PURE, Dimension(rad=1)):
+            raise Problem(
+                error("D061", f"`{name}` of {in_words(first)}", first.place, help="an angle is needed, as 30 deg")
+            )
+        return Value(_number_of(call, _OF_ANGLE[name](first.number)), PURE, call.place)
+    if first.dimension != PURE:
+        helps = "a pure number is needed: divide by a quantity of the same unit"
+        raise Problem(error("D061", f"`{name}` of {in_words(first)}", first.place, help=helps))
+    if name in _TO_ANGLE:
+        return Value(_number_of(call, _TO_ANGLE[name](first.number)), Dimension(rad=1), call.place)
+    return Value(_number_of(call, _OF_NUMBER[name](first.number)), PURE, call.place)
+
+
+def _number_of(call: Call, number: Real) -> Real:
+    """A function's result. Raises D066 where its argument has none, D067 where it is too large."""
+    if not isinstance(number, Scalar) and math.isnan(number):
+        raise Problem(error("D066", f"`{call.name.text}` of this number is none", place_of(call.positional[0])))
+    return representable(as_float(number), call.place)
 
 
 USAGE = {
@@ -355,6 +402,15 @@ USAGE = {
     "max": ("a", "b"),
     "linspace": ("from", "to", "count"),
     "logspace": ("from", "to", "count"),
+    "abs": ("x",),
+    "tan": ("x",),
+    "asin": ("x",),
+    "acos": ("x",),
+    "atan": ("x",),
+    "atan2": ("y", "x"),
+    "exp": ("x",),
+    "log": ("x",),
+    "tanh": ("x",),
 }
 
 

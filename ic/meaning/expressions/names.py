@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 
 from ic.grammar.syntax import Expression, Name
 from ic.meaning.definitions.resolve import Definitions
-from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, evaluate
+from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, RESERVED, evaluate
 from ic.meaning.expressions.quantity import Value, ValueList
 from ic.text.complaints import MOST_DIAGNOSTICS, known_words
 from ic.text.lexer import COMMAND_LINE
@@ -174,7 +174,7 @@ class Names:
                             help="give the value another name",
                         )
                     )
-                if text in CONSTANTS or text in FUNCTIONS:
+                if text in CONSTANTS or text in RESERVED:
                     raise Problem(
                         error(
                             "D079",

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from ic.grammar.syntax import Call, Expression, Name, Unary
 from ic.language import HEADS
-from ic.language.bodies import ARM, AT, AXIS, JOINT, JOINT_KINDS, LINK, RPY
+from ic.language.bodies import ARM, AT, AXIS, JOINT, JOINT_KINDS, JOINT_LIMITS, LINK, Q_MIN, RPY
 from ic.meaning.definitions.merge import Item, MergedBlock, with_meant_names
 from ic.meaning.definitions.resolve import Definition
 from ic.meaning.mechanics.bodies import check_moved
@@ -18,7 +18,7 @@ from ic.meaning.mechanics.matter import use_matter
 from ic.meaning.parameters.addresses import in_arm
 from ic.meaning.parameters.models import check_keys, value_place, word_of
 from ic.meaning.parameters.owner import Owner
-from ic.meaning.parameters.relations import no_direction
+from ic.meaning.parameters.relations import check_relations, no_direction
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words, where_it_belongs
 from met.diagnostic import Label, Place, did_you_mean, meant
@@ -27,8 +27,8 @@ from met.plan import BASE, Joint, Link
 from met.trace import Scalar, sqrt
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-NO_STOPS = "a joint has no stops in this version; a metric with `require` tells where it goes beyond"
-NOT_OF_A_JOINT = dict.fromkeys(("limit", "limits", "range", "stops"), NO_STOPS)
+LIMITS = "limits of a joint are `q_min`, `q_max`, `qd_max` and `tau_max`; what stops it is a `joint_stop` of a run"
+NOT_OF_A_JOINT = dict.fromkeys(("limit", "limits", "range", "stops"), LIMITS)
 
 
 @frozen
@@ -182,9 +182,34 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str,
         use_dh(scope, owner, kind, body.items["dh"], body)
     else:
         _frame(scope, owner, kind, body)
+    limits = _limits(scope, replace(owner, joint=kind), body)  # type: ignore[arg-type]  # a kind of joint by now
     if parent is None or child is None:
         return None
-    return Joint(item.name, kind, parent, child, item.place)  # type: ignore[arg-type]
+    return Joint(item.name, kind, parent, child, item.place, limits)  # type: ignore[arg-type]
+
+
+def _limits(scope: Scope, owner: Owner, body: MergedBlock) -> tuple[str, ...]:
+    """The names of the joint's limits that are written, with their numbers entered."""
+    written = {wanted: item for wanted in JOINT_LIMITS if (item := body.get(wanted.name)) is not None}
+    if owner.joint == "fixed":
+        for wanted, item in written.items():
+            message = f"a fixed joint has no `{wanted.name}`"
+            scope.complaints.error("D346", message, item.place, help=f"leave `{wanted.name}` out: it does not move")
+        return ()
+    values = {wanted.name: scope.number(owner, wanted, item) for wanted, item in written.items()}
+    ends = [name for name in ("q_min", "q_max") if name in values]
+    if len(ends) == 1:
+        other = "q_max" if ends == ["q_min"] else "q_min"
+        message = f"{owner.label} has `{ends[0]}` and no `{other}`"
+        scope.complaints.error(
+            "D346",
+            message,
+            body.items[ends[0]].place,
+            help=f"write `{other}` too: a range has two ends",
+        )
+    elif ends and None not in values.values():
+        check_relations(scope, owner, (Q_MIN,), body, values)
+    return tuple(values)
 
 
 def _frame(scope: Scope, owner: Owner, kind: str, body: MergedBlock) -> None:

@@ -1,28 +1,26 @@
-"""The outputs of a run: recorded channels, and metrics."""
+"""The channels that a run records; what is said of a name that is none."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 
 from ic.grammar.places import place_of
-from ic.grammar.syntax import Expression, List, Name
-from ic.meaning.definitions.merge import Item, MergedBlock
-from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
+from ic.grammar.syntax import Binary, Call, Expression, List, Name, Unary, WithUnit
+from ic.meaning.definitions.merge import Item
 from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import Label, Place, did_you_mean, nearest
-from met.plan import MetricUse, Recorded, Structure
-from met.plan.channel import FAMILIES, Channel, carries, channels, recordable
+from met.plan import Recorded, Structure
+from met.plan.channel import FAMILIES, carries, recordable
+
+COMPUTED = (Binary, Call, Unary, WithUnit)
+"""Expressions that a signal could be."""
 
 OF_SERVO = frozenset({"servo", "bed", "law"})
 """Heads of channels that a joint has only with a servo, or with its motor on a bed."""
-
-
-# Record
 
 
 def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Structure) -> tuple[Recorded, ...]:
@@ -44,13 +42,13 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
         made = known.get(name.text)
         if made is None and scope.failed_servos and not OF_SERVO.isdisjoint(word.text for word in name.path):
             continue
-        if made is None and _of_lost(scope, name, structure):
+        if made is None and of_lost(scope, name, structure):
             continue
         if made is None and scope.failed_parts and (name.path[0].text in scope.failed_parts or not structure.moving):
             continue
         if made is None:
             scope.complaints.error(
-                "D125", f"no channel `{name.text}`", name.place, help=_nearest(name, known, structure)
+                "D125", f"no channel `{name.text}`", name.place, help=nearest_channels(name, known, structure)
             )
         for each in made or ():
             if each.name in found:
@@ -66,7 +64,7 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
     return tuple(recorded for recorded, _ in found.values())
 
 
-def _of_lost(scope: Scope, name: Name, structure: Structure) -> bool:
+def of_lost(scope: Scope, name: Name, structure: Structure) -> bool:
     """Return True if this is a channel of a guide or a link's sensor that failed (already reported)."""
     words = [word.text for word in name.path]
     lost = {
@@ -95,11 +93,14 @@ def _names(scope: Scope, item: Item, expression: Expression | None) -> Iterator[
                 "D124",
                 "a record is a list of channels; this is none",
                 place_of(each),
-                help="write `record = [q, qd, tau];`",
+                help=[
+                    "write `record = [q, qd, tau];`",
+                    *(["give it a name: `signal NAME = ...;`, and record `signals.NAME`"] * isinstance(each, COMPUTED)),
+                ],
             )
 
 
-def _nearest(name: Name, known: dict[str, tuple[Recorded, ...]], structure: Structure) -> list[str]:
+def nearest_channels(name: Name, known: dict[str, tuple[Recorded, ...]], structure: Structure) -> list[str]:
     """Why there is none; or what was meant, and what there is: of the same joint or link, else of all; vectors and
     families as a whole."""
     why = _why_none([word.text for word in name.path], structure)
@@ -162,76 +163,11 @@ def _under_a_word(words: list[str], structure: Structure) -> str:
     return ""
 
 
-# Metrics
-
-
-def resolve_metrics(scope: Scope, block: MergedBlock, structure: Structure) -> tuple[MetricUse, ...]:
-    watched = [item.body.get("of") for item in block.of_kind("metric") if item.body is not None]
-    known = channels(structure, [of.value.text for of in watched if of is not None and isinstance(of.value, Name)])
-    found = (_metric(scope, item, structure, known) for item in block.of_kind("metric"))
-    return tuple(use for use in found if use is not None)
-
-
-def _metric(scope: Scope, item: Item, structure: Structure, known: dict[str, Channel]) -> MetricUse | None:
-    if item.detail:
-        scope.complaints.error(
-            "D129",
-            f"`{item.detail[0].text}` after the name of a metric",
-            item.detail[0].place,
-            help=f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`",
-        )
-    if item.value is None:
-        scope.complaints.error(
-            "D129",
-            f"metric `{item.name}` has no model",
-            item.place,
-            help=[
-                f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`",
-                known_words("metric models", sorted(models.available("metric"))),
-            ],
-        )
-        return None
-    metric = find_model(scope, "metric", word_of(item.value), place_of(item.value))
-    if metric is None or refuse_values(scope, item.value, ["of", *(p.name for p in metric.parameters)]):
-        return None
-    body = item.body or MergedBlock()
-    owner = Owner(f"metric `{item.name}`", item.place, f"metrics.{item.name}")
-    of = body.get("of")
-    channel = None
-    if of is None:
-        check_keys(scope, body, ["of", *(p.name for p in metric.parameters)], owner)
-        scope.complaints.missing(
-            item.place,
-            ("of",),
-            "D125",
-            f"metric `{item.name}` watches no channel",
-            help="write `of = CHANNEL;`, such as `of = shoulder.qd;`",
-        )
-    elif not isinstance(of.value, Name) or of.value.text not in known:
-        name = of.value if isinstance(of.value, Name) else None
-        if name is not None and (
-            name.path[0].text in scope.failed_servos | scope.failed_parts or _of_lost(scope, name, structure)
-        ):
-            return None
-        message, helps = "a channel is needed here", ["write `of = CHANNEL;`, such as `of = shoulder.qd;`"]
-        if name is not None:
-            message, helps = _not_one(name, structure)
-        scope.complaints.error("D125", message, place_of(of.value) if of.value is not None else of.place, help=helps)
-    else:
-        channel = known[of.value.text]
-    if channel is None:
-        return None
-    scope.keep_setting(f"metrics.{item.name}.model", metric.name, item=item)
-    scope.keep_setting(f"metrics.{item.name}.of", channel.path, item=of)
-    use_model(scope, replace(owner, of=channel.unit), metric.parameters, body, ("of",))
-    return MetricUse(item.name, metric.name, channel.path, item.place)
-
-
-def _not_one(name: Name, structure: Structure) -> tuple[str, list[str]]:
+def not_one(name: Name, structure: Structure) -> tuple[str, list[str]]:
     """The message and remedies for a name that is no single channel: which ones it stands for, or what was meant."""
     known = recordable(structure, [name.text])
     if name.text not in known:
-        return f"no channel `{name.text}`", _nearest(name, known, structure)
+        return f"no channel `{name.text}`", nearest_channels(name, known, structure)
     numbers = [f"`{path}`" for variable in known[name.text] for path in variable.channels]
     count = f"{len(numbers)} channel{'s' * (len(numbers) != 1)}"
     return f"`{name.text}` is {count}", [known_words("a metric watches one of them", numbers)]

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Literal
 
 from ic.grammar.places import place_of
 from ic.grammar.spell import spell
-from ic.grammar.syntax import Binary, Call, Expression, Name, OverCases, Statement
+from ic.grammar.syntax import Binary, Call, Expression, Name, OverCases, Statement, children
 from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.parameters.models import word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.expressions import is_over_time
 from ic.meaning.runs.step_errors import FLIPPED, is_step_error
 from ic.text.complaints import known_words
 from met import models
@@ -32,6 +36,7 @@ PERCENTILE = "percentile"
 class WrittenRequirement:
     """A `require` with its metric on the left.
 
+    limit       as written; None where a margin is to be at least 0
     share       of all cases, as written; None where every case is to meet it
     percentile  True where the share is that of a percentile: below which so many of the values lie
     confidence  as written; None where none is
@@ -40,20 +45,39 @@ class WrittenRequirement:
     statement: Statement
     metric: str
     operator: Literal["<", "<=", ">", ">="]
-    limit: Expression
+    limit: Expression | None
     share: Expression | None = None
     percentile: bool = False
     confidence: Expression | None = None
 
 
-def read_requirements(scope: Scope, block: MergedBlock) -> list[WrittenRequirement]:
-    """Every `require` that compares a metric of the run with a limit; reports the others."""
+def read_requirements(
+    scope: Scope, block: MergedBlock, required: Mapping[int, Expression] = MappingProxyType({})
+) -> list[WrittenRequirement]:
+    """Every `require` that compares a metric of the run with a limit; reports the others.
+
+    required  what statements require, by position, where a metric stands for a call (`metrics_over_time`)
+    """
     written = {item.name for item in block.of_kind("metric")}
     found = []
     for position, statement in enumerate(block.statements):
         if [word.text for word in statement.words] != ["require"]:
             continue
-        comparison, share, confidence = _over_cases(statement.value)
+        comparison, share, confidence = _over_cases(required.get(position, statement.value))
+        if position in required and isinstance(comparison, Name):
+            model = models.find("metric", word_of(block.items[f"metric {comparison.text}"].value) or "")
+            if model.share:
+                scope.complaints.error(
+                    "D355",
+                    f"`{model.name}` is a share, and there is no limit for it",
+                    place_of(statement.value),
+                    help=f"write `require {spell(_over_cases(statement.value)[0])} > 95 %;`",
+                )
+            else:
+                found.append(WrittenRequirement(statement, comparison.text, ">=", None, share, False, confidence))
+            continue
+        if any(map(is_over_time, (comparison, *children(comparison)))):
+            continue  # it is reported
         if not isinstance(comparison, Binary) or comparison.operator not in FLIPPED:
             scope.complaints.error(
                 "D131",
@@ -157,7 +181,7 @@ def resolve_requirements(scope: Scope, read: list[WrittenRequirement], structure
             continue  # the metric failed (already reported)
         owner = Owner("", each.statement.place, "require", called=f"the limit on `{each.metric}`")
         wanted = Parameter(name="limit", unit=metrics[each.metric], doc="limit", share=each.metric in shares)
-        number = _constant(scope, owner, wanted, each.limit)
+        number = 0.0 if each.limit is None else _constant(scope, owner, wanted, each.limit)
         share = confidence = None
         if each.share is not None:
             share = _constant(
@@ -182,6 +206,7 @@ def resolve_requirements(scope: Scope, read: list[WrittenRequirement], structure
             continue
         if number is not None:
             text = spell(each.statement.value)
+            text = f"{each.statement.name.text}: {text}" if each.statement.name is not None else text
             found.append(Requirement(text, each.metric, each.operator, number, each.statement.place, share, confidence))
     return tuple(found)
 

@@ -36,10 +36,13 @@ from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import ALLOW
 from ic.meaning.runs.base import check_base, initial_base, resolve_base
 from ic.meaning.runs.environment import resolve_environment
+from ic.meaning.runs.expressions import resolve_signals
 from ic.meaning.runs.initial import check_balanced, resolve_initial
 from ic.meaning.runs.keys import resolve_run_keys
+from ic.meaning.runs.metrics import resolve_metrics
+from ic.meaning.runs.over_time import metrics_over_time
 from ic.meaning.runs.rates import resolve_rates, resolve_schedule
-from ic.meaning.runs.record import resolve_metrics, resolve_record
+from ic.meaning.runs.record import resolve_record
 from ic.meaning.runs.requirements import read_requirements, resolve_requirements
 from ic.meaning.runs.step_errors import resolve_step_errors
 from ic.meaning.runs.tolerances import resolve_tolerances
@@ -77,7 +80,8 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     run = Owner(f"run `{definition.name}`", definition.place, "")
     _check_entries(scope, block, definition)
     block = with_meant_names(block, RUN.keys, RUN.named)
-    comparisons = read_requirements(scope, block)
+    block, required = metrics_over_time(scope, block)
+    comparisons = read_requirements(scope, block, required)
     arm = _arm(scope, run, block.get("arm"))
     integrator = _integrator(scope, block.get("integrator"))
     seed = _seed(scope, run, block.get("seed"))
@@ -159,9 +163,11 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     if known:
         check_spins(scope, block, structure)
     check_guides(scope, guides, structure)
-    metrics = resolve_metrics(scope, block, structure)
+    signals = resolve_signals(scope, block, structure)
+    structure = replace(structure, expressions=tuple(signals.expressions))
     record = resolve_record(scope, run, block.get("record"), structure)
-    structure = replace(structure, metrics=metrics, record=record)
+    metrics, watched = resolve_metrics(scope, block, signals)
+    structure = replace(structure, metrics=metrics, record=record, expressions=(*structure.expressions, *watched))
     remark_unread(scope, uses, structure)
     check_sampling(scope, structure)
     check_together(scope, uses, structure)

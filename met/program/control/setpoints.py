@@ -21,14 +21,19 @@ def setpoint(system: System, actuator: Actuator, read: ReadCell, time: Real) -> 
         return _of_guide(system, actuator.use.joint, actuator.command_kind, guide, read, time)
     if actuator.profile is None:
         return Setpoint("none", 0.0, 0.0)
-    p = parameters(
+    value, slope = answer(actuator.owner, actuator.profile.course, course_values(system, actuator, read), time)
+    return Setpoint(actuator.command_kind, value, slope)
+
+
+def course_values(system: System, actuator: Actuator, read: ReadCell) -> NamedValues:
+    """The parameters of the course of a servo's own command."""
+    assert actuator.profile is not None
+    return parameters(
         f"command `{actuator.profile.name}` of {actuator.owner}",
         f"{actuator.path}.command",
         actuator.profile.parameters,
         lambda path: system.value(path, read),
     )
-    value, slope = answer(actuator.owner, actuator.profile.course, p, time)
-    return Setpoint(actuator.command_kind, value, slope)
 
 
 def owner(use: GuideUse) -> str:

@@ -62,6 +62,11 @@ def test_every_variable_has_a_long_name_and_every_number_its_unit(here: Path, en
         assert units == {
             "gearbox.kp": "V*s/rad",
             "links.lower.mass": "kg",
+            **{
+                f"at_limit.{joint}.servo.{name}": "1"
+                for joint in ("shoulder", "elbow")
+                for name in ("v_max", "tau_max")
+            },
             "settle": "s",
             "volts": "V",
             "time": "s",
@@ -117,6 +122,10 @@ def test_a_varied_parameter_whose_repeated_name_is_taken_gets_another(here: Path
         ("sag > low", "rad", None),
         ("sag > 2 * low", "rad", None),
         ("sag > 1 deg * 1 m / 1 mm", "rad", None),
+        ("calm: always(abs(lag) < 2 deg/s, after = 1 s)", "rad/s", ("deg/s", math.pi / 180)),
+        ("always(3 V < x and x < (1 + 1) kV) > 0.1 V", "V", ("V", 1.0)),
+        ("holds_for(x < 2 deg/s, 0.2 s)", "s", None),
+        ("share_of_time(x < 2 deg/s) > 95 %", "1", ("%", 0.01)),
     ],
 )
 def test_the_unit_a_requirement_is_written_in(text: str, unit: str, written: tuple[str, float] | None) -> None:

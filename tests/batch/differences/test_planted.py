@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from batch.differences.campaigns import diff
 from batch.differences.result import Diff, SignalDiff
+from batch.differences.text import diff_lines
 from batch.differences.tolerance import tolerances
 from met.plan import Experiment, Origin, Quantity
 from met.run import Run
@@ -205,3 +206,23 @@ def test_the_same_answer_for_programs(monkeypatch: pytest.MonkeyPatch, tmp_path:
     assert (said["schema"], said["version"], said["verdict"]) == ("met.diff", 2, "different")
     [different] = [each for each in said["experiments"][0]["signals"] if each["verdict"] == "different"]
     assert (different["name"], different["different"], different["largest"]) == ("q", 1, pytest.approx(1.0))
+
+
+def test_pairs_of_cases_say_which_version_is_better(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Twelve cases of forty whose metric rises, two in which it falls: both tests are exact, corrected by Holm."""
+
+    def plant(run: Run, place: dict[int, int]) -> None:
+        for case in range(14):
+            if case in place:
+                run.metrics["volts"][place[case]] += 1.0 if case < 12 else -1.0
+
+    a, b = two(monkeypatch, tmp_path, list(range(40)), plant, cases=40)
+    found = diff(a, b)
+    [experiment] = found.experiments
+    volts = next(each for each in experiment.signals if each.name == "volts")
+    tests = len(experiment.requirements) + sum(each.metric for each in experiment.signals)
+    # at most two of fourteen signs are the rarer ones, on either side: 2 (1 + 14 + 91) / 2^14
+    assert (volts.higher, volts.lower) == (12, 2)
+    assert volts.chance == pytest.approx(tests * 212 / 2**14, rel=1e-12)
+    shown = "shown" if volts.chance < 0.05 else "not shown"
+    assert f"    volts rose in 12 of 40, fell in 2: {shown} (p = {volts.chance:.2g})" in diff_lines(found)

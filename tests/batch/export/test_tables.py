@@ -222,6 +222,9 @@ def test_says_how_many_rows_of_one_case() -> None:
 # A row a case
 
 
+AT_LIMITS = [f"at_limit.{joint}.servo.{name}" for joint in ("shoulder", "elbow") for name in ("v_max", "tau_max")]
+
+
 def test_a_case_id_that_reads_as_a_number_stays_a_word() -> None:
     field = TableColumn("case_id", "", "", "str", "case_id")
     ids = ["0751325775669632", "93556390810e0238", "948a9b4a612000ce", "12e45e6789012345"]
@@ -235,7 +238,7 @@ def test_of_a_sweep_a_row_is_a_case_with_what_is_varied_and_its_metrics(here: Pa
     done = export("a.h5", "a.csv")
     comments, heads, rows = table(done.path)
     assert (done.cases, done.rows, done.table) == (5, 5, "metrics")
-    assert comments == ["# MET 0.1.0: gains of two_link.ic", "# units: 1,,V*s/rad,kg,,s,V,,"]
+    assert comments == ["# MET 0.1.0: gains of two_link.ic", "# units: 1,,V*s/rad,kg,,s,V,1,1,1,1,,"]
     assert heads == [
         "case",
         "case_id",
@@ -244,6 +247,7 @@ def test_of_a_sweep_a_row_is_a_case_with_what_is_varied_and_its_metrics(here: Pa
         "status",
         "settle",
         "volts",
+        *AT_LIMITS,
         "require settle < 10 s",
         "require volts < 5 V",
     ]
@@ -253,7 +257,7 @@ def test_of_a_sweep_a_row_is_a_case_with_what_is_varied_and_its_metrics(here: Pa
             np.testing.assert_array_equal([float(row[column]) for row in rows], group.values(name))
         assert [row[1] for row in rows] == [str(each) for each in group.values("case_id")]
         met = [{1: "met", 0: "missed", -1: ""}[int(each)] for each in group.values("met")[:, 0]]
-    assert [row[7] for row in rows] == met
+    assert [row[7 + len(AT_LIMITS)] for row in rows] == met
     _, _, some = table(export("a.h5", "b.csv", cases=["#3", "#1"], table="metrics").path)
     assert some == [rows[3], rows[1]]
 
@@ -263,7 +267,8 @@ def test_of_a_run_a_row_is_an_instant_unless_metrics_are_asked_for(here: Path) -
     batch.run(plans.plan(), output="a.h5")
     assert export("a.h5", "a.csv").table == "histories"
     _, heads, rows = table(export("a.h5", "b.csv", table="metrics").path)
-    assert heads == ["case", "case_id", "status", "settle", "volts", "require settle < 10 s"] and len(rows) == 1
+    heads_of_metrics = ["settle", "volts", *AT_LIMITS, "require settle < 10 s"]
+    assert heads == ["case", "case_id", "status", *heads_of_metrics] and len(rows) == 1
 
 
 def test_a_case_that_failed_says_why(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:

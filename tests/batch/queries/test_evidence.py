@@ -69,6 +69,10 @@ def test_each_design_point_has_its_verdict_from_its_own_cases(tmp_path: Path) ->
     ("require late < 0.1 s in 95 % of cases with 90 % confidence;", 45, 1, "refuted  0 of 45 cases meet it: at most"),
     ("require late < 5 s in 95 % of cases;", 3, 0, "met  3 of 3 cases meet it"),
     ("require late < 0.1 s in 95 % of cases;", 3, 1, "missed  0 of 3 cases meet it"),
+    ("require calm: always(abs(*.qd - *.servo.command) < 1 deg/s, after = 4 s) in 95 % of cases with 90 % confidence;",
+     45, 0, "demonstrated  45 of 45 cases meet it: at least 95.01 % of all do; in 95 % of all it is at least 0.9"),
+    ("require always(abs(*.qd - *.servo.command) < 1 deg/s) in 95 % of cases with 90 % confidence;", 45, 1,
+     "refuted  0 of 45 cases meet it: at most"),
 ])  # fmt: skip
 def test_verdicts_decide_the_exit_code_and_are_shown(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], required: str, cases: int, code: int, said: str

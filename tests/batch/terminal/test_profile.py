@@ -110,6 +110,7 @@ brief: # joints, # case, modified_euler, steps of #
   dynamics  #  #  #  # %
   metrics  #  #  #  #  # %
   recorder  #  #  #  #  # %
+  limits  #  #  #  #  # %
   watch  #  #  #  #  # %
   all parts, each alone  #  #  #  # %
   the whole run  #  # %

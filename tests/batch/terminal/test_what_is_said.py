@@ -30,7 +30,7 @@ class TestWhatIsSaid:
         assert without_times(said) == (
             "nominal: 1 case, 2 s in 50 steps of 40 ms, modified_euler\n"
             "  histories: q, qd, tau, shoulder.servo.voltage; 51 rows, 2.8 KiB a case\n"
-            "writing two_link.h5, about 58.3 KiB\n"
+            "writing two_link.h5, about 64.2 KiB\n"
             "\n"
             "the case reached its end, TIME of computing\n"
             "  settle      5 ± 0.01 s  settling_time of shoulder.qd\n"

@@ -242,7 +242,8 @@ def test_it_is_done_by_itself_where_it_is_cheap() -> None:
 
     assert said(10, 2000) == "none"  # 6 cases of 10 would be 36 more
     assert said(1_300, 2000) == "none"  # and two programs
-    assert said(10_000, 2000) == "some"
+    assert said(10_000, 2000) == "none"
+    assert said(40_000, 2000) == "some"
     assert said(1_300, 2_000_000) == "some"
     nominal = engine.prepare(plans.nominal(ticks=2000))
     assert when.resolve("auto", nominal, 1) == "some"

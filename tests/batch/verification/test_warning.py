@@ -13,8 +13,9 @@ import pytest
 import batch
 import ic
 from batch.archive.read import ArchiveFile
-from batch.queries.step_errors.warning import campaign_warnings, warnings
+from batch.queries.step_errors.warning import warnings
 from batch.queries.summary import as_json, summarise
+from batch.queries.warnings import campaign_warnings
 from batch.terminal.running import run_and_tell
 from batch.terminal.show import show
 from met.diagnostic import Diagnostic

@@ -286,10 +286,9 @@ warning[D210]: not all that `two.urdf` says is in this arm
 2 | arm two from urdf("two.urdf") { }
   |                   ^^^^^^^^^^
  ::: two.urdf:4:5  the inertia of `m`: it is `base`, the ground
- ::: two.urdf:13:5  limits of 1 joint (base_joint): an arm has none
  ::: two.urdf:14:5  damping and friction of 1 joint (base_joint): a servo has these, such as `passive`
  ::: two.urdf:5:5  not read: 2 `visual`, 1 `collision`, 1 `material`, 1 `transmission`
-  = help: `met import` makes a deck of such a file, with limits and friction beside each joint
+  = help: `met import` makes a deck of such a file, with friction beside each joint
 
 warning[D211]: 2 names of `two.urdf` are another in decks
  --> deck.ic:2:19

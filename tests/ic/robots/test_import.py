@@ -54,13 +54,19 @@ arm pick_up {
     link hand { mass = 0.01 kg;  inertia = [1e-05, 2e-05, 2.5e-05] kg*m^2; }
     link tool_1 { mass = 0 kg; }  // `tool 1` in the file
 
-    joint shoulder revolute {  // from 0.5 to 2 rad; at most 3 rad/s; at most 50 N*m; damping 0.5; friction 0.2
+    joint shoulder revolute {  // damping 0.5; friction 0.2
         parent = base;  child = upper;
         at     = [0, 0, 0.3] m;
         rpy    = [0, -0.1, 0] rad;
         axis   = -y;
+        q_min  = 0.5 rad;  q_max = 2 rad;  qd_max = 3 rad/s;  tau_max = 50 N*m;
     }
-    joint roll revolute { parent = upper;  child = hand;  at = [0.5, 0, 0] m;  axis = x; }  // continuous; at most 5 N*m
+    joint roll revolute {  // continuous
+        parent  = upper;  child = hand;
+        at      = [0.5, 0, 0] m;
+        axis    = x;
+        tau_max = 5 N*m;
+    }
     // follows `roll` in the file (multiplier 0.1); here it is held at 0
     joint finger fixed { parent = hand;  child = tool_1; }
 }
@@ -261,3 +267,23 @@ def test_servos_of_the_deck_never_bear_a_joints_name() -> None:
 def test_a_robot_without_a_joint_that_moves_makes_an_arm_and_no_run() -> None:
     Path("two.urdf").write_text(TWO.replace("revolute", "fixed"), encoding="utf-8")
     assert import_robot("two.urdf").endswith("joint hinge fixed { parent = base;  child = bar; }\n}\n")
+
+
+def test_the_files_limits_are_the_joints_and_a_run_that_passes_one_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["import", "arm.urdf", "-o", "arm.ic", "--mimic", "fixed"]) == 0
+    [plan] = [ic.compile("arm.ic", select=["fall"])]
+    known = plan.experiments[0].parameters
+    limits = {path: (known[path].value, known[path].unit) for path in known if path.split(".")[-1] in LIMITS}
+    assert limits == {
+        "shoulder.q_min": (0.5, "rad"),
+        "shoulder.q_max": (2.0, "rad"),
+        "shoulder.qd_max": (3.0, "rad/s"),
+        "shoulder.tau_max": (50.0, "N*m"),
+        "roll.tau_max": (5.0, "N*m"),  # of a continuous joint, whose velocity of 0 says nothing
+    }
+    fell = run.run(plan.experiments[0])
+    lowest = fell.signals["q"][0, :, 0].min()
+    assert fell.excess["shoulder.q_min"][0] == pytest.approx(0.5 - lowest, abs=1e-4) and lowest < 0.4
+
+
+LIMITS = ("q_min", "q_max", "qd_max", "tau_max")

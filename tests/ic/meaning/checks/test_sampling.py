@@ -32,7 +32,7 @@ what is seen of it swings at 0 Hz
   |
 9 |     command = rate(sine(amplitude = 1 rad/s, frequency = 100 Hz));
   |                                                          ^^^^^^
-  = help: let it swing slower than 50 Hz; or give what sees it 1000 Hz, 10 instants a swing
+  = help: let it swing slower than 50 Hz; or give what sees it 1000 Hz, 10 instants a swing or more
 """
     )
 

@@ -75,11 +75,20 @@ warning[D338]: `gravity` and `pull` both give gravity: what they do adds up
     orbit = "around = gravity_gradient { radius = 7000 km; frame = inertial; };"
     assert codes(tmp_path, ARM, SERVO, inside(f"gravity = [0, 0, -9.81] m/s^2; {orbit}")) == ["D338"]
     assert codes(tmp_path, ARM, SERVO, inside(f"gravity = [0, 0, 0] m/s^2; {orbit}")) == []
-    held = "one = attitude_hold {{ link = {}; damping = [1, 1, 1] N*m*s/rad; }}; two = attitude_hold {{ damping = [1, 1, 1] N*m*s/rad; }};"
+    held = (
+        "one = attitude_hold {{ link = {}; stiffness = [1, 1, 1] N*m/rad; }}; "
+        "two = attitude_hold {{ stiffness = [1, 1, 1] N*m/rad; }};"
+    )
     free = changed(inside(held.format("base")), ("arm = swing;", "arm = swing; base = free;"))
     heavy = changed(ARM, ("arm swing {", "arm swing {\n    link base { mass = 9 kg; inertia = [1, 1, 1] kg*m^2; }"))
     assert codes(tmp_path, heavy, SERVO, free) == ["D338"]
     assert codes(tmp_path, heavy, SERVO, free.replace("link = base", "link = bar")) == []
+    damped = free.replace("; stiffness = [1, 1, 1] N*m/rad; }; two", "; damping = [1, 1, 1] N*m*s/rad; }; two")
+    assert damped != free and codes(tmp_path, heavy, SERVO, damped) == []
+    by_axis = free.replace("[1, 1, 1] N*m/rad", "[1, 0, 0] N*m/rad", 1).replace(
+        "[1, 1, 1] N*m/rad", "[0, 1, 1] N*m/rad"
+    )
+    assert codes(tmp_path, heavy, SERVO, by_axis) == []
 
 
 def test_a_grapple_from_afar(tmp_path: Path) -> None:

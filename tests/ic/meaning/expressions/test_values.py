@@ -125,7 +125,7 @@ def test_a_name_with_a_dimension_inside_brackets_with_a_unit_is_refused(tmp_path
         ("(-2)^0.5", "D068"),
         ("sqrt(2 m)", "D068"),
         ("2^(1 s)", "D068"),
-        ("tan(1)", "D069"),
+        ("tangent(1)", "D069"),
         ("sqrt(1, 2)", "D070"),
         ("sin(x = 1)", "D070"),
         ("sin(2 m)", "D061"),

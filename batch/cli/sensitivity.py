@@ -1,0 +1,57 @@
+"""`met sensitivity`: a face of batch.queries.sensitivity."""
+
+from __future__ import annotations
+
+import click
+
+from met.cli import YES, format_option
+from met.messages.visible import line, say
+
+
+@click.command(short_help="Say which varied parameters explain a metric, a failure, or a change.")
+@click.argument("archive", metavar="ARCHIVE")
+@click.argument("metrics", nargs=-1, metavar="[METRIC]...")
+@click.option("--run", "experiments", multiple=True, metavar="NAME", help="Only this run or sweep of the archive.")
+@click.option("--against", metavar="BEFORE.h5", help="Explain the change of each metric since this archive.")
+@format_option
+def sensitivity(
+    archive: str, metrics: tuple[str, ...], experiments: tuple[str, ...], against: str | None, form: str
+) -> int:
+    """Rank what is varied by the share of each METRIC's variance that it explains: all metrics by default, and
+    `failure` where some cases fail.
+
+    Alone: the first-order index. With others: the total index, as far as two inputs act together. Both with intervals
+    of 95 %. No special design is asked for; any cases do whose parameters vary independently.
+    """
+    import json
+    from contextlib import ExitStack
+
+    from batch.archive.read import ArchiveFile
+    from batch.differences.matching import match_cases, match_experiments
+    from batch.queries.groups import groups_named
+    from batch.queries.sensitivity import sensitivities
+    from batch.terminal.sensitivity import as_data, sensitivity_lines
+    from met.diagnostic import Problem, error
+
+    data, texts = [], []
+    with ExitStack() as files:
+        file = files.enter_context(ArchiveFile(archive))
+        groups = groups_named(file, experiments)
+        pairs = {}
+        if against is not None:
+            both, _, _ = match_experiments(files.enter_context(ArchiveFile(against)), file)
+            pairs = {
+                here.name: (there, *(matched := match_cases(there, here), matched.a, matched.b)[1:])
+                for there, here in both
+            }
+        for group in groups:
+            if against is not None and group.name not in pairs:
+                helps = "name one that both have: `--run NAME`"
+                raise Problem(error("E361", f"no cases of `{group.name}` are in {against}", help=helps))
+            found = sensitivities(group, metrics, pairs.get(group.name))
+            data.append({"experiment": group.name, "outputs": [as_data(each) for each in found]})
+            texts.append("\n\n".join("\n".join(map(line, sensitivity_lines(each))) for each in found))
+            if len(groups) > 1:
+                texts[-1] = f"{line(group.name)}\n\n{texts[-1]}"
+    say(json.dumps(data, indent=1) if form == "json" else "\n\n".join(texts))
+    return YES

@@ -1,0 +1,34 @@
+"""Whether two versions that ran the same cases differ by more than chance: McNemar's test of each requirement, and the
+sign test of each metric.
+
+Each case is a pair, which is far sharper than two shares with an interval each. The probabilities of all requirements
+and metrics of an experiment are corrected for their number by Holm's method.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from batch.differences.result import ExperimentDiff
+from met.statistics.significance import holm, sign_test
+
+LEVEL = 0.05
+"""Probability of calling any difference of an experiment shown that is due to chance."""
+
+
+def judge_pairs(found: ExperimentDiff) -> None:
+    """Give requirements and metrics of an experiment the probability that chance makes them differ so one-sidedly.
+
+    One case is no sample, and requirements of which each version has another limit are not compared.
+    """
+    if found.cases.count < 2:
+        return
+    alike = [i for i, each in enumerate(found.requirements) if not each.other]
+    metrics = [each for each in found.signals if each.metric and not each.why]
+    pairs = [(found.requirements[i].gained, found.requirements[i].lost) for i in alike]
+    pairs += [(each.higher, each.lower) for each in metrics]
+    chances = holm([sign_test(*pair) for pair in pairs])
+    for i, chance in zip(alike, chances, strict=False):
+        found.requirements[i] = replace(found.requirements[i], chance=chance)
+    for each, chance in zip(metrics, chances[len(alike) :], strict=True):
+        each.chance = chance

@@ -1,0 +1,40 @@
+"""What an archive warns of once its cases are run: errors by the step, and limits of machines and joints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from batch.queries import at_limits
+from batch.queries.step_errors import warning as step_errors
+from ic.printing.columns import count as counted
+from met.diagnostic import Diagnostic
+
+if TYPE_CHECKING:
+    from batch.archive.read import ArchiveGroup
+    from met.plan import Experiment
+
+
+def campaign_warnings(groups: Iterable[ArchiveGroup], experiments: Mapping[str, Experiment]) -> list[Diagnostic]:
+    """The warnings of all experiments of an archive, with the places in the deck; alike ones of structures once."""
+    first: dict[object, Diagnostic] = {}
+    more: dict[object, int] = {}
+    for group in groups:
+        for each in warnings(group, experiments.get(group.name)):
+            key = (each.code, each.at if each.at is not None else each.message)
+            more[key] = more.get(key, -1) + 1
+            first.setdefault(key, each)
+    said = (
+        (each, f"the same of {counted(more[key], 'other structure')}, which `met show` lists" if more[key] else "")
+        for key, each in first.items()
+    )
+    return [replace(each, help=(*each.help, note)) if note else each for each, note in said]
+
+
+def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
+    """The warnings of one experiment of an archive, but for what its run allows.
+
+    experiment  of the plan, for places
+    """
+    return [*step_errors.warnings(group, experiment), *at_limits.warnings(group, experiment)]

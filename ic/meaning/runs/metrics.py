@@ -1,0 +1,103 @@
+"""The metrics of a run: their models, what they watch, their parameters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ic.grammar.places import place_of
+from ic.grammar.syntax import Expression, Name
+from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
+from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.expressions import Signals
+from ic.meaning.runs.record import not_one, of_lost
+from ic.text.complaints import known_words
+from met import models
+from met.metrics.metric import Metric
+from met.plan import MetricUse, SignalExpression
+from met.plan.channel import Channel
+
+
+def resolve_metrics(
+    scope: Scope, block: MergedBlock, signals: Signals
+) -> tuple[tuple[MetricUse, ...], tuple[SignalExpression, ...]]:
+    """The metrics, and the expressions that they watch, which are no channels of the run so far."""
+    made: dict[str, SignalExpression] = {}
+    found = (_metric(scope, item, signals, made) for item in block.of_kind("metric"))
+    return tuple(use for use in found if use is not None), tuple(made.values())
+
+
+def _metric(scope: Scope, item: Item, signals: Signals, made: dict[str, SignalExpression]) -> MetricUse | None:
+    if item.detail:
+        scope.complaints.error(
+            "D129",
+            f"`{item.detail[0].text}` after the name of a metric",
+            item.detail[0].place,
+            help=f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`",
+        )
+    if item.value is None:
+        scope.complaints.error(
+            "D129",
+            f"metric `{item.name}` has no model",
+            item.place,
+            help=[
+                f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`",
+                known_words("metric models", sorted(models.available("metric"))),
+            ],
+        )
+        return None
+    metric = find_model(scope, "metric", word_of(item.value), place_of(item.value))
+    if metric is None or refuse_values(scope, item.value, ["of", *(p.name for p in metric.parameters)]):
+        return None
+    body = item.body or MergedBlock()
+    owner = Owner(f"metric `{item.name}`", item.place, f"metrics.{item.name}")
+    of = body.get("of")
+    channel = None
+    if of is None:
+        check_keys(scope, body, ["of", *(p.name for p in metric.parameters)], owner)
+        scope.complaints.missing(
+            item.place,
+            ("of",),
+            "D125",
+            f"metric `{item.name}` watches no {'condition' if metric.condition else 'channel'}",
+            help=_write(metric),
+        )
+    elif of.value is None or of.body is not None:
+        scope.complaints.error("D125", "a channel is needed here", of.place, help=_write(metric))
+    else:
+        channel = _watched(scope, of.value, metric, signals, made)
+    if channel is None or of is None:
+        return None
+    scope.keep_setting(f"metrics.{item.name}.model", metric.name, item=item)
+    scope.keep_setting(f"metrics.{item.name}.of", channel.path, item=of)
+    use_model(scope, replace(owner, of=channel.unit), metric.parameters, body, ("of",))
+    return MetricUse(item.name, metric.name, channel.path, item.place)
+
+
+def _write(metric: Metric) -> str:
+    if metric.condition:
+        return "write `of = CONDITION;`, such as `of = abs(shoulder.qd) < 2 deg/s;`"
+    return "write `of = CHANNEL;`, such as `of = shoulder.qd;`"
+
+
+def _watched(
+    scope: Scope, of: Expression, metric: Metric, signals: Signals, made: dict[str, SignalExpression]
+) -> Channel | None:
+    """The channel that a metric watches, or that of an expression; None where there is none (reported)."""
+    if isinstance(of, Name) and not metric.condition and of.path[0].text != "*":
+        if of.text in signals.known:
+            return signals.known[of.text]
+        if of.text in signals.lost or of.path[0].text in scope.failed_servos | scope.failed_parts:
+            return None
+        if not of_lost(scope, of, signals.structure):
+            message, helps = not_one(of, signals.structure)
+            scope.complaints.error("D125", message, of.place, help=helps)
+        return None
+    expression = None
+    with scope.complaints.gather():
+        expression = signals.condition(of, metric) if metric.condition else signals.number(of, metric)
+    if expression is None:
+        return None
+    made[expression.name] = expression
+    return Channel(expression.name, expression.unit, expression.text, 1)

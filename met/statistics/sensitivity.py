@@ -1,0 +1,263 @@
+"""Which inputs explain the variance of an output, from cases that are there: first-order and total indices.
+
+No design is asked for, only cases whose inputs vary independently of each other: a product of lists, a random sample, a
+Latin hypercube. An input is cut into cells of about equally many cases.
+
+- A first-order index is the share of the variance that lies between the means of an input's cells, once an additive
+  model has taken out the others: the correlation ratio (K. Pearson, 1905), less what so many cells take up by chance
+  (T. L. Kelley, PNAS 21 (1935) 554-559).
+- The index of a pair is the same of cells in two inputs, of what the inputs leave unexplained alone. It is extrapolated
+  from cells of two widths.
+- A total index is an input's own with those of its pairs (I. M. Sobol, 1993; A. Saltelli et al., Global Sensitivity
+  Analysis: The Primer, 2008). What three inputs and more do together is in no index; with noise and chance it is the
+  rest.
+- Intervals are by the jackknife, leaving out each of `GROUPS` parts of the cases in turn. Those of totals hold what was
+  extrapolated besides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from met.frozen import frozen
+
+GROUPS = 20
+"""Parts of the cases that are left out in turn."""
+
+QUANTILE = 2.093
+"""Of Student's distribution with GROUPS - 1 degrees of freedom: 95 % lie within, two-sided."""
+
+FEWEST = 64
+"""Cases below which nothing can be said."""
+
+MOST_INPUTS = 40
+"""Inputs up to which pairs are looked at: their number grows with the square."""
+
+CELLS, PAIR_CELLS = 64, 32
+"""Cells of an input, alone and in a pair, at most."""
+
+PAIR_CASES = 1 << 18
+"""Cases in which pairs are looked at, evenly chosen from all where there are more."""
+
+SWEEPS = 3
+"""Times that what each input explains alone is fitted to what the others leave."""
+
+
+@frozen
+class InputShare:
+    """The share of an output's variance that one input explains.
+
+    first, total          alone, and with its pairs; total is None where there are too many inputs for pairs
+    first_by, total_by    half the width of a 95 % interval
+    rank                  Spearman's correlation of input and output, -1 to 1
+    low, high             the mean output in the input's lowest and its highest cell
+    """
+
+    first: float
+    first_by: float
+    total: float | None
+    total_by: float
+    rank: float
+    low: float
+    high: float
+
+
+@frozen
+class Shares:
+    """The inputs' shares of an output's variance, in the inputs' order; None where the output does not vary.
+
+    rest  the share that no input and no pair explains: more than two together, noise, chance; None without pairs
+    """
+
+    inputs: tuple[InputShare, ...]
+    rest: float | None
+
+
+def cells(values: np.ndarray, most: int) -> np.ndarray:
+    """The cell of each value, rising from 0: one a value where there are at most so many, else of equal frequency."""
+    known = np.unique(values)
+    if len(known) > most:
+        known = np.unique(np.quantile(values, np.arange(1, most) / most))
+        return np.searchsorted(known, values, side="right").astype(np.uint8)
+    return np.searchsorted(known, values).astype(np.uint8)
+
+
+def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
+    """The shares of the output's variance that independent inputs explain.
+
+    inputs  of each case, [case] each;  output: of each case, finite. Raises ValueError with fewer than FEWEST cases
+    """
+    cases = len(output)
+    if cases < FEWEST:
+        raise ValueError(f"{cases} cases are fewer than {FEWEST}")
+    mean = float(output.mean())
+    deviation = float(np.abs(output - mean).max())
+    if not deviation > 0.0:
+        return None
+    y = (output - mean) / deviation
+    part = (np.random.default_rng(0).permutation(cases) % GROUPS).astype(np.uint8)
+    whole = _Variance(y, part)
+    alone = [cells(values, max(4, min(CELLS, cases // 16))) for values in inputs]
+    means = [_means(cell, y) for cell in alone]
+    effects, left = _additive(alone, y)
+    first = []
+    for cell, effect in zip(alone, effects, strict=True):
+        own = _Variance(left + effect[cell], part)
+        first.append(own.between(*own.sums(cell, _count(cell))) / whole.spread)
+    total: list[np.ndarray] | None = None
+    cut = np.zeros(len(inputs))
+    rest = None
+    if len(inputs) <= MOST_INPUTS:
+        some = slice(None, None, -(-cases // PAIR_CASES))
+        left = left[some]
+        size = max(3, min(PAIR_CELLS, int((len(left) / 25) ** 0.5)))
+        coarse = [cells(values[some], size).astype(np.int64) for values in inputs]
+        pairs, spread = _Variance(left, part[some]), _Variance(y[some], part[some]).spread
+        counts = [_count(cell) for cell in coarse]
+        is_cut = [
+            count == size and len(np.unique(each[some])) > size for count, each in zip(counts, inputs, strict=True)
+        ]
+        total = [each.copy() for each in first]
+        explained = np.sum(first, axis=0)
+        for i, j in combinations(range(len(inputs)), 2):
+            sums = pairs.sums(coarse[i] * counts[j] + coarse[j], counts[i] * counts[j])
+            fine, wide = (
+                pairs.between(*each, fitted=a + b - 2) / spread
+                for each, a, b in (
+                    (sums, counts[i], counts[j]),
+                    _halved(sums, counts[i], counts[j], is_cut[i], is_cut[j]),
+                )
+            )
+            # what cells hide falls with the square of their width
+            together = fine + (fine - wide) / 3.0
+            for each in (i, j):
+                total[each] += together
+                cut[each] += abs(fine[0] - wide[0]) / 3.0
+            explained = explained + together
+        rest = float(np.clip(1.0 - explained[0], 0.0, 1.0))
+    ranks = _ranks(output)
+    found = []
+    for number, values in enumerate(inputs):
+        of_total = None if total is None else total[number]
+        found.append(
+            InputShare(
+                first=_share(first[number]),
+                first_by=_width(first[number]),
+                total=None if of_total is None else max(_share(of_total), _share(first[number])),
+                total_by=0.0 if of_total is None else _width(of_total) + cut[number],
+                rank=_correlation(_ranks(values), ranks),
+                low=mean + deviation * float(means[number][0]),
+                high=mean + deviation * float(means[number][-1]),
+            )
+        )
+    return Shares(tuple(found), rest)
+
+
+def dependent(inputs: Sequence[np.ndarray]) -> list[tuple[int, int, float]]:
+    """Pairs of inputs that do not vary independently of each other, with the correlation of their ranks: beyond what
+    chance makes of one in 15,000 pairs, and a twentieth besides."""
+    ranks = [_ranks(values[:: max(1, len(values) // 20_000)]) for values in inputs]
+    found = []
+    for i, j in combinations(range(len(inputs)), 2):
+        size = _correlation(ranks[i], ranks[j])
+        if abs(size) > 0.05 + 4.0 / np.sqrt(max(1, len(ranks[i]) - 1)):
+            found.append((i, j, size))
+    return found
+
+
+def _additive(alone: Sequence[np.ndarray], y: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+    """The effect of each input's cells, and what no input explains alone: an additive model, fitted by turns
+    (backfitting), so that chance dependence of the inputs is in no input twice."""
+    left, effects = y.copy(), [np.zeros(_count(cell)) for cell in alone]
+    for _ in range(SWEEPS):
+        for cell, effect in zip(alone, effects, strict=True):
+            more = _means(cell, left)
+            effect += more
+            left -= more[cell]
+    return effects, left
+
+
+class _Variance:
+    """Sums of squares of all cases, and of the cases less each part: [1 + GROUPS], all cases first.
+
+    spread  about the mean
+    """
+
+    def __init__(self, y: np.ndarray, part: np.ndarray) -> None:
+        self._y, self._part = y, part.astype(np.int64)
+        count, total, squares = (_sums(self._part, GROUPS, weights) for weights in (None, y, y * y))
+        self._cases = _less_each(count[None, :])[0]
+        self._mean = _less_each(total[None, :])[0] / self._cases
+        self.spread = _less_each(squares[None, :])[0] - self._cases * self._mean**2
+
+    def sums(self, cell: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """The number of cases in so many cells, and the sum of their values: [cell, 1 + GROUPS] each."""
+        key, shape = cell * np.int64(GROUPS) + self._part, (count, GROUPS)
+        n = _less_each(_sums(key, count * GROUPS).reshape(shape))
+        return n, _less_each(_sums(key, count * GROUPS, self._y).reshape(shape))
+
+    def between(self, n: np.ndarray, sums: np.ndarray, fitted: int = 0) -> np.ndarray:
+        """The sum of squares between the means of cells, less what as many cells explain by chance.
+
+        fitted  degrees of freedom of the cells that were taken out before
+        """
+        between = np.divide(sums * sums, n, out=np.zeros_like(sums), where=n > 0).sum(axis=0)
+        between -= self._cases * self._mean**2
+        freedom = (n > 0).sum(axis=0) - 1.0
+        within = (self.spread - between) / np.maximum(1.0, self._cases - freedom - 1.0)
+        return np.asarray(between - np.maximum(0.0, freedom - fitted) * within)
+
+
+def _halved(
+    sums: tuple[np.ndarray, np.ndarray], a: int, b: int, cut_a: bool, cut_b: bool
+) -> tuple[tuple[np.ndarray, np.ndarray], int, int]:
+    """Sums of a by b cells in cells twice as wide, along the inputs that were cut, and how many these are."""
+    at_a, at_b = np.arange(0, a, 2 if cut_a else 1), np.arange(0, b, 2 if cut_b else 1)
+    n, found = (np.add.reduceat(np.add.reduceat(each.reshape(a, b, -1), at_a, axis=0), at_b, axis=1) for each in sums)
+    cells = len(at_a) * len(at_b)
+    return (n.reshape(cells, -1), found.reshape(cells, -1)), len(at_a), len(at_b)
+
+
+def _sums(key: np.ndarray, count: int, weights: np.ndarray | None = None) -> np.ndarray:
+    return np.bincount(key, weights, minlength=count).astype(float)
+
+
+def _less_each(sums: np.ndarray) -> np.ndarray:
+    """Sums of all parts, and of all but each: [cell, 1 + GROUPS] from [cell, GROUPS]."""
+    whole = sums.sum(axis=1, keepdims=True)
+    return np.concatenate([whole, whole - sums], axis=1)
+
+
+def _count(cell: np.ndarray) -> int:
+    return int(cell.max(initial=0)) + 1
+
+
+def _means(cell: np.ndarray, y: np.ndarray) -> np.ndarray:
+    count = np.bincount(cell)
+    return np.asarray(np.bincount(cell, y) / np.maximum(1, count))
+
+
+def _share(found: np.ndarray) -> float:
+    return float(np.clip(found[0], 0.0, 1.0))
+
+
+def _width(found: np.ndarray) -> float:
+    """Half the width of the jackknife's 95 % interval."""
+    each = found[1:]
+    return float(QUANTILE * np.sqrt((GROUPS - 1) / GROUPS * ((each - each.mean()) ** 2).sum()))
+
+
+def _ranks(values: np.ndarray) -> np.ndarray:
+    """Ranks, equal values with their mean rank."""
+    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
+    last = np.cumsum(count)
+    return np.asarray((last - (count - 1) / 2.0)[place.ravel()])
+
+
+def _correlation(a: np.ndarray, b: np.ndarray) -> float:
+    a, b = a - a.mean(), b - b.mean()
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / size if size else 0.0
