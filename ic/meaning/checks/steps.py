@@ -7,9 +7,11 @@ that it has at the start. What servos and sensors declare of themselves (D104, D
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ic.meaning.checks.step_words import at_the_start, fault_warning, loop_warning, motion_words
 from ic.meaning.parameters.scope import Scope
@@ -89,9 +91,11 @@ def _where(experiment: Experiment, fault: Fault, found: StepSize) -> str:
 
 
 def _note(experiment: Experiment, found: StepSize) -> Iterator[str]:
-    """The fastest mode of the first case, what a step makes of it, and the line of the servo of its joint."""
+    """The fastest mode of the first case, what a step makes of it, and the line of the servo of its joint; which cases
+    were looked at."""
+    looked = _looked_at(experiment, found.cases)
     if found.mode is None:
-        yield f"{NOTE}nothing changes by more than 1 % in a step"
+        yield f"{NOTE}nothing changes by more than 1 % in a step{looked}"
         return
     h, mode = experiment.structure.schedule.step, found.mode
     truth = math.exp(h * mode.root.real)
@@ -99,5 +103,16 @@ def _note(experiment: Experiment, found: StepSize) -> Iterator[str]:
     where = next((f" ({each.file}:{each.line})" for each in map(shown_place, filter(None, lines))), "")
     yield (
         f"{NOTE}{found.owner} {motion_words(mode.root)}: h * lambda = {h * abs(mode.root):.3g}, and a step makes "
-        f"{abs(mode.factor):.3g} of it, in truth {truth:.3g}{where}"
+        f"{abs(mode.factor):.3g} of it, in truth {truth:.3g}{where}{looked}"
     )
+
+
+def _looked_at(experiment: Experiment, rows: Sequence[int]) -> str:
+    """Which cases were looked at, in words; "" where these are all."""
+    cases = experiment.cases
+    if len(rows) >= cases.count:
+        return ""
+    ends = [np.ptp(each.values[list(rows)]) == np.ptp(each.values) for each in cases.coordinates]
+    of = "all that varies" if all(ends) else f"{sum(ends)} of the {len(ends)} that vary"
+    those = f", with the least and the largest of {of}" if any(ends) else ""
+    return f"; looked at {len(rows)} of {cases.count:,} cases{those}: the others are left to the run"
