@@ -120,7 +120,8 @@ def margins(
     known: dict[tuple[Any, ...], _Known] = {}
     found = []
     for done, case in enumerate(range(experiment.cases.count) if cases is None else cases, start=1):
-        found.append(tuple(_margins(plain, case, known)))
+        with np.errstate(all="ignore"):  # a bed with no inertia has no finite loop
+            found.append(tuple(_margins(plain, case, known)))
         if progress is not None:
             progress(done)
     return tuple(found)
