@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +14,7 @@ from met.backends.backend import Kernel
 from met.causes import causes_of, doubt_of
 from met.frozen import frozen
 from met.judging import judge
+from met.passing import Memories, run_past
 from met.plan import REPEAT, Experiment, keys
 from met.plan.limits import extremes, limits
 from met.program import cell_names, plausible
@@ -84,7 +84,6 @@ class Prepared:
     lanes: int | None = None
     wire: bool = False
     late: int = 0
-    _cells: dict[str, object] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
     def program(self) -> Program:
@@ -186,18 +185,39 @@ def compute(
     threads: int | None = None,
     record: bool = True,
     progress: Callable[[int], None] | None = None,
+    memories: Memories | None = None,
 ) -> tuple[np.ndarray | None, np.ndarray]:
     """The kernel's answer for these rows, as `results` takes it: histories [case, row, column], where they are kept
-    and there are any, and outputs [case, output], in the order of the program's."""
-    history, outputs = prepared.kernel.run(
-        inputs(prepared.experiment, rows),
-        prepared.experiment.structure.schedule.ticks,
-        record=record and prepared.program.columns > 0,
-        threads=threads,
-        progress=progress,
-    )
+    and there are any, and outputs [case, output], in the order of the program's.
+
+    memories  gets the memory of those of these cases that it wants
+    """
+    given, ticks = inputs(prepared.experiment, rows), prepared.experiment.structure.schedule.ticks
+    record = record and prepared.program.columns > 0
+    watched = np.zeros(len(rows), bool) if memories is None else np.isin(rows, list(memories.cases))
+    if memories is None or not watched.any():
+        history, outputs = prepared.kernel.run(given, ticks, record=record, threads=threads, progress=progress)
+    else:
+        history, outputs, found = run_past(
+            prepared.kernel, given[watched], ticks, memories.ticks, record=record, threads=threads
+        )
+        memories.by_case.update(zip(rows[watched].tolist(), found, strict=True))
+        if progress is not None:
+            progress(int(watched.sum()))
+        if not watched.all():
+            others, ended = prepared.kernel.run(given[~watched], ticks, record=record, threads=threads)
+            outputs = _together(watched, outputs, ended)
+            if history is not None and others is not None:
+                history = _together(watched, history, others)
     judge(prepared.program.outputs, outputs)
     return history, outputs
+
+
+def _together(first: np.ndarray, of_first: np.ndarray, of_others: np.ndarray) -> np.ndarray:
+    """Arrays of the cases where `first` is True, and of the others, in the cases' order."""
+    made = np.empty((len(first), *of_first.shape[1:]))
+    made[first], made[~first] = of_first, of_others
+    return made
 
 
 def inputs(experiment: Experiment, rows: np.ndarray) -> np.ndarray:

@@ -15,12 +15,12 @@ from batch.campaigns.output import sidecar_path
 from batch.campaigns.performing import perform
 from batch.campaigns.plans import read_plan
 from batch.queries.summary import summarise
-from batch.terminal.margin import in_words, remedy
+from batch.terminal.margin import in_words
 from batch.terminal.running import first_picture
 from batch.terminal.verdict import announcement, result_lines, worst_cases, writing
 from hw.case import pace_of
 from hw.drivers import check_model, in_lock_step, kind_of, ports_in_words
-from met.analysis.margin import margins
+from met.analysis.margin import margins, remedy
 from met.diagnostic import Problem, error
 from met.host.files import read_json
 from met.messages import visible

@@ -15,7 +15,7 @@ import numpy as np
 
 from batch.archive.sink import FileBusy as ArchiveBusy
 from batch.archive.sink import temporary_of
-from batch.campaigns import merge, resuming
+from batch.campaigns import instants, merge, resuming
 from batch.campaigns.campaign import Campaign, histories_section, values_sections
 from batch.campaigns.drive import Driver, Progress, Stopped, TooManyFailures
 from batch.campaigns.executor import Executor
@@ -46,11 +46,13 @@ class Performed:
     seconds  by experiment: of computing, on all workers together
     whole    whether all was there before, so that nothing was run
     notes    what happened on the way: what was resumed, which shards did not count
+    warned   what the steps do not follow at instants that cases passed
     """
 
     seconds: Mapping[str, float]
     whole: bool = False
     notes: tuple[str, ...] = ()
+    warned: tuple[Diagnostic, ...] = ()
 
 
 class TooMany(Problem):
@@ -90,6 +92,7 @@ def perform(
     if not there and not fresh and not together and not resuming.is_begun(Folder(beside(campaign.output)), key):
         resuming.guard(campaign)
     check_room(campaign.output, campaign.bytes_missing)
+    values = instants.with_memories(values)
     values[0].prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
     folder = Folder(beside(campaign.output))
     try:
@@ -148,6 +151,7 @@ class _CampaignWork:
         self.sections = {section.number: section for section in values}
         self.values = values
         self.notes: list[str] = []
+        self.warned: dict[object, Diagnostic] = {}
         self.began = time.time()
         self.reporter = Reporter(folder, campaign.cases, progress)
         self.max_failures = max_failures
@@ -192,7 +196,7 @@ class _CampaignWork:
         for number, count in driver.counts.items():
             seconds[self.sections[number].name] += count.seconds
         self.folder.remove()
-        return Performed(seconds, notes=tuple(self.notes))
+        return Performed(seconds, notes=tuple(self.notes), warned=tuple(self.warned.values()))
 
     def leave(self, state: str) -> str:
         """Give up, for now. What is worth keeping stays; in words how much and where, else "" and nothing stays."""
@@ -262,7 +266,10 @@ class _CampaignWork:
                     histories.get(number),
                     lambda cases: self.reporter.advance(cases, 0),
                 )
-                self._verify(writer, number, section)
+                outcomes = CaseOutcomes(*writer.put_before(number))
+                self._verify(writer, number, section, outcomes)
+                for each in instants.step_warnings(section, outcomes, self._threads):
+                    self.warned.setdefault((each.code, each.at), each)
                 self.reporter.end()
             writer.finish()
             sidecar = {
@@ -284,7 +291,11 @@ class _CampaignWork:
                 raise writer.failure from reason
             raise
 
-    def _verify(self, writer: ArchiveWriter, number: int, section: CampaignSection) -> None:
+    @property
+    def _threads(self) -> int | None:
+        return getattr(self.driver and self.driver.executor, "threads", None)
+
+    def _verify(self, writer: ArchiveWriter, number: int, section: CampaignSection, outcomes: CaseOutcomes) -> None:
         """Run some of an experiment's cases, which are all in the archive by now, with shorter steps, where that is
         wanted."""
         from batch.campaigns.verification import when
@@ -296,14 +307,12 @@ class _CampaignWork:
         from batch.campaigns.verification.verifying import FACTORS, verify
 
         experiment = self.campaign.parts[number].experiment
-        outcomes = CaseOutcomes(*writer.put_before(number))
         places = np.flatnonzero(outcomes.status == DONE) if way == "all" else chosen(experiment, outcomes)
         if len(places):
-            threads = getattr(self.driver and self.driver.executor, "threads", None)
             names = {each.key: each.name for each in writer.groups[number].layout.role("metric")}
             self.reporter.begin(f"{section.name}, with shorter steps", len(FACTORS) * len(places), 0, 0, "")
             found = verify(
-                experiment, section.rows[places], names, threads, lambda runs: self.reporter.advance(runs, 0)
+                experiment, section.rows[places], names, self._threads, lambda runs: self.reporter.advance(runs, 0)
             )
             writer.put_verified(number, found)
 

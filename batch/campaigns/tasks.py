@@ -16,6 +16,7 @@ import numpy as np
 from batch.campaigns import shard
 from met import run as engine
 from met.frozen import frozen
+from met.passing import Memories
 from met.run import Prepared
 
 GRANULE = 32
@@ -36,6 +37,7 @@ class CampaignSection:
     rows        of the case table, [case]
     recorded    whether histories are kept;  single: as numbers of four bytes
     begun       key of the program that the campaign was begun with, where it is of an older kind than ours for the same
+    memories    gets the memory of its cases at some instants, of those that this process runs; None: it is not wanted
     """
 
     number: int
@@ -45,6 +47,7 @@ class CampaignSection:
     recorded: bool
     single: bool = False
     begun: str = ""
+    memories: Memories | None = None
 
     @property
     def code(self) -> str:
@@ -124,7 +127,12 @@ def compute(
     began = time.perf_counter()
     rows = section.rows[task.first : task.last]
     history, outputs = engine.compute(
-        section.prepared, rows, threads=threads, record=section.recorded, progress=progress
+        section.prepared,
+        rows,
+        threads=threads,
+        record=section.recorded,
+        progress=progress,
+        memories=section.memories,
     )
     if history is not None and section.single:
         with np.errstate(over="ignore"):  # what is too large for four bytes is infinite there

@@ -113,7 +113,11 @@ def merge_campaign(path: Path) -> int:
     if not Folder(path).exists():
         return _say_result(path.with_name(path.name.removesuffix(".campaign")))  # somebody else was first
     campaign = described(Folder(path))
-    perform(campaign, executor=Threads(cores()), together=True, say=say)
+    performed = perform(campaign, executor=Threads(cores()), together=True, say=say)
+    if performed.warned:
+        from met.messages.render import render
+
+        say(render(performed.warned, {each.name: each.text for each in campaign.plan.sources}), err=True)
     return _say_result(campaign.output)
 
 

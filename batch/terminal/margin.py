@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from ic.printing.columns import columns, count
-from met.analysis.margin import HEAVIEST, Margin
+from met.analysis.margin import HEAVIEST, Margin, remedy
 from met.plan import Experiment
 
 
@@ -91,11 +91,3 @@ def in_words(one: Margin) -> str:
     r = one.least if one.too_light else one.together
     stable = "at no r" if one.limit == 0.0 else ends
     return f"{one.joint}: r = {r:.3g}, stable {stable} with {one.law} at {one.rate_hz:g} Hz"
-
-
-def remedy(one: Margin) -> str:
-    """Help that may make an unstable joint stable."""
-    if one.too_light:
-        return "a lower gain of the servo's rate loop, a faster servo or a heavier arm"
-    changed = "lower gains" if one.limit == 0.0 else "a lighter arm"
-    return f"{changed}, a faster servo or another law"

@@ -53,7 +53,7 @@ class RunResult:
     tables   of sweeps of several structures
     picture  its file; None where there is none
     excuse   why there can be none, in words
-    warned   what errors by the step and limits of machines call in question, with the places in the deck
+    warned   what errors by the step, the steps themselves and limits of machines call in question, with their places
     """
 
     summaries: tuple[Summary, ...]
@@ -116,7 +116,7 @@ def run_and_tell(
     performed = _performed(campaign, executor, fresh, max_failures, bar, json, say)
     if performed is None:
         return False
-    result = _result(campaign, no_picture, say)
+    result = _result(campaign, performed, no_picture, say)
     exported, refused = _exported(campaign, target, bool(histories), json, say)
     unlike = differences(again.archive, campaign.output) if again is not None else []
     compared = _compared(again, unlike)
@@ -186,13 +186,13 @@ def _performed(
     return performed
 
 
-def _result(campaign: Campaign, no_picture: bool, say: Callable[[str], None]) -> RunResult:
+def _result(campaign: Campaign, performed: Performed, no_picture: bool, say: Callable[[str], None]) -> RunResult:
     """Read what came of a campaign, and draw the picture beside its archive."""
     with ArchiveFile(campaign.output) as file:
         summaries = summarise(file)
         worst = worst_cases(file)
         experiments = {part.experiment.name: part.experiment for part in campaign.parts}
-        warned = campaign_warnings(file.groups, experiments)
+        warned = [*performed.warned, *campaign_warnings(file.groups, experiments)]
         tables = list(structures(file))
         try:
             picture, excuse = (None, "") if no_picture else first_picture(file)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ic.grammar.syntax import Deck, Expression, Name, Word, children
 from ic.meaning.checks.balance import check_balance
+from ic.meaning.checks.beds import check_beds
 from ic.meaning.checks.steps import check_steps
 from ic.meaning.checks.stops import check_stops
 from ic.meaning.definitions.resolve import Definition, Definitions
@@ -68,6 +69,7 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
                 check_stops(source.complaints, made)
                 check_balance(source.complaints, made)
                 made = check_steps(scope, made)
+                check_beds(source.complaints, made)
             source.complaints.settle()
             return [(made, scope)]
     if definition.parts:
@@ -227,6 +229,7 @@ class _Sweep:
             check_balance(self.complaints, made)
             made = replace(made, notes=(*made.notes, *check_confidences(self.complaints, there, made)))
             made = check_steps(scope, made)
+            check_beds(self.complaints, made)
         self.complaints.settle()
         self.source.effects.examine(scope, run, made, self.definition.group.body)
         return ((made, scope), rows[keep]), dropped

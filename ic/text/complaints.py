@@ -194,8 +194,11 @@ class Complaints:
         help: Iterable[str] | str = (),
     ) -> None:
         """A warning about what the deck means, which says something only once the deck has no errors."""
-        diagnostic = replace(error(code, message, at, also=also, help=help), severity="warning")
-        if code in PROVISIONAL:
+        self.pass_on(replace(error(code, message, at, also=also, help=help), severity="warning"))
+
+    def pass_on(self, diagnostic: Diagnostic) -> None:
+        """The same of a warning that is put into words elsewhere."""
+        if diagnostic.code in PROVISIONAL:
             self._provisional.append(diagnostic)
         else:
             self._note_remark(diagnostic)

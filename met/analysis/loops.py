@@ -112,7 +112,7 @@ def _carried(n: int, positions: int, m: int, since: float, h: float) -> np.ndarr
 
 @frozen
 class Loops:
-    """What was found of the loops: those that are unstable, the one that wants the smallest gain first; and cases of
+    """What was found of the loops: those that are unstable, the one that wants the smallest gain first; and lanes of
     which nothing grows, whatever the step alone does: their laws hold it."""
 
     unstable: tuple[Unstable, ...]
@@ -121,32 +121,46 @@ class Loops:
 
 def closed(experiment: Experiment, found: Sampled) -> Loops:
     """The loops of each lane: a joint's is to blame where its own gain alone can make all stable."""
-    length = math.lcm(found.divisor, *(each.divisor for each in found.laws))
-    if length // found.divisor + sum(length // each.divisor for each in found.laws) > MOST_EVENTS:
-        return Loops((), frozenset())
-    seconds = length / found.base_hz
+    growths, seconds = frame_growths(found)
     limit = max(LEAST, GROWS * seconds / experiment.structure.schedule.duration)
-    joints = tuple(each.joint for each in found.laws)
     worst: dict[tuple[str, ...], Unstable] = {}
-    numbers = np.isfinite(found.slope).all((1, 2))
-    for law in found.laws:
-        numbers &= np.isfinite(law.slope).all((1, 2))
-    lanes = np.flatnonzero(numbers)
-    growths = _growths(frame(found, lanes))
-    quiet = frozenset(found.case[lanes[growths <= limit]].tolist())
-    for lane, own in zip(lanes.tolist(), growths.tolist(), strict=True):
-        if not limit < own < math.inf:
-            continue
-        growth = partial(_of_ticks, found, lane, seconds)
-        if not limit < growth({}):
-            continue
-        fitting: dict[tuple[str, ...], float | None] = {(joint,): _fitting(growth, (joint,), limit) for joint in joints}
-        if not any(fitting.values()):
-            fitting = {joints: _fitting(growth, joints, limit)}
-        for blamed, gain in fitting.items():
-            if gain is not None and (blamed not in worst or gain < worst[blamed].gain):
-                worst[blamed] = Unstable(int(found.case[lane]), blamed, gain, seconds / own)
+    for lane in np.flatnonzero((limit < growths) & (growths < math.inf)).tolist():
+        for each in blamed(found, lane, limit):
+            if each.joints not in worst or each.gain < worst[each.joints].gain:
+                worst[each.joints] = each
+    quiet = frozenset(np.flatnonzero(growths <= limit).tolist())
     return Loops(tuple(sorted(worst.values(), key=lambda each: each.gain)), quiet)
+
+
+def frame_growths(found: Sampled) -> tuple[np.ndarray, float]:
+    """ln of the growth of a frame, of each lane: infinite where it is no number, or a frame is too long to be looked
+    at; and the length of a frame, s."""
+    length, growths = _length(found), np.full(len(found.case), math.inf)
+    if length // found.divisor + sum(length // each.divisor for each in found.laws) <= MOST_EVENTS:
+        numbers = np.isfinite(found.slope).all((1, 2))
+        for law in found.laws:
+            numbers &= np.isfinite(law.slope).all((1, 2))
+        lanes = np.flatnonzero(numbers)
+        growths[lanes] = _growths(frame(found, lanes))
+    return growths, length / found.base_hz
+
+
+def _length(found: Sampled) -> int:
+    """Ticks of the base rate in a frame."""
+    return math.lcm(found.divisor, *(each.divisor for each in found.laws))
+
+
+def blamed(found: Sampled, lane: int, limit: float) -> list[Unstable]:
+    """The loops of a lane whose ticks make a frame grow by more than this (ln); none where they do not."""
+    seconds = _length(found) / found.base_hz
+    growth, joints = partial(_of_ticks, found, lane, seconds), tuple(each.joint for each in found.laws)
+    if not limit < growth({}):
+        return []
+    fitting: dict[tuple[str, ...], float | None] = {(joint,): _fitting(growth, (joint,), limit) for joint in joints}
+    if not any(fitting.values()):
+        fitting = {joints: _fitting(growth, joints, limit)}
+    every = seconds / float(_growths(frame(found, np.array([lane])))[0])
+    return [Unstable(int(found.case[lane]), which, gain, every) for which, gain in fitting.items() if gain is not None]
 
 
 def _growths(frames: np.ndarray) -> np.ndarray:

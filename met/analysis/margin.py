@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from met.analysis.step_map import LaneTape
 from met.backends.reference.plain import PlainTape, follow
 from met.frozen import frozen
 from met.plan import Experiment
@@ -22,7 +23,6 @@ from met.program import cell_names
 from met.program.build import Builder
 from met.program.control.substituted import Mounted
 from met.program.system import System
-from met.run import inputs
 from met.servos.servo import Setpoint
 
 GROWS = 1.0 + 1e-6
@@ -97,6 +97,14 @@ class Margin:
         return self.lower < self.least and self.together < (self.searched if self.limit is None else self.limit)
 
 
+def remedy(one: Margin) -> str:
+    """Help that may make an unstable joint stable."""
+    if one.too_light:
+        return "a lower gain of the servo's rate loop, a faster servo or a heavier arm"
+    changed = "lower gains" if one.limit == 0.0 else "a lighter arm"
+    return f"{changed}, a faster servo or another law"
+
+
 def margins(
     experiment: Experiment, cases: Sequence[int] | None = None, progress: Callable[[int], None] | None = None
 ) -> tuple[tuple[Margin, ...], ...]:
@@ -112,10 +120,31 @@ def margins(
     known: dict[tuple[Any, ...], _Known] = {}
     found = []
     for done, case in enumerate(range(experiment.cases.count) if cases is None else cases, start=1):
-        found.append(tuple(_margins(plain, case, known)))
+        with np.errstate(all="ignore"):  # a bed with no inertia has no finite loop
+            found.append(tuple(_margins(plain, case, known)))
         if progress is not None:
             progress(done)
     return tuple(found)
+
+
+def rotor_inertias(experiment: Experiment, case: int) -> np.ndarray:
+    """N^2 J_m of the substituted joints of a case, kg m^2 (prismatic: kg): [joint]."""
+    builder, tape = _begun(_faultless(experiment), case)
+    motors = [builder.step.beds.motor(tape, each) for each in builder.step.beds.mounted]
+    return np.array([float(each.ratio * each.ratio * each.inertia) for each in motors])
+
+
+def ends_of_motion(Lambda: np.ndarray, rotors: np.ndarray) -> tuple[float, float]:
+    """The smallest and the largest r of any motion of the substituted joints; not numbers where it is none.
+
+    Lambda: [..., joint, joint] kg m^2;  rotors: [joint] N^2 J_m, kg m^2
+    """
+    ratios = Lambda / rotors[:, None]
+    if not np.isfinite(ratios).all():
+        return np.nan, np.nan
+    # of a matrix that is similar to a symmetric one: real but for rounding
+    motions = np.linalg.eigvals(ratios).real
+    return float(motions.min()), float(motions.max())
 
 
 @frozen
@@ -134,13 +163,9 @@ def _margins(experiment: Experiment, case: int, known: dict[tuple[Any, ...], _Kn
     names = [each.joint for each in beds.mounted]
     Lambda = np.array([[float(tape.read(cell_names.ARM_INERTIA(a, b))) for b in names] for a in names])
     loops = [_Loop(builder, tape, each) for each in beds.mounted]
-    ratios = Lambda / np.array([loop.rotor for loop in loops])[:, None]
-    # of a matrix that is similar to a symmetric one: real but for rounding
-    together, least = np.nan, np.nan
-    if np.isfinite(ratios).all():
-        motions = np.linalg.eigvals(ratios).real
-        together, least = float(motions.max()), float(motions.min())
-    for each, loop, r in zip(beds.mounted, loops, ratios.diagonal().tolist(), strict=True):
+    rotors = np.array([loop.rotor for loop in loops])
+    least, together = ends_of_motion(Lambda, rotors)
+    for each, loop, r in zip(beds.mounted, loops, (Lambda.diagonal() / rotors).tolist(), strict=True):
         heads = (f"{each.joint}.servo.", f"{each.joint}.bed.", f"{each.joint}.law.")
         own = [path for path in experiment.parameters if path.startswith(heads) and ".command." not in path]
         # Its own r is always among those searched. Where a loop grows, or not, beyond them is not known.
@@ -204,16 +229,19 @@ def _faultless(experiment: Experiment) -> Experiment:
     return replace(experiment, parameters=parameters)
 
 
-def _begun(experiment: Experiment, case: int) -> tuple[Builder, PlainTape]:
-    """The program after its first tick, in plain numbers."""
+def _begun(experiment: Experiment, case: int) -> tuple[Builder, LaneTape]:
+    """The program after its first tick, in plain numbers, on a tape that takes arrays from then on."""
     builder = Builder(System(experiment))
     program = builder.program()
-    values = inputs(experiment, np.array([case]))[0]
-    tape = PlainTape(program, dict(zip(program.inputs, values, strict=True)), 1)
+    values = {each.path: float(each.values[case]) for each in experiment.cases.coordinates}
+    # of what noise is a case's own, any will do: beds are without faults here
+    tape = PlainTape(program, values | dict.fromkeys(experiment.cases.noise, 0.0), 1)
     with np.errstate(all="ignore"):
         follow(tape, program.start)
         follow(tape, program.tick)
-    return builder, tape
+    lanes = LaneTape(program.base_hz, {name: np.asarray(value) for name, value in tape.inputs.items()}, 1)
+    lanes.cells.update(tape.cells)
+    return builder, lanes
 
 
 class _Noting(dict[str, Any]):
@@ -231,7 +259,7 @@ class _Noting(dict[str, Any]):
 class _Loop:
     """The loop of one joint at a tick, over the cells of a tape."""
 
-    def __init__(self, builder: Builder, tape: PlainTape, each: Mounted) -> None:
+    def __init__(self, builder: Builder, tape: LaneTape, each: Mounted) -> None:
         self.builder, self.tape, self.each = builder, tape, each
         self.beds = builder.step.beds.alone(each)
         self.motor = self.beds.motor(tape, each)
@@ -239,10 +267,10 @@ class _Loop:
         # back-EMF alone then takes half of the torque there is
         self.rate = 0.5 * float(self.motor.tau_max * self.motor.resistance / (self.motor.kt * self.motor.kt))
         own = (f"{each.joint}:", f"{each.joint}.bed.", f"{each.joint}.law.", f"{each.actuator.path}.")
-        cells = {name: float(value) for name, value in tape.cells.items() if name.startswith(own)}
+        cells = {name: value for name, value in tape.cells.items() if name.startswith(own)}
         tape.k = self.beds.divisor
         tape.cells = _Noting(tape.cells)
-        self._around(cells, self.rotor)
+        self._around(cells, np.float64(self.rotor))
         # Under a position command the angle acts back; else it only adds up.
         back = cell_names.SHAFT_ANGLE(each.joint) if each.actuator.command_kind == "position" else ""
         written = tape.cells.written
@@ -253,20 +281,19 @@ class _Loop:
         tape.write(f"{each.joint}.q", 0.0)
         self.beds.start(tape)
         self.start = {name: float(tape.cells[name]) for name in cells}
+        self.cells = dict(tape.cells)
 
-    def _around(self, cells: Mapping[str, float], load: float) -> dict[str, float]:
-        """The cells a tick later, with an arm of this inertia on the joint (kg m^2; kg)."""
+    def _around(self, cells: Mapping[str, Any], load: Any) -> dict[str, Any]:
+        """The cells a tick later, with an arm of this inertia on the joint (kg m^2; kg); both may be arrays."""
         tape, joint, actuator = self.tape, self.each.joint, self.each.actuator
-        tape.cells.update({name: np.float64(value) for name, value in cells.items()})
-        tape.cells.update(
-            {cell_names.ARM_INERTIA(joint, joint): np.float64(load), cell_names.ARM_TORQUE(joint): np.float64(0.0)}
-        )
+        tape.cells.update(cells)
+        tape.cells.update({cell_names.ARM_INERTIA(joint, joint): load, cell_names.ARM_TORQUE(joint): np.float64(0.0)})
         self.beds.advance(tape)
         self.beds.read(tape)
         q, qd = self.beds.seen(tape, actuator) or (0.0, 0.0)
         self.builder.compute(tape, actuator, self.builder.seen(actuator, q, qd, self._asked(), tape.time))
         self.beds.act(tape)
-        return {name: float(tape.cells[name]) for name in cells}
+        return {name: tape.cells[name] for name in cells}
 
     def _asked(self) -> Setpoint:
         """The command, of the deck's kind, under which the shaft turns on at the steady rate."""
@@ -275,21 +302,27 @@ class _Loop:
         value = {"position": self.beds.period * rate, "rate": rate}.get(kind, 0.0)
         return Setpoint(kind, value, rate if kind == "position" else 0.0)
 
-    def radius(self, r: float) -> float:
-        """The largest size of an eigenvalue of the map from tick to tick."""
-        load = r * self.rotor
+    def radii(self, ratios: Sequence[float]) -> np.ndarray:
+        """The largest size of an eigenvalue of the map from tick to tick, at each r: all of them and all differences at
+        once."""
+        count, n = len(ratios), len(self.names)
+        start = np.array([self.start[name] for name in self.names])
+        sizes = 1e-4 * np.maximum(1.0, np.abs(start))
+        moved = np.repeat(start[:, None, None], count, 1) + np.hstack([np.zeros((n, 1)), np.diag(sizes)])[:, None, :]
+        cells: dict[str, Any] = {**self.start, **dict(zip(self.names, moved.reshape(n, -1), strict=True))}
+        self.tape.cells = dict(self.cells)
         with np.errstate(all="ignore"):
-            base = self._around(self.start, load)
-            columns = []
-            for name in self.names:
-                size = 1e-4 * max(1.0, abs(self.start[name]))
-                moved = self._around({**self.start, name: self.start[name] + size}, load)
-                columns.append([(moved[other] - base[other]) / size for other in self.names])
-        matrix = np.array(columns).T
-        return float("inf") if not np.isfinite(matrix).all() else float(np.abs(np.linalg.eigvals(matrix)).max())
+            ends = self._around(cells, np.repeat(np.asarray(ratios) * self.rotor, n + 1))
+            after = np.array([np.broadcast_to(ends[name], count * (n + 1)) for name in self.names])
+            after = after.reshape(n, count, n + 1)
+            maps = np.moveaxis((after[..., 1:] - after[..., :1]) / sizes, 1, 0)
+        found = np.full(count, np.inf)
+        numbers = np.isfinite(maps).all((1, 2))
+        found[numbers] = np.abs(np.linalg.eigvals(maps[numbers])).max(1)
+        return found
 
     def grows(self, r: float) -> bool:
-        return self.radius(r) > GROWS
+        return bool(self.radii([r])[0] > GROWS)
 
     def stretches(self, lightest: float, heaviest: float, also: Sequence[float] = ()) -> _Stretches:
         """The ranges of r within these bounds in which the loop does not grow, rising, to a hundredth of r.
@@ -298,7 +331,7 @@ class _Loop:
         heaviest. also: r to look at besides
         """
         looked_at = sorted({*np.geomspace(lightest, heaviest, STEPS).tolist(), *also})
-        growing = [self.grows(r) for r in looked_at]
+        growing = (self.radii(looked_at) > GROWS).tolist()
         found: list[tuple[float, float | None]] = []
         lower = 0.0
         for (low, high), (before, after) in zip(pairwise(looked_at), pairwise(growing), strict=True):

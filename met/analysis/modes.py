@@ -103,11 +103,16 @@ def modes(found: StepMap, integrator: Integrator) -> Iterator[Mode]:
     with np.errstate(all="ignore"):
         roots = np.einsum("lij,ljk,lki->li", left, A, right) / sums
         apart = np.abs(weights).sum(2) < TOGETHER * np.abs(sums)
+    forward = factors.imag >= 0.0
+    together = np.flatnonzero((forward & ~apart).any(1))
+    made = {}
+    for at, found_roots, found_factors in zip(together.tolist(), *_answers(A[together], integrator, h), strict=True):
+        made[at] = found_roots, found_factors
     for at, lane in enumerate(lanes.tolist()):
-        for i in np.flatnonzero(factors[at].imag >= 0.0).tolist():
+        for i in np.flatnonzero(forward[at]).tolist():
             root, factor = complex(roots[at, i]), complex(factors[at, i])
             if not apart[at, i]:
-                root = _nearest(factor, A[at], integrator, h)
+                root = complex(made[at][0][np.argmin(np.abs(made[at][1] - factor))])
             if not max(abs(root) * h, abs(factor - 1.0)) > SLOW:
                 continue
             turns = bool(found.rate[lane] > TURNS * abs(root))
@@ -115,19 +120,19 @@ def modes(found: StepMap, integrator: Integrator) -> Iterator[Mode]:
             yield Mode(lane, case, loose, root, factor, turns, found.names, weights[at, i])
 
 
-def _nearest(factor: complex, A: np.ndarray, integrator: Integrator, h: float) -> complex:
-    """The eigenvalue of A of which the integrator makes what is nearest to mu, of a swing or of a lone state."""
+def _answers(A: np.ndarray, integrator: Integrator, h: float) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues of A, [lane, any], each with what the integrator makes of it: as of a swing, or of a lone state."""
+    if not len(A):
+        return np.zeros((0, 0)), np.zeros((0, 0))
     roots = np.linalg.eigvals(A)
-    nearest, root = np.inf, 0j
-    for each in roots[roots.imag >= 0.0].tolist():
-        swing = np.array([[0.0, 1.0], [-(abs(each) ** 2), 2.0 * each.real]])
-        made = [*np.linalg.eigvals(linear_step(integrator, swing, 1, h))]
-        if each.imag == 0.0:
-            made += [*linear_step(integrator, np.array([[each.real]]), 0, h).ravel()]
-        distance = min(abs(complex(one) - factor) for one in made)
-        if distance < nearest:
-            nearest, root = distance, each
-    return root
+    swings = np.zeros((*roots.shape, 2, 2))
+    swings[..., 0, 1] = 1.0
+    swings[..., 1, 0], swings[..., 1, 1] = -(np.abs(roots) ** 2), 2.0 * roots.real
+    made = np.linalg.eigvals(linear_step(integrator, swings, 1, h))
+    lone = linear_step(integrator, roots.real[..., None, None], 0, h)[..., 0]
+    every = np.concatenate([made, np.where(roots.imag[..., None] == 0.0, lone, np.inf)], axis=-1)
+    every[roots.imag < 0.0] = np.inf
+    return np.repeat(roots, 3, axis=1), every.reshape(len(A), -1)
 
 
 def of_lane(found: StepMap, lane: int, integrator: Integrator, h: float) -> StepMap:

@@ -40,10 +40,11 @@ SMALL_STATE = 1e-9
 
 @frozen
 class StepMap:
-    """The linearised step of some cases of one experiment, each as it is at the start, and at rest in that pose.
+    """The linearised step of some cases of one experiment, each as it is at an instant, and at rest in that pose: two
+    lanes, one after the other.
 
-    case     rows of the case table
-    loose    whether it is at rest there, without drive, and no dry friction holds anything; else as the run begins
+    case     rows of the case table: [lane]
+    loose    whether it is at rest there, without drive, and no dry friction holds anything; else as the run has it
     names    of what is changed: `shoulder.q`, `shoulder.qd`, states of servos and sensors
     counts   of these, positions (and as many rates); the rest are states
     slope    A: [lane, name, name], 1/s
@@ -80,7 +81,7 @@ class SampledLaw:
 
 @frozen
 class Sampled:
-    """Loose arms with the laws that tick on them.
+    """Arms, loose or as the run has them, with the laws that tick on them.
 
     case    rows of the case table
     states  how many cells are of the state, positions first;  held: cells of the laws' memory
@@ -183,10 +184,14 @@ ZERO = np.float64(0.0)
 
 
 class Linearizer:
-    """The program of an experiment at its first instant, for several cases at once: each as it begins, where what is
-    at rest and rubs is held, and loose. A motor on a bed lets its joint turn on as it does."""
+    """The program of an experiment at an instant, the first one or another, for several cases at once: each as it is
+    there, where what is at rest and rubs is held, and loose. A motor on a bed lets its joint turn on as it does."""
 
-    def __init__(self, experiment: Experiment, cases: Sequence[int]) -> None:
+    def __init__(
+        self, experiment: Experiment, cases: Sequence[int], memory: Mapping[str, np.ndarray] | None = None
+    ) -> None:
+        """memory: cells of these cases at instants that they pass, [lane]; a case may be there several times. None:
+        where they begin."""
         self.system = System(replace(experiment, structure=replace(experiment.structure, metrics=())))
         self.builder = Builder(self.system)
         self.cases = np.asarray(cases, dtype=np.int64)
@@ -199,6 +204,8 @@ class Linearizer:
             self.builder.start(begun)
             begun.follow((*step.grapple.events(), *self.builder.computers()))
             step.modes(begun)
+        if memory is not None:
+            begun.cells.update({name: memory[name] for name in begun.cells if name in memory})
         self.tape, self.loose = begun.spread(2), np.tile([False, True], lanes)
         self._loosen()
         self.cells = tuple(f"{name}.{part}" for part in ("q", "qd") for name in step.coordinates) + step.states
@@ -223,20 +230,29 @@ class Linearizer:
             M = self._of_stages() if stages else linear_step(system.integrator, A, positions, h)
         return StepMap(np.repeat(self.cases, 2), self.loose, self.cells, positions, A, M, rate, h)
 
-    def sampled(self) -> Sampled | None:
-        """The cases loose, with their laws that tick; None where none does, or one is on a bed."""
+    def sampled(self, *, loose: bool = True) -> Sampled | None:
+        """The cases with their laws that tick, loose or as the run has them; None where none does, or one is on a
+        bed."""
         if not self.laws:
             return None
         step, schedule = self.builder.step, self.builder.step.schedule
         with np.errstate(all="ignore"):
-            laws = tuple(self._law(each) for each in self.laws)
+            laws = tuple(self._law(each, self.loose == loose) for each in self.laws)
         return Sampled(
-            self.cases, len(self.cells), len(step.coordinates), self.held, self.slope[self.loose], laws,
+            self.cases, len(self.cells), len(step.coordinates), self.held, self.slope[self.loose == loose], laws,
             self.system.integrator, schedule.step, schedule.dynamics, schedule.base_hz,
         )  # fmt: skip
 
-    def _law(self, actuator: Actuator) -> SampledLaw:
-        """A law's slopes, under a command that its joint be as it is."""
+    def loads(self) -> np.ndarray:
+        """Effective inertias of the joints whose motors are on beds, as the run has them, kg m^2 (prismatic: kg):
+        [lane, joint, joint]; all other joints keep their modes."""
+        with np.errstate(all="ignore"):
+            Lambda, _ = self.builder.step.loads(self.tape)
+        of_lanes: list[list[Any]] = [[np.broadcast_to(np.asarray(x), self.tape.lanes) for x in row] for row in Lambda]
+        return np.moveaxis(np.array(of_lanes, dtype=float), -1, 0)[~self.loose]
+
+    def _law(self, actuator: Actuator, lanes: np.ndarray) -> SampledLaw:
+        """A law's slopes in these lanes, under a command that its joint be as it is."""
         joint, parts, moved = actuator.use.joint, actuator.parts, self.moved
         p = self.system.servo_values(actuator, self.wide.read)
         states: dict[str, Any] = {each.name: moved[f"{actuator.path}.{each.name}"] for each in parts.natural}
@@ -251,7 +267,7 @@ class Linearizer:
         after: dict[str, Any] = {f"{actuator.path}.{name}": value for name, value in found.outputs.items()}
         after |= {f"{actuator.path}.{name}": held[name] + seen.period * x for name, x in found.slopes.items()}
         memory = tuple(f"{actuator.path}.{part.name}" for part in parts.memory)
-        slope = _differences(after, memory, self.sizes)[self.loose]
+        slope = _differences(after, memory, self.sizes)[lanes]
         return SampledLaw(joint, actuator.use.divisor, memory, len(parts.outputs), slope)
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -102,7 +102,7 @@ def step_size(experiment: Experiment, cases: Sequence[int]) -> StepSize:
     def fault(kind: Literal["grows", "misses", "fast"], mode: Mode, figure: float, truth: float, after: float) -> None:
         faults.append(Fault(kind, mode, *owner_of(mode), figure, truth, after))
 
-    growing = [each for each in every if each.grown(h, steps) > np.log1p(TELLING) and each.case not in loops.quiet]
+    growing = [each for each in every if each.grown(h, steps) > np.log1p(TELLING) and each.lane // 2 not in loops.quiet]
     if growing:
         worst = max(growing, key=lambda each: (each.growth, not each.loose))
         fault("grows", worst, worst.growth, 0.0, 0.0)
@@ -129,18 +129,23 @@ def step_size(experiment: Experiment, cases: Sequence[int]) -> StepSize:
     )
 
 
-def remedy(experiment: Experiment, found: StepSize, fault: Fault) -> Remedy:
-    """The rate and the integrators that would do, and what of the environment is the cause."""
+def remedy(
+    experiment: Experiment, found: StepMap, fault: Fault, memory: Mapping[str, np.ndarray] | None = None
+) -> Remedy:
+    """The rate and the integrators that would do, and what of the environment is the cause.
+
+    found   the map that has the mode;  memory: of the case at its instant, one lane, as `Linearizer` takes it
+    """
     structure, mode = experiment.structure, fault.mode
     integrator, steps = models.find("integrator", structure.integrator), structure.schedule.ticks
     steps //= structure.schedule.dynamics
     others = tuple(
         name
         for name, each in models.find_own("integrator").items()
-        if name != integrator.name and fault.kind != "fast" and _followed(found.map, mode, each, steps)
+        if name != integrator.name and fault.kind != "fast" and _followed(found, mode, each, steps)
     )
-    rate = slowest(found.map, mode, integrator, structure.schedule, follows=fault.kind != "grows")
-    return Remedy(rate, others, _cause(experiment, mode, fault.kind))
+    rate = slowest(found, mode, integrator, structure.schedule, follows=fault.kind != "grows")
+    return Remedy(rate, others, _cause(experiment, mode, fault.kind, memory))
 
 
 def owner_of(mode: Mode) -> tuple[str, str]:
@@ -174,7 +179,7 @@ def _followed(found: StepMap, mode: Mode, integrator: Integrator, steps: int) ->
     return True
 
 
-def _cause(experiment: Experiment, mode: Mode, kind: str) -> str:
+def _cause(experiment: Experiment, mode: Mode, kind: str, memory: Mapping[str, np.ndarray] | None) -> str:
     """The environment model without which the case has no such mode: none that fast, or none that grows so."""
     structure = experiment.structure
     integrator = models.find("integrator", structure.integrator)
@@ -183,7 +188,8 @@ def _cause(experiment: Experiment, mode: Mode, kind: str) -> str:
             continue
         rest = tuple(each for each in structure.environment if each is not use)
         try:
-            found = Linearizer(replace(experiment, structure=replace(structure, environment=rest)), [mode.case]).map()
+            without = replace(experiment, structure=replace(structure, environment=rest))
+            found = Linearizer(without, [mode.case], memory).map()
         except Problem:
             continue
         lanes = [each for each in modes(found, integrator) if each.loose == mode.loose]

@@ -162,6 +162,7 @@ class Answering:
     """In place of `met.run.Prepared`."""
 
     kernel = None
+    wire = True  # so its program is not looked at
 
     def __init__(self, experiment: Experiment) -> None:
         self.experiment = experiment
@@ -176,7 +177,13 @@ class Answering:
 
 
 def computed(
-    prepared: Answering, rows: np.ndarray, *, threads: Any = None, record: bool = True, progress: Any = None
+    prepared: Answering,
+    rows: np.ndarray,
+    *,
+    threads: Any = None,
+    record: bool = True,
+    progress: Any = None,
+    memories: Any = None,
 ) -> tuple[np.ndarray | None, np.ndarray]:
     """In place of `met.run.compute`: histories and outputs are zeros; `results` has the answers."""
     engine.run(prepared.experiment, rows)  # for what a test lets happen meanwhile

@@ -110,7 +110,7 @@ class TestRefusedBeforeAnythingRuns:
         usage = namedtuple("usage", "total used free")
         monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(10**9, 10**9 - 5000, 5000))
         assert self.run("a.h5") == (
-            "error[E306]: cannot write a.h5: it needs about 81.1 KiB until it is whole, and the disk has 4.9 KiB left\n"
+            "error[E306]: cannot write a.h5: it needs about 88.6 KiB until it is whole, and the disk has 4.9 KiB left\n"
             " = help: `--histories none` keeps metrics only; `--float32`, fewer signals in `record`, or a slower "
             "`rates.record`, take less\n"
             "\n1 error\n"

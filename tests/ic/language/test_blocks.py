@@ -47,9 +47,13 @@ def test_an_entry_is_declared_whole(of: tuple[BlockDeclaration, Entry]) -> None:
         assert entry.parameter is not None or entry.name in ("q", "qd")
 
 
+LIMITED = ARM.replace("axis = z;", "axis = z; q_min = -9 rad; q_max = 9 rad; qd_max = 9 rad/s; tau_max = 99 N*m;")
+"""The arm with everything that a joint may have."""
+
+
 def experiment(tmp_path: Path, more: str = "") -> Experiment:
     path = tmp_path / "d.ic"
-    path.write_text(ARM + SERVO + RUN + more)
+    path.write_text(LIMITED + SERVO + RUN + more)
     return ic.compile(path, select=["hold"]).experiments[0]
 
 
@@ -66,7 +70,7 @@ def test_numbers_of_arms_vary_by_their_declared_paths(of: tuple[BlockDeclaration
     assert isinstance(value, float)
     written = f"{value!r} {known[path].unit}".removesuffix(" 1")
     sweep = f"sweep some of hold {{ vary {path} = [{written}]; }}"
-    (tmp_path / "d.ic").write_text(ARM + SERVO + RUN + sweep)
+    (tmp_path / "d.ic").write_text(LIMITED + SERVO + RUN + sweep)
     # one value in the place of itself; of some, such as the place of a hinge at the origin, nothing here depends
     told = ic.check(tmp_path / "d.ic", select=["some"]).diagnostics
     assert {each.code for each in told if each.severity == "error"} <= {"D137"}

@@ -378,12 +378,11 @@ def test_a_metric_of_what_is_no_channel(tmp_path: Path) -> None:
     assert (
         shown(tmp_path, ARM, SERVO, changed(RUN, ("duration", "metric top = max { of = [hinge.q]; }\n    duration")))
         == """\
-error[D125]: a channel is needed here
+error[D071]: one number is needed here, and this is a list
   --> deck.ic:15:29
    |
 15 |     metric top = max { of = [hinge.q]; }
    |                             ^^^^^^^^^
-   = help: write `of = CHANNEL;`, such as `of = shoulder.qd;`
 """
     )
 

@@ -163,8 +163,8 @@ error[D141]: joint `hinge` has no `limit`
   |
 3 |     joint hinge revolute { parent = base; child = bar; axis = z; limit = [-1, 1] rad; }
   |                                                                  ^^^^^
-  = help: a joint has no stops in this version; a metric with `require` tells where it goes beyond
-  = help: it has: parent, child, at, rpy, axis, dh
+  = help: limits of a joint are `q_min`, `q_max`, `qd_max` and `tau_max`; what stops it is a `joint_stop` of a run
+  = help: it has: parent, child, at, rpy, axis, dh, q_min, q_max, qd_max, tau_max
 """
     )
 

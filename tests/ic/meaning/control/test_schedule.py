@@ -141,6 +141,20 @@ def test_the_fastest_mode_is_noted(tmp_path: Path) -> None:
     assert note == "step size: nothing changes by more than 1 % in a step"
 
 
+@pytest.mark.parametrize(("count", "said"), [(1, "of all that varies"), (20, " of the 20 that vary")])
+def test_of_a_sweep_it_is_noted_which_ends_were_looked_at(count: int, said: str, tmp_path: Path) -> None:
+    """Drawn at random, the ends stand anywhere in the table; of 20 numbers there is no time for all."""
+    names = [f"angle_{n}" for n in range(count)]
+    lets = "".join(f"let {name} = 0 rad;\n" for name in names)
+    run = changed(RUN, ("duration", f"initial {{ hinge.q = {' + '.join(names)}; }}\n    duration"))
+    drawn = "".join(f"{name} = uniform(0, 1) rad; " for name in names)
+    sweep = f"sweep drawn of hold {{ sample random(500) {{ {drawn}}} }}\n"
+    made = experiment(tmp_path, ARM, SERVO, lets, run, sweep, select=["drawn"])
+    (note,) = (each for each in made.notes if each.startswith("step size: "))
+    assert "; looked at " in note and " of 500 cases, with the least and the largest of" in note
+    assert note.endswith(f"{said}: the others are left to the run")
+
+
 def test_h_lambda_above_a_half_warns(tmp_path: Path) -> None:
     compiled = check(tmp_path, LIGHT, lagging(0.51), RUN)
     assert [(d.code, d.severity) for d in compiled.diagnostics] == [("D105", "warning")]

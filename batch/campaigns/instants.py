@@ -1,0 +1,125 @@
+"""The step of the dynamics against the arm at instants that a campaign's cases pass: warnings, decided by counts alone.
+
+Of a small campaign the memory of cases is kept while they run; of a large one some cases are run again. Both give the
+same bits, so it does not matter who ran them, nor how often they were interrupted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from batch.campaigns.keep import CaseOutcomes, worst
+from batch.campaigns.tasks import GRANULE, CampaignSection
+from ic.meaning.checks.beds import bed_warning
+from ic.meaning.checks.step_words import fault_warning, from_instants, loop_warning
+from met import models
+from met import run as engine
+from met.analysis import passed
+from met.analysis.step_size import Fault, chosen_cases
+from met.diagnostic import Diagnostic, Problem
+from met.passing import Memories, even_ticks
+from met.plan import Experiment
+from met.run import DONE
+
+CODES = ("D317", "D318", "D319", "D320", "D321")
+
+SHARE = 0.03
+"""Of a campaign's steps: so much more is done to look at some of its cases again. A block is run, whatever is in it."""
+
+MOST_CASES = 8
+"""Cases that are looked at."""
+
+MOST_EXPERIMENTS = 8
+"""Experiments of a campaign that are looked at: a sweep of structures may have hundreds."""
+
+
+def with_memories(sections: Sequence[CampaignSection]) -> list[CampaignSection]:
+    """The sections of a campaign; those that are looked at, and are small, keep the memory of the cases for that."""
+    wanted = set(np.linspace(0, len(sections) - 1, MOST_EXPERIMENTS).astype(int).tolist())
+    return [replace(each, memories=_memories(each)) if at in wanted else each for at, each in enumerate(sections)]
+
+
+def _memories(section: CampaignSection) -> Memories | None:
+    """None where nothing is to be said of this experiment."""
+    experiment, rows = section.prepared.experiment, section.rows
+    structure = experiment.structure
+    known = structure.integrator in models.find_own("integrator")  # another package's is only recorded
+    if section.prepared.wire or not known or not structure.moving or all(map(experiment.allows, CODES)):
+        return None
+    cases: Sequence[int] = rows.tolist()
+    if len(rows) > GRANULE:
+        cases = [case for case in chosen_cases(experiment) if case in rows]
+        cases = [int(rows[0]), int(rows[-1]), *cases][: MOST_CASES if _is_small(section) else 0]
+    return Memories(even_ticks(structure.schedule, passed.MOST_INSTANTS // 2), frozenset(cases))
+
+
+def _is_small(section: CampaignSection) -> bool:
+    """True where another block of cases is no small share of the campaign's."""
+    return SHARE * len(section.rows) < GRANULE
+
+
+def step_warnings(section: CampaignSection, outcomes: CaseOutcomes, threads: int | None = None) -> list[Diagnostic]:
+    """What the steps of a campaign's cases do not follow at instants that they pass, but for what its run allows, and
+    what the check tells of the poses in which they begin."""
+    experiment, memories = section.prepared.experiment, section.memories
+    if memories is None:
+        return []
+    cases = _cases(section, outcomes, memories)
+    missing = np.array([case for case in cases if case not in memories.by_case], np.int64)
+    if len(missing):
+        again = replace(memories, cases=frozenset(missing.tolist()))
+        engine.compute(section.prepared, missing, record=False, threads=threads, memories=again)
+    try:
+        at = _passed(section, memories, cases)
+        if not len(at.case):
+            return []
+        said = [_warning(experiment, one) for one in passed.lasting(experiment, at)]
+        said += [
+            bed_warning(
+                experiment, each, f"reckoned with the arm as it stands {from_instants(experiment, each.case, since)}"
+            )
+            for each, since in passed.lasting_beds(experiment, at)
+        ]
+        return [each for each in said if not experiment.allows(each.code)]
+    except Problem:  # a program that cannot be put together but for a kernel
+        return []
+
+
+def _cases(section: CampaignSection, outcomes: CaseOutcomes, memories: Memories) -> list[int]:
+    """The cases that are looked at: those whose memory was asked for; the first, the last and the worst of each metric
+    where that is of all, or of none."""
+    if memories.cases and len(section.rows) > GRANULE:
+        return sorted(memories.cases)
+    done = np.flatnonzero(outcomes.status == DONE)
+    places = [0, len(section.rows) - 1] if not len(done) else [int(done[0]), int(done[-1])]
+    for name, values in outcomes.metrics.items():
+        ranked = worst(section.prepared.experiment, name, np.where(np.isfinite(values), values, np.nan))
+        places += ranked[:1].tolist()
+    most = min(MOST_CASES, passed.instants(section.prepared.experiment) // passed.LEAST_INSTANTS)
+    return sorted(int(section.rows[place]) for place in list(dict.fromkeys(places))[:most])
+
+
+def _passed(section: CampaignSection, memories: Memories, cases: Sequence[int]) -> passed.Passed:
+    """The telling instants of these cases."""
+    experiment, cells = section.prepared.experiment, section.prepared.recording.cells
+    count = max(passed.LEAST_INSTANTS, passed.instants(experiment) // len(cases))
+    places = [passed.telling(experiment, memories.by_case[case], cells, count) for case in cases]
+    every = np.concatenate([memories.by_case[case][at] for case, at in zip(cases, places, strict=True)])
+    return passed.Passed(
+        np.repeat(cases, [len(at) for at in places]),
+        np.array(memories.ticks)[np.concatenate(places)],
+        {name: every[:, slot] for slot, name in enumerate(cells)},
+    )
+
+
+def _warning(experiment: Experiment, found: passed.Lasting) -> Diagnostic:
+    """A warning of what lasts, in words."""
+    hz = experiment.structure.schedule.base_hz
+    where = from_instants(experiment, found.case, float(found.at.tick[0]) / hz, found.until)
+    if not isinstance(found.fault, Fault):
+        return loop_warning(experiment, found.fault, experiment.place, f"as it stands {where}")
+    better = passed.remedy_of(experiment, found)
+    return fault_warning(experiment, found.fault, better, experiment.place, f"reckoned {where}")

@@ -1,0 +1,57 @@
+"""Warnings of motors on beds whose loops are unstable with the arm that they are to stand for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ic.meaning.checks.step_words import at_the_start
+from ic.text.complaints import Complaints
+from met.diagnostic import Diagnostic, Label, Problem
+from met.plan import Experiment
+
+if TYPE_CHECKING:
+    from met.analysis.margin import Margin
+
+MOST_CASES = 3
+"""Cases that are looked at: each takes some 25 ms."""
+
+
+def check_beds(complaints: Complaints, experiment: Experiment) -> None:
+    """Warns of each joint on a bed that is unstable in the first case, or where something is least or largest."""
+    if not experiment.structure.substitutions or not experiment.cases.count:
+        return
+    from met.analysis.margin import margins
+    from met.analysis.step_size import chosen_cases
+
+    told: set[str] = set()
+    cases = chosen_cases(experiment)[:MOST_CASES]
+    left = experiment.cases.count - len(cases)
+    try:
+        found = margins(experiment, cases)
+    except Problem:  # said where the program is built
+        return
+    for each in (one for of_case in found for one in of_case):
+        if not each.stable and each.joint not in told:
+            told.add(each.joint)
+            where = f"reckoned with the arm as it stands {at_the_start(experiment, each.case)}"
+            where += f"; {left} of {experiment.cases.count} cases were not looked at" if left else ""
+            complaints.pass_on(bed_warning(experiment, each, where))
+
+
+def bed_warning(experiment: Experiment, found: Margin, where: str) -> Diagnostic:
+    """A warning of a loop that grows. where: in which pose of which case, in words."""
+    from met.analysis.margin import remedy
+
+    r = found.least if found.too_light else found.together
+    if found.limit == 0.0 or r != r:
+        ends = "stable with no arm" if r == r else "no number"
+    else:
+        ends = f"above {found.lower:.3g}" if found.too_light else f"up to {found.limit:.3g}"
+        ends = f"stable {ends}"
+    message = (
+        f"the loop of joint `{found.joint}` on its bed is unstable with `{found.law}` at {found.rate_hz:.12g} Hz: "
+        f"r = {r:.3g}, and it is {ends}"
+    )
+    place = next(use.place for use in experiment.structure.substitutions if use.joint == found.joint)
+    helps = (f"{remedy(found)} may help", "`met margin` says it of all cases", where)
+    return Diagnostic("D321", message, None if place is None else Label(place), (), helps, "warning")

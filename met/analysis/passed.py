@@ -1,0 +1,313 @@
+"""The step against the arm at instants that cases pass, where a run has been: what grows there, and is not followed.
+
+At an instant the arm moves, and its modes are those of A as it is then. They are believed over the time between
+neighbouring instants that both have them, and no longer: what comes and goes between is not seen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from met import models
+from met.analysis.loops import LEAST, Unstable, blamed, frame_growths
+from met.analysis.margin import Margin, ends_of_motion, margins, rotor_inertias
+from met.analysis.modes import FAST, TELLING, Mode, modes
+from met.analysis.step_map import Linearizer, Sampled, StepMap
+from met.analysis.step_size import Fault, Remedy, chosen_cases, owner_of, remedy, step_size
+from met.frozen import frozen
+from met.integrators.integrator import Integrator
+from met.passing import BESIDE
+from met.plan import Experiment
+
+GROWS = 1.0
+"""ln of the growth from one instant to others, above which something is said: what was there is lost in it."""
+
+NAMES = 2000
+"""Names times instants that are looked at, at most: it bounds the time, some 20 ms."""
+
+LEAST_INSTANTS, MOST_INSTANTS = 8, 64
+"""Of all cases together."""
+
+Found = TypeVar("Found")
+
+Owner = tuple[str, str]
+"""What takes part in a mode most, as `met.analysis.step_size.owner_of` has it."""
+
+
+@frozen
+class Passed:
+    """Instants that cases have passed: the lanes of a case are neighbours, and rise.
+
+    case    rows of the case table: [lane]
+    tick    of the base rate: [lane]
+    memory  cells of the program by name: [lane]
+    """
+
+    case: np.ndarray
+    tick: np.ndarray
+    memory: Mapping[str, np.ndarray]
+
+    def only(self, lanes: np.ndarray) -> Passed:
+        """Some of its lanes."""
+        return Passed(self.case[lanes], self.tick[lanes], {name: values[lanes] for name, values in self.memory.items()})
+
+
+@frozen
+class Lasting:
+    """What neighbouring instants of a case all show.
+
+    fault   the worst of it: of the step, or of a servo's loop
+    case    row of the case table;  since, until: s from the start of the run
+    at      the worst one's instant, alone
+    """
+
+    fault: Fault | Unstable
+    case: int
+    since: float
+    until: float
+    at: Passed
+
+
+def instants(experiment: Experiment) -> int:
+    """The number of instants that are looked at, of all cases together."""
+    names = 2 * len(experiment.structure.moving) + 6 * len(experiment.structure.servos) + 12
+    return min(MOST_INSTANTS, max(LEAST_INSTANTS, NAMES // names))
+
+
+def telling(experiment: Experiment, memory: np.ndarray, cells: Sequence[str], count: int) -> np.ndarray:
+    """Places of so many of a case's instants: where a joint is at its ends, or fastest, and others evenly; always with
+    the one that follows.
+
+    memory  [instant, cell]
+    """
+    places = {name: slot for slot, name in enumerate(cells)}
+    fine = np.flatnonzero(np.isfinite(memory).all(1))
+    if len(fine) <= count:
+        return fine
+    wanted = []
+    for joint in experiment.structure.moving:
+        q, qd = (memory[fine, places[f"{joint.name}.{part}"]] for part in ("q", "qd"))
+        wanted += [int(np.argmax(np.abs(qd))), int(np.argmin(q)), int(np.argmax(q))]
+    last = len(fine) // 2 - 1
+    pairs = list(dict.fromkeys(min(each // 2, last) for each in wanted))[: count // 4]
+    even = np.linspace(0, last, max(1, count // 2 - len(pairs))).astype(int).tolist()
+    return fine[sorted({place for pair in {*pairs, *even} for place in (2 * pair, 2 * pair + 1)})]
+
+
+def lasting(experiment: Experiment, passed: Passed) -> tuple[Lasting, ...]:
+    """What of each kind lasts: the worst that is unstable, that is damped, that is fast, and of loops; none of a kind
+    that the poses show in which cases begin, for the check has told it. Raises Problem where the program cannot be
+    built."""
+    integrator, schedule = models.find("integrator", experiment.structure.integrator), experiment.structure.schedule
+    linearizer = Linearizer(experiment, passed.case.tolist(), passed.memory)
+    sampled, as_it_is, times = linearizer.sampled(), linearizer.sampled(loose=False), passed.tick / schedule.base_hz
+    quiet = np.zeros(len(times), bool)
+    if as_it_is is not None:
+        growths, frame = frame_growths(as_it_is)
+        quiet = growths <= max(LEAST, GROWS * frame / schedule.duration)
+    seen = _Seen(_by_owner(as_run(linearizer.map()), integrator, len(times)), times, _stretches(passed), schedule.step)
+    held = {law.joint for law in sampled.laws} if sampled is not None else set()
+    every = [seen.growing(quiet), seen.missed(held)]
+    if not any(every):
+        every.append(seen.fast())
+    if sampled is not None and not every[0]:
+        every.append(_loops(sampled, times, seen.stretches, schedule.duration))
+    found = []
+    for several in every:
+        if several:
+            worst = max(several, key=lambda each: each.weight)
+            at = passed.only(np.array([worst.lane]))
+            since, until = float(times[worst.first]), float(times[worst.last])
+            found.append(Lasting(worst.fault, int(passed.case[worst.lane]), since, until, at))
+    return _news(experiment, found)
+
+
+@frozen
+class _Candidate:
+    """What the lanes `first` to `last` show, and `lane` most, and how much it matters among those of its kind."""
+
+    weight: float
+    fault: Fault | Unstable
+    lane: int
+    first: int
+    last: int
+
+
+@frozen
+class _Seen:
+    """The modes of each lane by their owners, with the instants of the lanes, s, and the lanes of each case."""
+
+    modes: Sequence[Mapping[Owner, Sequence[Mode]]]
+    times: np.ndarray
+    stretches: Sequence[tuple[int, int]]
+    h: float
+
+    def growing(self, quiet: np.ndarray) -> list[_Candidate]:
+        """Modes that the step makes grow by e and more, where no law holds them."""
+        shown = self._of(lambda mode, lane: mode.grown(self.h, 1) > 0.0 and not quiet[lane])
+        found = []
+        for owner, first, last in _lasting_ones(shown, self.stretches):
+            of_each = [max(shown[lane][owner], key=lambda mode: mode.growth) for lane in range(first, last + 1)]
+            grown = _over([mode.grown(self.h, 1) for mode in of_each], self.times[first : last + 1], self.h)
+            if grown > GROWS:
+                worst = max(of_each, key=lambda mode: mode.growth)
+                fault = Fault("grows", worst, *owner, worst.growth, 0.0, 0.0)
+                found.append(_Candidate(grown, fault, worst.lane, first, last))
+        return found
+
+    def missed(self, held: set[str]) -> list[_Candidate]:
+        """What swings and is damped, or not damped, as it is not in truth: all the time, as of the best instant."""
+        shown = self._of(lambda mode, _: abs(mode.root.imag) > abs(mode.root.real))
+        found = []
+        for owner, first, last in _lasting_ones(shown, self.stretches):
+            steps = round((self.times[last] - self.times[first]) / self.h)
+
+            def lost(mode: Mode, steps: int = steps) -> float:
+                run, truth, _ = mode.missed(self.h, steps)
+                return abs(run - truth)
+
+            best = min((max(shown[lane][owner], key=lost) for lane in range(first, last + 1)), key=lost)
+            if lost(best) > TELLING and owner[1] not in held and steps > BESIDE:
+                run, truth, k = best.missed(self.h, steps)
+                fault = Fault("misses", best, *owner, run, truth, k * self.h)
+                found.append(_Candidate(lost(best), fault, best.lane, first, last))
+        return found
+
+    def fast(self) -> list[_Candidate]:
+        """Modes for which the step is long."""
+        shown = self._of(lambda mode, _: abs(mode.root) * self.h > FAST * (1.0 + 1e-6))
+        found = []
+        for owner, first, last in _lasting_ones(shown, self.stretches):
+            every = [mode for lane in range(first, last + 1) for mode in shown[lane][owner]]
+            worst = max(every, key=lambda mode: round(abs(mode.root) * self.h, 6))
+            figure = abs(worst.root) * self.h
+            fault = Fault("fast", worst, *owner, figure, 0.0, 0.0)
+            if round((self.times[last] - self.times[first]) / self.h) > BESIDE:
+                found.append(_Candidate(figure, fault, worst.lane, first, last))
+        return found
+
+    def _of(self, telling: Callable[[Mode, int], bool]) -> list[dict[Owner, list[Mode]]]:
+        """Of each lane and owner the modes that tell something."""
+        return [
+            {owner: those for owner, each in of_lane.items() if (those := [m for m in each if telling(m, lane)])}
+            for lane, of_lane in enumerate(self.modes)
+        ]
+
+
+def _by_owner(found: StepMap, integrator: Integrator, lanes: int) -> list[dict[Owner, list[Mode]]]:
+    """Modes that the arm does not turn away from before they have swung, of each lane by their owners."""
+    out: list[dict[Owner, list[Mode]]] = [{} for _ in range(lanes)]
+    for mode in modes(found, integrator):
+        if not mode.turns:
+            out[mode.lane].setdefault(owner_of(mode), []).append(mode)
+    return out
+
+
+def _over(growths: Sequence[float], times: np.ndarray, length: float) -> float:
+    """ln of the growth over all these instants, of what grows so much in a length of time: of neighbours the less."""
+    return float(np.sum(np.minimum(growths[1:], growths[:-1]) * np.diff(times)) / length)
+
+
+def lasting_beds(experiment: Experiment, passed: Passed) -> list[tuple[Margin, float]]:
+    """The joints on beds that are unstable with the heaviest or the lightest arm that neighbouring instants of a case
+    both show, and the first of these, s; none that are with the arm of the pose in which the case begins."""
+    if not experiment.structure.substitutions:
+        return []
+    Lambda = Linearizer(experiment, passed.case.tolist(), passed.memory).loads()
+    found: dict[str, tuple[Margin, float]] = {}
+    for first, last in _stretches(passed):
+        case = int(passed.case[first])
+        rotors = rotor_inertias(experiment, case)
+        motions = np.array([ends_of_motion(each, rotors) for each in Lambda[first : last + 1]])
+        if last == first or not np.isfinite(motions).all():
+            continue
+        least, most = np.maximum(*_pairs(motions[:, 0])), np.minimum(*_pairs(motions[:, 1]))
+        (begun,) = margins(experiment, [case])
+        for one in begun:
+            for at in (int(np.argmax(most)), int(np.argmin(least))):
+                then = replace(one, least=float(least[at]), together=float(most[at]))
+                if one.stable and not then.stable and one.joint not in found:
+                    time = float(passed.tick[first + at]) / experiment.structure.schedule.base_hz
+                    found[one.joint] = then, time
+    return list(found.values())
+
+
+def _pairs(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return values[1:], values[:-1]
+
+
+def remedy_of(experiment: Experiment, found: Lasting) -> Remedy:
+    """What would follow a mode that lasts, as it is at its worst instant."""
+    assert isinstance(found.fault, Fault)
+    here = as_run(Linearizer(experiment, found.at.case.tolist(), found.at.memory).map())
+    fault = replace(found.fault, mode=replace(found.fault.mode, lane=0))
+    return remedy(experiment, here, fault, found.at.memory)
+
+
+def as_run(found: StepMap) -> StepMap:
+    """The lanes that are as the run has them, numbered by instant."""
+    own = ~found.loose
+    return replace(
+        found, case=found.case[own], loose=found.loose[own], slope=found.slope[own], step=found.step[own],
+        rate=found.rate[own],
+    )  # fmt: skip
+
+
+def _stretches(passed: Passed) -> list[tuple[int, int]]:
+    """First and last lane of each case."""
+    ends = np.flatnonzero(np.diff(passed.case)).tolist()
+    return list(zip([0, *(end + 1 for end in ends)], [*ends, len(passed.case) - 1], strict=True))
+
+
+def _lasting_ones(
+    shown: Sequence[Mapping[Found, object]], stretches: Sequence[tuple[int, int]]
+) -> Iterator[tuple[Found, int, int]]:
+    """Each owner with the first and last of two or more neighbouring lanes of a case that all have it."""
+    for first, last in stretches:
+        for owner in dict.fromkeys(each for lane in range(first, last + 1) for each in shown[lane]):
+            since = None
+            for lane in range(first, last + 2):
+                if lane <= last and owner in shown[lane]:
+                    since = lane if since is None else since
+                elif since is not None:
+                    if lane - 1 > since:
+                        yield owner, since, lane - 1
+                    since = None
+
+
+def _loops(
+    found: Sampled, times: np.ndarray, stretches: Sequence[tuple[int, int]], duration: float
+) -> list[_Candidate]:
+    """The loops that are unstable for longest, by their ticks."""
+    growths, frame = frame_growths(found)
+    least = max(LEAST, GROWS * frame / duration)
+    shown = [{"": None} if least < growth < math.inf else {} for growth in growths.tolist()]
+    several = [
+        (_over(growths[first : last + 1].tolist(), times[first : last + 1], frame), first, last)
+        for _, first, last in _lasting_ones(shown, stretches)
+    ]
+    for grown, first, last in sorted(several, reverse=True):
+        lane = first + int(np.argmax(growths[first : last + 1]))
+        blame = blamed(found, lane, GROWS * frame / (times[last] - times[first])) if grown > GROWS else []
+        if blame:
+            return [_Candidate(grown, min(blame, key=lambda each: each.gain), lane, first, last)]
+    return []
+
+
+def _news(experiment: Experiment, found: Sequence[Lasting]) -> tuple[Lasting, ...]:
+    """Those of a kind that the poses in which cases begin do not show: the check has told these."""
+    if not found:
+        return ()
+    begun = step_size(experiment, chosen_cases(experiment))
+    told = {each.kind for each in begun.faults}
+    if "grows" in told or "misses" in told:
+        told.add("fast")
+    loops = bool(begun.loops) or "grows" in told
+    return tuple(
+        each for each in found if (not loops if isinstance(each.fault, Unstable) else each.fault.kind not in told)
+    )

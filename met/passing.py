@@ -1,0 +1,101 @@
+"""Cases stepped from instant to instant, so that their memory can be looked at on the way: the same bits as of a run.
+
+A block of the kernel keeps its state from call to call. It is the same code that runs a campaign, so looking changes
+nothing and costs a copy of the state at each instant.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import field
+
+import numpy as np
+
+from met.backends.backend import Kernel
+from met.frozen import frozen
+from met.plan import Schedule
+
+LONGEST = 1 << 16
+"""Ticks of one call into machine code, which cannot be interrupted."""
+
+
+BESIDE = 8
+"""Steps from an instant to the next: a few, so that what changes soon is seen for as long as it lasts."""
+
+
+@frozen
+class Memories:
+    """The memory of some cases at instants that they pass, filled in as they are run.
+
+    ticks    rising;  cases: rows of the case table
+    by_case  row -> [instant, cell], in the order of the recording's cells
+    """
+
+    ticks: tuple[int, ...]
+    cases: frozenset[int]
+    by_case: dict[int, np.ndarray] = field(default_factory=dict)
+
+
+def even_ticks(schedule: Schedule, instants: int) -> tuple[int, ...]:
+    """Ticks of so many instants of the dynamics over a run, evenly, each with one that is `BESIDE` steps later; fewer
+    of a short run."""
+    steps = schedule.ticks // schedule.dynamics
+    first = [n * steps // instants for n in range(instants)]
+    return tuple(sorted({n * schedule.dynamics for k in first for n in (k, min(k + BESIDE, steps))}))
+
+
+def run_past(
+    kernel: Kernel,
+    inputs: np.ndarray,
+    ticks: int,
+    at: Sequence[int],
+    *,
+    record: bool,
+    threads: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
+    """Rows and outputs as `Kernel.run` gives them, and the memory [case, instant, cell] at these ticks, which rise.
+
+    threads: None: as many as there are cores. Not for more than a few blocks of cases: their memory is kept whole.
+    """
+    program = kernel.program
+    cases, record = len(inputs), record and program.columns > 0
+    ends = sorted({*at, *range(LONGEST, ticks, LONGEST), ticks})
+    outputs = np.empty((cases, len(program.outputs)))
+    memory = np.empty((cases, len(at), len(kernel.recording.cells)))
+    pieces: dict[int, list[np.ndarray]] = {}
+    wanted, starts, done, ended = frozenset(at), range(0, cases, kernel.lanes), 0, threading.Event()
+
+    def work(start: int) -> int:
+        block = kernel.block(inputs[start : start + kernel.lanes])
+        here = slice(start, min(start + kernel.lanes, cases))
+        width, first, kept = here.stop - here.start, 0, iter(range(len(at)))
+        rows = pieces[start] = []
+        for last in ends:
+            if ended.is_set():
+                return 0
+            if record:
+                rows.append(block.recorded(first, last))
+            else:
+                block.step(first, last)
+            if last in wanted:
+                memory[here, next(kept)] = block.state[: memory.shape[2], :width].T
+            first = last + 1
+        outputs[here] = block.outputs[: outputs.shape[1], :width].T
+        return width
+
+    with ThreadPoolExecutor(max(1, min(threads or len(os.sched_getaffinity(0)), len(starts)))) as pool:
+        try:
+            for width in pool.map(work, starts):
+                done += width
+                if progress is not None:
+                    progress(done)
+        except BaseException:
+            ended.set()
+            raise
+    if not record:
+        return None, outputs, memory
+    return np.concatenate([np.concatenate(pieces[start], axis=1) for start in starts]), outputs, memory
