@@ -94,7 +94,7 @@ def _signals(signals: Sequence[SignalDiff]) -> list[str]:
 def _paired(experiment: ExperimentDiff) -> list[str]:
     """Metrics as pairs of the same cases."""
     lines = words.paired_metrics(experiment)
-    return ["", "  metrics, case by case:", *(f"    {line}" for line in lines)] if lines else []
+    return ["", f"  {words.PAIRED}:", *(f"    {line}" for line in lines)] if lines else []
 
 
 def _samples(experiment: ExperimentDiff) -> list[str]:

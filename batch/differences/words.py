@@ -17,6 +17,9 @@ from met.frozen import frozen
 from met.messages.visible import visible
 from met.outputs import quoted
 
+PAIRED = "metrics, case by case"
+"""The heading of what pairs of the same cases show of metrics."""
+
 SMALLEST = 1e-9
 """Probabilities below this one are not told apart."""
 

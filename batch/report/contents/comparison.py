@@ -55,12 +55,13 @@ def _run_changes(found: Diff, experiment: ExperimentDiff, several: bool) -> RunC
     allowed = (
         line.replace("the deck of b ", f"the deck of {found.b} ") for line in words.tolerance_lines(found, experiment)
     )
+    paired = words.paired_metrics(experiment)
     return RunChanges(
         heading=words.heading(experiment),
         word=experiment.verdict,
         alone=tuple(alone),
         endings=tuple(words.endings(experiment)),
-        notes=(*experiment.notes, *words.paired_metrics(experiment)),
+        notes=(*experiment.notes, *([f"{words.PAIRED}: {'; '.join(paired)}"] if paired else [])),
         allowed=tuple(allowed),
         signals=tuple(map(words.signal_row, experiment.signals)),
         samples=tuple(map(words.distribution, experiment.samples)),
