@@ -18,7 +18,7 @@ from ic.meaning.checks.step_words import fault_warning, from_instants, loop_warn
 from met import models
 from met import run as engine
 from met.analysis import passed
-from met.analysis.step_size import Fault, chosen_cases
+from met.analysis.step_size import StepFault, chosen_cases
 from met.diagnostic import Diagnostic, Problem
 from met.passing import Memories, even_ticks
 from met.plan import Experiment
@@ -119,7 +119,7 @@ def _warning(experiment: Experiment, found: passed.Lasting) -> Diagnostic:
     """A warning of what lasts, in words."""
     hz = experiment.structure.schedule.base_hz
     where = from_instants(experiment, found.case, float(found.at.tick[0]) / hz, found.until)
-    if not isinstance(found.fault, Fault):
+    if not isinstance(found.fault, StepFault):
         return loop_warning(experiment, found.fault, experiment.place, f"as it stands {where}")
     better = passed.remedy_of(experiment, found)
     return fault_warning(experiment, found.fault, better, experiment.place, f"reckoned {where}")

@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from met.analysis.step_map import Sampled, linear_step
+from met.analysis.step_map import SampledLoops, linear_step
 from met.frozen import frozen
 from met.plan import Experiment
 
@@ -46,7 +46,7 @@ class Unstable:
     every: float
 
 
-def frame(found: Sampled, lane: int | np.ndarray, gains: Mapping[str, float] | None = None) -> np.ndarray:
+def frame(found: SampledLoops, lane: int | np.ndarray, gains: Mapping[str, float] | None = None) -> np.ndarray:
     """The map of one frame, of state, memory, memory at the step's first tick, and the state a step before; of a lane,
     or of several.
 
@@ -119,7 +119,7 @@ class Loops:
     quiet: frozenset[int]
 
 
-def closed(experiment: Experiment, found: Sampled) -> Loops:
+def closed(experiment: Experiment, found: SampledLoops) -> Loops:
     """The loops of each lane: a joint's is to blame where its own gain alone can make all stable."""
     growths, seconds = frame_growths(found)
     limit = max(LEAST, GROWS * seconds / experiment.structure.schedule.duration)
@@ -132,7 +132,7 @@ def closed(experiment: Experiment, found: Sampled) -> Loops:
     return Loops(tuple(sorted(worst.values(), key=lambda each: each.gain)), quiet)
 
 
-def frame_growths(found: Sampled) -> tuple[np.ndarray, float]:
+def frame_growths(found: SampledLoops) -> tuple[np.ndarray, float]:
     """ln of the growth of a frame, of each lane: infinite where it is no number, or a frame is too long to be looked
     at; and the length of a frame, s."""
     length, growths = _length(found), np.full(len(found.case), math.inf)
@@ -145,12 +145,12 @@ def frame_growths(found: Sampled) -> tuple[np.ndarray, float]:
     return growths, length / found.base_hz
 
 
-def _length(found: Sampled) -> int:
+def _length(found: SampledLoops) -> int:
     """Ticks of the base rate in a frame."""
     return math.lcm(found.divisor, *(each.divisor for each in found.laws))
 
 
-def blamed(found: Sampled, lane: int, limit: float) -> list[Unstable]:
+def blamed(found: SampledLoops, lane: int, limit: float) -> list[Unstable]:
     """The loops of a lane whose ticks make a frame grow by more than this (ln); none where they do not."""
     seconds = _length(found) / found.base_hz
     growth, joints = partial(_of_ticks, found, lane, seconds), tuple(each.joint for each in found.laws)
@@ -172,7 +172,7 @@ def _growths(frames: np.ndarray) -> np.ndarray:
     return growths
 
 
-def _of_ticks(found: Sampled, lane: int, seconds: float, gains: Mapping[str, float]) -> float:
+def _of_ticks(found: SampledLoops, lane: int, seconds: float, gains: Mapping[str, float]) -> float:
     """ln of the growth of a frame as far as it is of the ticks, for it would not be so if the laws were continuous."""
     own = float(_growths(frame(found, np.array([lane]), gains))[0])
     if own == math.inf:
@@ -184,7 +184,7 @@ def _of_ticks(found: Sampled, lane: int, seconds: float, gains: Mapping[str, flo
     return excess if excess > 0.5 * own else 0.0
 
 
-def continuous(found: Sampled, lane: int, gains: Mapping[str, float]) -> np.ndarray:
+def continuous(found: SampledLoops, lane: int, gains: Mapping[str, float]) -> np.ndarray:
     """The slopes of state and integrals were all laws continuous, 1/s; not numbers where an output answers itself."""
     n, m, places = found.states, len(found.held), {name: i for i, name in enumerate(found.held)}
     made = np.eye(m, n + m, n)  # what a tick makes of memory

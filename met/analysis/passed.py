@@ -17,8 +17,8 @@ from met import models
 from met.analysis.loops import LEAST, Unstable, blamed, frame_growths
 from met.analysis.margin import Margin, ends_of_motion, margins, rotor_inertias
 from met.analysis.modes import FAST, TELLING, Mode, modes
-from met.analysis.step_map import Linearizer, Sampled, StepMap
-from met.analysis.step_size import Fault, Remedy, chosen_cases, owner_of, remedy, step_size
+from met.analysis.step_map import Linearizer, SampledLoops, StepMap
+from met.analysis.step_size import Remedy, StepFault, chosen_cases, owner_of, remedy, step_size
 from met.frozen import frozen
 from met.integrators.integrator import Integrator
 from met.passing import BESIDE
@@ -66,7 +66,7 @@ class Lasting:
     at      the worst one's instant, alone
     """
 
-    fault: Fault | Unstable
+    fault: StepFault | Unstable
     case: int
     since: float
     until: float
@@ -132,7 +132,7 @@ class _Candidate:
     """What the lanes `first` to `last` show, and `lane` most, and how much it matters among those of its kind."""
 
     weight: float
-    fault: Fault | Unstable
+    fault: StepFault | Unstable
     lane: int
     first: int
     last: int
@@ -156,7 +156,7 @@ class _Seen:
             grown = _over([mode.grown(self.h, 1) for mode in of_each], self.times[first : last + 1], self.h)
             if grown > GROWS:
                 worst = max(of_each, key=lambda mode: mode.growth)
-                fault = Fault("grows", worst, *owner, worst.growth, 0.0, 0.0)
+                fault = StepFault("grows", worst, *owner, worst.growth, 0.0, 0.0)
                 found.append(_Candidate(grown, fault, worst.lane, first, last))
         return found
 
@@ -174,7 +174,7 @@ class _Seen:
             best = min((max(shown[lane][owner], key=lost) for lane in range(first, last + 1)), key=lost)
             if lost(best) > TELLING and owner[1] not in held and steps > BESIDE:
                 run, truth, k = best.missed(self.h, steps)
-                fault = Fault("misses", best, *owner, run, truth, k * self.h)
+                fault = StepFault("misses", best, *owner, run, truth, k * self.h)
                 found.append(_Candidate(lost(best), fault, best.lane, first, last))
         return found
 
@@ -186,7 +186,7 @@ class _Seen:
             every = [mode for lane in range(first, last + 1) for mode in shown[lane][owner]]
             worst = max(every, key=lambda mode: round(abs(mode.root) * self.h, 6))
             figure = abs(worst.root) * self.h
-            fault = Fault("fast", worst, *owner, figure, 0.0, 0.0)
+            fault = StepFault("fast", worst, *owner, figure, 0.0, 0.0)
             if round((self.times[last] - self.times[first]) / self.h) > BESIDE:
                 found.append(_Candidate(figure, fault, worst.lane, first, last))
         return found
@@ -243,7 +243,7 @@ def _pairs(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def remedy_of(experiment: Experiment, found: Lasting) -> Remedy:
     """What would follow a mode that lasts, as it is at its worst instant."""
-    assert isinstance(found.fault, Fault)
+    assert isinstance(found.fault, StepFault)
     here = as_run(Linearizer(experiment, found.at.case.tolist(), found.at.memory).map())
     fault = replace(found.fault, mode=replace(found.fault.mode, lane=0))
     return remedy(experiment, here, fault, found.at.memory)
@@ -281,7 +281,7 @@ def _lasting_ones(
 
 
 def _loops(
-    found: Sampled, times: np.ndarray, stretches: Sequence[tuple[int, int]], duration: float
+    found: SampledLoops, times: np.ndarray, stretches: Sequence[tuple[int, int]], duration: float
 ) -> list[_Candidate]:
     """The loops that are unstable for longest, by their ticks."""
     growths, frame = frame_growths(found)

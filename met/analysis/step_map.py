@@ -80,7 +80,7 @@ class SampledLaw:
 
 
 @frozen
-class Sampled:
+class SampledLoops:
     """Arms, loose or as the run has them, with the laws that tick on them.
 
     case    rows of the case table
@@ -230,7 +230,7 @@ class Linearizer:
             M = self._of_stages() if stages else linear_step(system.integrator, A, positions, h)
         return StepMap(np.repeat(self.cases, 2), self.loose, self.cells, positions, A, M, rate, h)
 
-    def sampled(self, *, loose: bool = True) -> Sampled | None:
+    def sampled(self, *, loose: bool = True) -> SampledLoops | None:
         """The cases with their laws that tick, loose or as the run has them; None where none does, or one is on a
         bed."""
         if not self.laws:
@@ -238,7 +238,7 @@ class Linearizer:
         step, schedule = self.builder.step, self.builder.step.schedule
         with np.errstate(all="ignore"):
             laws = tuple(self._law(each, self.loose == loose) for each in self.laws)
-        return Sampled(
+        return SampledLoops(
             self.cases, len(self.cells), len(step.coordinates), self.held, self.slope[self.loose == loose], laws,
             self.system.integrator, schedule.step, schedule.dynamics, schedule.base_hz,
         )  # fmt: skip

@@ -22,7 +22,7 @@ LANES = 300
 
 
 @frozen
-class Fault:
+class StepFault:
     """A mode that the step does not follow.
 
     kind     "grows"; "misses": it is damped, or not damped, as in truth it is not; "fast": its h |lambda| is large
@@ -68,7 +68,7 @@ class StepSize:
     joint: str
     fastest: float
     grown: float
-    faults: tuple[Fault, ...]
+    faults: tuple[StepFault, ...]
     finite: bool
     loops: tuple[Unstable, ...]
     map: StepMap
@@ -97,10 +97,10 @@ def step_size(experiment: Experiment, cases: Sequence[int]) -> StepSize:
     steps, h = schedule.ticks // schedule.dynamics, found.h
     loops = closed(experiment, sampled) if sampled is not None else Loops((), frozenset())
     held = {law.joint for law in sampled.laws} if sampled is not None else set()
-    faults: list[Fault] = []
+    faults: list[StepFault] = []
 
     def fault(kind: Literal["grows", "misses", "fast"], mode: Mode, figure: float, truth: float, after: float) -> None:
-        faults.append(Fault(kind, mode, *owner_of(mode), figure, truth, after))
+        faults.append(StepFault(kind, mode, *owner_of(mode), figure, truth, after))
 
     growing = [each for each in every if each.grown(h, steps) > np.log1p(TELLING) and each.lane // 2 not in loops.quiet]
     if growing:
@@ -130,7 +130,7 @@ def step_size(experiment: Experiment, cases: Sequence[int]) -> StepSize:
 
 
 def remedy(
-    experiment: Experiment, found: StepMap, fault: Fault, memory: Mapping[str, np.ndarray] | None = None
+    experiment: Experiment, found: StepMap, fault: StepFault, memory: Mapping[str, np.ndarray] | None = None
 ) -> Remedy:
     """The rate and the integrators that would do, and what of the environment is the cause.
 

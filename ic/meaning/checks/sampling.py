@@ -29,7 +29,7 @@ ENOUGH = 10
 
 
 @frozen
-class Sampled:
+class SampledContent:
     """What a model brings in time, and the instants that see it.
 
     label     whose it is, in words;  path: of its parameters
@@ -54,13 +54,15 @@ def check_sampling(scope: Scope, structure: Structure) -> None:
         _observe(scope, sampled, structure.schedule)
 
 
-def _all_sampled(structure: Structure) -> Iterator[Sampled]:
+def _all_sampled(structure: Structure) -> Iterator[SampledContent]:
     schedule = structure.schedule
 
-    def course(label: str, path: str, model: str, interval: float, by: str, place: Place | None) -> Iterator[Sampled]:
+    def course(
+        label: str, path: str, model: str, interval: float, by: str, place: Place | None
+    ) -> Iterator[SampledContent]:
         profile = models.find("command", model, place)
         if profile.content is not None:
-            yield Sampled(label, path, profile.parameters, profile.content, interval, by, place)
+            yield SampledContent(label, path, profile.parameters, profile.content, interval, by, place)
 
     steps = "the dynamics steps"
     for use in structure.servos:
@@ -81,10 +83,10 @@ def _all_sampled(structure: Structure) -> Iterator[Sampled]:
         model = models.find("environment", load.model, load.place)
         if model.content is not None:
             label, path = f"environment `{load.name}`", f"environment.{load.name}"
-            yield Sampled(label, path, model.parameters, model.content, schedule.step, steps, load.place)
+            yield SampledContent(label, path, model.parameters, model.content, schedule.step, steps, load.place)
 
 
-def _observe(scope: Scope, sampled: Sampled, schedule: Schedule) -> None:
+def _observe(scope: Scope, sampled: SampledContent, schedule: Schedule) -> None:
     settled = {each.name: scope.parameters.get(f"{sampled.path}.{each.name}") for each in sampled.declared}
     known = {name: each.value for name, each in settled.items() if each is not None}
     if len(known) < len(settled):
@@ -114,7 +116,7 @@ def _observe(scope: Scope, sampled: Sampled, schedule: Schedule) -> None:
     scope.checks.observe(tuple(numbers.values()), warn, place, needs=(sampled.path,))
 
 
-def _remark(scope: Scope, sampled: Sampled, found: list[Content], schedule: Schedule, place: Place) -> None:
+def _remark(scope: Scope, sampled: SampledContent, found: list[Content], schedule: Schedule, place: Place) -> None:
     duration, base = schedule.duration, schedule.base_hz
     first = min(found, key=lambda each: each.begins)
     if duration <= first.begins < math.inf:

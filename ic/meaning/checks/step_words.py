@@ -15,10 +15,12 @@ from met.plan import Experiment, Formula
 
 if TYPE_CHECKING:
     from met.analysis.loops import Unstable
-    from met.analysis.step_size import Fault, Remedy
+    from met.analysis.step_size import Remedy, StepFault
 
 
-def fault_warning(experiment: Experiment, fault: Fault, better: Remedy, place: Place | None, where: str) -> Diagnostic:
+def fault_warning(
+    experiment: Experiment, fault: StepFault, better: Remedy, place: Place | None, where: str
+) -> Diagnostic:
     """A warning of a mode that the step does not follow: D317, D318 or D319.
 
     place  of the rate, or of the run;  where: the state that this is about, in words
@@ -90,7 +92,7 @@ def _value(experiment: Experiment, path: str, case: int) -> float:
     return float(np.asarray(experiment.formulas.replay(inputs)[value.output])[case])
 
 
-def _words(experiment: Experiment, fault: Fault, better: Remedy) -> tuple[str, str, str, list[str]]:
+def _words(experiment: Experiment, fault: StepFault, better: Remedy) -> tuple[str, str, str, list[str]]:
     """Code, message, the label at the rate, and help."""
     structure = experiment.structure
     h, integrator, root = structure.schedule.step, structure.integrator, fault.mode.root
@@ -122,7 +124,7 @@ def _hertz(root: complex) -> str:
     return f"{abs(root.imag) / (2.0 * math.pi):.3g} Hz"
 
 
-def _places(experiment: Experiment, fault: Fault, better: Remedy) -> Iterator[Label]:
+def _places(experiment: Experiment, fault: StepFault, better: Remedy) -> Iterator[Label]:
     """The servo of the joint, and the environment model without which it would not be so."""
     structure = experiment.structure
     for use in structure.servos:

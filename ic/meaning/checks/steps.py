@@ -21,7 +21,7 @@ from met.messages.render import shown_place
 from met.plan import Experiment
 
 if TYPE_CHECKING:
-    from met.analysis.step_size import Fault, StepSize
+    from met.analysis.step_size import StepFault, StepSize
 
 NOTE = "step size: "
 """The beginning of the plan's note on it."""
@@ -67,7 +67,7 @@ def check_steps(scope: Scope, experiment: Experiment) -> Experiment:
 
 
 def _is_told(
-    fault: Fault, kept: frozenset[str], declared: dict[str, tuple[float, tuple[int, ...]]], found: StepSize
+    fault: StepFault, kept: frozenset[str], declared: dict[str, tuple[float, tuple[int, ...]]], found: StepSize
 ) -> bool:
     """True where what a servo or sensor declares of itself has said it."""
     if "D104" in kept:
@@ -79,7 +79,7 @@ def _is_told(
     return fault.kind == "fast" and "D105" in kept and fault.figure <= BEYOND * declared.get("D105", (0.0, ()))[0]
 
 
-def _where(experiment: Experiment, fault: Fault, found: StepSize) -> str:
+def _where(experiment: Experiment, fault: StepFault, found: StepSize) -> str:
     """Which state this is about, in words, and what was not looked at."""
     cases = experiment.cases
     where = at_the_start(experiment, fault.mode.case)

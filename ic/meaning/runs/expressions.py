@@ -37,7 +37,7 @@ COMPARE = "compare numbers with <, <=, >, >=, and join comparisons by `and`, `or
 
 
 @frozen
-class Margin:
+class ConditionMargin:
     """A condition's margin: in one unit, or where its parts have several, 1 where it holds and -1 where not.
 
     mixed  parts in two units; none where there is one
@@ -49,10 +49,10 @@ class Margin:
     mixed: tuple[Value, ...] = ()
 
 
-def resolve_signals(scope: Scope, block: MergedBlock, structure: Structure) -> Signals:
+def resolve_signals(scope: Scope, block: MergedBlock, structure: Structure) -> ChannelTable:
     """Every `signal NAME = EXPRESSION;` of a run, each of channels and of the signals before it."""
     written = [*(item.value for item in block.of_kind("signal")), *watched(block)]
-    signals = Signals(scope, structure, [each for each in written if each is not None])
+    signals = ChannelTable(scope, structure, [each for each in written if each is not None])
     for item in block.of_kind("signal"):
         path = f"{SIGNALS}.{item.name}"
         signals.lost.add(path)
@@ -68,7 +68,7 @@ def watched(block: MergedBlock) -> list[Expression | None]:
     return [of.value for of in bodies if of is not None]
 
 
-class Signals:
+class ChannelTable:
     """What expressions of a run are made of; every method that resolves one raises Problem.
 
     known        channels by path, signals of the deck among them
@@ -212,7 +212,7 @@ class Signals:
 
     # Conditions
 
-    def _margin(self, expression: Expression, negated: bool = False) -> Margin:
+    def _margin(self, expression: Expression, negated: bool = False) -> ConditionMargin:
         if isinstance(expression, Unary) and expression.operator == "not":
             return self._margin(expression.operand, not negated)
         if isinstance(expression, Binary) and expression.operator in ("and", "or"):
@@ -231,7 +231,7 @@ class Signals:
             raise Problem(error("D355", message, expression.name.place, help=helps))
         raise Problem(error("D353", "a condition is needed here", place_of(expression), help=COMPARE))
 
-    def _comparison(self, comparison: Binary, negated: bool) -> Margin:
+    def _comparison(self, comparison: Binary, negated: bool) -> ConditionMargin:
         left, right = (self._number(side) for side in (comparison.left, comparison.right))
         if not units.same(left.dimension, right.dimension):
             helps = "both must be of one dimension"
@@ -243,7 +243,7 @@ class Signals:
             raise Problem(error("D063", message, comparison.place, also=also, help=helps))
         below = comparison.operator.startswith("<") != negated
         number = right.number - left.number if below else left.number - right.number
-        return Margin(number, left.dimension, place_of(comparison))
+        return ConditionMargin(number, left.dimension, place_of(comparison))
 
     # Every joint
 
@@ -288,14 +288,14 @@ def is_over_time(expression: Expression) -> bool:
     return name in models.available("metric") and models.find("metric", name).condition
 
 
-def _joined(left: Margin, right: Margin, least: bool, place: Place) -> Margin:
+def _joined(left: ConditionMargin, right: ConditionMargin, least: bool, place: Place) -> ConditionMargin:
     """The margin of two conditions of which both hold (least), or one."""
     choose = minimum if least else maximum
     mixed = left.mixed or right.mixed
     if not mixed and units.same(left.dimension, right.dimension):
-        return Margin(choose(left.number, right.number), left.dimension, place)
+        return ConditionMargin(choose(left.number, right.number), left.dimension, place)
     mixed = mixed or tuple(Value(0.0, each.dimension, each.place) for each in (left, right))
-    return Margin(choose(_truth(left.number), _truth(right.number)), PURE, place, mixed)
+    return ConditionMargin(choose(_truth(left.number), _truth(right.number)), PURE, place, mixed)
 
 
 def _truth(margin: Real) -> Real:

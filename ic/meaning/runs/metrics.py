@@ -10,7 +10,7 @@ from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
-from ic.meaning.runs.expressions import Signals
+from ic.meaning.runs.expressions import ChannelTable
 from ic.meaning.runs.record import not_one, of_lost
 from ic.text.complaints import known_words
 from met import models
@@ -20,7 +20,7 @@ from met.plan.channel import Channel
 
 
 def resolve_metrics(
-    scope: Scope, block: MergedBlock, signals: Signals
+    scope: Scope, block: MergedBlock, signals: ChannelTable
 ) -> tuple[tuple[MetricUse, ...], tuple[SignalExpression, ...]]:
     """The metrics, and the expressions that they watch, which are no channels of the run so far."""
     made: dict[str, SignalExpression] = {}
@@ -28,7 +28,7 @@ def resolve_metrics(
     return tuple(use for use in found if use is not None), tuple(made.values())
 
 
-def _metric(scope: Scope, item: Item, signals: Signals, made: dict[str, SignalExpression]) -> MetricUse | None:
+def _metric(scope: Scope, item: Item, signals: ChannelTable, made: dict[str, SignalExpression]) -> MetricUse | None:
     if item.detail:
         scope.complaints.error(
             "D129",
@@ -82,7 +82,7 @@ def _write(metric: Metric) -> str:
 
 
 def _watched(
-    scope: Scope, of: Expression, metric: Metric, signals: Signals, made: dict[str, SignalExpression]
+    scope: Scope, of: Expression, metric: Metric, signals: ChannelTable, made: dict[str, SignalExpression]
 ) -> Channel | None:
     """The channel that a metric watches, or that of an expression; None where there is none (reported)."""
     if isinstance(of, Name) and not metric.condition and of.path[0].text != "*":
