@@ -74,7 +74,7 @@ def _cause_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
 
 
 def doubt_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
-    """What makes a case that is done doubtful, in words: a rate that hardly anything could give."""
+    """The doubt about a case that is done, in words: a rate that hardly anything could give."""
     name, unit, where = _of_rate(experiment, int(outputs[OF]))
     return (
         f"{_head(experiment, outputs[DOUBTFUL_TICK])}{name}: it moves faster than {DOUBTFUL * outputs[MEASURE]:.3g} "

@@ -13,7 +13,7 @@ SMALL = 0.1
 
 @frozen(kw_only=True)
 class Content:
-    """What changes in time, for whoever samples it.
+    """The changes in time of something that is sampled.
 
     begins, ends  when it first changes, and when for the last time, s: inf where it never does; ends: where it goes on
     frequency     of its fastest swing, Hz; 0: it does not swing

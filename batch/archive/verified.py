@@ -39,7 +39,7 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
 
 @frozen
 class Verified:
-    """What was computed with shorter steps.
+    """The metrics that were computed with shorter steps.
 
     cases          [case] positions in the case table, rising
     metrics        names of the metrics' variables in the archive
@@ -82,7 +82,7 @@ def write(parent: Any, found: Verified) -> None:
 
 
 def read(node: Any, group: StoredGroup) -> Verified | None:
-    """What stands in an experiment's group, checked; None where nothing was verified. Raises Unlike."""
+    """The verified metrics of an experiment's group, checked; None where nothing was verified. Raises Unlike."""
     inside = node.get(NAME)
     if not isinstance(inside, h5py().Group):  # a metric of an older archive may be called so
         return None

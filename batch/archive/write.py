@@ -106,7 +106,7 @@ class ArchiveWriter:
         return group.node["status"][...], metrics
 
     def put_verified(self, number: int, found: verified.Verified) -> None:
-        """What shorter steps gave for some cases of an experiment, in a group of its own."""
+        """Write the metrics that shorter steps gave for some cases of an experiment, in a group of its own."""
         verified.write(self.groups[number].node, found)
         self._sink.check()
 

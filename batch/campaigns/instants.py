@@ -62,8 +62,8 @@ def _is_small(section: CampaignSection) -> bool:
 
 
 def step_warnings(section: CampaignSection, outcomes: CaseOutcomes, threads: int | None = None) -> list[Diagnostic]:
-    """What the steps of a campaign's cases do not follow at instants that they pass, but for what its run allows, and
-    what the check tells of the poses in which they begin."""
+    """Warnings of modes that the steps of a campaign's cases do not follow at instants that they pass, but for what
+    its run allows, and what the check tells of the poses in which they begin."""
     experiment, memories = section.prepared.experiment, section.memories
     if memories is None:
         return []

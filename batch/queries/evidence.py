@@ -93,7 +93,8 @@ def evidence(group: ArchiveGroup) -> list[EvidenceRow]:
 
 @frozen
 class DesignPoint:
-    """What was chosen, path -> text with its unit, and the positions of the cases that share it."""
+    """A point of the design: what was chosen, path -> text with its unit, and the positions of the cases that share
+    it."""
 
     chosen: dict[str, str]
     cases: np.ndarray

@@ -34,7 +34,7 @@ class VariedInput:
 
 @frozen
 class Sensitivity:
-    """What explains the variance of one output of an experiment.
+    """The inputs that explain the variance of one output of an experiment.
 
     name, unit, scale  of the output, and how many SI units its deck's unit is
     of                 what its values are: "" of a metric, else `failure` or `change`
@@ -81,7 +81,7 @@ def sensitivities(
 
 
 def _inputs(group: ArchiveGroup, positions: np.ndarray) -> list[VariedInput]:
-    """What varies in these cases, each once. Raises Problem E361 where nothing does, or in too few cases."""
+    """The inputs that vary in these cases, each once. Raises Problem E361 where nothing does, or in too few cases."""
     found: list[VariedInput] = []
     places: list[np.ndarray] = []
     for variable in group.role("coordinate"):

@@ -176,7 +176,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
 
 
 def _doubts(group: ArchiveGroup, here: slice) -> tuple[FailureGroup, ...]:
-    """What makes cases doubtful, by what it is; nothing of an archive of before there were warnings."""
+    """The doubts about cases, by what causes them; nothing of an archive of before there were warnings."""
     if "warning" not in group.variables:
         return ()
     causes = group.values("warning")[here]

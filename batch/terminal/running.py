@@ -47,7 +47,7 @@ class RunRequest:
 
 @frozen
 class RunResult:
-    """What an archive says of the cases that were run, and the picture of it.
+    """The results that an archive has of the cases that were run, and the picture of it.
 
     worst    the worst cases of each summary
     tables   of sweeps of several structures

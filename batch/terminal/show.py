@@ -224,7 +224,7 @@ def verdict(summary: Summary, width: int) -> list[str]:
 
 
 def warning_lines(summary: Summary, width: int) -> list[str]:
-    """What the errors by the step call in question, and what to do."""
+    """Lines of the warnings that errors by the step give, with what to do."""
     out = []
     for each in summary.warnings:
         said = [f"warning[{each.code}]: {each.message}", *(f"  help: {text}" for text in each.help)]

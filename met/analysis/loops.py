@@ -112,7 +112,7 @@ def _carried(n: int, positions: int, m: int, since: float, h: float) -> np.ndarr
 
 @frozen
 class Loops:
-    """What was found of the loops: those that are unstable, the one that wants the smallest gain first; and lanes of
+    """The findings on the loops: those that are unstable, the one that wants the smallest gain first; and lanes of
     which nothing grows, whatever the step alone does: their laws hold it."""
 
     unstable: tuple[Unstable, ...]

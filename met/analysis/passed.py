@@ -59,7 +59,7 @@ class Passed:
 
 @frozen
 class Lasting:
-    """What neighbouring instants of a case all show.
+    """A finding that neighbouring instants of a case all show.
 
     fault   the worst of it: of the step, or of a servo's loop
     case    row of the case table;  since, until: s from the start of the run
@@ -100,7 +100,8 @@ def telling(experiment: Experiment, memory: np.ndarray, cells: Sequence[str], co
 
 
 def lasting(experiment: Experiment, passed: Passed) -> tuple[Lasting, ...]:
-    """What of each kind lasts: the worst that is unstable, that is damped, that is fast, and of loops; none of a kind
+    """The findings that last, one of each kind: the worst that is unstable, that is damped, that is fast, and of
+    loops; none of a kind
     that the poses show in which cases begin, for the check has told it. Raises Problem where the program cannot be
     built."""
     integrator, schedule = models.find("integrator", experiment.structure.integrator), experiment.structure.schedule
@@ -129,7 +130,8 @@ def lasting(experiment: Experiment, passed: Passed) -> tuple[Lasting, ...]:
 
 @frozen
 class _Candidate:
-    """What the lanes `first` to `last` show, and `lane` most, and how much it matters among those of its kind."""
+    """A finding that the lanes `first` to `last` show, and `lane` most, and how much it matters among those of its
+    kind."""
 
     weight: float
     fault: StepFault | Unstable
@@ -161,7 +163,8 @@ class _Seen:
         return found
 
     def missed(self, held: set[str]) -> list[_Candidate]:
-        """What swings and is damped, or not damped, as it is not in truth: all the time, as of the best instant."""
+        """The mode that swings and is damped, or not damped, as it is not in truth: all the time, as of the best
+        instant."""
         shown = self._of(lambda mode, _: abs(mode.root.imag) > abs(mode.root.real))
         found = []
         for owner, first, last in _lasting_ones(shown, self.stretches):
@@ -192,7 +195,7 @@ class _Seen:
         return found
 
     def _of(self, telling: Callable[[Mode, int], bool]) -> list[dict[Owner, list[Mode]]]:
-        """Of each lane and owner the modes that tell something."""
+        """The modes of each lane and owner that tell something."""
         return [
             {owner: those for owner, each in of_lane.items() if (those := [m for m in each if telling(m, lane)])}
             for lane, of_lane in enumerate(self.modes)
@@ -242,7 +245,7 @@ def _pairs(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def remedy_of(experiment: Experiment, found: Lasting) -> Remedy:
-    """What would follow a mode that lasts, as it is at its worst instant."""
+    """The remedy for a mode that lasts, as it is at its worst instant."""
     assert isinstance(found.fault, StepFault)
     here = as_run(Linearizer(experiment, found.at.case.tolist(), found.at.memory).map())
     fault = replace(found.fault, mode=replace(found.fault.mode, lane=0))

@@ -44,7 +44,7 @@ class StepFault:
 
 @frozen
 class Remedy:
-    """What would follow a mode that the step does not follow.
+    """The remedy for a mode that the step does not follow.
 
     rate     the slowest rate at which it is followed, Hz; None: none that is sensible
     others   integrators that follow it at this rate
@@ -58,7 +58,7 @@ class Remedy:
 
 @frozen
 class StepSize:
-    """What was found of some cases: cases that were looked at; the fastest mode of the first, its owner and joint,
+    """The findings on some cases: cases that were looked at; the fastest mode of the first, its owner and joint,
     where there is one; the largest h |lambda|; ln of the largest growth over a run; faults, the worst of each kind;
     whether all slopes are numbers; loops of servos that tick and are unstable; the map that all this is of."""
 
@@ -149,7 +149,8 @@ def remedy(
 
 
 def owner_of(mode: Mode) -> tuple[str, str]:
-    """What takes part in a mode most, in words; and the joint's name where it is one, or its servo."""
+    """The owner of a mode, which takes part in it most, in words; and the joint's name where it is one, or its
+    servo."""
     sums: dict[tuple[str, str], float] = {}
     for name, share in mode.shares:
         owner = _owner(name)

@@ -17,7 +17,7 @@ from met.trace import Real
 
 @frozen
 class OverJoints:
-    """What a metric watches where it is asked for several joints: one number of theirs, at each sample.
+    """The number that a metric watches where it is asked for several joints: one of theirs, at each sample.
 
     word  what it is called: `max(*.servo.voltage)`
     of    the joints' numbers, one or more -> that number

@@ -18,7 +18,7 @@ from met.trace.program import Tape
 
 @frozen
 class Demand:
-    """What the run's start demands of a servo that can be balanced.
+    """The demand of the run's start on a servo that can be balanced.
 
     torque  that keeps its joint from accelerating, N m (N)
     seen    what its law sees there: a command that the joint be as it is, and the states that `starts` has
@@ -54,7 +54,7 @@ def balance(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[s
 
 
 def demands(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[str, Real]]) -> Iterator[Demand]:
-    """What the start demands of each servo that can be balanced; y, begun: as of `balance`.
+    """The demands of the start on each servo that can be balanced; y, begun: as of `balance`.
 
     The torques are those with which none of their joints accelerates. Other joints move as their servos let them; one
     at rest stays where its dry friction holds it while all of them do, and moves where it does not.

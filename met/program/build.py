@@ -110,7 +110,7 @@ class Builder:
         return (*plausible.OUTPUTS, *([UNHELD] if self.system.structure.balanced else []), *self.limits.outputs)
 
     def computers(self) -> list[Control]:
-        """What ticks by clocks of its own, in this order: sensors of links, guides, servos."""
+        """The parts that tick by clocks of their own, in this order: sensors of links, guides, servos."""
         found: list[Control] = []
         for divisor in sorted({use.divisor for use in self.system.structure.sensors}):
             found.append(Every(divisor, (RunPhase(Phase(f"sensors_{divisor}", self._sensors(divisor))),)))

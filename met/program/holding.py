@@ -61,7 +61,7 @@ def holds(demand: Demand, torque: Real, brake: Real) -> Truth:
 
 
 def _outputs(demand: Demand, own: Mapping[str, Real]) -> Mapping[str, Real]:
-    """What the servo's law gives with this memory and these states."""
+    """The outputs of the servo's law with this memory and these states."""
     actuator, p, seen = demand.actuator, demand.p, demand.seen
     held = NamedValues(actuator.owner, own)
     q, qd = seen.q, seen.qd

@@ -45,7 +45,7 @@ class Unheld:
 
     @property
     def reason(self) -> str:
-        """What is in the way, and what to do."""
+        """The limits that are in the way, and the remedy, in words."""
         if not self.limits:
             return (
                 "none of its limits is in the way: an integral with a gain of 0 holds nothing; give the law an "
@@ -87,7 +87,8 @@ class _Judged:
         self.held = self._over_cases(holds(demand, demand.torque, brake))
 
     def of(self, case: int) -> tuple[float, float, tuple[tuple[str, str], ...]]:
-        """What its joint takes in this case, what it can hold, and the limits that stop it, as `Unheld` has them."""
+        """The torque that its joint takes in this case, what it can hold, and the limits that stop it, as `Unheld`
+        has them."""
         finite = [name for name, values in self.limits.items() if np.isfinite(values[case])]
         alone = [name for name in finite if self.without_one[name][case]]
         binding = alone or (finite if self.without_any[case] else [])

@@ -29,7 +29,8 @@ COMPARISONS = MappingProxyType({"<": operator.lt, "<=": operator.le, ">": operat
 
 
 def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
-    """What the errors by the step of an archive's experiment call in question, but for what its run allows.
+    """Warnings of results that the errors by the step of an archive's experiment call in question, but for what its
+    run allows.
 
     experiment  of the plan, for places
     """

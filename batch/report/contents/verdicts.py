@@ -106,7 +106,7 @@ def _notes(pool: Pool) -> tuple[str, ...]:
 
 
 def _warnings(pool: Pool) -> list[str]:
-    """What makes cases doubtful that are done, each with the cases of which it is so."""
+    """The doubts about cases that are done, each with the cases of which it is so."""
     warnings = np.array(pool.texts("warning", np.arange(pool.count)), dtype=object)
     doubtful = np.flatnonzero(warnings != "")
     found = failures(np.zeros(len(doubtful)), warnings[doubtful], pool.cases[doubtful], pool.cases[doubtful])

@@ -30,7 +30,7 @@ ENOUGH = 10
 
 @frozen
 class SampledContent:
-    """What a model brings in time, and the instants that see it.
+    """The content that a model brings in time, and the instants that see it.
 
     label     whose it is, in words;  path: of its parameters
     declared  its parameters;  content: what it brings (`Profile.content`, `Environment.content`)

@@ -141,7 +141,7 @@ def _others(better: Remedy, head: str) -> list[str]:
 
 
 def motion_words(root: complex) -> str:
-    """What a mode does, in words."""
+    """The motion of a mode, in words."""
     if abs(root.imag) > 1e-3 * abs(root.real):
         return f"swings with {_hertz(root)}"
     return f"{'grows' if root.real > 0.0 else 'decays'} with {abs(root):.3g} 1/s"

@@ -18,7 +18,7 @@ ALLOW = "allow"
 def allowances_of(
     definitions: Definitions, run: Definition, complaints: Complaints, sweep: Definition | None = None
 ) -> tuple[Allowance, ...]:
-    """What a run allows, or a sweep of it: a reason of its own takes the place of that of its base."""
+    """The allowances of a run, or of a sweep of it: a reason of its own takes the place of that of its base."""
     runs = definitions.of_kind("run")
     bodies = [runs[name].group.body for name in definitions.homes(run)[:-1]]
     bodies += [run.group.body, *([sweep.group.body] if sweep is not None else [])]
@@ -29,7 +29,7 @@ def allowances_of(
 
 
 def _read(body: Iterable[Entry], complaints: Complaints) -> dict[str, Allowance]:
-    """What the statements of one block allow, by code; reports each that is wrong, or there twice."""
+    """The allowances of the statements of one block, by code; reports each that is wrong, or there twice."""
     found: dict[str, Allowance] = {}
     for entry in body:
         if not isinstance(entry, Statement) or entry.words[0].text != ALLOW:

@@ -63,13 +63,13 @@ def resolve_signals(scope: Scope, block: MergedBlock, structure: Structure) -> C
 
 
 def watched(block: MergedBlock) -> list[Expression | None]:
-    """What the metrics of a run are to watch, as written."""
+    """The expressions that the metrics of a run are to watch, as written."""
     bodies = (item.body.get("of") for item in block.of_kind("metric") if item.body is not None)
     return [of.value for of in bodies if of is not None]
 
 
 class ChannelTable:
-    """What expressions of a run are made of; every method that resolves one raises Problem.
+    """The channels of which expressions of a run are made; every method that resolves one raises Problem.
 
     known        channels by path, signals of the deck among them
     lost         signals that failed (already reported)
@@ -105,7 +105,7 @@ class ChannelTable:
         self.scope.keep_setting(path, made.text, item=item)
 
     def number(self, expression: Expression, metric: Metric) -> SignalExpression:
-        """What a metric watches: of several joints what it declares of them."""
+        """The number that a metric watches: of several joints the one that it declares of them."""
         expression_of = self._expanded(expression)
         joints = self._joints(expression_of)
         if not joints:
