@@ -28,6 +28,9 @@ from met.servos.servo import Setpoint
 GROWS = 1.0 + 1e-6
 """Eigenvalues above it grow; the slow modes of a servo with a heavy arm come that near to one."""
 
+SETTLED = 1e-12
+"""Share of its entries by which a turn changes the observer's covariance once no more turns are made."""
+
 LIGHTEST, HEAVIEST, STEPS = 0.05, 2000.0, 40
 """Range of r that is searched, wider for an arm that lies outside it; and how many values, a constant share apart."""
 
@@ -155,6 +158,13 @@ class _Known:
     stretches: _Stretches
     grows: dict[float, bool]
 
+    @classmethod
+    def of(cls, loop: _Loop, lightest: float, heaviest: float, own: Sequence[float]) -> _Known:
+        """The results for a loop whose first arms have these r."""
+        looked_at = np.geomspace(lightest, heaviest, STEPS).tolist()
+        growing = loop.grow([*looked_at, *own])
+        return cls(loop.stretches(looked_at, growing[:STEPS]), dict(zip(own, growing[STEPS:], strict=True)))
+
 
 def _margins(experiment: Experiment, case: int, known: dict[tuple[Any, ...], _Known]) -> Iterator[Margin]:
     builder, tape = _begun(experiment, case)
@@ -174,7 +184,7 @@ def _margins(experiment: Experiment, case: int, known: dict[tuple[Any, ...], _Kn
             lightest, heaviest = min(lightest, 0.5 * least), max(heaviest, 2.0 * together)
         key = (each.joint, lightest, heaviest, *(builder.system.value(path, tape.read) for path in own))
         if key not in known:
-            known[key] = _Known(loop.stretches(lightest, heaviest), {})
+            known[key] = _Known.of(loop, lightest, heaviest, _finite(least, together))
         lower, limit = _around(known[key], loop, (least, together), (lightest, heaviest))
         delay = float(builder.system.value(f"{each.joint}.bed.delay", tape.read))
         rate_hz = builder.schedule.base_hz / beds.divisor
@@ -191,12 +201,13 @@ def _around(
     At its own r it is as the loop is there, also where the search has gone past a narrow stretch.
     """
     stretches = known.stretches
-    numbers = [r for r in own if 0.0 < r < np.inf]
-    for r in numbers:
-        if r not in known.grows:
-            known.grows[r] = loop.grows(r)
+    numbers = _finite(*own)
+    unknown = [r for r in numbers if r not in known.grows]
+    if unknown:
+        known.grows.update(zip(unknown, loop.grow(unknown), strict=True))
     if any(known.grows[r] == any(_holds(each, r) for each in stretches) for r in numbers):
-        stretches = loop.stretches(*searched, numbers)
+        looked_at = sorted({*np.geomspace(*searched, STEPS).tolist(), *numbers})
+        stretches = loop.stretches(looked_at, loop.grow(looked_at))
 
     def near(stretch: tuple[float, float | None]) -> float:
         lower, limit = stretch
@@ -205,6 +216,11 @@ def _around(
         return 1.0 if limit is None else min(1.0, limit / own[1])
 
     return max(stretches, key=near, default=(0.0, 0.0))
+
+
+def _finite(*own: float) -> list[float]:
+    """Those r of an arm for which a loop can be looked at, rising."""
+    return sorted({r for r in own if 0.0 < r < np.inf})
 
 
 def _holds(stretch: tuple[float, float | None], r: float) -> bool:
@@ -237,7 +253,7 @@ def _begun(experiment: Experiment, case: int) -> tuple[Builder, LaneTape]:
     # of what noise is a case's own, any will do: beds are without faults here
     tape = PlainTape(program, values | dict.fromkeys(experiment.cases.noise, 0.0), 1)
     with np.errstate(all="ignore"):
-        follow(tape, program.start)
+        follow(tape, program.start, settled=SETTLED)
         follow(tape, program.tick)
     lanes = LaneTape(program.base_hz, {name: np.asarray(value) for name, value in tape.inputs.items()}, 1)
     lanes.cells.update(tape.cells)
@@ -321,26 +337,27 @@ class _Loop:
         found[numbers] = np.abs(np.linalg.eigvals(maps[numbers])).max(1)
         return found
 
-    def grows(self, r: float) -> bool:
-        return bool(self.radii([r])[0] > GROWS)
+    def grow(self, ratios: Sequence[float]) -> list[bool]:
+        """Tells of each r whether the loop grows there."""
+        return (self.radii(ratios) > GROWS).tolist()
 
-    def stretches(self, lightest: float, heaviest: float, also: Sequence[float] = ()) -> _Stretches:
-        """The ranges of r within these bounds in which the loop does not grow, rising, to a hundredth of r.
+    def stretches(self, looked_at: Sequence[float], growing: Sequence[bool]) -> _Stretches:
+        """The ranges of r in which the loop does not grow, rising, to a hundredth of r.
 
-        A range begins at 0 where the loop does not grow at the lightest arm, and ends at None where it does not at the
-        heaviest. also: r to look at besides
+        A range begins at 0 where the loop does not grow at the smallest r that was looked at, and ends at None where it
+        does not at the largest. looked_at: rising; growing: of each of them
         """
-        looked_at = sorted({*np.geomspace(lightest, heaviest, STEPS).tolist(), *also})
-        growing = (self.radii(looked_at) > GROWS).tolist()
         found: list[tuple[float, float | None]] = []
         lower = 0.0
         for (low, high), (before, after) in zip(pairwise(looked_at), pairwise(growing), strict=True):
             if before == after:
                 continue
-            while high > 1.005 * low:
-                middle = (low * high) ** 0.5
-                low, high = (low, middle) if self.grows(middle) == after else (middle, high)
-            end = (low * high) ** 0.5
+            between = [low, high]
+            while between[1] > 1.005 * between[0]:
+                middles = [(a * b) ** 0.5 for a, b in pairwise(between)]
+                between = [r for two in zip(between, middles, strict=False) for r in two] + [high]
+            first = [*self.grow(between[1:-1]), after].index(after)
+            end = (between[first] * between[first + 1]) ** 0.5
             if after:
                 found.append((lower, end))
             else:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from met.trace.functions import absolute
 from met.trace.graph import Real, Truth
 from met.trace.program import CallPhase, Control, Every, Program, RecordPhase, RunPhase, Unless0, WhileAny
 
@@ -79,8 +80,11 @@ def execute(
     return tape.rows, tape.outputs
 
 
-def follow(tape: PlainTape, body: tuple[Control, ...]) -> None:
-    """Runs the body once, at the tape's tick."""
+def follow(tape: PlainTape, body: tuple[Control, ...], *, settled: float = 0.0) -> None:
+    """Runs the body once, at the tape's tick.
+
+    settled  loops also end after a turn in which no cell changes by more than this share of its value; 0: they do not
+    """
     for node in body:
         match node:
             case RunPhase(phase) | CallPhase(phase):
@@ -91,15 +95,24 @@ def follow(tape: PlainTape, body: tuple[Control, ...]) -> None:
                     phase.body(tape)
             case Every(divisor, inner):
                 if tape.k % divisor == 0:
-                    follow(tape, inner)
+                    follow(tape, inner, settled=settled)
             case Unless0(inner):
                 if tape.k > 0:
-                    follow(tape, inner)
+                    follow(tape, inner, settled=settled)
             case WhileAny(cell, at_most, inner):
                 for _ in range(at_most):
                     if not tape.read_mask(cell):
                         break
-                    follow(tape, inner)
+                    before = dict(tape.cells) if settled else {}
+                    follow(tape, inner, settled=settled)
+                    if settled and all(_near(value, before.get(name), settled) for name, value in tape.cells.items()):
+                        break
+
+
+def _near(value: Real, before: Real | None, share: float) -> bool:
+    if value is before:
+        return True
+    return before is not None and bool(absolute(value - before) <= share * absolute(value))
 
 
 __all__: list[Any] = ["PlainTape", "execute", "follow"]
