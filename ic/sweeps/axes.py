@@ -21,7 +21,7 @@ from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Value, measure_of
+from ic.meaning.expressions.quantity import Value, in_words, measure_of
 from ic.meaning.runs.allowances import ALLOW
 from ic.sweeps.choices import (
     MACRO,
@@ -351,9 +351,9 @@ class _SweepReader:
                 raise Problem(
                     error(
                         "D063",
-                        f"{named(value)} in a list that begins with {named(first)}",
+                        f"{in_words(value)} in a list that begins with {in_words(first)}",
                         value.place,
-                        also=[Label(first.place, named(first))],
+                        also=[Label(first.place, in_words(first))],
                         help="all must be of one dimension",
                     )
                 )
@@ -482,10 +482,6 @@ def _refuse(entry: object, words: list[str], base: str) -> None:
             ],
         )
     )
-
-
-def named(value: Value) -> str:
-    return "a pure number" if value.dimension == PURE else units.text(value.dimension)
 
 
 def check_no_equal_cases(columns: Sequence[Column], places: Sequence[Place]) -> None:

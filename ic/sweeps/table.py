@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
-from ic.grammar.places import place_of
-from ic.grammar.spell import spell
-from ic.grammar.syntax import Binary, Expression, Name, Unary
-from ic.meaning.expressions.evaluate import COMPARISONS, PURE, evaluate_number
+from ic.grammar.syntax import Binary, Name
 from ic.meaning.expressions.quantity import Value, ValueList
+from ic.meaning.expressions.truths import Truths
 from ic.meaning.parameters.scope import Scope
-from ic.sweeps.axes import Sweep, named
+from ic.sweeps.axes import Sweep
 from ic.sweeps.choices import OF_JOINT, OF_RUN, Choices
-from ic.text.complaints import known_words
-from met import units
-from met.diagnostic import Label, Problem, did_you_mean, error
+from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
 from met.plan import Structure
 from met.plan.channel import channels
-from met.trace import Formulas, Scalar
+from met.trace import Scalar
 from met.unit_parser import parse_unit
 
 MOST_NAMED = 4
@@ -93,98 +90,26 @@ def kept(
     return keep, dropped
 
 
-class _Truths:
-    """Conditions over rows of the table."""
+class _Truths(Truths):
+    """Conditions over rows of the table of a sweep."""
 
     def __init__(
         self, scope: Scope, values: Mapping[str, np.ndarray], choices: Choices, count: int, structure: Structure
     ) -> None:
-        self.scope, self.values, self.count, self.structure = scope, values, count, structure
-        self.words = {column.path: option.text for column, option in choices}
-        self.options = {column.path: [option.text for option in column.options] for column, _ in choices}
+        words = {column.path: option.text for column, option in choices}
+        options = {column.path: [option.text for option in column.options] for column, _ in choices}
+        super().__init__(self._find, scope.graph, values, count, words, options)
+        self.scope, self.structure = scope, structure
 
-    def of(self, expression: Expression, asked: np.ndarray) -> np.ndarray:
-        """Rows for which it holds. asked: rows for which it matters, as behind an `and` those that may still hold."""
-        if isinstance(expression, Unary) and expression.operator == "not":
-            return ~self.of(expression.operand, asked)
-        if isinstance(expression, Binary) and expression.operator in ("and", "or"):
-            left = self.of(expression.left, asked)
-            if expression.operator == "and":
-                return left & self.of(expression.right, asked & left)
-            return left | self.of(expression.right, asked & ~left)
-        if not isinstance(expression, Binary) or expression.operator not in COMPARISONS:
-            raise Problem(
-                error(
-                    "D130",
-                    "a comparison is needed here",
-                    place_of(expression),
-                    help="such as `gearbox.kp > 0.03 V*s/rad`, joined by `and`, `or`, `not`",
-                )
-            )
-        word = self._words(expression)
-        return np.full(self.count, word) if word is not None else self._numbers(expression, asked)
+    def warn(self, found: Diagnostic) -> None:
+        self.scope.complaints.add(replace(found, severity="warning"))
 
-    def _words(self, expression: Binary) -> bool | None:
-        """The truth of a comparison of a choice with a word; None if none is compared, or one that is a number."""
-        for side, other in ((expression.left, expression.right), (expression.right, expression.left)):
-            if isinstance(side, Name) and side.text in self.words:
-                text = self.words[side.text]
-                if text[:1].isdigit() or text[:1] in "-.":
-                    return None
-                if expression.operator not in ("==", "!="):
-                    raise Problem(
-                        error(
-                            "D130",
-                            f"`{side.text}` is a word, which is not less or more than another",
-                            expression.place,
-                            help="compare with `==` or `!=`",
-                        )
-                    )
-                written = spell(other)
-                if written not in self.options[side.text]:
-                    known = self.options[side.text]
-                    raise Problem(
-                        error(
-                            "D130",
-                            f"`{side.text}` is never `{written}` in this sweep",
-                            place_of(other),
-                            help=[*did_you_mean(written, known), known_words("it varies over", known)],
-                        )
-                    )
-                return (written == text) == (expression.operator == "==")
-        return None
-
-    def _numbers(self, expression: Binary, asked: np.ndarray) -> np.ndarray:
-        scope, count = self.scope, self.count
-        sides = [evaluate_number(side, self._find) for side in (expression.left, expression.right)]
-        if not units.same(sides[0].dimension, sides[1].dimension):
-            helps = "both must be of one dimension"
-            for one, other in (sides, sides[::-1]):
-                if one.bare and one.dimension == PURE and not isinstance(one.number, Scalar):
-                    helps = f"write `{one.number:g} {units.text(other.dimension)}`"
-            raise Problem(
-                error(
-                    "D063",
-                    f"`{expression.operator}` of {named(sides[0])} and {named(sides[1])}",
-                    expression.place,
-                    also=[Label(side.place, named(side)) for side in sides],
-                    help=helps,
-                )
-            )
-        if None not in (hertz := [side.hertz for side in sides]) and hertz[0] != hertz[1]:
-            scope.complaints.warn(
-                "D305",
-                f"`{expression.operator}` of Hz and 1/s, which are taken for one",
-                expression.place,
-                help=[
-                    "if that is meant, write both sides in the same of the two",
-                    "if cycles a second are meant, write 2 pi times the number of Hz, in `1/s`",
-                ],
-            )
-        formulas = Formulas.of(scope.graph, [side.number for side in sides])
-        left, right = (np.broadcast_to(np.asarray(x, dtype=float), count) for x in formulas.replay(self.values))
+    def look_at(
+        self, expression: Binary, sides: Sequence[Value], left: np.ndarray, right: np.ndarray, asked: np.ndarray
+    ) -> None:
+        """Refuse a side that has no value, and warn where rounding decides."""
         lost = asked & (np.isnan(left) | np.isnan(right))
-        cases = f"of {count} {'case' if count == 1 else 'cases'}"
+        cases = f"of {self.count} {'case' if self.count == 1 else 'cases'}"
         if lost.any():
             raise Problem(
                 error(
@@ -202,22 +127,13 @@ class _Truths:
         edge[finite] = np.abs(left - right)[finite] <= ROUNDING * np.maximum(np.abs(left), np.abs(right))[finite]
         if edge.any():
             row = int(np.flatnonzero(edge)[0])
-            scope.complaints.remark(
+            self.scope.complaints.remark(
                 "D127",
                 f"rounding decides this comparison in {int(edge.sum())} {cases}",
                 expression.place,
                 also=[Label(sides[0].place, f"{float(left[row])!r}"), Label(sides[1].place, f"{float(right[row])!r}")],
                 help="compare with a limit between two values, not with one of them",
             )
-        holds = {
-            "<": np.less,
-            "<=": np.less_equal,
-            ">": np.greater,
-            ">=": np.greater_equal,
-            "==": np.equal,
-            "!=": np.not_equal,
-        }[expression.operator]
-        return np.asarray(holds(left, right))
 
     def _find(self, name: Name) -> Value | ValueList:
         """Names in `exclude when`: coordinates, parameters of the run, then what any expression may name."""

@@ -1,0 +1,114 @@
+"""Conditions over the rows of a table: comparisons of expressions and of words, joined by `and`, `or`, `not`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ic.grammar.places import place_of
+from ic.grammar.spell import spell
+from ic.grammar.syntax import Binary, Expression, Name, Unary
+from ic.meaning.expressions.evaluate import COMPARISONS, Lookup, evaluate_number
+from ic.meaning.expressions.quantity import Value, in_words
+from ic.text.complaints import known_words
+from met import units
+from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
+from met.trace import Formulas, Graph, Scalar
+from met.units import PURE
+
+HOLDS = {
+    "<": np.less,
+    "<=": np.less_equal,
+    ">": np.greater,
+    ">=": np.greater_equal,
+    "==": np.equal,
+    "!=": np.not_equal,
+}
+EXAMPLE = "such as `gearbox.kp > 0.03 V*s/rad`, joined by `and`, `or`, `not`"
+
+
+class Truths:
+    """The rows of a table in which conditions hold.
+
+    find     gives names their values: numbers, or inputs of `graph` that stand for a column
+    columns  the values of these inputs by name, [row]
+    words    of what is a word in each row: one for all rows, or one a row; options: all the words that there are
+    Where a side of a comparison has no value, it does not hold.
+    """
+
+    def __init__(
+        self,
+        find: Lookup,
+        graph: Graph,
+        columns: Mapping[str, np.ndarray],
+        count: int,
+        words: Mapping[str, str | np.ndarray],
+        options: Mapping[str, Sequence[str]],
+    ) -> None:
+        self.find, self.graph, self.columns, self.count = find, graph, columns, count
+        self.words, self.options = words, options
+
+    def of(self, expression: Expression, asked: np.ndarray) -> np.ndarray:
+        """Rows for which it holds. asked: rows for which it matters, as behind an `and` those that may still hold.
+        Raises Problem D130 where it is no condition, D063 where the sides of a comparison are of two dimensions."""
+        if isinstance(expression, Unary) and expression.operator == "not":
+            return ~self.of(expression.operand, asked)
+        if isinstance(expression, Binary) and expression.operator in ("and", "or"):
+            left = self.of(expression.left, asked)
+            if expression.operator == "and":
+                return left & self.of(expression.right, asked & left)
+            return left | self.of(expression.right, asked & ~left)
+        if not isinstance(expression, Binary) or expression.operator not in COMPARISONS:
+            raise Problem(error("D130", "a comparison is needed here", place_of(expression), help=EXAMPLE))
+        of_words = self._of_words(expression)
+        return self._of_numbers(expression, asked) if of_words is None else of_words
+
+    def _of_words(self, expression: Binary) -> np.ndarray | None:
+        """The truth of a comparison of a choice with a word; None if none is compared, or one that is a number."""
+        for side, other in ((expression.left, expression.right), (expression.right, expression.left)):
+            if isinstance(side, Name) and side.text in self.words:
+                text = self.words[side.text]
+                if any(each[:1].isdigit() or each[:1] in "-." for each in np.unique(text).tolist()):
+                    return None
+                if expression.operator not in ("==", "!="):
+                    message = f"`{side.text}` is a word, which is not less or more than another"
+                    raise Problem(error("D130", message, expression.place, help="compare with `==` or `!=`"))
+                written, known = spell(other), self.options[side.text]
+                if written not in known:
+                    message = f"`{side.text}` is never `{written}` in this sweep"
+                    helps = [*did_you_mean(written, known), known_words("it varies over", known)]
+                    raise Problem(error("D130", message, place_of(other), help=helps))
+                holds = (np.asarray(text) == written) == (expression.operator == "==")
+                return np.array(np.broadcast_to(holds, self.count))
+        return None
+
+    def _of_numbers(self, expression: Binary, asked: np.ndarray) -> np.ndarray:
+        sides = [evaluate_number(side, self.find) for side in (expression.left, expression.right)]
+        if not units.same(sides[0].dimension, sides[1].dimension):
+            helps = "both must be of one dimension"
+            for one, other in (sides, sides[::-1]):
+                if one.bare and one.dimension == PURE and not isinstance(one.number, Scalar):
+                    helps = f"write `{one.number:g} {units.text(other.dimension)}`"
+            message = f"`{expression.operator}` of {in_words(sides[0])} and {in_words(sides[1])}"
+            also = [Label(side.place, in_words(side)) for side in sides]
+            raise Problem(error("D063", message, expression.place, also=also, help=helps))
+        if None not in (hertz := [side.hertz for side in sides]) and hertz[0] != hertz[1]:
+            message = f"`{expression.operator}` of Hz and 1/s, which are taken for one"
+            helps_hertz = [
+                "if that is meant, write both sides in the same of the two",
+                "if cycles a second are meant, write 2 pi times the number of Hz, in `1/s`",
+            ]
+            self.warn(error("D305", message, expression.place, help=helps_hertz))
+        formulas = Formulas.of(self.graph, [side.number for side in sides])
+        left, right = (np.broadcast_to(np.asarray(x, float), self.count) for x in formulas.replay(self.columns))
+        self.look_at(expression, sides, left, right, asked)
+        return np.asarray(HOLDS[expression.operator](left, right)) & ~(np.isnan(left) | np.isnan(right))
+
+    def warn(self, found: Diagnostic) -> None:
+        """Called with what may be meant otherwise; nothing is done with it here."""
+
+    def look_at(
+        self, expression: Binary, sides: Sequence[Value], left: np.ndarray, right: np.ndarray, asked: np.ndarray
+    ) -> None:
+        """Called with the numbers of each comparison before it is decided."""
