@@ -11,6 +11,7 @@ from batch.archive.stored import Stored
 from batch.queries.signals import deck_unit
 from met.diagnostic import Problem, did_you_mean, error
 from met.frozen import frozen
+from met.statistics.in_step import in_step
 from met.statistics.sensitivity import FEWEST, InputShare, dependent, shares
 
 FAILURE = "failure"
@@ -82,21 +83,9 @@ def sensitivities(
 
 def _inputs(group: ArchiveGroup, positions: np.ndarray) -> list[VariedInput]:
     """The inputs that vary in these cases, each once. Raises Problem E361 where nothing does, or in too few cases."""
-    found: list[VariedInput] = []
-    places: list[np.ndarray] = []
-    for variable in group.role("coordinate"):
-        values = np.asarray(group.values(variable.name), float)[positions]
-        _, place = np.unique(values, return_inverse=True)
-        place = place.ravel()
-        if not place.any():
-            continue
-        for number, other in enumerate(places):
-            if np.array_equal(place, other) or np.array_equal(place, other.max() - other):
-                found[number] = VariedInput((*found[number].paths, variable.path), found[number].values)
-                break
-        else:
-            found.append(VariedInput((variable.path,), values))
-            places.append(place)
+    variables = group.role("coordinate")
+    values = [np.asarray(group.values(each.name), float)[positions] for each in variables]
+    found = [VariedInput(tuple(variables[i].path for i in part), values[part[0]]) for part in in_step(values)]
     if not found:
         helps = "a sweep varies some: `vary`, `sample`"
         raise Problem(error("E361", f"nothing varies in the cases of `{group.name}`", help=helps))
