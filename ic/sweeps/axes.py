@@ -98,10 +98,21 @@ class Sweep:
 
 
 def read_sweep(
-    definitions: Definitions, complaints: Complaints, definition: Definition, graph: Graph, *, seed: int = 0
+    definitions: Definitions,
+    complaints: Complaints,
+    definition: Definition,
+    graph: Graph,
+    *,
+    seed: int = 0,
+    own_seed: bool = True,
 ) -> Sweep:
-    """The sweep's axes with their values; reports mistakes in them. seed: the run's, for what is drawn."""
+    """The sweep's axes with their values; reports mistakes in them.
+
+    seed  the run's, for what is drawn;  own_seed: False where it stands in place of one that the sweep writes
+    """
     reader = _SweepReader(definitions, complaints, definition, graph, seed)
+    if not own_seed:
+        reader.seed = None
     for entry in definition.group.body:
         with complaints.gather():
             reader.enter(entry)

@@ -167,7 +167,9 @@ class _Sweep:
         settings = self.source.settings
         definitions, base = settings.in_run(definitions, _base(definitions, definition, self.complaints))
         graph = Graph()
-        sweep = read_sweep(definitions, self.complaints, definition, graph, seed=_seed_of(definitions, base))
+        seed, own_seed = _seed_of(definitions, base), not settings.sets_seed
+        sweep = read_sweep(definitions, self.complaints, definition, graph, seed=seed, own_seed=own_seed)
+        sweep = settings.fixed_in(sweep)
         settings.check_sweep(sweep, self.complaints, definitions)
         return _Read(definitions, definition, base, sweep, graph)
 

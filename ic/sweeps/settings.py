@@ -10,6 +10,7 @@ A path is one that `vary` takes, or the seed. Where its value goes is where the 
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
@@ -18,13 +19,14 @@ from ic.grammar.places import place_of
 from ic.grammar.settings import path_of
 from ic.grammar.syntax import List, Name, Setting
 from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.evaluate import PURE
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.expressions.remedies import unit_remedy
 from ic.meaning.parameters.models import word_of
 from ic.meaning.parameters.scope import VARIES
-from ic.sweeps.axes import Sweep
+from ic.sweeps.axes import Column, Sweep, SweepAxis
 from ic.sweeps.choices import OF_RUN, ONE_OF_TWO, SENSOR, decides_structure, in_servo, keys_of, nested_entry
 from ic.text.complaints import Complaints
 from met import units
@@ -83,13 +85,22 @@ class Settings:
                 if isinstance(old, Value) and isinstance(new, Value) and not units.same(old.dimension, new.dimension):
                     complaints.add(*_of_another_dimension(path_of(entry), old, new, let.name.place).diagnostics)
 
+    @property
+    def sets_seed(self) -> bool:
+        """True if the seed is set."""
+        return any(path_of(entry) == SEED for entry in self.entries)
+
+    def fixed_in(self, sweep: Sweep) -> Sweep:
+        """The sweep without what is set, which no longer varies."""
+        paths = {path_of(entry) for entry in self.entries}
+        axes = (_without(axis, paths) for axis in sweep.axes)
+        return replace(sweep, axes=tuple(axis for axis in axes if axis.columns))
+
     def check_sweep(self, sweep: Sweep, complaints: Complaints, definitions: Definitions) -> None:
-        """Report what the sweep varies itself, so that it would be set in vain."""
-        for entry in self.entries:
+        """Report what is set of a structure that the sweep chooses itself, so that it would be set in vain."""
+        for entry in self.for_destination(definitions, "run"):  # else it is a number of what the sweep chooses
             path = path_of(entry)
-            found = [column for axis in sweep.axes for column in axis.columns if column.path == path]
-            if destination(definitions, entry) == "run":  # else it is a number of what the sweep chooses
-                found += [column for column in sweep.chosen if path.startswith(f"{column.path}.")]
+            found = [column for column in sweep.chosen if path.startswith(f"{column.path}.")]
             for column in found[:1]:
                 complaints.error(
                     "D233",
@@ -98,14 +109,26 @@ class Settings:
                     help=VARIES,
                     also=[Label(column.place, f"`{column.path}` varies here")],
                 )
-            if path == SEED and sweep.seed is not None:
-                complaints.error(
-                    "D233",
-                    f"this sets the seed of runs, and sweep `{sweep.name}` has its own",
-                    entry.place,
-                    also=[Label(sweep.place, "this sweep")],
-                    help="leave one of the two out",
-                )
+
+
+def _without(axis: SweepAxis, paths: Collection[str]) -> SweepAxis:
+    """The axis without the columns of these paths; of rows that were written and are equal then, the first."""
+    columns = [column for column in axis.columns if column.path not in paths]
+    if len(columns) == len(axis.columns) or axis.design or not columns:
+        return replace(axis, columns=tuple(columns))
+    rows = zip(*(_keys(column) for column in columns), strict=True)
+    first = {row: number for number, row in reversed(list(enumerate(rows)))}
+    return replace(axis, columns=tuple(_rows(column, sorted(first.values())) for column in columns))
+
+
+def _keys(column: Column) -> Sequence[object]:
+    return column.values.tolist() if isinstance(column, VariedPath) else [option.text for option in column.options]
+
+
+def _rows(column: Column, rows: list[int]) -> Column:
+    if isinstance(column, VariedPath):
+        return replace(column, values=column.values[rows])
+    return replace(column, options=tuple(column.options[row] for row in rows))
 
 
 def destination(definitions: Definitions, entry: Setting) -> Destination:

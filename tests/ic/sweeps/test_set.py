@@ -379,23 +379,16 @@ error[D232]: this sets `hinge.servo.kp`, which is set already
     )
 
 
-@pytest.mark.parametrize(
-    ("setting", "varied", "at", "value"),
-    [
-        ("drive.ki=3 V/rad", "drive.ki", 1, "drive.ki"),
-        ("hinge.servo.ki=3 V/rad", "drive.ki", 16, "3 V/rad"),
-    ],
-)
-def test_what_a_sweep_varies_is_not_set(setting: str, varied: str, at: int, value: str, tmp_path: Path) -> None:
+def test_a_part_of_what_a_sweep_varies_is_not_set(tmp_path: Path) -> None:
     assert (
-        refused(tmp_path, setting, text=ARM + SERVO + RUN + GAINS, select=["it"])
-        == f"""\
-error[D233]: this sets `{setting.partition("=")[0]}`, which the sweep varies
- --> <command line>:1:{at}
+        refused(tmp_path, "hinge.servo.ki=3 V/rad", text=ARM + SERVO + RUN + GAINS, select=["it"])
+        == """\
+error[D233]: this sets `hinge.servo.ki`, which the sweep varies
+ --> <command line>:1:16
   |
-1 | {setting}
-  | {" " * (at - 1)}{"^" * len(value)}
- ::: deck.ic:18:25  `{varied}` varies here
+1 | hinge.servo.ki=3 V/rad
+  |                ^^^^^^^
+ ::: deck.ic:18:25  `drive.ki` varies here
   = help: leave it out here, or name runs and sweeps that do not vary this
 
 1 error
@@ -405,19 +398,52 @@ error[D233]: this sets `{setting.partition("=")[0]}`, which the sweep varies
 
 @pytest.mark.parametrize(("setting", "body", "said"), [
     ("drive.ki=3 V/rad", "vary hinge.servo.ki = [1, 2] V/rad;", "this sets `hinge.servo.ki`, which the sweep varies"),
-    ("integrator=rk4", "vary integrator = [rk4, midpoint];", "this sets `integrator`, which the sweep varies"),
     ("hinge.servo.command=rate(slow)", "vary hinge.servo = [drive, plain];",
      "this sets `hinge.servo.command`, which the sweep varies"),
-    ("links.bar.mass=3 kg", "zip { links.bar.mass = [1, 2] kg; drive.ki = [1, 2] V/rad; }",
-     "this sets `links.bar.mass`, which the sweep varies"),
     ("links.bar.mass=3 kg", "sample lhs(4) { swing.links.bar.mass = uniform(1, 2) kg; }",
      "this sets `links.bar.mass`, which the sweep varies"),
-    ("seed=3", "sample lhs(4) { links.bar.mass = uniform(1, 2) kg; } seed = 4;",
-     "this sets the seed of runs, and sweep `it` has its own"),
 ])  # fmt: skip
 def test_however_a_sweep_varies_it(setting: str, body: str, said: str, tmp_path: Path) -> None:
     text = ARM + SERVO + OTHERS + RUN + f"sweep it of hold {{ {body} }}\n"
     assert refused(tmp_path, setting, text=text, select=["it"]).startswith(f"error[D233]: {said}\n")
+
+
+@pytest.mark.parametrize(("settings", "body", "rest"), [
+    (["drive.ki=3 V/rad"], "vary drive.ki = [1, 2] V/rad; vary drive.kp = [0.1, 0.2] V*s/rad;",
+     "vary drive.kp = [0.1, 0.2] V*s/rad;"),
+    (["links.bar.mass=3 kg"], "zip { links.bar.mass = [1, 2] kg; drive.ki = [1, 2] V/rad; }",
+     "vary drive.ki = [1, 2] V/rad;"),
+    (["links.bar.mass=3 kg"], "zip { links.bar.mass = [1, 2, 2] kg; drive.ki = [1, 1, 2] V/rad; }",
+     "vary drive.ki = [1, 2] V/rad;"),
+    (["integrator=rk4"], "vary integrator = [rk4, midpoint]; vary drive.ki = [1, 2] V/rad;",
+     "vary drive.ki = [1, 2] V/rad;"),
+    (["seed=3"], "sample random(4) { links.bar.mass = uniform(1, 2) kg; } seed = 4;",
+     "sample random(4) { links.bar.mass = uniform(1, 2) kg; } seed = 3;"),
+])  # fmt: skip
+def test_what_is_set_no_longer_varies(settings: list[str], body: str, rest: str, tmp_path: Path) -> None:
+    head = ARM + SERVO + OTHERS + RUN
+    wanted = made(tmp_path, f"{head}sweep it of hold {{ {rest} }}\n", ["it"], settings)
+    assert same(made(tmp_path, f"{head}sweep it of hold {{ {body} }}\n", ["it"], settings), wanted)
+
+
+def test_what_is_drawn_beside_it_stays_what_it_was(tmp_path: Path) -> None:
+    text = (
+        ARM
+        + SERVO
+        + RUN
+        + (
+            "sweep it of hold { sample random(9) { "
+            "links.bar.mass = uniform(1, 2) kg; drive.ki = uniform(1, 2) V/rad; } }\n"
+        )
+    )
+    [whole], [fixed] = (made(tmp_path, text, ["it"], settings) for settings in ([], ["links.bar.mass=3 kg"]))
+    before = {each.path: each.values.tolist() for each in whole.cases.coordinates}
+    assert {each.path: each.values.tolist() for each in fixed.cases.coordinates} == {"drive.ki": before["drive.ki"]}
+
+
+def test_a_sweep_of_which_all_is_set_is_one_case(tmp_path: Path) -> None:
+    [one] = made(tmp_path, ARM + SERVO + RUN + GAINS, ["it"], ["drive.ki=3 V/rad"])
+    assert one.cases.count == 1 and not one.cases.coordinates
 
 
 def test_a_path_that_no_run_has_is_told_with_the_one_that_was_meant(tmp_path: Path) -> None:
