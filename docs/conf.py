@@ -21,8 +21,8 @@ from met.version import VERSION  # noqa: E402  (only once the checkout is on the
 PAGES = {
     "Decks": ["deck", "robots", "servos", "environments", "models", "substitution", "reference", "diagnostics",
               "editors"],
-    "Campaigns and results": ["cluster", "verification", "evidence", "sensitivity", "plots", "report", "diff", "export",
-                              "notebooks"],
+    "Campaigns and results": ["cluster", "best", "verification", "evidence", "sensitivity", "plots", "report", "diff",
+                              "export", "notebooks"],
     "A motor on a bed": ["bed", "protocol", "../hw/firmware/README"],
     "From Python": ["api"],
     "What it computes": ["physics", "paper", "engine"],

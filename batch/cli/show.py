@@ -28,6 +28,11 @@ if TYPE_CHECKING:
     "NAME:largest: largest first. Repeated: equal ones by the next.",
 )
 @click.option("--reverse", is_flag=True, help="Of --sort: largest first, by each NAME that does not say it itself.")
+@click.option(
+    "--where", metavar="CONDITION", help="Only cases in which it holds: 'settle < 4 s and gearbox.kp > 0.02 V*s/rad'."
+)
+@click.option("--over", multiple=True, metavar="PATH", help="Of these that differ in PATH alone, the worst.")
+@click.option("--met", is_flag=True, help="Only cases, of these, that meet all requirements.")
 @click.option("--no-plots", is_flag=True, help="Numbers only.")
 @format_option
 def show(
@@ -38,6 +43,9 @@ def show(
     all_cases: bool,
     sort: tuple[str, ...],
     reverse: bool,
+    where: str | None,
+    met: bool,
+    over: tuple[str, ...],
     no_plots: bool,
     form: str,
 ) -> int:
@@ -50,6 +58,7 @@ def show(
 
     from batch.archive.read import ArchiveFile
     from batch.queries.ordering import by_names
+    from batch.queries.selection import CaseSelection
     from batch.terminal.show import as_json, show
     from met.messages.render import wants_colour
 
@@ -57,10 +66,13 @@ def show(
         raise click.UsageError("--reverse is of --sort, and nothing is sorted: `--sort NAME`")
     if case is not None and sort:
         raise click.UsageError("--sort is of many cases, and --case of one")
+    some = CaseSelection(where or "", over, met)
+    if case is not None and not some.everything:
+        raise click.UsageError("--where, --met and --over are of many cases, and --case of one")
     by = by_names(sort, reverse=reverse)
     with ArchiveFile(archive) as file:
         if form == "json":
-            click.echo(as_json(file, experiments, case=case, all_cases=all_cases, by=by))
+            click.echo(as_json(file, experiments, case=case, all_cases=all_cases, by=by, some=some))
             return YES
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
         colour = wants_colour(sys.stdout)
@@ -71,6 +83,7 @@ def show(
             case=case,
             all_cases=all_cases,
             by=by,
+            some=some,
             width=width,
             colour=colour,
             plots=not no_plots,

@@ -24,16 +24,21 @@ MISSES = "\N{BALLOT X}"
 
 
 def table(
-    group: ArchiveGroup, most: int | None = SHOWN_CASES, *, by: CaseOrder | None = None, hint: bool = True
+    group: ArchiveGroup,
+    most: int | None = SHOWN_CASES,
+    *,
+    by: CaseOrder | None = None,
+    among: np.ndarray | None = None,
+    hint: bool = True,
 ) -> list[str]:
     """The cases as lines, worst first or `by` what is asked for, in the deck's units; a metric that misses a
     requirement bears a cross.
 
-    most: how many, None for all; hint: whether to say how many are left out.
+    most: how many, None for all; among: positions, None for all; hint: whether to say how many are left out.
     """
     from ic.printing.columns import columns
 
-    positions = ordering.positions(group, by)
+    positions = _among(ordering.positions(group, by), among)
     left = 0 if most is None else max(0, len(positions) - most)
     positions = positions[: len(positions) - left]
     outcomes = requirements.outcomes(group, positions)
@@ -61,11 +66,14 @@ def table(
     return [*out, f"  ... {left:,} more; --all-cases prints them"] if left and hint else out
 
 
-def table_across(pool: Pool, by: CaseOrder, most: int | None = SHOWN_CASES) -> list[str]:
-    """The cases of all structures of a sweep as lines, `by` what is asked for, with what tells the structures apart."""
+def table_across(
+    pool: Pool, by: CaseOrder, most: int | None = SHOWN_CASES, *, among: np.ndarray | None = None
+) -> list[str]:
+    """The cases of all structures of a sweep as lines, `by` what is asked for, with what tells the structures apart.
+    among: places, None for all."""
     from ic.printing.columns import columns
 
-    places = ordering.positions_in_pool(pool, by)
+    places = _among(ordering.positions_in_pool(pool, by), among)
     left = 0 if most is None else max(0, len(places) - most)
     places = places[: len(places) - left]
     cells = [["", "", *(f"#{case}" for case in pool.cases[places])]]
@@ -91,6 +99,10 @@ def table_across(pool: Pool, by: CaseOrder, most: int | None = SHOWN_CASES) -> l
     return [*out, f"  ... {left:,} more; --all-cases prints them"] if left else out
 
 
+def _among(order: np.ndarray, some: np.ndarray | None) -> np.ndarray:
+    return order if some is None else order[np.isin(order, some)]
+
+
 def title(group: ArchiveGroup, most: int | None = None, *, by: CaseOrder | None = None) -> str:
     """The title of the table, which says how it is ordered."""
     if (found := ordering.order_of_group(group, by)) is not None:
@@ -112,11 +124,14 @@ def rows_json(
     most: int | None = SHOWN_CASES,
     *,
     by: CaseOrder | None = None,
+    among: np.ndarray | None = None,
     positions: Sequence[int] | np.ndarray | None = None,
 ) -> list[dict[str, Any]]:
-    """The table of cases for programs, in SI, of these cases or of the worst: what a case is, how it ended, its metrics
-    (null where not finite), and whether it meets each requirement."""
-    positions = ordering.positions(group, by)[:most] if positions is None else np.asarray(positions)
+    """The table of cases for programs, in SI, of these cases or of the worst among some: what a case is, how it ended,
+    its metrics (null where not finite), and whether it meets each requirement."""
+    if positions is None:
+        positions = _among(ordering.positions(group, by), among)[:most]
+    positions = np.asarray(positions)
     numbers = [variable.name for variable in (*group.role("coordinate"), *group.role("metric"))]
     repeats = {"repeat": group.at("repeat", positions)} if "repeat" in group.variables else {}
     values = {name: group.at(name, positions) for name in ("case", "case_id", "status", "cause", *numbers)}

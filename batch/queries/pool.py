@@ -163,12 +163,12 @@ class Pool:
     @cached_property
     def columns(self) -> tuple[CaseColumn, ...]:
         """All columns that may be drawn: choices, varied parameters, repeats, metrics; in the deck's units."""
-        out = [self._choice(variable) for variable in self._variables("choice")]
-        out += [self._numbers(variable, "parameter") for variable in self._variables("coordinate")]
+        out = [self._choice(variable) for variable in self.variables("choice")]
+        out += [self._numbers(variable, "parameter") for variable in self.variables("coordinate")]
         repeats = self.gathered("repeat", 0.0)
         if repeats.any():
             out.append(CaseColumn("repeat", "repeat", "", "repeat", repeats))
-        return (*out, *(self._numbers(variable, "metric") for variable in self._variables("metric")))
+        return (*out, *(self._numbers(variable, "metric") for variable in self.variables("metric")))
 
     def metrics(self) -> tuple[CaseColumn, ...]:
         return tuple(column for column in self.columns if column.role == "metric")
@@ -182,7 +182,7 @@ class Pool:
             )
         )
 
-    def _variables(self, role: str) -> list[Stored]:
+    def variables(self, role: str) -> list[Stored]:
         """The variables of this role in all groups, each name once."""
         return list({v.name: v for group in reversed(self.groups) for v in group.role(role)}.values())
 

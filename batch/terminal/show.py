@@ -8,6 +8,8 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries import cases, ordering
 from batch.queries.at_limits import reached_texts
@@ -15,7 +17,8 @@ from batch.queries.deck_units import DeckUnits
 from batch.queries.failures import failure_lines
 from batch.queries.groups import cases_named
 from batch.queries.ordering import CaseOrder
-from batch.queries.pool import pools
+from batch.queries.pool import Pool, pools
+from batch.queries.selection import CaseSelection
 from batch.queries.signals import case_text, history, number_text, panels, pretty_unit
 from batch.queries.step_errors.words import NONE, about, error_text
 from batch.queries.structures import structures
@@ -34,6 +37,8 @@ MOST_GROUPS = 4
 NARROWEST = 40
 """Characters of a line beside a name, however long that is."""
 
+EVERYTHING = CaseSelection()
+
 PLOTS = 4
 """Signals that are drawn unless some are asked for."""
 
@@ -46,13 +51,15 @@ def show(
     case: str | None = None,
     all_cases: bool = False,
     by: CaseOrder | None = None,
+    some: CaseSelection = EVERYTHING,
     width: int = 100,
     colour: bool = False,
     plots: bool = True,
 ) -> str:
     """The whole text: of all cases with their table, worst first or `by` what is asked for, or all about one `case`.
 
-    By something, the cases of all structures of a sweep are in one table.
+    By something, the cases of all structures of a sweep are in one table. some: the cases that the table is of; all
+    else is of all of them.
 
     A plot is of one case, the first recorded unless `case` names another; under the table of all cases there is none
     unless `signals` are asked for.
@@ -73,10 +80,13 @@ def show(
         for pool in pools([group for group, _ in shown]):
             if len(pool.groups) > 1:
                 most = None if all_cases else cases.SHOWN_CASES
-                out += ["", f"{pool.name}, {by.title}", *cases.table_across(pool, by, most)]
+                among = None if some.everything else some.places(pool)
+                said = [] if among is None else [some.words(len(among), pool.count)]
+                table = cases.table_across(pool, by, most, among=among) if among is None or len(among) else []
+                out += ["", f"{pool.name}, {by.title}", *said, *table]
                 shown = [each for each in shown if signals or each[0] not in pool.groups]
     for group, position in shown:
-        out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, by, width), ""]
+        out += ["", *heading(group, width), "", *_about(archive, group, position, all_cases, by, some, width), ""]
         if plots and (signals or position is not None or not all_cases):
             out.drawn(_plots(archive, group, signals, position, width, colour))
         elif signals:
@@ -99,7 +109,13 @@ class _Lines:
 
 
 def _about(
-    archive: ArchiveFile, group: ArchiveGroup, position: int | None, all_cases: bool, by: CaseOrder | None, width: int
+    archive: ArchiveFile,
+    group: ArchiveGroup,
+    position: int | None,
+    all_cases: bool,
+    by: CaseOrder | None,
+    some: CaseSelection,
+    width: int,
 ) -> list[str]:
     """Lines about how the cases went, and which of them how; or about one case, with what was varied in it."""
     if position is not None:
@@ -110,8 +126,19 @@ def _about(
     out = [*verdict(summary, width), *warning_lines(summary, width)]
     if group.count > 1:
         most = None if all_cases else cases.SHOWN_CASES
-        out += ["", cases.title(group, by=by), *cases.table(group, most, by=by)]
+        if some.everything:
+            return [*out, "", cases.title(group, by=by), *cases.table(group, most, by=by)]
+        among = _positions(group, some)
+        out += ["", some.words(len(among), group.count)]
+        if len(among):
+            out += [cases.title(group, by=by), *cases.table(group, most, by=by, among=among)]
     return out
+
+
+def _positions(group: ArchiveGroup, some: CaseSelection) -> np.ndarray:
+    """Positions in a group of the cases that are asked for."""
+    pool = Pool(group.name, [group])
+    return pool.position_of[some.places(pool)]
 
 
 def as_json(
@@ -121,6 +148,7 @@ def as_json(
     case: str | None = None,
     all_cases: bool = False,
     by: CaseOrder | None = None,
+    some: CaseSelection = EVERYTHING,
 ) -> str:
     """An archive for programs: outcome, cases, variables and attributes, without the signals' values.
 
@@ -136,9 +164,9 @@ def as_json(
     ordering.check([group for group, _ in shown], by)
     for group, position in shown:
         if position is None:
-            said: dict[str, Any] = {
-                "case_table": cases.rows_json(group, None if all_cases else cases.SHOWN_CASES, by=by)
-            }
+            among = None if some.everything else _positions(group, some)
+            most = None if all_cases else cases.SHOWN_CASES
+            said: dict[str, Any] = {"case_table": cases.rows_json(group, most, by=by, among=among)}
         else:
             [about] = cases.rows_json(group, positions=[position])
             said = {"case": {**about, "parameters": outcomes.finite(cases.parameters(archive, group, position))}}

@@ -53,6 +53,17 @@ def parse_on(
     return tuple(entries), tuple(parser.unreadable), sound
 
 
+def parse_expression(tokens: Sequence[Token], findings: Findings) -> Expression | None:
+    """The one expression that these tokens are; None, and what is wrong is in the findings, where they are not one."""
+    parser = _Parser(tokens, findings)
+    with suppress(GiveUp, EndedInsideBlock, Unreadable):
+        found = parser.value()
+        if parser.token.kind != END:
+            parser.unexpected("the end of the line")
+        return found
+    return None
+
+
 class _Parser(Expressions):
     def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
         super().__init__(tokens, findings)

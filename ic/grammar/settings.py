@@ -1,11 +1,11 @@
-"""Settings of the command line, `PATH=VALUE`, as entries of the syntax tree."""
+"""Settings of the command line, `PATH=VALUE`, and its expressions, as a syntax tree."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from ic.grammar.parse import parse
-from ic.grammar.syntax import Setting
+from ic.grammar.parse import parse, parse_expression
+from ic.grammar.syntax import Expression, Setting
 from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, SPACE, Text, Token, logical_lines
 from ic.text.limits import Findings, GiveUp
 from ic.text.source import SourceFile
@@ -43,6 +43,17 @@ def read_settings(texts: Sequence[str], before: str = "") -> tuple[Setting, ...]
     if findings.errors:
         raise Problem(findings.all)
     return tuple(made.values())
+
+
+def read_expression(text: str) -> Expression:
+    """An expression of the command line, as behind `--where`. Raises Problem with all that is wrong with it."""
+    text = _one_line(text)
+    source, findings = Text(COMMAND_LINE, f"{text}\n"), Findings()
+    tokens = [*_tokens(source, 0, text, findings), Token(END, "", source, len(text.rstrip()), 1)]
+    found = None if findings.errors else parse_expression(tokens, findings)
+    if found is None or findings.errors:
+        raise Problem(findings.all, {COMMAND_LINE: command_line([text]).text})
+    return found
 
 
 def path_of(entry: Setting) -> str:

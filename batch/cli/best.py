@@ -1,0 +1,66 @@
+"""`met best`: a face of batch.queries.best."""
+
+from __future__ import annotations
+
+import click
+
+from met.cli import NO, YES, format_option
+from met.messages.visible import line, say
+
+
+@click.command(short_help="Say which of the designs of a sweep to use.")
+@click.argument("archive", metavar="ARCHIVE")
+@click.option("--run", "experiment", metavar="NAME", help="The sweep, where the archive holds several.")
+@click.option("--over", multiple=True, metavar="PATH", help="Not chosen, but to be borne: hold designs against it.")
+@click.option(
+    "--by",
+    multiple=True,
+    metavar="METRIC",
+    help="The least METRIC, or expression of metrics, in the worst case; METRIC:largest. Repeated: then by the next. "
+    "Without it: farthest from the border of what meets all requirements.",
+)
+@click.option("--front", multiple=True, metavar="METRIC", help="Also the trade-off of two such: name each.")
+@format_option
+def best(
+    archive: str, experiment: str | None, over: tuple[str, ...], by: tuple[str, ...], front: tuple[str, ...], form: str
+) -> int:
+    """Choose among what a sweep chooses (`vary`, `zip`, `from`), held against what it draws and what --over names: a
+    design that meets all requirements in all of its cases, far from where one is missed.
+
+    Exit status: 0 a design meets all; 1 none does; 2 the input is wrong.
+    """
+    import json
+    import shutil
+
+    from batch.archive.read import ArchiveFile
+    from batch.queries.best import Designs
+    from batch.queries.groups import groups_named
+    from batch.queries.pool import pools
+    from batch.terminal.best import BestAnswer
+    from met.diagnostic import Problem, error
+
+    with ArchiveFile(archive) as file:
+        found = [each for each in pools(groups_named(file, [experiment] if experiment else [])) if each.count > 1]
+        if not found:
+            helps = "a sweep has several: `vary`, `sample`"
+            raise Problem(error("E395", f"{archive} has no designs to choose among: each run is one case", help=helps))
+        if len(found) > 1:
+            helps = f"name one: {', '.join(f'`--run {each.name}`' for each in found)}"
+            raise Problem(error("E395", f"{archive} holds several sweeps", help=helps))
+        pool = found[0]
+        designs = Designs(pool, over)
+        if not pool.requirements and not by:
+            metrics = ", ".join(column.label for column in pool.metrics())
+            helps = f"`--by METRIC`: {metrics}" if metrics else "give its run a metric, and require something of it"
+            raise Problem(error("E396", f"nothing says which design of `{pool.name}` is better", help=helps))
+        if len(front) == 1:
+            raise click.UsageError("--front is of two: name each, `--front settle --front over`")
+        goals, traded = ([designs.goal(text) for text in texts] for texts in (by, front))
+        seed = int(pool.groups[0].at("seed", [0])[0])
+        answer = BestAnswer(designs, goals, traded, deck=file.deck.strip("<>"), name=pool.name, seed=seed)
+        width = min(100, shutil.get_terminal_size((100, 24)).columns)
+        if form == "json":
+            say(json.dumps(answer.as_data(), indent=1))
+        else:
+            say("\n".join(map(line, answer.lines(width))))
+        return NO if answer.best is None else YES

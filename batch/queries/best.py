@@ -1,0 +1,285 @@
+"""Which of the designs of a sweep to use: all that was chosen in it, held against all that was not.
+
+A design is a combination of the values of what a sweep chooses: `vary`, `zip`, `from`. Its cases differ in what it
+must stand: what is drawn, repeats, and what the asker names besides. It is good if it meets all requirements in them: a
+requirement over a share of cases in that share of its own. How far a good design is from trouble is counted in steps of
+the sweep's grid: the border is where a design is not good, or where the sweep ends, behind which nothing is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from batch.queries import requirements
+from batch.queries.evidence import ROUNDING
+from batch.queries.expressions import CaseTable
+from batch.queries.grids import levels
+from batch.queries.pool import CaseColumn, Pool
+from met.diagnostic import Problem, did_you_mean, error
+from met.distinct import distinct
+from met.frozen import frozen
+from met.run import DONE
+from met.statistics.design_points import design_points
+from met.statistics.in_step import in_step
+from met.units import Dimension
+
+MOST_CELLS = 1 << 26
+"""Cells of a grid of designs, at most; with more the border is not looked for."""
+
+FULL = 0.5
+"""A grid has designs in more than this share of its cells."""
+
+ENDS, FAILS, UNKNOWN = "the sweep ends", "a case fails", "it was not run"
+
+
+@frozen
+class DesignAxis:
+    """What is chosen as one: a choice, a parameter, or several that go in step.
+
+    columns  of these, in the deck's units;  values: of the first, rising
+    level    of each design, its place in `values`
+    """
+
+    columns: tuple[CaseColumn, ...]
+    values: np.ndarray
+    level: np.ndarray
+
+    @property
+    def ordered(self) -> bool:
+        """True if its values are numbers, so that there is a next one."""
+        return self.columns[0].role != "choice"
+
+
+@frozen
+class Stretch:
+    """How far a design may go along an axis, all else as it is: the levels of the first and the last good design, and
+    what is on either side behind these, in words."""
+
+    first: int
+    last: int
+    below: str
+    above: str
+
+
+@frozen
+class Goal:
+    """What is to be least, or largest: a metric, or an expression of metrics and parameters.
+
+    text    as it was asked for;  largest: whether it is to be that
+    values  of each case, SI;  dimension: theirs
+    """
+
+    text: str
+    largest: bool
+    values: np.ndarray
+    dimension: Dimension
+
+
+class Designs:
+    """The designs of a pool of cases.
+
+    over  what they are held against besides what is drawn and repeated, by path
+    """
+
+    def __init__(self, pool: Pool, over: Sequence[str] = ()) -> None:
+        self.pool = pool
+        varied = varied_columns(pool)
+        check_varied(pool, over)
+        drawn = {each.path for each in pool.variables("coordinate") if each.attributes.get("design")}
+        chosen = [column for column in varied if column.label not in (*drawn, *over)]
+        self.against = tuple(column for column in varied if column not in chosen)
+        """What the designs are held against."""
+        if not chosen:
+            why = "all that varies is drawn" if not over else f"nothing is left beside {', '.join(over)}"
+            if not varied:
+                why = "nothing varies"
+            message = f"`{pool.name}` has no designs to choose among: {why}"
+            raise Problem(error("E395", message, help="`vary PATH = [...];` in a sweep chooses values"))
+        self.of_case = design_points([column.values for column in chosen], pool.count)
+        """[case] its design."""
+        self.first = np.unique(self.of_case, return_index=True)[1]
+        """[design] its first case."""
+        self.cases = np.bincount(self.of_case)
+        """[design] how many cases it has."""
+        self.axes = tuple(self._axis([chosen[i] for i in part]) for part in in_step([c.values for c in chosen]))
+
+    @property
+    def count(self) -> int:
+        return len(self.first)
+
+    def _axis(self, columns: Sequence[CaseColumn]) -> DesignAxis:
+        own = columns[0].values[self.first]
+        found = levels(own)
+        return DesignAxis(tuple(columns), found, np.searchsorted(found, own))
+
+    @cached_property
+    def demands(self) -> tuple[str, ...]:
+        """What makes a design good: the requirements; of a sweep that has none, that its cases reach their end."""
+        return self.pool.requirements or (FAILS,)
+
+    @cached_property
+    def meets(self) -> np.ndarray:
+        """[design, demand] whether it meets it."""
+        if not self.pool.requirements:
+            return np.asarray(self._share((self.pool.status == DONE)[:, None]) == 1.0)
+        shares = {
+            each.text: each.share for group in self.pool.groups for each in requirements.group_requirements(group)
+        }
+        wanted = np.array([shares.get(text) or 1.0 for text in self.demands])
+        return np.asarray(self._share(self.pool.outcomes == 1) >= wanted * (1.0 - ROUNDING))
+
+    def _share(self, holds: np.ndarray) -> np.ndarray:
+        """The share of each design's cases in which each of these holds."""
+        counts = [np.bincount(self.of_case, weights=column, minlength=self.count) for column in holds.T]
+        return np.stack(counts, axis=1) / self.cases[:, None]
+
+    @cached_property
+    def good(self) -> np.ndarray:
+        """[design] whether it meets all."""
+        return np.asarray(self.meets.all(axis=1))
+
+    @cached_property
+    def room(self) -> np.ndarray:
+        """[design] how far it stays from the nearest limit of what all of its cases must meet, as a share of the limit;
+        infinite where there is none."""
+        far = np.full(self.pool.count, -np.inf)
+        for group_number, group in enumerate(self.pool.groups):
+            here = self.pool.group_of == group_number
+            for each in requirements.group_requirements(group):
+                if each.share is None:
+                    values = group.values(each.metric)
+                    beyond = requirements.beyond(values, each.comparison, each.limit)
+                    far[here] = np.maximum(far[here], beyond[self.pool.position_of[here]])
+        return -self.worst(far, largest=True)
+
+    def worst(self, values: np.ndarray, *, largest: bool) -> np.ndarray:
+        """[design] the largest, or smallest, of a number of its cases; not a number where a case has none."""
+        out = np.full(self.count, -np.inf if largest else np.inf)
+        with np.errstate(invalid="ignore"):
+            (np.maximum if largest else np.minimum).at(out, self.of_case, values)
+        return out
+
+    def goal(self, text: str) -> Goal:
+        """What `METRIC`, `EXPRESSION`, `METRIC:largest` asks for. Raises Problem."""
+        name, colon, way = text.rpartition(":")
+        largest = bool(colon) and way.strip() == "largest"
+        if not colon or way.strip() not in ("largest", "smallest"):
+            name = text
+        values, dimension = CaseTable(self.pool).values(name)
+        return Goal(name.strip(), largest, values, dimension)
+
+    # The border
+
+    @cached_property
+    def steps(self) -> np.ndarray | None:
+        """[design] how many steps of the grid it is from the border, in any direction: 0 where it is not good. None
+        where the designs are no grid."""
+        from scipy.ndimage import distance_transform_cdt
+
+        there = self._grid
+        if there is None:
+            return None
+        good = there >= 0
+        good[good] = self.good[there[good]]
+        steps = np.zeros(self.count, np.int64)
+        kinds = [number for number, axis in enumerate(self.axes) if not axis.ordered]
+        shape = [len(self.axes[number].values) for number in kinds]
+        for kind in np.ndindex(*shape):
+            at: list[int | slice] = [slice(None)] * len(self.axes)
+            for number, level in zip(kinds, kind, strict=True):
+                at[number] = level
+            part = there[tuple(at)]
+            if part.ndim == 0:  # choices alone: none is next to another
+                steps[int(part)] = int(good[tuple(at)])
+                continue
+            near = distance_transform_cdt(np.pad(good[tuple(at)], 1), metric="chessboard")
+            inner = near[(slice(1, -1),) * part.ndim]
+            steps[part[part >= 0]] = inner[part >= 0]
+        return steps
+
+    @cached_property
+    def _grid(self) -> np.ndarray | None:
+        """The design in each cell of the grid of all axes' levels, -1 where there is none; None: they are no grid."""
+        sizes = [len(axis.values) for axis in self.axes]
+        cells = int(np.prod([float(size) for size in sizes]))
+        if cells > MOST_CELLS or self.count <= FULL * cells:
+            return None
+        out = np.full(sizes, -1)
+        out[tuple(axis.level for axis in self.axes)] = np.arange(self.count)
+        return out
+
+    def stretch(self, design: int, axis: int) -> Stretch | None:
+        """How far a good design may go along an axis; None where that has no order, or the designs are no grid."""
+        if self._grid is None or not self.axes[axis].ordered:
+            return None
+        at: list[int | slice] = [int(each.level[design]) for each in self.axes]
+        own = int(self.axes[axis].level[design])
+        at[axis] = slice(None)
+        line = self._grid[tuple(at)]
+        ends = []
+        for step in (-1, 1):
+            level = own
+            while 0 <= level + step < len(line) and line[level + step] >= 0 and self.good[line[level + step]]:
+                level += step
+            beyond = level + step
+            why = ENDS if not 0 <= beyond < len(line) else UNKNOWN if line[beyond] < 0 else self._why(line[beyond])
+            ends.append((level, why))
+        (first, below), (last, above) = ends
+        return Stretch(first, last, below, above)
+
+    def _why(self, design: int) -> str:
+        """The demands that a design does not meet, in words."""
+        missed = [text for text, met in zip(self.demands, self.meets[design], strict=True) if not met]
+        if missed == [FAILS]:
+            return FAILS
+        return f"`{missed[0]}`" + (f" and {len(missed) - 1} more" if len(missed) > 1 else "")
+
+    # Which to use
+
+    def order(self, goals: Sequence[Goal] = ()) -> np.ndarray:
+        """The good designs, the best first: by the goals in the worst of their cases, one after the other; then, and
+        without any, by the steps to the border and by the room to the nearest limit."""
+        good = np.flatnonzero(self.good)
+        keys = [self._wanted(goal)[good] for goal in goals]
+        if self.steps is not None:
+            keys.append(-self.steps[good].astype(float))
+        keys.append(-self.room[good])
+        return good[np.lexsort(keys[::-1])]
+
+    def _wanted(self, goal: Goal) -> np.ndarray:
+        """[design] a goal in the worst of its cases, as a number that is to be small; what has none comes last."""
+        found = self.worst(-goal.values if goal.largest else goal.values, largest=True)
+        return np.where(np.isnan(found), np.inf, found)
+
+    def front(self, goals: Sequence[Goal]) -> np.ndarray:
+        """The good designs of which no other is at least as near to all goals and nearer to one, by the first goal."""
+        good = np.flatnonzero(self.good)
+        numbers = np.stack([self._wanted(goal)[good] for goal in goals], axis=1)
+        order = np.lexsort(numbers.T[::-1])
+        kept: list[int] = []
+        for i in order.tolist():
+            if np.isfinite(numbers[i]).all() and not any((numbers[j] <= numbers[i]).all() for j in kept):
+                kept.append(i)
+        return good[kept]
+
+
+def varied_columns(pool: Pool) -> list[CaseColumn]:
+    """The choices and parameters in which cases differ."""
+    columns = [column for column in pool.columns if column.role in ("choice", "parameter")]
+    return [column for column in columns if len(distinct(column.values[np.isfinite(column.values)])) > 1]
+
+
+def check_varied(pool: Pool, paths: Sequence[str]) -> None:
+    """Raises Problem E394 for a path that varies in no case."""
+    known = [column.label for column in varied_columns(pool)]
+    for path in paths:
+        if path not in known:
+            fixed = [column.label for column in pool.columns if column.role in ("choice", "parameter")]
+            message = f"no varied parameter `{path}` in `{pool.name}`"
+            if path in fixed:
+                message = f"`{path}` is the same in all cases of `{pool.name}`"
+            helps = [*did_you_mean(path, known), f"varied: {', '.join(known) or 'nothing'}"]
+            raise Problem(error("E394", message, help=helps))

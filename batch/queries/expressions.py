@@ -1,0 +1,80 @@
+"""Expressions and conditions over the cases of a run or sweep, in the deck's language: `settle < 4 s and load > 5 kg`.
+
+A name is a metric's, or the path of what varies; numbers have their units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import cached_property
+
+import numpy as np
+
+from batch.archive.stored import Stored
+from batch.queries.pool import Pool
+from ic.grammar.settings import read_expression
+from ic.grammar.syntax import Name
+from ic.meaning.expressions.evaluate import evaluate_number
+from ic.meaning.expressions.quantity import Value
+from ic.meaning.expressions.truths import Truths
+from ic.text.complaints import known_words
+from ic.text.lexer import COMMAND_LINE
+from met.diagnostic import Problem, did_you_mean, error
+from met.trace import Formulas, Graph
+from met.unit_parser import parse_unit
+from met.units import Dimension
+
+
+class CaseTable:
+    """The cases of a pool as a table whose columns expressions may name."""
+
+    def __init__(self, pool: Pool) -> None:
+        self.pool = pool
+        self._graph = Graph()
+        self._columns: dict[str, np.ndarray] = {}
+
+    @cached_property
+    def _variables(self) -> Mapping[str, Stored]:
+        """Numbers of the cases by the names that a deck gives them."""
+        roles = ("metric", "coordinate")
+        return {each.path: each for role in roles for each in self.pool.variables(role)}
+
+    def holds(self, condition: str) -> np.ndarray:
+        """The cases in which a condition holds, [case]: none in which it compares what has no value. Raises Problem."""
+        choices = {each.label: each for each in self.pool.columns if each.role == "choice"}
+        words = {
+            name: np.array([*each.words, ""])[np.nan_to_num(each.values, nan=len(each.words)).astype(int)]
+            for name, each in choices.items()
+        }
+        options = {name: each.words for name, each in choices.items()}
+        truths = Truths(self._find, self._graph, self._columns, self.pool.count, words, options)
+        with _shown(condition):
+            return truths.of(read_expression(condition), np.ones(self.pool.count, bool))
+
+    def values(self, expression: str) -> tuple[np.ndarray, Dimension]:
+        """The value of an expression in each case, [case] in SI, and its dimension. Raises Problem."""
+        with _shown(expression):
+            found = evaluate_number(read_expression(expression), self._find)
+        [numbers] = Formulas.of(self._graph, [found.number]).replay(self._columns)
+        return np.array(np.broadcast_to(np.asarray(numbers, float), self.pool.count)), found.dimension
+
+    def _find(self, name: Name) -> Value:
+        variable = self._variables.get(name.text)
+        if variable is None:
+            known = [*self._variables, *(each.label for each in self.pool.columns if each.role == "choice")]
+            helps = [*did_you_mean(name.text, known), known_words("here", known)]
+            raise Problem(error("D065", f"no metric or varied parameter `{name.text}`", name.place, help=helps))
+        if name.text not in self._columns:
+            self._columns[name.text] = self.pool.gathered(variable.name)
+        measure = parse_unit(variable.unit)
+        return Value(self._graph.input(name.text), measure.dimension, name.place, hertz=measure.hertz)
+
+
+@contextmanager
+def _shown(expression: str) -> Iterator[None]:
+    """Lets a Problem show the expression that it is about."""
+    try:
+        yield
+    except Problem as problem:
+        raise problem if problem.sources else Problem(problem.diagnostics, {COMMAND_LINE: f"{expression}\n"}) from None

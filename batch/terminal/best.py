@@ -1,0 +1,315 @@
+"""`met best`: which design of a sweep to use, in a terminal and as data."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from batch.archive.stored import Stored
+from batch.queries.best import ENDS, Designs, Goal, Stretch
+from batch.queries.pool import CaseColumn
+from batch.queries.signals import number_text, pretty_unit
+from batch.queries.summary import finite
+from ic.printing.columns import columns, count
+from met.frozen import frozen
+from met.outputs import quoted
+from met.unit_parser import parse_unit
+from met.units import text as unit_text
+
+RUNNERS_UP = 3
+"""Designs that are shown behind the best."""
+
+MOST_ON_FRONT = 15
+"""Rows of a trade-off, evenly chosen of more."""
+
+NEAREST = 3
+"""Designs that are shown where none is good."""
+
+
+@frozen
+class BestRow:
+    """A design in a table: its number, and why it is there, in words."""
+
+    design: int
+    label: str
+
+
+class BestAnswer:
+    """What is to be said of the designs of one run or sweep.
+
+    deck   of the archive;  name: of the sweep where the deck has several;  seed: the campaign's
+    front  goals that are traded off against each other
+    """
+
+    def __init__(
+        self, designs: Designs, goals: Sequence[Goal], front: Sequence[Goal], *, deck: str, name: str, seed: int
+    ) -> None:
+        self.designs, self.goals, self.front = designs, tuple(goals), tuple(front)
+        self.deck, self.name, self.seed = deck, name, seed
+        self.order = designs.order(goals)
+        required = [
+            goal
+            for column in designs.pool.metrics()
+            if column.limits and column.label not in {goal.text for goal in (*goals, *front)}
+            for goal in [designs.goal(f"{column.label}:{'smallest' if column.limits[0].sense == '<' else 'largest'}")]
+        ]
+        self.shown = tuple({goal.text: goal for goal in (*self.goals, *self.front, *required)}.values())
+        """Goals that have a column."""
+
+    @property
+    def best(self) -> int | None:
+        """The design to use; None where none is good."""
+        return int(self.order[0]) if len(self.order) else None
+
+    def rows(self) -> list[BestRow]:
+        """The best, those that are best in one number alone, and the runners-up."""
+        designs = self.designs
+        first = f"{_least(self.goals[0])}" if self.goals else "farthest from the border"
+        if not self.goals and designs.steps is None:
+            first = "most room"
+        found = {int(self.order[0]): first}
+        for goal in self.shown:
+            if all(goal is not each for each in self.goals):
+                found.setdefault(int(designs.order([goal])[0]), _least(goal))
+        for number, design in enumerate(self.order[1 : 1 + RUNNERS_UP].tolist(), start=2):
+            found.setdefault(design, f"{number}{ {2: 'nd', 3: 'rd'}.get(number, 'th') }")
+        return [BestRow(design, label) for design, label in found.items()]
+
+    # Text
+
+    def lines(self, width: int) -> list[str]:
+        out = self._none(width) if self.best is None else self._use(self.best, width)
+        if self.front and self.best is not None:
+            out += ["", *self._trade_off()]
+        return out
+
+    def _use(self, best: int, width: int) -> list[str]:
+        designs = self.designs
+        out = [f"use {', '.join(f'{path} = {value}' for path, value in self.settings(best, exact=False))}"]
+        out += _wrapped(self._why(best), width)
+        stretches = [
+            [column.label, f"{_at(column, axis.values, found)}", _ends(found)]
+            for number, axis in enumerate(designs.axes)
+            if (found := designs.stretch(best, number)) is not None
+            for column in axis.columns[:1]
+        ]
+        if stretches:
+            out += ["", "how far each may go by itself:", *columns(stretches)]
+        out += ["", *self.table(self.rows()), "", *self._commands(best), *self._at_an_end(best)]
+        if not designs.against and len(designs.axes) > 1:
+            last = designs.axes[-1].columns[0].label
+            out.append(
+                f"all that varies is taken for your choice; what is not, goes behind --over: `--over {quoted(last)}`"
+            )
+        return out
+
+    def _why(self, best: int) -> str:
+        designs = self.designs
+        cases, good = int(designs.cases[best]), int(designs.good.sum())
+        number = len(designs.pool.requirements)
+        what = (
+            "it reaches the end"
+            if not number
+            else f"it meets {'the requirement' if number == 1 else f'all {number} requirements'}"
+        )
+        where = "" if cases == 1 else f" in {'both' if cases == 2 else f'all {cases:,}'} of its cases"
+        if designs.against:
+            where += f" ({', '.join(map(_range, designs.against))})"
+        steps = "" if designs.steps is None else f", {count(int(designs.steps[best]), 'cell')} from the border"
+        room = float(designs.room[best])
+        room_said = f", {100.0 * room:.3g} % of a limit from the nearest one" if math.isfinite(room) else ""
+        return f"{what}{where}{steps}{room_said}. So do {good:,} of {designs.count:,} designs."
+
+    def _at_an_end(self, best: int) -> list[str]:
+        """A note of what is chosen where the sweep ends: what is better may lie beyond."""
+        at = [
+            axis.columns[0].label
+            for number, axis in enumerate(self.designs.axes)
+            if len(axis.values) > 2
+            and (found := self.designs.stretch(best, number)) is not None
+            and (
+                (found.first == axis.level[best] and found.below == ENDS)
+                or (found.last == axis.level[best] and found.above == ENDS)
+            )
+        ]
+        return [f"it lies where the sweep of {' and of '.join(at)} ends: a wider one may find better"] if at else []
+
+    def _none(self, width: int) -> list[str]:
+        """Where no design is good: those that are nearest."""
+        designs = self.designs
+        unmet = (~designs.meets).sum(axis=1)
+        order = np.lexsort((-designs.room, unmet))[:NEAREST].tolist()
+        out = [f"none of {designs.count:,} designs meets all requirements"]
+        for text, met in zip(designs.demands, designs.meets.T, strict=True):
+            out.append(f"  require {text}  met by {int(met.sum()):,}" if designs.pool.requirements else f"  {text}")
+        out += ["", "those that come nearest:"]
+        labels = [
+            "misses " + ", ".join(text for text, met in zip(designs.demands, designs.meets[i], strict=True) if not met)
+            for i in order
+        ]
+        return [*out, *self.table([BestRow(*each) for each in zip(order, labels, strict=True)])]
+
+    def _trade_off(self) -> list[str]:
+        found = self.designs.front(self.front)
+        some = found[np.unique(np.linspace(0, len(found) - 1, min(len(found), MOST_ON_FRONT)).astype(int))]
+        names = " against ".join(goal.text for goal in self.front)
+        head = f"{names}: no good design is better in one and as good in the other"
+        left = f"; {len(some)} of {len(found):,} are shown" if len(some) < len(found) else ""
+        return [f"{head}{left}", *self.table([BestRow(int(design), "") for design in some])]
+
+    def table(self, rows: Sequence[BestRow]) -> list[str]:
+        """Designs as lines: what is chosen, how far from the border, and each number in the worst case."""
+        designs = self.designs
+        chosen = [column for axis in designs.axes for column in axis.columns]
+        cells = [["", "", *(row.label for row in rows)]]
+        for column in chosen:
+            at = designs.first[[row.design for row in rows]]
+            cells.append([column.label, column.unit, *(_value(column, place) for place in at)])
+        if designs.steps is not None:
+            cells.append(["border", "cells", *(str(designs.steps[row.design]) for row in rows)])
+        for goal in self.shown:
+            unit, scale = self._unit(goal)
+            values = self._worst(goal)[[row.design for row in rows]] / scale
+            cells.append([goal.text, unit, *("-" if math.isnan(each) else number_text(each) for each in values)])
+        if any(int(designs.cases[row.design]) > 1 for row in rows):
+            cells[0][1] = "in the worst case:"
+        lines = [list(row) for row in zip(*cells, strict=True)]
+        words = {1 + i for i, column in enumerate(chosen) if column.role == "choice"}
+        return columns(lines, right=[i for i in range(1, len(cells)) if i not in words])
+
+    def _worst(self, goal: Goal) -> np.ndarray:
+        """[design] a goal in the worst of its cases, SI."""
+        return self.designs.worst(goal.values, largest=not goal.largest)
+
+    def _unit(self, goal: Goal) -> tuple[str, float]:
+        """The unit in which a goal is shown, and how many SI units it is."""
+        for column, variable in self._metrics():
+            if column.label == goal.text:
+                return column.unit, float(variable.attributes.get("deck_scale", 1.0))
+        unit = unit_text(goal.dimension)
+        return ("" if unit == "1" else pretty_unit(unit)), 1.0
+
+    def _metrics(self) -> Iterator[tuple[CaseColumn, Stored]]:
+        variables = {each.path: each for each in self.designs.pool.variables("metric")}
+        return ((column, variables[column.label]) for column in self.designs.pool.metrics())
+
+    def settings(self, design: int, *, exact: bool = True) -> list[tuple[str, str]]:
+        """The choices that make a design: each path, and its value as a deck would write it; exact, or to four
+        digits."""
+        pool, place = self.designs.pool, int(self.designs.first[design])
+        variables = {each.path: each for each in pool.variables("coordinate")}
+        out = []
+        for axis in self.designs.axes:
+            for column in axis.columns:
+                if column.role == "choice":
+                    out.append((column.label, column.words[int(column.values[place])]))
+                else:
+                    variable = variables[column.label]
+                    si = float(pool.gathered(variable.name)[place])
+                    unit = str(variable.attributes.get("deck_unit", variable.unit))
+                    rounded = f"{number_text(column.values[place])} {unit}".removesuffix(" 1")
+                    out.append((column.label, written(si, unit) if exact else rounded))
+        return out
+
+    def command(self, design: int, *, seed: int | None = None) -> str:
+        """The command that runs a design's cases again, with other draws where there is a seed."""
+        name = f" {quoted(self.name)}"
+        settings = "".join(f" --set {quoted(f'{path}={value}')}" for path, value in self.settings(design))
+        other = f" --set seed={seed}" if seed is not None else ""
+        return f"met run {quoted(self.deck)}{name}{settings}{other}"
+
+    def _commands(self, best: int) -> list[str]:
+        drawn = any(each.attributes.get("design") for each in self.designs.pool.variables("coordinate"))
+        said = f"it was picked out of {self.designs.count:,} by these very cases, so its numbers flatter it:"
+        if not drawn:
+            return [f"run it: {self.command(best)}"]
+        return [f"{said} other draws confirm it or not", f"  {self.command(best, seed=self.seed + 1)} -o confirmed.h5"]
+
+    # Data
+
+    def as_data(self) -> dict[str, Any]:
+        """The same for programs: SI, null for what is not finite."""
+        designs = self.designs
+        rows = self.rows() if self.best is not None else []
+        data: dict[str, Any] = {
+            "experiment": designs.pool.name,
+            "designs": designs.count,
+            "good": int(designs.good.sum()),
+            "over": [column.label for column in designs.against],
+            "best": None if self.best is None else self._as_row(BestRow(self.best, rows[0].label)),
+            "rows": [self._as_row(row) for row in rows],
+            "front": [self._as_row(BestRow(int(i), "")) for i in designs.front(self.front)] if self.front else [],
+            "command": "" if self.best is None else self.command(self.best),
+        }
+        out: dict[str, Any] = finite(data)
+        return out
+
+    def _as_row(self, row: BestRow) -> dict[str, Any]:
+        designs = self.designs
+        return {
+            "why": row.label,
+            "chosen": dict(self.settings(row.design)),
+            "cases": int(designs.cases[row.design]),
+            "cells_to_border": None if designs.steps is None else int(designs.steps[row.design]),
+            "room": float(designs.room[row.design]),
+            "worst": {
+                goal.text: float(designs.worst(goal.values, largest=not goal.largest)[row.design])
+                for goal in self.shown
+            },
+        }
+
+
+def written(si: float, unit: str) -> str:
+    """An SI value in a unit, in as few digits as give the same value again: `0.33 V*s/rad`."""
+    measure = parse_unit(unit)
+    rough = si / measure.to_si(1.0)
+    texts = (_plain(float(f"{rough:.{digits}g}")) for digits in range(1, 18))
+    text = next((each for each in texts if measure.to_si(float(each), each.lstrip("-")) == si), f"{rough!r}")
+    return text if unit in ("", "1") else f"{text} {unit}"
+
+
+def _plain(value: float) -> str:
+    """A number's own digits, without an exponent where it reads well without."""
+    if value and not 1e-4 <= abs(value) < 1e7:
+        return repr(value)
+    return np.format_float_positional(value, trim="-")
+
+
+def _least(goal: Goal) -> str:
+    return f"{'largest' if goal.largest else 'least'} {goal.text}"
+
+
+def _value(column: CaseColumn, place: int) -> str:
+    value = float(column.values[place])
+    return column.words[int(value)] if column.role == "choice" else number_text(value)
+
+
+def _range(column: CaseColumn) -> str:
+    """What a design is held against, in words."""
+    if column.role == "choice":
+        return f"{column.label} {', '.join(column.words)}"
+    ends = column.values[np.isfinite(column.values)]
+    return f"{column.label} {number_text(ends.min())} .. {number_text(ends.max())} {column.unit}".rstrip()
+
+
+def _at(column: CaseColumn, values: np.ndarray, found: Stretch) -> str:
+    low, high = (number_text(float(values[level])) for level in (found.first, found.last))
+    return f"{low} .. {high} {column.unit}".rstrip()
+
+
+def _ends(found: Stretch) -> str:
+    if found.below == found.above == ENDS:
+        return f"on both sides {ENDS}"
+    return f"below: {_beyond(found.below)}; above: {_beyond(found.above)}"
+
+
+def _beyond(why: str) -> str:
+    return f"{why} is missed" if why.startswith("`") else why
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    return textwrap.wrap(text, max(40, width), initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
