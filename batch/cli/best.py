@@ -12,6 +12,7 @@ from met.messages.visible import line, say
 @click.argument("archive", metavar="ARCHIVE")
 @click.option("--run", "experiment", metavar="NAME", help="The sweep, where the archive holds several.")
 @click.option("--over", multiple=True, metavar="PATH", help="Not chosen, but to be borne: hold designs against it.")
+@click.option("--choose", multiple=True, metavar="PATH", help="Chosen, though drawn, a payload's, or of the start.")
 @click.option(
     "--by",
     multiple=True,
@@ -22,10 +23,18 @@ from met.messages.visible import line, say
 @click.option("--front", multiple=True, metavar="METRIC", help="Also the trade-off of two such: name each.")
 @format_option
 def best(
-    archive: str, experiment: str | None, over: tuple[str, ...], by: tuple[str, ...], front: tuple[str, ...], form: str
+    archive: str,
+    experiment: str | None,
+    over: tuple[str, ...],
+    choose: tuple[str, ...],
+    by: tuple[str, ...],
+    front: tuple[str, ...],
+    form: str,
 ) -> int:
-    """Choose among what a sweep chooses (`vary`, `zip`, `from`), held against what it draws and what --over names: a
-    design that meets all requirements in all of its cases, far from where one is missed.
+    """Choose among what a sweep chooses (`vary`, `zip`, `from`), held against what the arm must bear: a design that
+    meets all requirements in all of its cases, far from where one is missed.
+
+    It must bear what is drawn, what is a payload's, the environment's or of the start, and what --over names.
 
     Exit status: 0 a design meets all; 1 none does; 2 the input is wrong.
     """
@@ -48,7 +57,7 @@ def best(
             helps = f"name one: {', '.join(f'`--run {each.name}`' for each in found)}"
             raise Problem(error("E395", f"{archive} holds several sweeps", help=helps))
         pool = found[0]
-        designs = Designs(pool, over)
+        designs = Designs(pool, over, choose)
         if not pool.requirements and not by:
             metrics = ", ".join(column.label for column in pool.metrics())
             helps = f"`--by METRIC`: {metrics}" if metrics else "give its run a metric, and require something of it"

@@ -29,6 +29,9 @@ from met.units import Dimension
 MOST_CELLS = 1 << 26
 """Cells of a grid of designs, at most; with more the border is not looked for."""
 
+BORNE = ("payloads.", "environment.", "initial.")
+"""Beginnings of the paths of what an arm must bear, and nobody chooses: unless it is said."""
+
 FULL = 0.5
 """A grid has designs in more than this share of its cells."""
 
@@ -81,23 +84,29 @@ class Goal:
 class Designs:
     """The designs of a pool of cases.
 
-    over  what they are held against besides what is drawn and repeated, by path
+    over    what they are held against besides what is drawn, repeated, or a load's, the environment's or of the start,
+            by path
+    choose  what is chosen all the same of these
+
+    Raises Problem E394 for a path that varies in no case, E395 where nothing is chosen.
     """
 
-    def __init__(self, pool: Pool, over: Sequence[str] = ()) -> None:
+    def __init__(self, pool: Pool, over: Sequence[str] = (), choose: Sequence[str] = ()) -> None:
         self.pool = pool
         varied = varied_columns(pool)
-        check_varied(pool, over)
-        drawn = {each.path for each in pool.variables("coordinate") if each.attributes.get("design")}
-        chosen = [column for column in varied if column.label not in (*drawn, *over)]
-        self.against = tuple(column for column in varied if column not in chosen)
+        check_varied(pool, (*over, *choose))
+        borne = {each.path for each in pool.variables("coordinate") if each.attributes.get("design")}
+        borne = ({*borne, *(column.label for column in varied if column.label.startswith(BORNE))} - {*choose}) | {*over}
+        chosen = [column for column in varied if column.label not in borne]
+        self.against = tuple(column for column in varied if column.label in borne)
         """What the designs are held against."""
         if not chosen:
-            why = "all that varies is drawn" if not over else f"nothing is left beside {', '.join(over)}"
-            if not varied:
-                why = "nothing varies"
+            names = ", ".join(column.label for column in varied)
+            why = f"it must bear {names}" if names else "nothing varies"
             message = f"`{pool.name}` has no designs to choose among: {why}"
-            raise Problem(error("E395", message, help="`vary PATH = [...];` in a sweep chooses values"))
+            helps = ["`vary PATH = [...];` in a sweep chooses values"]
+            helps += ["`--choose PATH` says that one of these is chosen"] if names else []
+            raise Problem(error("E395", message, help=helps))
         self.of_case = design_points([column.values for column in chosen], pool.count)
         """[case] its design."""
         self.first = np.unique(self.of_case, return_index=True)[1]

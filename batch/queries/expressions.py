@@ -67,7 +67,11 @@ class CaseTable:
             raise Problem(error("D065", f"no metric or varied parameter `{name.text}`", name.place, help=helps))
         if name.text not in self._columns:
             self._columns[name.text] = self.pool.gathered(variable.name)
-        measure = parse_unit(variable.unit)
+        try:
+            measure = parse_unit(variable.unit)
+        except ValueError:
+            message = f"`{name.text}` has no unit that can be read: `{variable.unit}`"
+            raise Problem(error("E302", message, name.place, help="was the archive changed?")) from None
         return Value(self._graph.input(name.text), measure.dimension, name.place, hertz=measure.hertz)
 
 

@@ -82,40 +82,63 @@ class BestAnswer:
     # Text
 
     def lines(self, width: int) -> list[str]:
-        out = self._none(width) if self.best is None else self._use(self.best, width)
+        out = self._none() if self.best is None else self._use(self.best, width)
         if self.front and self.best is not None:
             out += ["", *self._trade_off()]
         return out
 
     def _use(self, best: int, width: int) -> list[str]:
-        designs = self.designs
-        out = [f"use {', '.join(f'{path} = {value}' for path, value in self.settings(best, exact=False))}"]
-        out += _wrapped(self._why(best), width)
-        stretches = [
-            [column.label, f"{_at(column, axis.values, found)}", _ends(found)]
-            for number, axis in enumerate(designs.axes)
-            if (found := designs.stretch(best, number)) is not None
-            for column in axis.columns[:1]
-        ]
-        if stretches:
+        out = [self.headline, *_wrapped(self.why, width)]
+        if stretches := self.stretches():
             out += ["", "how far each may go by itself:", *columns(stretches)]
-        out += ["", *self.table(self.rows()), "", *self._commands(best), *self._at_an_end(best)]
+        out += ["", *self.table(self.rows()), ""]
+        said, command = self.confirmation()
+        out += [f"{said} {command}"] if said.endswith("it:") else [said, f"  {command}"]
+        return [*out, *self.notes()]
+
+    @property
+    def headline(self) -> str:
+        """`use drive.kp = 0.33 V*s/rad`, or that none is good."""
+        if self.best is None:
+            return f"none of {self.designs.count:,} designs meets all requirements"
+        return f"use {', '.join(f'{path} = {value}' for path, value in self.settings(self.best, exact=False))}"
+
+    def stretches(self) -> list[list[str]]:
+        """How far the best may go along each axis by itself: the parameter, from where to where, and what ends it."""
+        assert self.best is not None
+        return [
+            [axis.columns[0].label, _at(axis.columns[0], axis.values, found), _ends(found)]
+            for number, axis in enumerate(self.designs.axes)
+            if (found := self.designs.stretch(self.best, number)) is not None
+        ]
+
+    def notes(self) -> list[str]:
+        """What is to be known besides: that better ones may lie beyond the sweep, that all is taken for chosen."""
+        assert self.best is not None
+        designs = self.designs
+        at = [
+            axis.columns[0].label
+            for number, axis in enumerate(designs.axes)
+            if len(axis.values) > 2
+            and (found := designs.stretch(self.best, number)) is not None
+            and _at_an_end(found, int(axis.level[self.best]))
+        ]
+        out = [f"it lies where the sweep of {' and of '.join(at)} ends: a wider one may find better"] if at else []
         if not designs.against and len(designs.axes) > 1:
-            last = designs.axes[-1].columns[0].label
-            out.append(
-                f"all that varies is taken for your choice; what is not, goes behind --over: `--over {quoted(last)}`"
-            )
+            last = quoted(designs.axes[-1].columns[0].label)
+            out.append(f"all that varies is taken for chosen; `--over {last}` of `met best` holds designs against it")
         return out
 
-    def _why(self, best: int) -> str:
-        designs = self.designs
+    @property
+    def why(self) -> str:
+        """What the best has for it, and how many designs meet all."""
+        assert self.best is not None
+        designs, best = self.designs, self.best
         cases, good = int(designs.cases[best]), int(designs.good.sum())
         number = len(designs.pool.requirements)
-        what = (
-            "it reaches the end"
-            if not number
-            else f"it meets {'the requirement' if number == 1 else f'all {number} requirements'}"
-        )
+        what = "it reaches the end"
+        if number:
+            what = f"it meets {'the requirement' if number == 1 else f'all {number} requirements'}"
         where = "" if cases == 1 else f" in {'both' if cases == 2 else f'all {cases:,}'} of its cases"
         if designs.against:
             where += f" ({', '.join(map(_range, designs.against))})"
@@ -124,34 +147,20 @@ class BestAnswer:
         room_said = f", {100.0 * room:.3g} % of a limit from the nearest one" if math.isfinite(room) else ""
         return f"{what}{where}{steps}{room_said}. So do {good:,} of {designs.count:,} designs."
 
-    def _at_an_end(self, best: int) -> list[str]:
-        """A note of what is chosen where the sweep ends: what is better may lie beyond."""
-        at = [
-            axis.columns[0].label
-            for number, axis in enumerate(self.designs.axes)
-            if len(axis.values) > 2
-            and (found := self.designs.stretch(best, number)) is not None
-            and (
-                (found.first == axis.level[best] and found.below == ENDS)
-                or (found.last == axis.level[best] and found.above == ENDS)
-            )
-        ]
-        return [f"it lies where the sweep of {' and of '.join(at)} ends: a wider one may find better"] if at else []
-
-    def _none(self, width: int) -> list[str]:
+    def _none(self) -> list[str]:
         """Where no design is good: those that are nearest."""
         designs = self.designs
-        unmet = (~designs.meets).sum(axis=1)
-        order = np.lexsort((-designs.room, unmet))[:NEAREST].tolist()
-        out = [f"none of {designs.count:,} designs meets all requirements"]
+        out = [self.headline]
         for text, met in zip(designs.demands, designs.meets.T, strict=True):
             out.append(f"  require {text}  met by {int(met.sum()):,}" if designs.pool.requirements else f"  {text}")
-        out += ["", "those that come nearest:"]
-        labels = [
-            "misses " + ", ".join(text for text, met in zip(designs.demands, designs.meets[i], strict=True) if not met)
-            for i in order
-        ]
-        return [*out, *self.table([BestRow(*each) for each in zip(order, labels, strict=True)])]
+        return [*out, "", "those that come nearest:", *self.table(self.nearest())]
+
+    def nearest(self) -> list[BestRow]:
+        """The designs that miss least, with what they miss."""
+        designs = self.designs
+        order = np.lexsort((-designs.room, (~designs.meets).sum(axis=1)))[:NEAREST].tolist()
+        missed = [[text for text, met in zip(designs.demands, designs.meets[i], strict=True) if not met] for i in order]
+        return [BestRow(i, f"misses {', '.join(texts)}") for i, texts in zip(order, missed, strict=True)]
 
     def _trade_off(self) -> list[str]:
         found = self.designs.front(self.front)
@@ -162,24 +171,35 @@ class BestAnswer:
         return [f"{head}{left}", *self.table([BestRow(int(design), "") for design in some])]
 
     def table(self, rows: Sequence[BestRow]) -> list[str]:
-        """Designs as lines: what is chosen, how far from the border, and each number in the worst case."""
+        """Designs as lines."""
+        lines = self.cells(rows)
+        if any(int(self.designs.cases[row.design]) > 1 for row in rows):
+            lines[1][0] = "in the worst case:"
+        return columns(lines, right=self.right)
+
+    @property
+    def right(self) -> list[int]:
+        """Columns of the table that are numbers."""
+        chosen = [column for axis in self.designs.axes for column in axis.columns]
+        words = {1 + i for i, column in enumerate(chosen) if column.role == "choice"}
+        return [i for i in range(1, len(self.cells([])[0])) if i not in words]
+
+    def cells(self, rows: Sequence[BestRow]) -> list[list[str]]:
+        """Designs as a table whose first lines are heads and units: why it is there, what is chosen, how far from the
+        border, and each number in the worst case."""
         designs = self.designs
         chosen = [column for axis in designs.axes for column in axis.columns]
+        numbers = [row.design for row in rows]
         cells = [["", "", *(row.label for row in rows)]]
         for column in chosen:
-            at = designs.first[[row.design for row in rows]]
-            cells.append([column.label, column.unit, *(_value(column, place) for place in at)])
+            cells.append([column.label, column.unit, *(_value(column, place) for place in designs.first[numbers])])
         if designs.steps is not None:
-            cells.append(["border", "cells", *(str(designs.steps[row.design]) for row in rows)])
+            cells.append(["border", "cells", *(str(designs.steps[number]) for number in numbers)])
         for goal in self.shown:
             unit, scale = self._unit(goal)
-            values = self._worst(goal)[[row.design for row in rows]] / scale
+            values = self._worst(goal)[numbers] / scale
             cells.append([goal.text, unit, *("-" if math.isnan(each) else number_text(each) for each in values)])
-        if any(int(designs.cases[row.design]) > 1 for row in rows):
-            cells[0][1] = "in the worst case:"
-        lines = [list(row) for row in zip(*cells, strict=True)]
-        words = {1 + i for i, column in enumerate(chosen) if column.role == "choice"}
-        return columns(lines, right=[i for i in range(1, len(cells)) if i not in words])
+        return [list(row) for row in zip(*cells, strict=True)]
 
     def _worst(self, goal: Goal) -> np.ndarray:
         """[design] a goal in the worst of its cases, SI."""
@@ -222,12 +242,14 @@ class BestAnswer:
         other = f" --set seed={seed}" if seed is not None else ""
         return f"met run {quoted(self.deck)}{name}{settings}{other}"
 
-    def _commands(self, best: int) -> list[str]:
-        drawn = any(each.attributes.get("design") for each in self.designs.pool.variables("coordinate"))
-        said = f"it was picked out of {self.designs.count:,} by these very cases, so its numbers flatter it:"
-        if not drawn:
-            return [f"run it: {self.command(best)}"]
-        return [f"{said} other draws confirm it or not", f"  {self.command(best, seed=self.seed + 1)} -o confirmed.h5"]
+    def confirmation(self) -> tuple[str, str]:
+        """What the best is worth, in words, and the command that runs it: with other draws where its cases were
+        drawn."""
+        assert self.best is not None
+        if not any(each.attributes.get("design") for each in self.designs.pool.variables("coordinate")):
+            return "run it:", self.command(self.best)
+        said = f"it was picked out of {self.designs.count:,} by these very cases, so its numbers flatter it: "
+        return f"{said}other draws confirm it or not", f"{self.command(self.best, seed=self.seed + 1)} -o confirmed.h5"
 
     # Data
 
@@ -264,8 +286,12 @@ class BestAnswer:
 
 
 def written(si: float, unit: str) -> str:
-    """An SI value in a unit, in as few digits as give the same value again: `0.33 V*s/rad`."""
-    measure = parse_unit(unit)
+    """An SI value in a unit, in as few digits as give the same value again: `0.33 V*s/rad`; of a unit that cannot be
+    read, as no MET writes, the number alone."""
+    try:
+        measure = parse_unit(unit)
+    except ValueError:
+        return f"{si!r}"
     rough = si / measure.to_si(1.0)
     texts = (_plain(float(f"{rough:.{digits}g}")) for digits in range(1, 18))
     text = next((each for each in texts if measure.to_si(float(each), each.lstrip("-")) == si), f"{rough!r}")
@@ -299,6 +325,11 @@ def _range(column: CaseColumn) -> str:
 def _at(column: CaseColumn, values: np.ndarray, found: Stretch) -> str:
     low, high = (number_text(float(values[level])) for level in (found.first, found.last))
     return f"{low} .. {high} {column.unit}".rstrip()
+
+
+def _at_an_end(found: Stretch, level: int) -> bool:
+    """True if a level is the first or the last of the sweep."""
+    return (found.first == level and found.below == ENDS) or (found.last == level and found.above == ENDS)
 
 
 def _ends(found: Stretch) -> str:

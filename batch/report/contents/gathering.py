@@ -15,6 +15,7 @@ from batch.queries.step_errors.figures import figures, together
 from batch.queries.step_errors.words import about as about_errors
 from batch.report.contents import comparison
 from batch.report.contents.against import ComparedArchive, EarlierCases, of_groups
+from batch.report.contents.designs import design_answer
 from batch.report.contents.evidence import evidence_table
 from batch.report.contents.histories import MOST_VALUES, no_signals, signals
 from batch.report.contents.overview import overview
@@ -62,7 +63,9 @@ def gather(
     befores = [None if against is None else against.of(pool) for pool in found]
     sections = tuple(
         replace(
-            _section(name, pool, pool.name if several else "", experiments, trouble, share, progress, before),
+            _section(
+                name, pool, pool.name if several else "", experiments, trouble, share, progress, before, archive.deck
+            ),
             changes=() if against is None else comparison.run_changes(against.found, before),
         )
         for pool, before in zip(found, befores, strict=True)
@@ -104,6 +107,7 @@ def _section(
     values: int,
     progress: Callable[[int], None] | None,
     before: EarlierCases | None,
+    deck: str,
 ) -> ReportSection:
     own = {group.name: experiments[group.name] for group in pool.groups if group.name in experiments}
     beds: Stability | None = None
@@ -123,6 +127,7 @@ def _section(
         metrics=metric_rows(pool, before, errors),
         structures=structures(pool, before),
         evidence=evidence_table(pool),
+        designs=design_answer(pool, deck.strip("<>")),
         worst=worst(pool, archive, only, before),
         overview=overview(pool, before),
         signals=drawn,

@@ -187,6 +187,43 @@ class ParameterRow:
     among: tuple[str, ...] = ()
 
 
+@frozen
+class DesignMap:
+    """Two parameters that are chosen, and which designs meet all requirements, all else as in the best.
+
+    x_texts, y_texts  the values along each side
+    steps   (y, x): cells to the border; 0 of a design that is not good, -1 where there is none
+    best    place of the best: (y, x)
+    """
+
+    x: str
+    y: str
+    x_unit: str
+    y_unit: str
+    x_texts: tuple[str, ...]
+    y_texts: tuple[str, ...]
+    steps: np.ndarray
+    best: tuple[int, int]
+
+
+@frozen
+class DesignAnswer:
+    """The design to use, as `met best` says it.
+
+    headline, why  which it is, and what it has for it;  table: it and others;  stretches: how far each parameter may go
+    said, command  how to run it or confirm it;  map: None where no two parameters with an order are chosen
+    """
+
+    headline: str
+    why: str
+    table: TextTable
+    stretches: TextTable | None
+    said: str
+    command: str
+    notes: tuple[str, ...]
+    map: DesignMap | None
+
+
 # Plots
 
 
@@ -366,6 +403,7 @@ class ReportSection:
 
     name        as it is asked for;  lede  what it is, in a sentence
     evidence    what the cases show of requirements over a share of cases;  None where there is none
+    designs     which design of a sweep to use;  None where it chooses none, or requires nothing
     changes     against another archive, a structure each;  what one of them lacks is in `ArchiveChanges.alone`
     trouble     why parameters and stability are missing; "" where they are not
     by_step     what the errors of metrics by the step rest on; "" where none was verified
@@ -377,6 +415,7 @@ class ReportSection:
     varied: tuple[VariedParameter, ...]
     metrics: tuple[MetricRow, ...]
     evidence: TextTable | None
+    designs: DesignAnswer | None
     structures: TextTable | None
     worst: WorstCaseTable | None
     overview: Overview | None

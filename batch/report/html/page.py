@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from batch.report.contents.parts import Report, ReportSection
-from batch.report.html import blocks, changes, inlined, tables
+from batch.report.html import blocks, changes, designs, inlined, tables
 from batch.report.html.markup import Child, Html, el, join, lines
 from batch.report.html.payload import script_json, section_data
 
@@ -89,6 +89,7 @@ def _links(number: int, section: ReportSection, report: Report) -> list[tuple[st
     if len(report.sections) > 1:
         return [(f"s{number}", section.name)]
     found = [
+        ("designs", "Which design", section.designs is not None),
         ("run", "What was run", True),
         ("overview", "Cases", section.overview is not None),
         ("evidence", "Evidence", section.evidence is not None),
@@ -141,6 +142,8 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
                 cls="compared",
             )
         )
+    if section.designs is not None:
+        out.append(part("designs", "Which design to use", designs.designs(section.designs)))
     out.append(
         part(
             "run",

@@ -110,6 +110,16 @@ def test_a_design_is_good_if_it_is_in_all_of_its_cases() -> None:
     assert Designs(made({"kp": kp, "load": load}, met)).good.tolist() == met.tolist()
 
 
+def test_a_payload_and_what_is_drawn_are_borne_unless_they_are_chosen() -> None:
+    kp, load = (each.ravel() for each in np.meshgrid([1.0, 2.0, 3.0], [10.0, 20.0], indexing="ij"))
+    pool = made({"kp": kp, "payloads.load.mass": load}, np.ones(6, bool))
+    assert [column.label for column in Designs(pool).against] == ["payloads.load.mass"] and Designs(pool).count == 3
+    chosen = Designs(pool, choose=["payloads.load.mass"])
+    assert chosen.against == () and chosen.count == 6
+    drawn = made({"kp": kp, "load": load}, np.ones(6, bool), drawn=("load",))
+    assert Designs(drawn).count == 3 and Designs(drawn, choose=["load"]).count == 6
+
+
 def test_what_goes_in_step_is_one_axis() -> None:
     values = np.arange(4.0)
     designs = Designs(made({"a": values, "b": 10.0 - values, "c": values**2}, np.ones(4, bool)))
@@ -223,8 +233,9 @@ error[E394]: no varied parameter `links.lowr.mass` in `grid`
 1 error
 """),
     (["--over", "gearbox.kp", "--over", "gearbox.ki", "--over", "links.lower.mass"], """\
-error[E395]: `grid` has no designs to choose among: nothing is left beside gearbox.kp, gearbox.ki, links.lower.mass
+error[E395]: `grid` has no designs to choose among: it must bear gearbox.kp, gearbox.ki, links.lower.mass
  = help: `vary PATH = [...];` in a sweep chooses values
+ = help: `--choose PATH` says that one of these is chosen
 
 1 error
 """),

@@ -11,6 +11,7 @@ import pytest
 import batch
 from batch.archive.read import ArchiveFile
 from batch.queries import ordering
+from batch.queries.best import Designs
 from batch.queries.grids import column_levels
 from batch.queries.pool import ENDED, CaseColumn, Pool, pools
 from batch.report.contents import histories, overview, stability
@@ -20,6 +21,7 @@ from batch.report.contents.maps import ruler
 from batch.report.contents.parts import OutcomeCount, Report
 from batch.report.contents.thinning import thin, thin_clock
 from batch.report.html.payload import _column
+from batch.terminal.best import BestAnswer
 from met.analysis.margin import margins
 from tests.batch import plans
 from tests.batch.report import archives
@@ -73,6 +75,34 @@ class TestTheVerdict:
         found = gathered(archives.made(here / "a.h5", plans.nominal(), plans.gains(3)))
         assert [verdict.about for verdict in found.verdicts] == ["nominal", "gains"]
         assert [section.name for section in found.sections] == ["nominal", "gains"]
+
+
+class TestTheDesignToUse:
+    def test_is_what_met_best_says(self, here: Path, engine: None) -> None:
+        one = archives.grid([0.01, 0.02, 0.03, 0.04, 0.05], [20.0, 21.0, 22.0, 23.0])
+        one = replace(one, requirements=tuple(replace(each, limit=20.0) for each in one.requirements))
+        path = archives.made(here / "a.h5", one)
+        found = gathered(path).sections[0].designs
+        with ArchiveFile(path) as file:
+            [pool] = pools(file.groups)
+            designs = Designs(pool)
+            answer = BestAnswer(designs, (), (), deck="two_link.ic", name="gains", seed=7)
+            assert found is not None and found.map is not None and designs.steps is not None and answer.best is not None
+            assert found.headline.lower() == answer.headline.lower() and found.why.lower() == answer.why.lower()
+            assert found.map.steps.shape == (4, 5) and found.map.steps[found.map.best] == designs.steps[answer.best]
+            assert (found.map.steps > 0).sum() == designs.good.sum()
+            assert found.command.startswith("met run two_link.ic gains --set 'gearbox.kp=")
+
+    def test_is_not_asked_of_a_run_or_where_nothing_is_required(self, here: Path, engine: None) -> None:
+        assert gathered(archives.made(here / "a.h5", plans.nominal())).sections[0].designs is None
+        bare = replace(plans.gains(4), requirements=())
+        assert gathered(archives.made(here / "b.h5", bare)).sections[0].designs is None
+
+    def test_where_none_is_good_those_that_come_nearest_are_shown(self, sweep: Path) -> None:
+        found = gathered(sweep).sections[0].designs
+        assert found is not None and found.map is None and found.command == ""
+        assert found.headline == "None of 20 designs meets all requirements"
+        assert [row[0] for row in found.table.rows] == 3 * ["misses volts < 5 V"]
 
 
 class TestWorstCases:

@@ -1,0 +1,86 @@
+"""The design to use, as `met best` says it: the first answer of a report on a sweep that chooses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from batch.queries.best import DesignAxis, Designs
+from batch.queries.pool import CaseColumn, Pool
+from batch.queries.signals import number_text
+from batch.report.contents.parts import DesignAnswer, DesignMap, TextTable
+from batch.terminal.best import BestAnswer
+from met.diagnostic import Problem
+
+MOST_CELLS = 10_000
+"""Cells of a map, at most: more would be smaller than a dot."""
+
+
+def design_answer(pool: Pool, deck: str) -> DesignAnswer | None:
+    """The answer for a sweep; None where nothing is chosen in it, or nothing required."""
+    if pool.count < 2 or not pool.requirements:
+        return None
+    try:
+        designs = Designs(pool)
+    except Problem:  # it chooses nothing
+        return None
+    answer = BestAnswer(designs, (), (), deck=deck, name=pool.name, seed=int(pool.groups[0].at("seed", [0])[0]))
+    if answer.best is None:
+        table = _table(answer.cells(answer.nearest()), answer.right)
+        return DesignAnswer(
+            _sentence(answer.headline), "Those that come nearest are below.", table, None, "", "", (), None
+        )
+    said, command = answer.confirmation()
+    stretches = tuple(map(tuple, answer.stretches()))
+    heads = ("how far each may go", "by itself", "what ends it")
+    return DesignAnswer(
+        headline=_sentence(answer.headline),
+        why=_sentence(answer.why),
+        table=_table(answer.cells(answer.rows()), answer.right),
+        stretches=TextTable(heads, ("",) * 3, stretches) if stretches else None,
+        said=_sentence(said),
+        command=command,
+        notes=tuple(f"{_sentence(note)}." for note in answer.notes()),
+        map=_map(designs, answer.best),
+    )
+
+
+def _table(cells: list[list[str]], right: list[int]) -> TextTable:
+    heads, units, *rows = cells
+    return TextTable(tuple(heads), tuple(units), tuple(map(tuple, rows)), frozenset(right))
+
+
+def _map(designs: Designs, best: int) -> DesignMap | None:
+    """The map over the two ordered axes that have most values; the others are as in the best."""
+    sides = sorted((axis for axis in designs.axes if axis.ordered), key=lambda axis: -len(axis.values))[:2]
+    steps = designs.steps
+    if len(sides) < 2 or steps is None or len(sides[0].values) * len(sides[1].values) > MOST_CELLS:
+        return None
+    x, y = sorted(sides, key=designs.axes.index)
+    shown = np.ones(designs.count, bool)
+    for axis in designs.axes:
+        if axis is not x and axis is not y:
+            shown &= axis.level == axis.level[best]
+    cells = np.full((len(y.values), len(x.values)), -1)
+    cells[y.level[shown], x.level[shown]] = steps[shown]
+    at = int(y.level[best]), int(x.level[best])
+    return DesignMap(_name(x), _name(y), _unit(x), _unit(y), _texts(x), _texts(y), cells, at)
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _first(axis: DesignAxis) -> CaseColumn:
+    return axis.columns[0]
+
+
+def _name(axis: DesignAxis) -> str:
+    return " with ".join(column.label for column in axis.columns)
+
+
+def _unit(axis: DesignAxis) -> str:
+    return _first(axis).unit
+
+
+def _texts(axis: DesignAxis) -> tuple[str, ...]:
+    return tuple(number_text(float(value)) for value in axis.values)

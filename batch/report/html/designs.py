@@ -1,0 +1,70 @@
+"""The design to use: a sentence, a map of which designs meet all requirements, tables, the command that runs it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from batch.report.contents.parts import DesignAnswer, DesignMap
+from batch.report.html.markup import Child, Html, el, join
+from batch.report.html.tables import command, table
+
+SIDE = 320
+"""Units of a map's longer side in its drawing."""
+
+SHADES = 4
+"""Shades of designs that meet all: deeper the farther from the border."""
+
+
+def designs(found: DesignAnswer) -> Html:
+    """The answer of `met best`."""
+    words: list[Child] = [el("p", found.headline, cls="pick"), el("p", found.why, cls="said")]
+    if found.command:
+        words += [el("p", found.said, cls="said"), el("p", command(found.command), cls="command")]
+    words += [table(found.stretches, "How far each may go")] if found.stretches is not None else []
+    words += [el("p", note, cls="note") for note in found.notes]
+    head = el("div", el("div", words), _map(found.map) if found.map is not None else None, cls="answered")
+    about = el("p", "Each number is that of the worst case of a design.", cls="said")
+    return join([head, about, table(found.table, "Designs")])
+
+
+def _map(found: DesignMap) -> Html:
+    """A cell a design: meets all, deeper the farther from the border; does not; was not run."""
+    rows, columns = found.steps.shape
+    side = SIDE / max(rows, columns)
+    deepest = max(1, int(found.steps.max(initial=1)))
+    cells = []
+    for y in range(rows):
+        for x in range(columns):
+            steps = int(found.steps[y, x])
+            if steps < 0:
+                continue
+            shade = 1 + (SHADES - 1) * (steps - 1) // max(1, deepest - 1) if steps else 0
+            at = {"x": f"{x * side:.2f}", "y": f"{(rows - 1 - y) * side:.2f}"}
+            size = f"{side - min(1.0, 0.1 * side):.2f}"
+            cells.append(el("rect", **at, width=size, height=size, cls=f"good{shade}" if steps else "miss"))
+    y, x = found.best
+    middle = {"cx": f"{(x + 0.5) * side:.2f}", "cy": f"{(rows - 0.5 - y) * side:.2f}"}
+    cells.append(el("circle", **middle, r=f"{max(3.0, 0.32 * side):.2f}", cls="best"))
+    wide, high = columns * side, rows * side
+    good, there = int((found.steps > 0).sum()), int((found.steps >= 0).sum())
+    words = f"Designs over {found.x} and {found.y}: {good} of {there} meet all"
+    drawn = el("svg", cells, viewBox=f"-2 -2 {wide + 4:.2f} {high + 4:.2f}", role="img", aria_label=words)
+    return el(
+        "figure",
+        el("p", _side(found.y, found.y_texts, found.y_unit, "upwards"), cls="under"),
+        drawn,
+        el("p", _side(found.x, found.x_texts, found.x_unit, "to the right"), cls="under"),
+        el(
+            "figcaption",
+            el("span", el("span", cls="key good4"), "meets all, far from the border"),
+            el("span", el("span", cls="key good1"), "meets all, at the border"),
+            el("span", el("span", cls="key miss"), "does not"),
+            cls="legend",
+        ),
+        cls="designs",
+    )
+
+
+def _side(name: str, texts: Sequence[str], unit: str, way: str) -> str:
+    """What a side of the map is: `drive.kp from 0.05 to 1 V*s/rad, to the right`."""
+    return f"{name} from {texts[0]} to {texts[-1]} {unit}".rstrip() + f", {way}"
