@@ -12,7 +12,9 @@ from met.messages.visible import line, say
 @click.argument("archive", metavar="ARCHIVE")
 @click.option("--run", "experiment", metavar="NAME", help="The sweep, where the archive holds several.")
 @click.option("--over", multiple=True, metavar="PATH", help="Not chosen, but to be borne: hold designs against it.")
-@click.option("--choose", multiple=True, metavar="PATH", help="Chosen, though drawn, a payload's, or of the start.")
+@click.option(
+    "--choose", multiple=True, metavar="PATH", help="Chosen, though drawn, or of a link, a payload, ..."
+)
 @click.option(
     "--by",
     multiple=True,
@@ -34,7 +36,7 @@ def best(
     """Choose among what a sweep chooses (`vary`, `zip`, `from`), held against what the arm must bear: a design that
     meets all requirements in all of its cases, far from where one is missed.
 
-    It must bear what is drawn, what is a payload's, the environment's or of the start, and what --over names.
+    It must bear what is drawn, what is of links, payloads, the environment or the start, and what --over names.
 
     Exit status: 0 a design meets all; 1 none does; 2 the input is wrong.
     """

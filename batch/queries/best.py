@@ -29,8 +29,8 @@ from met.units import Dimension
 MOST_CELLS = 1 << 26
 """Cells of a grid of designs, at most; with more the border is not looked for."""
 
-BORNE = ("payloads.", "environment.", "initial.")
-"""Beginnings of the paths of what an arm must bear, and nobody chooses: unless it is said."""
+BORNE = ("links.", "payloads.", "environment.", "initial.")
+"""Beginnings of the paths of what servos must bear, and who tunes them does not choose: unless it is said."""
 
 FULL = 0.5
 """A grid has designs in more than this share of its cells."""
@@ -84,8 +84,8 @@ class Goal:
 class Designs:
     """The designs of a pool of cases.
 
-    over    what they are held against besides what is drawn, repeated, or a load's, the environment's or of the start,
-            by path
+    over    what they are held against besides what is drawn, repeated, or of links, payloads, the environment or the
+            start, by path
     choose  what is chosen all the same of these
 
     Raises Problem E394 for a path that varies in no case, E395 where nothing is chosen.

@@ -40,7 +40,7 @@ def design_answer(pool: Pool, deck: str) -> DesignAnswer | None:
         said=_sentence(said),
         command=command,
         notes=tuple(f"{_sentence(note)}." for note in answer.notes()),
-        map=_map(designs, answer.best),
+        map=design_map(designs, answer.best),
     )
 
 
@@ -49,7 +49,7 @@ def _table(cells: list[list[str]], right: list[int]) -> TextTable:
     return TextTable(tuple(heads), tuple(units), tuple(map(tuple, rows)), frozenset(right))
 
 
-def _map(designs: Designs, best: int) -> DesignMap | None:
+def design_map(designs: Designs, best: int) -> DesignMap | None:
     """The map over the two ordered axes that have most values; the others are as in the best."""
     sides = sorted((axis for axis in designs.axes if axis.ordered), key=lambda axis: -len(axis.values))[:2]
     steps = designs.steps

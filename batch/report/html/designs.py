@@ -44,7 +44,7 @@ def _map(found: DesignMap) -> Html:
             cells.append(el("rect", **at, width=size, height=size, cls=f"good{shade}" if steps else "miss"))
     y, x = found.best
     middle = {"cx": f"{(x + 0.5) * side:.2f}", "cy": f"{(rows - 0.5 - y) * side:.2f}"}
-    cells.append(el("circle", **middle, r=f"{max(3.0, 0.32 * side):.2f}", cls="best"))
+    cells.append(el("circle", **middle, r=f"{min(10.0, max(3.0, 0.32 * side)):.2f}", cls="best"))
     wide, high = columns * side, rows * side
     good, there = int((found.steps > 0).sum()), int((found.steps >= 0).sum())
     words = f"Designs over {found.x} and {found.y}: {good} of {there} meet all"

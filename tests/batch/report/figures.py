@@ -7,6 +7,7 @@ report_points.png     its cases, one of which is chosen, and two parameters at o
 report_signals.png    its worst cases, near to
 report_stability.png  a motor on a bed, under arms of ten weights
 report_narrow.png     the head of the same on a telephone, dark
+report_designs.png    which design to use: the crane of docs/best.md
 report_against.png           the story of docs/diff.md: the head of after.h5 against before.h5
 report_against_signals.png   what was before under what is now
 report_against_points.png    the metric of each case, and where it was; a map of the change
@@ -14,6 +15,7 @@ report_against_points.png    the metric of each case, and where it was; a map of
 
 from __future__ import annotations
 
+import re
 import tempfile
 from pathlib import Path
 
@@ -64,6 +66,13 @@ def draw(folder: Path) -> list[Path]:
         page = chromium.open(payload, width=390, height=844, dark=True, scale=2)
         page.settle()
         written.append(_window(page, folder / "report_narrow.png"))
+        deck = re.search(r"<!-- crane\.ic -->\n```c\n(.*?)```", (FOLDER.parent / "best.md").read_text(), re.DOTALL)
+        assert deck is not None
+        (home / "crane.ic").write_text(deck[1], encoding="utf-8")
+        batch.run(ic.compile(home / "crane.ic", select=["gains"]), output=home / "crane.gains.h5", histories="none")
+        page = chromium.open(report(home / "crane.gains.h5"), width=1180, height=960, scale=1.5)
+        page.settle()
+        written.append(page.picture(folder / "report_designs.png", "section.designs"))
         mended_servo.told(home)
         against = report(home / "after.h5", against=home / "before.h5", title="Drive 2 against drive 1")
         page = chromium.open(against, width=1180, height=1150, scale=1.5)

@@ -15,6 +15,7 @@ from batch.queries.best import Designs
 from batch.queries.grids import column_levels
 from batch.queries.pool import ENDED, CaseColumn, Pool, pools
 from batch.report.contents import histories, overview, stability
+from batch.report.contents.designs import design_map
 from batch.report.contents.gathering import gather
 from batch.report.contents.maps import _steps as round_steps
 from batch.report.contents.maps import ruler
@@ -84,14 +85,22 @@ class TestTheDesignToUse:
         path = archives.made(here / "a.h5", one)
         found = gathered(path).sections[0].designs
         with ArchiveFile(path) as file:
-            [pool] = pools(file.groups)
-            designs = Designs(pool)
-            answer = BestAnswer(designs, (), (), deck="two_link.ic", name="gains", seed=7)
-            assert found is not None and found.map is not None and designs.steps is not None and answer.best is not None
+            answer = BestAnswer(Designs(pools(file.groups)[0]), (), (), deck="two_link.ic", name="gains", seed=7)
+            assert found is not None and answer.best is not None
             assert found.headline.lower() == answer.headline.lower() and found.why.lower() == answer.why.lower()
-            assert found.map.steps.shape == (4, 5) and found.map.steps[found.map.best] == designs.steps[answer.best]
-            assert (found.map.steps > 0).sum() == designs.good.sum()
             assert found.command.startswith("met run two_link.ic gains --set 'gearbox.kp=")
+
+    def test_has_a_map_where_two_are_chosen(self, here: Path, engine: None) -> None:
+        one = archives.grid([0.01, 0.02, 0.03, 0.04, 0.05], [20.0, 21.0, 22.0, 23.0])
+        one = replace(one, requirements=tuple(replace(each, limit=20.0) for each in one.requirements))
+        with ArchiveFile(archives.made(here / "a.h5", one)) as file:
+            designs = Designs(pools(file.groups)[0], choose=["links.lower.mass"])
+            best = int(designs.order()[0])
+            found = design_map(designs, best)
+            assert found is not None and designs.steps is not None and found.steps.shape == (4, 5)
+            assert found.steps[found.best] == designs.steps[best] == designs.steps.max()
+            assert (found.steps > 0).sum() == designs.good.sum() == 16
+            assert design_map(Designs(pools(file.groups)[0]), 0) is None
 
     def test_is_not_asked_of_a_run_or_where_nothing_is_required(self, here: Path, engine: None) -> None:
         assert gathered(archives.made(here / "a.h5", plans.nominal())).sections[0].designs is None
