@@ -12,9 +12,7 @@ from met.messages.visible import line, say
 @click.argument("archive", metavar="ARCHIVE")
 @click.option("--run", "experiment", metavar="NAME", help="The sweep, where the archive holds several.")
 @click.option("--over", multiple=True, metavar="PATH", help="Not chosen, but to be borne: hold designs against it.")
-@click.option(
-    "--choose", multiple=True, metavar="PATH", help="Chosen, though drawn, or of a link, a payload, ..."
-)
+@click.option("--choose", multiple=True, metavar="PATH", help="Chosen, though drawn, or of a link, a payload, ...")
 @click.option(
     "--by",
     multiple=True,

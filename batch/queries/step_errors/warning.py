@@ -13,14 +13,15 @@ from batch.queries.requirements import GroupRequirement, group_requirements
 from batch.queries.signals import deck_unit, number_text
 from batch.queries.step_errors.figures import CaseError, Verification, figures
 from batch.queries.step_errors.words import rounded
+from met.analysis.step_error import NEAR, StepError
 from met.diagnostic import Diagnostic, Label, Place
 
 if TYPE_CHECKING:
     from batch.archive.read import ArchiveGroup
     from met.plan import Experiment
 
-MATTERS = 0.01
-"""Of a metric's largest value: an error that nothing explains is worth a word above it."""
+MATTERS, LARGE = 0.01, 0.1
+"""Of a metric's largest value: an error that nothing explains is worth a word above the first, any above the second."""
 
 MOST_HALVINGS = 10
 """Times a step is halved to make an error small; more is no remedy."""
@@ -91,22 +92,24 @@ def _excess(case: CaseError, required: GroupRequirement) -> float:
 
 
 def _unclear(group: ArchiveGroup, found: Verification, name: str, experiment: Experiment | None) -> Diagnostic | None:
-    """A metric that changes much with the step, and not as the integrator does."""
+    """A metric that changes much with the step, or not as the integrator does."""
     values = group.values(name)
     size = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
-    those = [each for each in found.metrics[name].cases if each.error is not None and not each.error.clear]
-    those = [each for each in those if each.error is not None and MATTERS * size < each.error.error < math.inf]
+    those = [
+        each
+        for each in found.metrics[name].cases
+        if each.error is not None and (LARGE if each.error.clear else MATTERS) * size < each.error.error < math.inf
+    ]
     if not those:
         return None
     case = max(those, key=lambda each: each.error.error if each.error is not None else 0.0)
     assert case.error is not None
     scale, unit = deck_unit(group.variables[name])
     unit = "" if unit == "1" else f" {unit}"
-    seen = "is unclear" if math.isnan(case.error.order) else f"is {case.error.order:.1f}"
+    value, half, quarter = (f"{number_text(each / scale)}{unit}" for each in (case.value, case.half, case.quarter))
     message = (
-        f"`{name}` of case #{case.case} is {number_text(case.value / scale)}{unit} ± "
-        f"{rounded(case.error.error / abs(scale))}{unit} by the step; the order of that {seen}, and should be "
-        f"{found.order}"
+        f"`{name}` of case #{case.case} depends on the step: it is {value}, {half} at half of the step, and "
+        f"{quarter} at a quarter"
     )
     helps = [_remedy(found, case, MATTERS * size, f"an error below {100 * MATTERS:g} %")]
     place = None
@@ -139,12 +142,17 @@ def _lost(found: Verification, experiment: Experiment | None) -> list[Diagnostic
 
 def _remedy(found: Verification, case: CaseError, tolerance: float, wanted: str) -> str:
     """The rate of the dynamics at which the error would be so small."""
-    if case.error is not None and math.isfinite(case.error.error) and tolerance > 0.0:
+    if case.error is not None and math.isfinite(case.error.error) and tolerance > 0.0 and _falls(case.error):
         step = case.error.step_for(found.step, tolerance)
         halvings = max(1, math.ceil(math.log2(found.step / step))) if step > 0.0 else MOST_HALVINGS + 1
         if halvings <= MOST_HALVINGS:
             return f"`rates {{ dynamics = {_rate(found, 2**halvings)}; }}` would do, for {wanted}"
-    return f"no step that can be said would do; `rates {{ dynamics = {_rate(found, 4)}; }}` shows more of it"
+    return f"it is not known which step would do; `rates {{ dynamics = {_rate(found, 4)}; }}` shows more of it"
+
+
+def _falls(error: StepError) -> bool:
+    """True if the error falls as the step does, so that there is a step at which it is small."""
+    return error.clear or math.isnan(error.order) or error.order > NEAR
 
 
 def _rate(found: Verification, factor: int) -> str:

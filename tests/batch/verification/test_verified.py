@@ -247,6 +247,6 @@ def test_it_is_done_by_itself_where_it_is_cheap() -> None:
     assert said(1_300, 2_000_000) == "some"
     nominal = engine.prepare(plans.nominal(ticks=2000))
     assert when.resolve("auto", nominal, 1) == "some"
-    assert when.resolve("auto", engine.prepare(plans.nominal(ticks=40_000)), 1) == "none"
+    assert when.resolve("auto", engine.prepare(plans.nominal(ticks=400_000)), 1) == "none"
     assert when.resolve("none", nominal, 1) == "none"
     assert when.resolve("all", engine.prepare(plans.gains(10)), 10) == "all"

@@ -113,12 +113,12 @@ def test_what_is_turned_round_by_another_step_is_told_of_the_worst_case(tmp_path
         "`settle` of case #1 is 2.28 s at the step, infinite at half of it"
     )
     assert found.help == (
-        "no step that can be said would do; `rates { dynamics = 100 Hz; }` shows more of it",
+        "it is not known which step would do; `rates { dynamics = 100 Hz; }` shows more of it",
         "so it is in 2 of the 3 verified cases",
     )
 
 
-def test_an_order_that_is_not_the_integrator_s(tmp_path: Path) -> None:
+def test_a_metric_that_changes_with_the_step_and_not_as_the_integrator_does(tmp_path: Path) -> None:
     plan = planned(tmp_path, DECK.replace("    require turn < 0.0721 rad;\n", ""))
     path = batch.run(plan, output=tmp_path / "a.h5", verify="some").path
 
@@ -130,10 +130,28 @@ def test_an_order_that_is_not_the_integrator_s(tmp_path: Path) -> None:
     [found] = warned(changed(path, grows), plan)
     assert (found.code, found.severity) == ("D311", "warning")
     assert found.message == (
-        "`turn` of case #0 is 0.07208 rad ± 0.0045 rad by the step; the order of that is -1.4, and should be 2"
+        "`turn` of case #0 depends on the step: it is 0.07208 rad, 0.0715 rad at half of the step, and 0.07 rad at a "
+        "quarter"
     )
     assert found.at is not None and found.at.place.line == 4
-    assert found.help == ("`rates { dynamics = 200 Hz; }` would do, for an error below 1 %",)
+    assert found.help == ("it is not known which step would do; `rates { dynamics = 100 Hz; }` shows more of it",)
+
+
+def test_a_large_change_is_told_although_the_integrator_explains_it(tmp_path: Path) -> None:
+    plan = planned(tmp_path, DECK.replace("    require turn < 0.0721 rad;\n", ""))
+    path = batch.run(plan, output=tmp_path / "a.h5", verify="some").path
+
+    def falls(size: float) -> Callable[[h5py.Group], None]:
+        def change(node: h5py.Group) -> None:
+            column = list(node["verified_metric"].asstr()).index("turn")
+            node["half"][0, column], node["quarter"][0, column] = 0.07208 + size, 0.07208 + 1.25 * size
+
+        return change
+
+    assert warned(changed(path, falls(0.003)), plan) == []  # an error of 5.5 %
+    [found] = warned(changed(path, falls(0.006)), plan)
+    assert found.code == "D311" and "0.07808 rad at half of the step, and 0.07958 rad at a quarter" in found.message
+    assert found.help == ("`rates { dynamics = 100 Hz; }` would do, for an error below 1 %",)
 
 
 @pytest.mark.parametrize(("share", "said", "rate"), [("half", "half", 50), ("quarter", "a quarter", 100)])
