@@ -70,9 +70,8 @@ def humps_of_turns(points: Sequence[tuple[float, float]]) -> Iterator[Hump]:
     times, values = (list(each) for each in zip(*points, strict=True))
     every, heights = np.array(times), np.array(values)
     for before, at, after in _turned(values):
-        rise = min(abs(values[at] - values[before]), abs(values[at] - values[after]))
         sign = math.copysign(1.0, values[at] - values[before])
-        foot = values[at] - sign * rise
+        foot = (max if sign > 0.0 else min)(values[before], values[after])  # one of them, without any rounding
         first, last = _crossing(times, values, at, -1, foot), _crossing(times, values, at, 1, foot)
         inner = (every > first) & (every < last)
         yield Hump(

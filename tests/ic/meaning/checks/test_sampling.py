@@ -9,7 +9,7 @@ import pytest
 
 import met.run as engine
 from ic.meaning.checks.carried import uncarried
-from met.content import humps_from_zero
+from met.content import humps_from_zero, humps_of_turns
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
 from tests.oracles.random_deck import random_deck
 
@@ -125,6 +125,16 @@ def test_two_joints_with_one_servo_are_told_once(tmp_path: Path) -> None:
     )
     servo = under("rate(step(to = 1 rad/s, at = 3 s))")
     assert codes(tmp_path, arm, servo, changed(RUN, ("hinge = drive", "hinge = drive; wrist = drive"))) == ["D334"]
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_humps_of_random_tables_rise_from_their_feet_and_come_back(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    values = np.round(random.normal(size=12) * 10.0 ** random.uniform(-3.0, 3.0), 4)
+    points = list(zip(np.cumsum(random.uniform(0.01, 1.0, 12)).tolist(), values.tolist(), strict=True))
+    for hump in humps_of_turns(points):
+        assert hump.heights[0] == hump.heights[-1] == 0.0 and hump.impulse > 0.0
+        assert (hump.heights >= 0.0).all() and (np.diff(hump.times) >= 0.0).all()
 
 
 PULSE = "table(times = [0, 0.502, 0.503, 0.516, 0.517] s, values = [0, 0, 2, 2, 0] rad/s)"
