@@ -37,18 +37,21 @@ class Magnitude:
 _BODY = r"(links|payloads)\.[^.]+\."
 _VECTOR = r"\.[xyz]"
 
+LENGTHS = Magnitude(
+    "m",
+    re.compile(rf"[^.]+\.at{_VECTOR}|[^.]+\.dh\.[ad]|{_BODY}((com|at){_VECTOR}|shape\..+)"),
+    0.0,
+    200.0,
+    "the longest links there are have some 60 m",
+)
+MASSES = Magnitude(
+    "kg", re.compile(rf"{_BODY}mass"), 1e-6, 1e7, "links weigh a milligram and more, and the largest some 400 t"
+)
+
 MAGNITUDES = (
     Magnitude("m/s^2", re.compile(rf"environment\.[^.]+\.g{_VECTOR}"), 0.0, 300.0, "the Sun's surface has 274 m/s^2"),
-    Magnitude(
-        "m",
-        re.compile(rf"[^.]+\.at{_VECTOR}|[^.]+\.dh\.[ad]|{_BODY}((com|at){_VECTOR}|shape\..+)"),
-        0.0,
-        200.0,
-        "the longest links there are have some 60 m",
-    ),
-    Magnitude(
-        "kg", re.compile(rf"{_BODY}mass"), 1e-6, 1e7, "links weigh a milligram and more, and the largest some 400 t"
-    ),
+    LENGTHS,
+    MASSES,
     Magnitude("N*m/A", re.compile(r".+"), 0.0, 300.0, "the largest motors have some 100 N*m/A"),
     *(
         Magnitude(
@@ -203,7 +206,8 @@ def _observe_density(scope: Scope, name: str, head: str) -> None:
     def warn(rows: np.ndarray) -> None:
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             densities = rows[:, 0] / (constant * np.prod(rows[:, 1:] ** powers, axis=1))
-        bad = np.isfinite(densities) & (rows[:, 0] > 0.0) & ((densities < thin) | (densities > dense))
+        fine = ~(_beyond(MASSES, rows[:, 0]) | _beyond(LENGTHS, rows[:, 1:]).any(axis=1))  # else that is told
+        bad = fine & np.isfinite(densities) & (rows[:, 0] > 0.0) & ((densities < thin) | (densities > dense))
         if not bad.any() or scope.complaints.error_count:
             return
         density = float(densities[bad][np.abs(np.log(densities[bad])).argmax()])

@@ -115,6 +115,12 @@ def test_what_is_only_rare_is_not_told(tmp_path: Path, body: str) -> None:
     assert not {"D297", "D298"} & set(found)
 
 
+def test_one_mistake_is_told_once(tmp_path: Path) -> None:
+    """A box of which the sizes are told is not told as a body besides."""
+    assert codes(tmp_path, arm("mass = 2 kg; shape = box(size = [400, 80, 80] m);"), SERVO, RUN) == ["D297"]
+    assert codes(tmp_path, arm("mass = 1e-9 kg; shape = sphere(radius = 1 m);"), SERVO, RUN) == ["D297"]
+
+
 def test_it_may_be_allowed(tmp_path: Path) -> None:
     run = inside('environment { gravity = [0, 0, -400] m/s^2; } allow D297 because "a centrifuge";')
     assert codes(tmp_path, ARM, SERVO, run) == []
