@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -99,13 +100,16 @@ MORE = (
 """Cures of a density: words, factors of the mass, and of the density for each size."""
 
 GYRATION, LEAST_GYRATION = 10.0, 10.0
-"""Times the arm's length, and m: a radius of gyration that is above both is of no link of it."""
+"""Times the length of an arm or a shape, and m: a radius of gyration that is above both is of no link of the arm, one
+above the former of no body of that shape."""
 
 OTHER_UNITS = (1e3, 1e6, 1e9)
 """What a number is too large or small by where a prefix went wrong."""
 
 OTHER_INERTIAS = ((1e4, "kg*cm^2"), (1e6, "kg*mm^2"), (1e7, "g*cm^2"), (1e9, "g*mm^2"))
 """What a moment of inertia is too large by where it was in this unit."""
+
+OF_BASE = f"links.{BASE}"
 
 MEANT = 'if it is meant so, `allow {} because "...";`'
 
@@ -121,9 +125,12 @@ def check_magnitudes(scope: Scope, structure: Structure) -> None:
                 found.setdefault(kind, []).append((path, settled))
     for kind, those in found.items():
         _observe(scope, kind, those)
-    for name, head in _bodies(structure):
-        _observe_density(scope, name, head)
-    _observe_inertias(scope, structure)
+    bodies = list(_bodies(scope, structure))
+    _observe_densities(scope, [body for body in bodies if body.sizes and body.may_be_odd])
+    of_their_own = [body for body in bodies if any(each.origin.kind != "derived" for each in body.moments)]
+    # the inertia of a shape is its shape's; a base may be as large as it likes, and so may what an arm carries
+    told = [body for body in of_their_own if body.sizes or (body.head.startswith("links.") and body.head != OF_BASE)]
+    _observe_inertias(scope, structure, told)
 
 
 def _observe(scope: Scope, kind: Magnitude, those: list[tuple[str, Settled]]) -> None:
@@ -143,7 +150,6 @@ def _observe(scope: Scope, kind: Magnitude, those: list[tuple[str, Settled]]) ->
         row, column = np.unravel_index(int(worst.argmax()), worst.shape)
         path, settled, _ = numbers[column]
         value, several = float(rows[row, column]), len({numbers[at][0] for at in np.flatnonzero(beyond.any(axis=0))})
-        more = f", and {several - 1} more {'is' if several == 2 else 'are'} so" if several > 1 else ""
         unit, small = settled.unit, abs(value) < kind.low
         helps = [
             f"{times:,.0f} times {'more' if small else 'less'} would be {value * factor:.6g} {unit}: "
@@ -156,7 +162,7 @@ def _observe(scope: Scope, kind: Magnitude, those: list[tuple[str, Settled]]) ->
             helps.append("a link without mass is a frame: `mass = 0 kg`")
         scope.complaints.remark(
             "D297",
-            f"`{path}` is {value:.6g} {unit}{more}, and {kind.known}",
+            f"`{path}` is {value:.6g} {unit}{_others(several)}, and {kind.known}",
             settled.origin.place or place,
             help=[*helps, MEANT.format("D297")],
         )
@@ -177,91 +183,154 @@ def _beyond(kind: Magnitude, values: np.ndarray) -> np.ndarray:
     return np.asarray(np.isfinite(sizes) & (sizes > 0.0) & ((sizes < kind.low) | (sizes > kind.high)))
 
 
-def _bodies(structure: Structure) -> Iterator[tuple[str, str]]:
-    """Links and payloads that have a shape: in words, and the head of their paths."""
-    for link in structure.links:
-        if link.shape is not None:
-            yield f"link `{link.name}`", f"links.{link.name}"
-    for payload in structure.payloads:
-        if payload.shape is not None:
-            yield f"payload `{payload.name}`", f"payloads.{payload.name}"
+@frozen
+class WeighedBody:
+    """A link or a payload, and what is known of it: mass, largest moments and sizes of its shape.
+
+    name    in words;  head: of its paths
+    place   of its shape, or of its inertia
+    sizes   of its shape by name, m; empty where it has none
+    """
+
+    name: str
+    head: str
+    place: Place
+    mass: Settled
+    moments: tuple[Settled, ...]
+    sizes: Mapping[str, Settled]
+
+    @property
+    def is_rod(self) -> bool:
+        """True of a shape that has no volume."""
+        return set(self.sizes) == {"length"}
+
+    def volume(self, sizes: Iterable[Any]) -> Any:
+        """The volume, m^3, of a rod the length, m, for sizes in the order of `sizes`: numbers, or arrays of them."""
+        ball = set(self.sizes) == {"radius"}
+        factor = 4.0 / 3.0 * math.pi if ball else math.pi if "radius" in self.sizes else 1.0
+        powers = (3 if ball else 2 if name == "radius" else 1 for name in self.sizes)
+        return math.prod((size**power for size, power in zip(sizes, powers, strict=True)), start=factor)
+
+    @property
+    def may_be_odd(self) -> bool:
+        """True where the density is none of a solid, or varies."""
+        numbers = [self.mass.value, *(each.value for each in self.sizes.values())]
+        if any(isinstance(each, Scalar) for each in numbers):
+            return True
+        volume = self.volume(numbers[1:])
+        thin, dense = self.densities
+        return volume > 0.0 and not thin * volume <= self.mass.value <= dense * volume
+
+    @property
+    def densities(self) -> tuple[float, float]:
+        """The least and the largest density that is let pass, kg/m^3, of a rod kg/m."""
+        return (0.0, HEAVY_ROD) if self.is_rod else (THIN, DENSE)
 
 
-def _observe_density(scope: Scope, name: str, head: str) -> None:
-    """Look at what a body of this shape and mass would be made of."""
-    sizes = {
-        path.removeprefix(f"{head}.shape."): settled
-        for path, settled in scope.auxiliary.items()
-        if path.startswith(f"{head}.shape.") and settled.unit == "m"
-    }
-    mass = scope.parameters.get(f"{head}.mass")
-    place = next((each.origin.place for each in sizes.values() if each.origin.place), None)
-    if mass is None or place is None:
-        return
-    is_rod = set(sizes) == {"length"}
-    constant = 4.0 / 3.0 * math.pi if set(sizes) == {"radius"} else math.pi if "radius" in sizes else 1.0
-    powers = np.array([3 if set(sizes) == {"radius"} else 2 if each == "radius" else 1 for each in sizes])
-    thin, dense = (0.0, HEAVY_ROD) if is_rod else (THIN, DENSE)
+def _bodies(scope: Scope, structure: Structure) -> Iterator[WeighedBody]:
+    """Links and payloads whose numbers are known."""
+    named = [("link", "links", each.name) for each in structure.links]
+    named += [("payload", "payloads", each.name) for each in structure.payloads]
+    for word, group, name in named:
+        head = f"{group}.{name}"
+        sizes = {
+            path.removeprefix(f"{head}.shape."): settled
+            for path, settled in scope.auxiliary.items()
+            if path.startswith(f"{head}.shape.") and settled.unit == "m"
+        }
+        mass = scope.parameters.get(f"{head}.mass")
+        moments = [scope.parameters.get(f"{head}.inertia.{axis}{axis}") for axis in XYZ]
+        written = [*sizes.values(), *moments]
+        place = next((each.origin.place for each in written if each is not None and each.origin.place), None)
+        if mass is not None and place is not None and None not in moments:
+            yield WeighedBody(f"{word} `{name}`", head, place, mass, tuple(each for each in moments if each), sizes)
+
+
+def _observe_densities(scope: Scope, bodies: Sequence[WeighedBody]) -> None:
+    """Look at what bodies of these shapes and masses would be made of."""
+    settled = [each for body in bodies for each in (body.mass, *body.sizes.values())]
+    ends = np.cumsum([1 + len(body.sizes) for body in bodies]).tolist()
 
     def warn(rows: np.ndarray) -> None:
-        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            densities = rows[:, 0] / (constant * np.prod(rows[:, 1:] ** powers, axis=1))
-        fine = ~(_beyond(MASSES, rows[:, 0]) | _beyond(LENGTHS, rows[:, 1:]).any(axis=1))  # else that is told
-        bad = fine & np.isfinite(densities) & (rows[:, 0] > 0.0) & ((densities < thin) | (densities > dense))
-        if not bad.any() or scope.complaints.error_count:
+        found = []
+        for body, first, last in zip(bodies, [0, *ends], ends, strict=False):
+            mass, sizes = rows[:, first], rows[:, first + 1 : last]
+            thin, dense = body.densities
+            with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+                densities = mass / body.volume(sizes.T)
+            fine = ~(_beyond(MASSES, mass) | _beyond(LENGTHS, sizes).any(axis=1))  # else that is told
+            bad = fine & np.isfinite(densities) & (mass > 0.0) & ((densities < thin) | (densities > dense))
+            if bad.any():
+                found.append((body, float(densities[bad][np.abs(np.log(densities[bad])).argmax()])))
+        if not found or scope.complaints.error_count:
             return
-        density = float(densities[bad][np.abs(np.log(densities[bad])).argmax()])
-        cures = MORE if density < thin else LESS
-        unit, known, least, most = SOLIDS[is_rod]
-        changed = [(words, density * times * across ** (1 if is_rod else 3)) for words, times, across in cures]
+        body, density = max(found, key=lambda each: abs(math.log(each[1])))
+        cures = MORE if density < 1.0 else LESS
+        unit, known, least, most = SOLIDS[body.is_rod]
+        changed = [(words, density * times * across ** (1 if body.is_rod else 3)) for words, times, across in cures]
         helps = [f"{words} it would be {x:.4g} {unit}: is a unit another?" for words, x in changed if least < x < most]
         scope.complaints.remark(
             "D298",
-            f"{name} would be of {density:.4g} {unit}, and {known}",
-            place,
+            f"{body.name} would be of {density:.4g} {unit}{_others(len(found))}, and {known}",
+            body.place,
             help=[*helps[:1], "look at the units of its mass and of its shape", MEANT.format("D298")],
         )
 
-    _direct(scope, [mass, *sizes.values()], warn, place, head)
+    _together(scope, settled, warn, bodies)
 
 
-def _observe_inertias(scope: Scope, structure: Structure) -> None:
-    """Look at links' radii of gyration beside the length of the arm."""
-    lengths = [f"{joint.name}.at" for joint in structure.joints]
-    lengths += [f"links.{link.name}.com" for link in structure.links]
-    vectors = [scope.parameters.get(f"{path}.{axis}") for path in lengths for axis in XYZ]
-    for link in structure.links:
-        paths = ("mass", *(f"inertia.{axis}{axis}" for axis in XYZ))
-        own = [scope.parameters.get(f"links.{link.name}.{path}") for path in paths]
-        place = next((each.origin.place for each in own[1:] if each is not None and each.origin.place), None)
-        if link.name == BASE or place is None or None in own or None in vectors or link.shape is not None:
-            continue
+def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[WeighedBody]) -> None:
+    """Look at bodies' radii of gyration beside their shapes, and those of links without one beside the arm's length."""
+    if not bodies:
+        return
+    paths = [f"{joint.name}.at" for joint in structure.joints] + [f"links.{each.name}.com" for each in structure.links]
+    vectors = [scope.parameters.get(f"{path}.{axis}") for path in paths for axis in XYZ]
+    if None in vectors:
+        return
+    settled = [each for body in bodies for each in (body.mass, *body.moments, *body.sizes.values())]
+    ends = np.cumsum([4 + len(body.sizes) for body in bodies]).tolist()
 
-        def warn(rows: np.ndarray, name: str = link.name, place: Place = place) -> None:
-            mass, largest = rows[:, 0], rows[:, 1:4].max(axis=1)
-            length = np.sqrt((rows[:, 4:].reshape(len(rows), -1, 3) ** 2).sum(axis=2)).sum(axis=1)
-            radius = np.sqrt(largest / np.where(mass > 0.0, mass, np.inf))
-            bad = (length > 0.0) & (radius > np.maximum(GYRATION * length, LEAST_GYRATION))
-            if not bad.any() or scope.complaints.error_count:
-                return
-            row = int(np.where(bad, radius, 0.0).argmax())
-            helps = [
-                f"it would be of {radius[row] / math.sqrt(times):.4g} m, were it in {unit}: "
-                f"`{largest[row]:.6g} {unit}` is {largest[row] / times:.4g} kg*m^2"
-                for times, unit in OTHER_INERTIAS
-                if radius[row] / math.sqrt(times) <= 2.0 * length[row]
-            ][:1]
-            scope.complaints.remark(
-                "D298",
-                f"link `{name}` has the inertia of a body of {radius[row]:.4g} m (its radius of gyration), and its arm "
-                f"is {length[row]:.4g} m long",
-                place,
-                help=[*helps, "look at the units of its mass and of its inertia", MEANT.format("D298")],
-            )
+    def warn(rows: np.ndarray) -> None:
+        arm = np.sqrt((rows[:, ends[-1] :].reshape(len(rows), -1, 3) ** 2).sum(axis=2)).sum(axis=1)
+        found = []
+        for body, first, last in zip(bodies, [0, *ends], ends, strict=False):
+            mass, largest, sizes = rows[:, first], rows[:, first + 1 : first + 4].max(axis=1), rows[:, first + 4 : last]
+            radius = np.sqrt(np.maximum(largest, 0.0) / np.where(mass > 0.0, mass, np.inf))
+            length = np.sqrt((sizes * sizes).sum(axis=1)) if body.sizes else arm
+            least = GYRATION * length if body.sizes else np.maximum(GYRATION * length, LEAST_GYRATION)
+            bad = (length > 0.0) & (radius > least)
+            if bad.any():
+                row = int(np.where(bad, radius / np.where(bad, least, 1.0), 0.0).argmax())
+                found.append((body, float(radius[row]), float(length[row]), float(largest[row])))
+        if not found or scope.complaints.error_count:
+            return
+        body, radius, length, largest = max(found, key=lambda each: each[1] / each[2])
+        helps = [
+            f"it would be of {radius / math.sqrt(times):.4g} m, were it in {unit}: "
+            f"`{largest:.6g} {unit}` is {largest / times:.4g} kg*m^2"
+            for times, unit in OTHER_INERTIAS
+            if radius / math.sqrt(times) <= 2.0 * length
+        ]
+        beside = f"its shape is {length:.4g} m large" if body.sizes else f"its arm is {length:.4g} m long"
+        scope.complaints.remark(
+            "D298",
+            f"{body.name} has the inertia of a body of {radius:.4g} m (its radius of gyration){_others(len(found))}, "
+            f"and {beside}",
+            next((each.origin.place for each in body.moments if each.origin.place), body.place),
+            help=[*helps[:1], "look at the units of its mass and of its inertia", MEANT.format("D298")],
+        )
 
-        _direct(scope, [*own, *vectors], warn, place, f"links.{link.name}")
+    _together(scope, [*settled, *(each for each in vectors if each is not None)], warn, bodies)
 
 
-def _direct(scope: Scope, those: list[Settled | None], warn: object, place: Place, head: str) -> None:
-    values = tuple(each.value for each in those if each is not None)
-    scope.checks.observe(values, warn, place, needs=(head,))  # type: ignore[arg-type]
+def _others(count: int) -> str:
+    """A remark in words that others are so too, beside the one that is told."""
+    return f", and {count - 1} more {'is' if count == 2 else 'are'} so" if count > 1 else ""
+
+
+def _together(
+    scope: Scope, settled: Sequence[Settled], warn: Callable[[np.ndarray], None], bodies: Sequence[WeighedBody]
+) -> None:
+    if bodies:
+        values: tuple[Real, ...] = tuple(each.value for each in settled)  # type: ignore[misc]  # they are numbers
+        scope.checks.observe(values, warn, bodies[0].place, needs=tuple(body.head for body in bodies))

@@ -115,6 +115,27 @@ def test_what_is_only_rare_is_not_told(tmp_path: Path, body: str) -> None:
     assert not {"D297", "D298"} & set(found)
 
 
+def test_an_inertia_that_no_body_of_the_shape_has_is_told_at_the_inertia(tmp_path: Path) -> None:
+    body = "mass = 2 kg; shape = box(size = [0.3, 0.1, 0.1] m);\n inertia = [3e3, 2e4, 2e4] kg*m^2;"
+    [found] = check(tmp_path, arm(body), SERVO, RUN).diagnostics
+    assert found.code == "D298" and found.at is not None and found.at.place.line == 2
+    assert found.message.endswith(" m (its radius of gyration), and its shape is 0.3317 m large")
+    assert codes(tmp_path, arm(body.replace("3e3", "3e-3").replace("2e4", "2e-2")), SERVO, RUN) == []
+
+
+def test_a_mistake_in_all_links_is_told_once(tmp_path: Path) -> None:
+    two = "arm swing {{ link bar {{ {0} }} link tip {{ {0} }} joint hinge revolute {{ parent = base; child = bar; axis = z; }} "
+    two += "joint wrist revolute {{ parent = bar; child = tip; axis = z; at = [0.3, 0, 0] m; }} }}\n"
+    dense = two.format("mass = 900 kg; shape = cylinder(radius = 1 mm, length = 30 mm, along = x);")
+    [found] = check(tmp_path, dense, SERVO, RUN).diagnostics
+    assert found.message == "link `bar` would be of 9.549e+09 kg/m^3, and 1 more is so, and solids have 1 to 22,600"
+    large = two.format("mass = 1 kg; com = [0.2, 0, 0] m; inertia = [2e4, 2e4, 2e4] kg*m^2;")
+    [found] = check(tmp_path, large, SERVO, RUN).diagnostics
+    assert found.message.startswith(
+        "link `bar` has the inertia of a body of 141.4 m (its radius of gyration), and 1 more"
+    )
+
+
 def test_one_mistake_is_told_once(tmp_path: Path) -> None:
     """A box of which the sizes are told is not told as a body besides."""
     assert codes(tmp_path, arm("mass = 2 kg; shape = box(size = [400, 80, 80] m);"), SERVO, RUN) == ["D297"]
