@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
 
 from met.frozen import frozen
 
@@ -19,12 +22,15 @@ class Content:
     frequency     of its fastest swing, Hz; 0: it does not swing
     pulses        from and until, s, of each rise and fall: when it is beyond half of its height. What samples none of
                   these instants sees less than half of the pulse
+    points        times, s, and values of a course of straight lines that holds its ends: by them it is known how much
+                  of a pulse the instants carry that sample it. (): it is no such course
     """
 
     begins: float
     ends: float
     frequency: float = 0.0
     pulses: tuple[tuple[float, float], ...] = ()
+    points: tuple[tuple[float, float], ...] = ()
 
 
 NEVER = Content(begins=math.inf, ends=math.inf)
@@ -37,18 +43,74 @@ def content_of_points(times: Sequence[float], values: Sequence[float], begin: fl
     if not changes:
         return NEVER
     pulses = tuple((begin + first, begin + last) for first, last in _pulses(times, values))
-    return Content(begins=begin + times[changes[0]], ends=begin + times[changes[-1] + 1], pulses=pulses)
+    points = tuple((begin + time, value) for time, value in zip(times, values, strict=True))
+    return Content(begins=begin + times[changes[0]], ends=begin + times[changes[-1] + 1], pulses=pulses, points=points)
+
+
+@frozen
+class Hump:
+    """A part of a course of straight lines that rises and falls again, or dips: its points' times, s, and its heights
+    there above the higher of its feet (of a dip the depths below the lower)."""
+
+    times: np.ndarray
+    heights: np.ndarray
+
+    @property
+    def impulse(self) -> float:
+        """The integral of the heights over time."""
+        return float(np.trapezoid(self.heights, self.times))
+
+    def at(self, instants: np.ndarray) -> np.ndarray:
+        """Its heights at these instants, s."""
+        return np.asarray(np.interp(instants, self.times, self.heights, left=0.0, right=0.0))
+
+
+def humps_of_turns(points: Sequence[tuple[float, float]]) -> Iterator[Hump]:
+    """The humps between the points at which a course turns back (`SMALL`)."""
+    times, values = (list(each) for each in zip(*points, strict=True))
+    every, heights = np.array(times), np.array(values)
+    for before, at, after in _turned(values):
+        sign = math.copysign(1.0, values[at] - values[before])
+        foot = (max if sign > 0.0 else min)(values[before], values[after])  # one of them, without any rounding
+        first, last = _crossing(times, values, at, -1, foot), _crossing(times, values, at, 1, foot)
+        inner = (every > first) & (every < last)
+        yield Hump(
+            np.concatenate([[first], every[inner], [last]]),
+            np.concatenate([[0.0], sign * (heights[inner] - foot), [0.0]]),
+        )
+
+
+def humps_from_zero(points: Sequence[tuple[float, float]], until: float) -> Iterator[Hump]:
+    """The parts of a course of one sign, from 0 s on until then: what it integrates to between two of its zeros."""
+    times, values = np.array(points).T
+    inner = (times > 0.0) & (times < until)
+    ends = np.interp([0.0, until], times, values)
+    times, values = np.concatenate([[0.0], times[inner], [until]]), np.concatenate([ends[:1], values[inner], ends[1:]])
+    crossed = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+    share = values[crossed] / (values[crossed] - values[crossed + 1])
+    times = np.insert(times, crossed + 1, times[crossed] + share * (times[crossed + 1] - times[crossed]))
+    values = np.insert(values, crossed + 1, 0.0)
+    zeros = np.flatnonzero(values == 0.0)
+    for first, last in pairwise(sorted({0, *zeros.tolist(), len(values) - 1})):
+        part = values[first : last + 1]
+        if part.any():
+            yield Hump(times[first : last + 1], np.abs(part))
 
 
 def _pulses(times: Sequence[float], values: Sequence[float]) -> list[tuple[float, float]]:
     """Where the lines turn back: from half of the smaller of the way there and the way back, until half of it."""
-    turns = _turns(values, SMALL * (max(values) - min(values)))
     found = []
-    for before, at, after in zip(turns, turns[1:], turns[2:], strict=False):
+    for before, at, after in _turned(values):
         height = min(abs(values[at] - values[before]), abs(values[at] - values[after]))
         half = values[at] - math.copysign(0.5 * height, values[at] - values[before])
         found.append((_crossing(times, values, at, -1, half), _crossing(times, values, at, 1, half)))
     return found
+
+
+def _turned(values: Sequence[float]) -> Iterator[tuple[int, int, int]]:
+    """Each point at which the lines turn back, between the turns before and after it."""
+    turns = _turns(values, SMALL * (max(values) - min(values)))
+    return zip(turns, turns[1:], turns[2:], strict=False)
 
 
 def _turns(values: Sequence[float], least: float) -> list[int]:

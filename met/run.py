@@ -17,6 +17,7 @@ from met.judging import judge
 from met.passing import Memories, run_past
 from met.plan import REPEAT, Experiment, keys
 from met.plan.limits import extremes, limits
+from met.plan.outputs import GRAPPLE_FIGURES, grappled_payloads
 from met.program import cell_names, plausible
 from met.program.build import COORDINATE, METRIC, build
 from met.program.control.substituted import LIMITED
@@ -53,6 +54,8 @@ class Run:
                  where the case failed
     extreme_at   of required metrics that keep an extreme: the number of the limit that was reached there, from 1 in the
                  order of `met.plan.limits.extremes`; 0 where none was, or the case failed
+    grapples     figures of each grapple (`met.plan.outputs.GRAPPLE_FIGURES`) by `PAYLOAD.FIGURE`; not-a-number where it
+                 never came, or the case failed
     warning      what makes a case that is done doubtful, in words, empty where nothing does
     """
 
@@ -70,6 +73,7 @@ class Run:
     at_limit: dict[str, np.ndarray]
     excess: dict[str, np.ndarray]
     extreme_at: dict[str, np.ndarray]
+    grapples: dict[str, np.ndarray]
     warning: list[str]
 
 
@@ -301,8 +305,19 @@ def results(
             name: np.where(failed, 0, out[cell_names.EXTREME_AT(name)]).astype(np.int64)
             for name in extremes(experiment)
         },
+        grapples=_grapples(experiment, out, failed),
         warning=warnings,
     )
+
+
+def _grapples(experiment: Experiment, out: Mapping[str, np.ndarray], failed: np.ndarray) -> dict[str, np.ndarray]:
+    """The figures of grapples, as `Run` has them."""
+    found = {}
+    for payload in grappled_payloads(experiment.structure):
+        never = failed | (out[cell_names.GRAPPLED(payload, "near")] == 0.0)
+        for name in GRAPPLE_FIGURES:
+            found[f"{payload}.{name}"] = np.where(never, math.nan, out[cell_names.GRAPPLED(payload, name)])
+    return found
 
 
 def _misapplied(experiment: Experiment, rows: np.ndarray, out: Mapping[str, np.ndarray]) -> dict[int, str]:

@@ -40,14 +40,14 @@ from met.plan import Coordinate, Experiment, Plan, Recorded
 from met.plan.channel import DIMENSIONS, channels
 from met.plan.limits import extremes
 from met.plan.limits import limits as limits_of
-from met.plan.outputs import metric_units
+from met.plan.outputs import GRAPPLE_FIGURES, grappled_payloads, metric_units
 from met.unit_parser import parse_unit
 
 SCHEMA = "met.archive"
 VERSION = 1
 
-OfLimit = Literal["limit", "excess", "extreme"]
-Role = Literal["dimension", "case", "coordinate", "choice", OfLimit, "metric", "requirement", "recorded", "signal"]
+OfMachine = Literal["limit", "excess", "extreme", "grapple"]
+Role = Literal["dimension", "case", "coordinate", "choice", OfMachine, "metric", "requirement", "recorded", "signal"]
 Kind = Literal["float64", "float32", "int64", "int8", "str"]
 
 WIDTHS: Mapping[Kind, int] = {"float64": 8, "float32": 4, "int64": 8, "int8": 1, "str": 48}
@@ -72,9 +72,9 @@ EVENTS = {
 }
 """Counts of friction's events in a case (`met.run.Run.events`): variables `friction_...`."""
 
-AT_LIMIT, EXCESS, EXTREME_AT = "at_limit.", "excess.", "extreme_at."
+AT_LIMIT, EXCESS, EXTREME_AT, GRAPPLE = "at_limit.", "excess.", "extreme_at.", "grapple."
 """Prefixes of variables along `case`: the share of a run's time at the limit of this path, the largest excess over it,
-and the limit that was reached where the extreme of this metric fell."""
+the limit that was reached where the extreme of this metric fell, and a figure of the grapple of this payload."""
 
 LIMITED = "ticks at which the load motor of a bed was at its limit"
 
@@ -241,7 +241,7 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         *([variable("bed_limited", "int64", LIMITED)] if experiment.structure.substitutions else []),
     ]
     taken |= set(names.values())
-    for each in _limits(experiment):
+    for each in (*_limits(experiment), *_grapples(experiment)):
         name = _apart(each.name, "limits", taken, ())
         taken.add(name)
         out.append(replace(each, name=name, source=each.name))
@@ -306,6 +306,18 @@ def _limits(experiment: Experiment) -> list[Variable]:
         words = f"limit that was reached where {metric} took its value"
         found.append(Variable(EXTREME_AT + metric, "int64", ("case",), "extreme", words, "", told))
     return found
+
+
+def _grapples(experiment: Experiment) -> list[Variable]:
+    """Figures of grapples, by their own names."""
+    return [
+        Variable(
+            f"{GRAPPLE}{payload}.{name}", "float64", ("case",), "grapple", f"payload {payload}: {words}", unit,
+            {"of": payload, "figure": name},
+        )
+        for payload in grappled_payloads(experiment.structure)
+        for name, (unit, words) in GRAPPLE_FIGURES.items()
+    ]  # fmt: skip
 
 
 def _over_cases(experiment: Experiment) -> dict[str, np.ndarray]:

@@ -55,6 +55,7 @@ OF_ROLES: dict[str, str | tuple[str, ...]] = {
     "limit": ("<f8",),
     "excess": ("<f8",),
     "extreme": ("<i8",),
+    "grapple": ("<f8",),
     "signal": ("<f8", "<f4"),
     "choice": WORDS,
 }
@@ -130,7 +131,8 @@ def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
     wanted = OF_ROLES.get(variable.role, NUMBERS + WORDS)
     if kinds[name] not in wanted and types[name] not in wanted:
         raise Unlike(f"variable `{name}` is of another type")
-    if variable.role in ("coordinate", "metric", "choice", "limit", "excess", "extreme", "case") and dims != ("case",):
+    of_cases = ("coordinate", "metric", "choice", "limit", "excess", "extreme", "grapple", "case")
+    if variable.role in of_cases and dims != ("case",):
         raise Unlike(f"variable `{name}` is not over cases")
     if variable.role == "signal":
         if dims[:2] != ("recorded_case", "time"):

@@ -18,7 +18,7 @@ import numpy as np
 from batch.archive import layout as archive_layout
 from batch.archive import verified
 from batch.archive.hdf5 import LIBVER, h5py
-from batch.archive.layout import AT_LIMIT, EXCESS, EXTREME_AT, Layout, Variable
+from batch.archive.layout import AT_LIMIT, EXCESS, EXTREME_AT, GRAPPLE, Layout, Variable
 from batch.archive.provenance import Revision, version
 from batch.archive.sink import Sink
 from met import backends
@@ -222,8 +222,9 @@ def _values(group: OpenGroup, run: Run) -> dict[str, Any]:
         **{AT_LIMIT + path: share for path, share in run.at_limit.items()},
         **{EXCESS + path: most for path, most in run.excess.items()},
         **{EXTREME_AT + metric: number for metric, number in run.extreme_at.items()},
+        **{GRAPPLE + of: figure for of, figure in run.grapples.items()},
     }
-    for role in ("limit", "excess", "extreme"):  # by the name that is free
+    for role in ("limit", "excess", "extreme", "grapple"):  # by the name that is free
         values |= {variable.name: values[variable.key] for variable in group.layout.role(role)}
     for choice, variable in zip(experiment.cases.choices, group.layout.role("choice"), strict=True):
         values[variable.name] = [choice.value] * len(rows)

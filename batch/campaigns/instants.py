@@ -32,6 +32,10 @@ SHARE = 0.03
 MOST_CASES = 8
 """Cases that are looked at."""
 
+STANDS_OUT, LEAST_CASES, MOST_OUT, ROUNDING = 20.0, 16, 2, 1e-6
+"""A metric of a case stands out where it is so many times the width of the middle half of all cases away from their
+median, and more than a rounding: of so many cases at least, and so many of them at most."""
+
 MOST_EXPERIMENTS = 8
 """Experiments of a campaign that are looked at: a sweep of structures may have hundreds."""
 
@@ -89,17 +93,35 @@ def step_warnings(section: CampaignSection, outcomes: CaseOutcomes, threads: int
 
 
 def _cases(section: CampaignSection, outcomes: CaseOutcomes, memories: Memories) -> list[int]:
-    """The cases that are looked at: those whose memory was asked for; the first, the last and the worst of each metric
-    where that is of all, or of none."""
+    """The cases that are looked at: those whose memory was asked for, and any that stand out; the first, the last and
+    the worst of each metric where memory was asked for of all, or of none."""
+    out = [int(section.rows[place]) for place in standing_out(outcomes)]
     if memories.cases and len(section.rows) > GRANULE:
-        return sorted(memories.cases)
+        return sorted({*memories.cases, *out})
     done = np.flatnonzero(outcomes.status == DONE)
     places = [0, len(section.rows) - 1] if not len(done) else [int(done[0]), int(done[-1])]
     for name, values in outcomes.metrics.items():
         ranked = worst(section.prepared.experiment, name, np.where(np.isfinite(values), values, np.nan))
         places += ranked[:1].tolist()
     most = min(MOST_CASES, passed.instants(section.prepared.experiment) // passed.LEAST_INSTANTS)
-    return sorted(int(section.rows[place]) for place in list(dict.fromkeys(places))[:most])
+    return sorted({*(int(section.rows[place]) for place in list(dict.fromkeys(places))[:most]), *out})
+
+
+def standing_out(outcomes: CaseOutcomes) -> list[int]:
+    """Places of the cases of which a metric is far from all others', the furthest first: one row of many that went
+    another way. None of a few cases, nor where metrics are spread evenly."""
+    found: dict[int, float] = {}
+    for values in outcomes.metrics.values():
+        fine = np.flatnonzero((outcomes.status == DONE) & np.isfinite(values))
+        if len(fine) < LEAST_CASES:
+            continue
+        quarter, middle, three_quarters = np.percentile(values[fine], (25.0, 50.0, 75.0))
+        away = np.abs(values[fine] - middle)
+        at, spread = int(away.argmax()), STANDS_OUT * (three_quarters - quarter)
+        if away[at] > max(spread, ROUNDING * abs(middle)):
+            ratio = float(away[at] / spread) if spread > 0.0 else np.inf
+            found[int(fine[at])] = max(ratio, found.get(int(fine[at]), 0.0))
+    return sorted(found, key=lambda place: (-found[place], place))[:MOST_OUT]
 
 
 def _passed(section: CampaignSection, memories: Memories, cases: Sequence[int]) -> passed.Passed:

@@ -100,7 +100,8 @@ def _fields(groups: Sequence[ArchiveGroup], *, deck: bool) -> Iterator[TableColu
     for variable in {v.name: v for group in groups for v in group.role("metric")}.values():
         unit, scale = in_unit(variable, deck=deck)
         yield TableColumn(variable.name, unit, variable.long_name, "float", variable.name, scale)
-    for variable in {v.name: v for group in groups for v in group.role("limit")}.values():
+    watched = [v for role in ("limit", "grapple") for group in groups for v in group.role(role)]
+    for variable in {v.name: v for v in watched}.values():
         yield TableColumn(variable.name, variable.unit, variable.long_name, "float", variable.name)
     for text in dict.fromkeys(text for group in groups for text in requirements.requirement_texts(group)):
         yield TableColumn(f"require {text}", "", "met, missed, or empty where that is not known", "str")

@@ -23,6 +23,7 @@ class LimitSummary:
 
     limit   path of the parameter that sets it;  about: what the share is of, in words
     cases   how many came to it;  largest: of their shares of the run's time;  row: position of that case
+    mostly  how many were there for more than half of the time
     """
 
     limit: str
@@ -30,6 +31,7 @@ class LimitSummary:
     cases: int
     largest: float
     row: int
+    mostly: int
 
 
 def limit_summaries(group: ArchiveGroup, here: slice = slice(None)) -> tuple[LimitSummary, ...]:
@@ -37,8 +39,10 @@ def limit_summaries(group: ArchiveGroup, here: slice = slice(None)) -> tuple[Lim
     rows, found = group.values("case")[here], []
     for variable in group.role("limit"):
         shares = np.nan_to_num(group.values(variable.name)[here])
-        worst, cases = int(shares.argmax()), int((shares > 0.0).sum())
-        found.append(LimitSummary(_of(variable), variable.long_name, cases, float(shares[worst]), int(rows[worst])))
+        worst, cases, mostly = int(shares.argmax()), int((shares > 0.0).sum()), int((shares > 0.5).sum())
+        found.append(
+            LimitSummary(_of(variable), variable.long_name, cases, float(shares[worst]), int(rows[worst]), mostly)
+        )
     return tuple(found)
 
 
@@ -48,7 +52,8 @@ def reached_texts(found: tuple[LimitSummary, ...], cases: int) -> list[str]:
     for each in found:
         if each.cases:
             of = f"{each.about}: {100.0 * each.largest:.3g} %"
-            many = f"at most, in #{each.row}; not 0 in {each.cases:,} of {cases:,} cases"
+            half = f", more than half in {each.mostly:,}" if each.mostly else ""
+            many = f"at most, in #{each.row}; not 0 in {each.cases:,} of {cases:,} cases{half}"
             out.append(of if cases == 1 else f"{of} {many}")
     return out
 

@@ -108,4 +108,5 @@ ENVIRONMENT = Environment(
     idle=idle,
     alone=held,
     pushed_links=lambda p: ("link",),
+    holds=lambda p: ("link",) if any(p.stiffness) else (),
 )

@@ -129,4 +129,5 @@ ENVIRONMENT = Environment(
     loads=loads,
     idle=idle,
     pushed_links=lambda p: ("link", "to"),
+    holds=lambda p: ("link", "to") if any((*p.stiffness, *p.turning)) else (),
 )

@@ -115,6 +115,11 @@ class Environment:
            alone: a deck is warned where they do not carry that. Asked with numbers. None: nothing is known of it
     alone  (p) -> what only one model of a run should give, in words, such as "gravity": a deck with two is warned. "":
            nothing, with these numbers. None: several go together
+    holds  (p) -> the parameters that name the two bodies that it holds where they are to each other, by a stiffness;
+           one where the other is the ground: a deck in which servos tell all joints between them their accelerations
+           is warned, for then it holds nothing. (): it holds none, with these numbers. None: it never does
+    may_be_load  it is also a load, such as a balancing spring: nothing is said of what it holds where a metric sees
+           torques
     springs  the parameters that name a joint, and are the stiffness with which it is pushed back where it touches: a
            deck is warned where the dynamics' step is long for that (met/analysis/contact.py). (): there is none
     limits  those that it has: how much of a run is spent at each is kept of every case. (): there are none
@@ -150,6 +155,8 @@ class Environment:
     initial_range: tuple[str, ...] = ()
     content: Callable[[Any, float], Content] | None = None
     alone: Callable[[Any], str] | None = None
+    holds: Callable[[Any], tuple[str, ...]] | None = None
+    may_be_load: bool = False
     springs: tuple[str, ...] = ()
     limits: tuple[Limit, ...] = ()
     friction_joint: str = ""

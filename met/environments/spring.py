@@ -67,4 +67,6 @@ ENVIRONMENT = Environment(
     loads=loads,
     idle=idle,
     pushed_links=lambda p: ("link", "to"),
+    holds=lambda p: ("link", "to") if p.stiffness else (),
+    may_be_load=True,
 )

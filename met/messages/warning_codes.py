@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 WHILE_RUNNING: frozenset[str] = frozenset(
-    {"D310", "D311", "D312", "D317", "D318", "D319", "D320", "D321", "D344", "D345"}
+    {"D310", "D311", "D312", "D317", "D318", "D319", "D320", "D321", "D344", "D345", "D347"}
 )
 """Codes of warnings that a run itself may give: the check does not know whether an `allow` of one is of use."""
 
@@ -11,8 +11,8 @@ WARNINGS = WHILE_RUNNING | {
     "D003", "D015", "D017", "D036", "D037",
     "D102", "D105", "D127", "D138", "D167", "D168", "D169",
     "D210", "D211", "D228", "D248", "D249", "D252", "D256", "D267", "D268", "D290", "D293", "D294", "D295",
-    "D300", "D301", "D305", "D306", "D307",
-    "D334", "D335", "D336", "D337", "D338", "D339", "D340", "D341", "D352",
+    "D296", "D297", "D298", "D300", "D301", "D305", "D306", "D307",
+    "D334", "D335", "D336", "D337", "D338", "D339", "D340", "D341", "D342", "D352",
 }  # fmt: skip
 """Every code that a warning of a run or of its deck has, but that of an `allow` that silences nothing. An error may
 have the same.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from met import models
 from met.plan import MetricUse, Recorded, Structure
@@ -10,6 +10,20 @@ from met.plan.channel import channel_paths, channels, watched_unit
 
 OF_ALL = {"rel": "1", "time": "s"}
 """Tolerances of everything, with units: a share of the value; how much earlier or later."""
+
+GRAPPLE_FIGURES: Mapping[str, tuple[str, str]] = {
+    "distance": ("m", "how far it was from its place as it was grappled"),
+    "near": ("m", "the distance up to which it counts as near, by the sizes of payload, link and arm"),
+    "speed": ("m/s", "the speed against the link that some part of it had then"),
+    "rate": ("rad/s", "how fast it turned against the link then"),
+    "energy": ("J", "kinetic energy that its grapple cost"),
+}
+"""Figures that are kept of each grapple (`met.program.grappled`): units, and what they are in words."""
+
+
+def grappled_payloads(structure: Structure) -> tuple[str, ...]:
+    """The payloads that are grappled in a run, by name."""
+    return tuple(payload.name for payload in structure.payloads if payload.grappled)
 
 
 def metric_units(structure: Structure) -> dict[str, str]:

@@ -99,15 +99,16 @@ class Builder:
                 *self.step.beds.wire_outputs,
             ),
             state_outputs=(*OUTPUTS, *self.step.beds.wire_outputs),
-            counters=(*EVENTS, LIMITED, *plausible.OUTPUTS[1:], *self.limits.outputs),
+            counters=(*EVENTS, LIMITED, *plausible.OUTPUTS[1:], *self.limits.outputs, *self.step.grapple.watch.outputs),
         )
 
     @property
     def watched(self) -> tuple[str, ...]:
         """Outputs that say what became of a run without being part of its state."""
+        found = (*self.limits.outputs, *self.step.grapple.watch.outputs)
         if self.step.beds.wire:
-            return self.limits.outputs
-        return (*plausible.OUTPUTS, *([UNHELD] if self.system.structure.balanced else []), *self.limits.outputs)
+            return found
+        return (*plausible.OUTPUTS, *([UNHELD] if self.system.structure.balanced else []), *found)
 
     def computers(self) -> list[Control]:
         """The parts that tick by clocks of their own, in this order: sensors of links, guides, servos."""

@@ -60,6 +60,10 @@ PAYLOAD_BODY = CellFamily(
     "payload:{}:body.{}", "mass, moments and inertia in the recursion's frame", "kg; kg m; kg m^2"
 )
 GRAPPLING = CellFamily("payload:{}:grappling", "1 at the instant of its grapple, else 0", "1")
+GRAPPLED = CellFamily("payload:{}:grappled.{}", "a figure of its grapple (met.plan.outputs), 0: none", "the figure's")
+AGAINST = CellFamily(
+    "payload:{}:against.{}", "as it was grappled: its w and v against the link, and the link's there", "rad/s; m/s"
+)
 RELEASING = CellFamily("payload:{}:releasing", "1 at the instant of its release, else 0", "1")
 
 # Bodies that move freely, by their prefix; their coordinates are `met.program.motion.bodies.FreeBody.coordinates`.

@@ -17,6 +17,7 @@ from met.integrators.integrator import Motion
 from met.plan import INSTANT
 from met.program import cell_names, cells, rotors
 from met.program.evaluation import servo_response
+from met.program.grappled import GrappleWatch
 from met.program.motion import payloads
 from met.program.motion.base import base_of, free_base, motions
 from met.program.motion.bodies import place
@@ -25,7 +26,7 @@ from met.program.system import Actuator, System
 from met.program.values import NamedValues
 from met.servos.servo import Drive
 from met.trace import Real, Truth, any_of, both, either, not_
-from met.trace.program import Control, Every, Phase, RunPhase, Tape, WhileAny
+from met.trace.program import CallPhase, Control, Every, Phase, RunPhase, Tape, WhileAny
 from met.vectors import quaternion
 
 
@@ -40,6 +41,7 @@ class Grapple:
         self, system: System, state: Callable[[Tape], Motion], held: Callable[[Tape, Actuator], NamedValues]
     ) -> None:
         self.system, self._state, self._held = system, state, held
+        self.watch = GrappleWatch(system, state)
 
     def events(self) -> tuple[Control, ...]:
         """Phases of grapples and releases at an instant."""
@@ -47,7 +49,11 @@ class Grapple:
             return ()
         parts: list[Control] = [RunPhase(Phase("payloads", self.due))]
         if any(payload.grappled for payload in self.system.flying):
-            parts.append(WhileAny("grappling", 1, (RunPhase(Phase("grapple", self.grapple)),)))
+            before, after = (
+                CallPhase(Phase(f"grapple_{name}", look))  # pieces of their own: the impact's code is as without them
+                for name, look in (("before", self.watch.before), ("after", self.watch.after))
+            )
+            parts.append(WhileAny("grappling", 1, (before, RunPhase(Phase("grapple", self.grapple)), after)))
         if any(payload.released for payload in self.system.flying):
             parts.append(WhileAny("releasing", 1, (RunPhase(Phase("release", self.release)),)))
         return (Every(self.system.structure.schedule.dynamics, tuple(parts)),)

@@ -253,5 +253,6 @@ def answer(
         },
         excess={},
         extreme_at={name: np.zeros(len(rows), dtype=np.int64) for name in extremes(experiment)},
+        grapples={},
         warning=[""] * len(rows),
     )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +13,8 @@ from ic.meaning.parameters.models import value_place
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.diagnostic import Place
-from met.plan import Payload, Structure
+from met.frozen import frozen
+from met.plan import Experiment, Formula, Payload, Structure
 from met.trace import Real
 
 FAR = 1.5
@@ -20,17 +23,71 @@ FAR = 1.5
 
 def check_reach(scope: Scope, block: MergedBlock, structure: Structure) -> None:
     """Warn of payloads that are grappled beyond the reach of their links: on a fixed base, with revolute joints."""
-    if structure.base is not None or scope.complaints.error_count:
+    if scope.complaints.error_count:
         return
     items = {item.name: item for item in block.of_kind("payload")}
     for payload in structure.payloads:
-        joints = _way_to(structure, payload.link)
-        if payload.grappled and joints is not None and not _is_pushed(scope, structure, payload):
+        looked_at = _looked_at(structure, payload, scope.parameters)
+        if looked_at is not None:
             item = items[payload.name]
             grapple = item.body.get("grapple") if item.body is not None else None
-            gravity = [f"environment.{load.name}.g" for load in structure.environment if load.model == "gravity"]
-            offsets, place = [f"{joint}.at" for joint in joints], value_place(grapple or item)
-            _observe(scope, payload, offsets, gravity, structure.schedule.duration, place)
+            _observe(scope, payload, looked_at, structure.schedule.duration, value_place(grapple or item))
+
+
+def flies_from_afar(experiment: Experiment, name: str) -> bool:
+    """True where the check warns of the grapple of the payload of this name."""
+    structure = experiment.structure
+    payload = next((each for each in structure.payloads if each.name == name), None)
+    looked_at = _looked_at(structure, payload, experiment.parameters) if payload is not None else None
+    if looked_at is None or experiment.allows("D339"):
+        return False
+    inputs = {each.path: each.values for each in experiment.cases.coordinates}
+    outputs, columns = experiment.formulas.replay(inputs), []
+    for path in looked_at.paths:
+        value = experiment.parameters[path].value
+        columns.append(outputs[value.output] if isinstance(value, Formula) else value)
+    rows = np.stack(np.broadcast_arrays(*(np.atleast_1d(each) for each in columns)), axis=1).astype(float)
+    return bool(looked_at.away(rows, structure.schedule.duration)[0].size)
+
+
+@frozen
+class _LookedAt:
+    """The numbers by which a grapple is from afar: paths of scalars, then of vectors by component, those of gravities
+    before those of the joints."""
+
+    paths: tuple[str, ...]
+    gravities: int
+
+    def away(self, rows: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The rows that are from afar; of all rows the distance from the base then, and the link's reach, m.
+
+        rows  values at the paths: [case, path]
+        """
+        time, own, of_link = rows[:, 0], rows[:, 1:5], rows[:, 5:9]
+        at, position, velocity, rate, com, middle, *others = np.moveaxis(rows[:, 9:].reshape(len(rows), -1, 3), 1, 0)
+        g = sum(others[: self.gravities], np.zeros_like(at))
+        away = _length(position + velocity * time[:, None] + 0.5 * g * (time * time)[:, None])
+        reach = sum((_length(each) for each in others[self.gravities :]), _length(at))
+        reach = reach + 2.0 * _length(middle) + _size(of_link)
+        # its frame goes round its centre, which flies straight; and as far again as its body is large
+        loose = _length(com) * (2.0 + _length(rate) * time) + _size(own)
+        return np.flatnonzero((away > FAR * (reach + loose)) & (time <= duration)), away, reach
+
+
+def _looked_at(structure: Structure, payload: Payload, parameters: Mapping[str, Any]) -> _LookedAt | None:
+    """None where nothing can be said: the base moves, a joint slides, it is pushed, or it is not grappled."""
+    joints = _way_to(structure, payload.link)
+    if structure.base is not None or joints is None or not payload.grappled:
+        return None
+    if _is_pushed(structure, payload, parameters):
+        return None
+    head = f"payloads.{payload.name}"
+    link = f"links.{payload.link}" if f"links.{payload.link}.mass" in parameters else head
+    sizes = ("mass", *(f"inertia.{x}{x}" for x in "xyz"))
+    gravity = [f"environment.{load.name}.g" for load in structure.environment if load.model == "gravity"]
+    numbers = [f"{head}.grapple", *(f"{each}.{name}" for each in (head, link) for name in sizes)]
+    vectors = [*(f"{head}.{name}" for name in _OF_PAYLOAD), f"{link}.com", *gravity, *(f"{each}.at" for each in joints)]
+    return _LookedAt((*numbers, *(f"{each}.{x}" for each in vectors for x in "xyz")), len(gravity))
 
 
 def _way_to(structure: Structure, link: str) -> list[str] | None:
@@ -46,13 +103,13 @@ def _way_to(structure: Structure, link: str) -> list[str] | None:
     return found
 
 
-def _is_pushed(scope: Scope, structure: Structure, payload: Payload) -> bool:
+def _is_pushed(structure: Structure, payload: Payload, parameters: Mapping[str, Any]) -> bool:
     """Return True if something but uniform gravity may act on a payload while it flies."""
     known = models.find_own("environment")
     for load in structure.environment:
         model = models.find("environment", load.model, load.place)
         links = [each.name for each in model.parameters if each.names == "link"]
-        named = [scope.parameters.get(f"environment.{load.name}.{each}") for each in links]
+        named = [parameters.get(f"environment.{load.name}.{each}") for each in links]
         if load.model not in known or model.free_fall is not None:
             return True
         if any(each is not None and each.value == payload.name for each in named):
@@ -60,16 +117,9 @@ def _is_pushed(scope: Scope, structure: Structure, payload: Payload) -> bool:
     return False
 
 
-def _observe(
-    scope: Scope, payload: Payload, joints: list[str], gravity: list[str], duration: float, place: Place
-) -> None:
-    """joints, gravity: paths of the vectors from joint to joint, and of the accelerations of free fall."""
+def _observe(scope: Scope, payload: Payload, looked_at: _LookedAt, duration: float, place: Place) -> None:
     head = f"payloads.{payload.name}"
-    link = f"links.{payload.link}" if f"links.{payload.link}.mass" in scope.parameters else head
-    sizes = ("mass", *(f"inertia.{x}{x}" for x in "xyz"))
-    numbers = [f"{head}.grapple", *(f"{each}.{name}" for each in (head, link) for name in sizes)]
-    vectors = [*(f"{head}.{name}" for name in _OF_PAYLOAD), f"{link}.com", *gravity, *joints]
-    settled = [scope.parameters.get(path) for path in (*numbers, *(f"{each}.{x}" for each in vectors for x in "xyz"))]
+    settled = [scope.parameters.get(path) for path in looked_at.paths]
     values: list[Real] = [each.value for each in settled if each is not None]  # type: ignore[misc]  # they are numbers
     if len(values) < len(settled):
         return  # one that lacks is already reported
@@ -77,20 +127,12 @@ def _observe(
     def warn(rows: np.ndarray) -> None:
         if scope.complaints.error_count:
             return  # a number may be out of its range
-        time, own, of_link = rows[:, 0], rows[:, 1:5], rows[:, 5:9]
-        at, position, velocity, rate, com, middle, *others = np.moveaxis(rows[:, 9:].reshape(len(rows), -1, 3), 1, 0)
-        g = sum(others[: len(gravity)], np.zeros_like(at))
-        away = _length(position + velocity * time[:, None] + 0.5 * g * (time * time)[:, None])
-        reach = sum((_length(each) for each in others[len(gravity) :]), _length(at))
-        reach = reach + 2.0 * _length(middle) + _size(of_link)
-        # its frame goes round its centre, which flies straight; and as far again as its body is large
-        loose = _length(com) * (2.0 + _length(rate) * time) + _size(own)
-        far = np.flatnonzero((away > FAR * (reach + loose)) & (time <= duration))
+        far, away, reach = looked_at.away(rows, duration)
         if far.size:
             row = far[np.argmax(away[far])]
             scope.complaints.remark(
                 "D339",
-                f"link `{payload.link}` grapples payload `{payload.name}` from afar: at {time[row]:.6g} s it flies "
+                f"link `{payload.link}` grapples payload `{payload.name}` from afar: at {rows[row, 0]:.6g} s it flies "
                 f"{away[row]:.4g} m from the base, and no part of the link is ever further than {reach[row]:.4g} m",
                 place,
                 help=[

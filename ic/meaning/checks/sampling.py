@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ic.meaning.checks.carried import Uncarried, uncarried
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.content import Content
@@ -24,6 +25,9 @@ MOST_ROWS = 1000
 ROUNDING = 1e-9
 """Share of an interval by which an instant may miss what it is at."""
 
+MOST_TIMES = 40
+"""Times the rate that there is, up to which one is sought that carries a pulse."""
+
 ENOUGH = 10
 """Instants in a swing that show its shape, and not only that it swings."""
 
@@ -35,6 +39,7 @@ class SampledContent:
     label     whose it is, in words;  path: of its parameters
     declared  its parameters;  content: what it brings (`Profile.content`, `Environment.content`)
     interval  s between instants;  by: what they are, in words, as in "its servo ticks"
+    integral  whether the integral of its pulses counts, as of a rate or a torque, else their peaks
     """
 
     label: str
@@ -44,6 +49,7 @@ class SampledContent:
     interval: float
     by: str
     place: Place | None
+    integral: bool = True
 
 
 def check_sampling(scope: Scope, structure: Structure) -> None:
@@ -58,11 +64,11 @@ def _all_sampled(structure: Structure) -> Iterator[SampledContent]:
     schedule = structure.schedule
 
     def course(
-        label: str, path: str, model: str, interval: float, by: str, place: Place | None
+        label: str, path: str, model: str, interval: float, by: str, place: Place | None, *, integral: bool = False
     ) -> Iterator[SampledContent]:
         profile = models.find("command", model, place)
         if profile.content is not None:
-            yield SampledContent(label, path, profile.parameters, profile.content, interval, by, place)
+            yield SampledContent(label, path, profile.parameters, profile.content, interval, by, place, integral)
 
     steps = "the dynamics steps"
     for use in structure.servos:
@@ -70,7 +76,8 @@ def _all_sampled(structure: Structure) -> Iterator[SampledContent]:
             interval = schedule.step if use.continuous else use.divisor / schedule.base_hz
             by = steps if use.continuous else "its servo ticks"
             label = f"the command of servo `{use.definition}`"
-            yield from course(label, f"{use.joint}.servo.command", use.command.model, interval, by, use.place)
+            path, integral = f"{use.joint}.servo.command", use.command.kind != "position"
+            yield from course(label, path, use.command.model, interval, by, use.place, integral=integral)
     for guide in structure.guides:
         interval = guide.divisor / schedule.base_hz
         for each in guide.courses:
@@ -155,6 +162,39 @@ def _remark(scope: Scope, sampled: SampledContent, found: list[Content], schedul
             place,
             help=[f"let it last longer than {sampled.interval:.6g} s", *rate],
         )
+        return
+    off = [(each.points, one) for each in found for one in _uncarried(sampled, each, duration)]
+    if off:
+        points, worst = max(off, key=lambda each: each[1].off)
+        others = f", and {len(off) - 1} more" if len(off) > 1 else ""
+        what = "integral" if sampled.integral else "peak"
+        scope.complaints.remark(
+            "D342",
+            f"{sampled.label} has a pulse that is seen as another{others}: from {worst.begins:.9g} s to "
+            f"{worst.ends:.9g} s its {what} is {worst.truth:.4g}, and {sampled.by} every {sampled.interval:.6g} s make "
+            f"it {worst.seen:.4g}, {100.0 * worst.off:.3g} % {'more' if worst.seen > worst.truth else 'less'}",
+            place,
+            help=[
+                "let it begin, turn and end at instants that see it, or last longer",
+                *_rates_that_carry(sampled, points, duration, base),
+            ],
+        )
+
+
+def _uncarried(sampled: SampledContent, content: Content, duration: float) -> list[Uncarried]:
+    return uncarried(content.points, sampled.interval, duration, integral=sampled.integral)
+
+
+def _rates_that_carry(
+    sampled: SampledContent, points: tuple[tuple[float, float], ...], duration: float, base: float
+) -> list[str]:
+    """The slowest of the rates that fit with which its pulses are seen as they are, as a remedy in words; none where it
+    would be beyond some dozens of the rate that there is."""
+    for times in range(2, MOST_TIMES):
+        hz = _fitting(times / sampled.interval, base)
+        if not uncarried(points, 1.0 / hz, duration, integral=sampled.integral):
+            return [f"or give what sees it {hz:.6g} Hz"]
+    return []
 
 
 def _fitting(wanted: float, base: float) -> float:

@@ -1,8 +1,9 @@
-"""Warnings of models that cannot both hold: a stop and a servo that no torque stops, two models of one thing."""
+"""Warnings of models that cannot both hold: a stop or a spring and a servo that no torque stops, two of one thing."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping
 from types import SimpleNamespace
 
 from ic.meaning.control.servos import Use
@@ -10,6 +11,7 @@ from ic.meaning.parameters.scope import Scope
 from met import models
 from met.analysis.probe import accelerates
 from met.diagnostic import Label
+from met.parameter import WORLD
 from met.plan import EnvironmentUse, Structure
 from met.trace import Scalar
 
@@ -19,6 +21,7 @@ def check_together(scope: Scope, uses: Iterable[Use], structure: Structure) -> N
     servos = {use.joint: use for use in uses}
     for load in structure.environment:
         _remark_stop(scope, load, servos)
+        _remark_hold(scope, load, servos, structure)
     _remark_alone(scope, structure.environment)
 
 
@@ -44,6 +47,73 @@ def _remark_stop(scope: Scope, load: EnvironmentUse, servos: dict[str, Use]) -> 
                 f"`metric most = max {{ of = {servo.joint}.q; }}`",
             ],
         )
+
+
+def _remark_hold(scope: Scope, load: EnvironmentUse, servos: Mapping[str, Use], structure: Structure) -> None:
+    """Report a model that would hold two bodies, where servos tell all joints between them what to do: then it moves
+    nothing."""
+    model = models.find("environment", load.model, load.place)
+    if model.holds is None or load.place is None:
+        return
+    if model.may_be_load and any(_is_of_torques(use.of) for use in structure.metrics):
+        return
+    values = {
+        each.name: _value(scope, f"environment.{load.name}.{each.name}", each.shape == "vector")
+        for each in model.parameters
+    }
+    if None in values.values():
+        return
+    bodies = [str(values[name]) for name in model.holds(SimpleNamespace(**values))]
+    between = _joints_between(structure, bodies) if bodies else None
+    if not between or any(joint not in servos for joint in between):
+        return
+    told = [servos[joint] for joint in between]
+    if any(use.parameters is None or not accelerates(use.bare, use.parameters) for use in told):
+        return
+    using = next((use for use in told if use.servo.at_rest is None), None)
+    if using is not None:
+        scope.complaints.remark(
+            "D296",
+            f"`{load.name}` holds nothing: servo `{using.definition}` ({using.servo.name}) tells joint `{using.joint}` "
+            f"its acceleration{_and_others(len(told) - 1)}, and what holds `{bodies[0]}` gives way to it",
+            load.place,
+            also=[Label(using.place, "its servo")],
+            help=[
+                "give the joint a servo that has a torque, or leave this out",
+                'if what it takes is what the run is about, `allow D296 because "...";`',
+            ],
+        )
+
+
+def _and_others(count: int) -> str:
+    if not count:
+        return ""
+    return f", as {count} other joint{'s are' if count > 1 else ' is'} told"
+
+
+def _is_of_torques(channel: str) -> bool:
+    """True for a channel, or an expression, of what a joint or its motor takes."""
+    return not {"tau", "torque", "reaction", "current", "power"}.isdisjoint(re.split(r"\W+", channel))
+
+
+def _joints_between(structure: Structure, bodies: list[str]) -> list[str] | None:
+    """The joints that move between two bodies, or between one and the ground; None where a base moves freely there, or
+    a payload is one of them."""
+    carrying = {joint.child: joint for joint in structure.joints}
+    ways = []
+    for body in [*bodies, WORLD][:2]:
+        if any(payload.name == body for payload in structure.payloads):
+            return None
+        way = []
+        while body in carrying:
+            way.append(carrying[body])
+            body = carrying[body].parent
+        ways.append(way)
+    if structure.free and WORLD in [*bodies, WORLD][:2]:
+        return None
+    first, second = ways
+    apart = [joint for joint in (*first, *second) if (joint in first) != (joint in second)]
+    return [joint.name for joint in apart if joint.kind != "fixed"]
 
 
 def _remark_alone(scope: Scope, environment: Iterable[EnvironmentUse]) -> None:

@@ -11,6 +11,7 @@ from ic.grammar.syntax import Call, Name, Word
 from ic.language.runs import DURATION, ENVIRONMENT, INITIAL, RATES, RUN, SEED, TOLERANCES
 from ic.meaning.checks.failures import check_failures, check_friction
 from ic.meaning.checks.idle import remark_beginnings
+from ic.meaning.checks.magnitudes import check_magnitudes
 from ic.meaning.checks.reach import check_reach
 from ic.meaning.checks.reading import remark_unread
 from ic.meaning.checks.requirements import check_requirements
@@ -172,6 +173,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     check_sampling(scope, structure)
     check_together(scope, uses, structure)
     check_reach(scope, block, structure)
+    check_magnitudes(scope, structure)
     scope.keep_setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
     requirements = resolve_requirements(scope, comparisons, structure)
     step_errors = resolve_step_errors(scope, block, structure)

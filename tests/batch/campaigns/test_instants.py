@@ -12,6 +12,7 @@ import pytest
 import ic
 from batch.campaigns import instants
 from batch.campaigns.campaign import prepare, values_sections
+from batch.campaigns.keep import CaseOutcomes
 from batch.campaigns.performing import Performed, perform
 from batch.executors.threads import Threads
 from met import run as engine
@@ -90,6 +91,57 @@ run hold {
     compiled = ic.check(tmp_path / "deck.ic") if (tmp_path / "deck.ic").write_text(deck) else None
     assert compiled is not None and [each.code for each in compiled.diagnostics] == ["D317"]
     assert codes(performed(made(tmp_path, deck), tmp_path / "a.h5")) == []
+
+
+def one_of_many(bad: bool) -> str:
+    """200 masses on springs, of which one swings too fast for the step: neither its mass nor its spring is extreme."""
+    pick = np.random.default_rng(3)
+    masses, rates = pick.uniform(1.0, 100.0, 200), pick.uniform(1.0, 20.0, 200)
+    masses[50], rates[50] = 400.0, 20.0
+    masses[120], rates[120] = 0.5, 1.0
+    masses[77], rates[77] = 2.5, 95.0 if bad else 9.5
+    stiffness = masses * rates**2
+    return f"""\
+arm a {{
+    link b {{ mass = 1 kg;  com = [0, 0, 0] m;  inertia = [1, 1, 1] kg*m^2; }}
+    joint x prismatic {{ parent = base;  child = b;  axis = x; }}
+}}
+run swing {{
+    arm = a;  initial {{ x.q = 0.1 m; }}  rates {{ dynamics = 100 Hz; }}  duration = 1 s;  record = [q];
+    environment {{
+        pull = spring {{ link = b;  to = world;  to_point = [-10, 0, 0] m;  length = 10 m;  stiffness = 10 N/m; }}
+    }}
+    metric way = final {{ of = x.q; }}
+}}
+sweep all of swing {{
+    zip {{ environment.pull.stiffness = {stiffness.tolist()} N/m;  a.links.b.mass = {masses.tolist()} kg; }}
+}}
+"""
+
+
+def test_one_row_of_many_that_goes_another_way_is_looked_at(tmp_path: Path) -> None:
+    deck = one_of_many(bad=True)
+    (tmp_path / "deck.ic").write_text(deck)
+    assert [each.code for each in ic.check(tmp_path / "deck.ic", select=["all"]).diagnostics] == []
+    found = performed(made(tmp_path, deck, "all"), tmp_path / "a.h5")
+    assert codes(found) == ["D317"] and "of case #77" in found.warned[0].help[-1]
+    assert codes(performed(made(tmp_path, one_of_many(bad=False), "all"), tmp_path / "b.h5")) == []
+
+
+@pytest.mark.parametrize(
+    ("values", "out"),
+    [
+        ([*range(50), 5000.0], [50]),
+        ([*range(50), 200.0], []),
+        ([0.0] * 30 + [1.0], [30]),
+        ([1.0] * 30 + [1.0 + 1e-9], []),
+        ([*range(10), 5000.0], []),
+        ([*range(50), 5000.0, np.nan, np.inf], [50]),
+    ],
+)
+def test_a_case_stands_out_where_all_others_are_alike(values: list[float], out: list[int]) -> None:
+    outcomes = CaseOutcomes(np.zeros(len(values), np.int8), {"way": np.array(values, float)})
+    assert instants.standing_out(outcomes) == out
 
 
 def test_memory_on_the_way_changes_no_bit(tmp_path: Path) -> None:

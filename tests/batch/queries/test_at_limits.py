@@ -117,6 +117,15 @@ def test_what_a_requirement_judges_is_not_warned_of_besides(tmp_path: Path) -> N
     assert data["met"].values.tolist() == [[0]]
 
 
+def test_cases_that_are_at_a_limit_for_most_of_the_time_are_counted(tmp_path: Path) -> None:
+    asked = DECK.replace("times = [0, 0.5, 0.501, 2] s", "times = [0, 1.5, 1.501, 2] s")
+    (tmp_path / "d.ic").write_text(asked, encoding="utf-8")
+    path = batch.run(ic.compile(tmp_path / "d.ic", select=["motors"]), output=tmp_path / "a.h5", verify="none").path
+    with ArchiveFile(path) as file:
+        [said] = [line for line in show(file, plots=False).splitlines() if "share of the time at hinge" in line]
+    assert said.endswith(" % at most, in #0; not 0 in 2 of 3 cases, more than half in 2")
+
+
 def test_show_and_its_json_list_the_limits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, _ = made(tmp_path, "motors")
     with ArchiveFile(path) as file:

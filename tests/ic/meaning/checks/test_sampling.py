@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, messages
+import met.run as engine
+from ic.meaning.checks.carried import uncarried
+from met.content import humps_from_zero, humps_of_turns
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
 from tests.oracles.random_deck import random_deck
 
 TICKS = ("servos = 1 kHz", "servos = 100 Hz")
@@ -121,6 +125,90 @@ def test_two_joints_with_one_servo_are_told_once(tmp_path: Path) -> None:
     )
     servo = under("rate(step(to = 1 rad/s, at = 3 s))")
     assert codes(tmp_path, arm, servo, changed(RUN, ("hinge = drive", "hinge = drive; wrist = drive"))) == ["D334"]
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_humps_of_random_tables_rise_from_their_feet_and_come_back(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    values = np.round(random.normal(size=12) * 10.0 ** random.uniform(-3.0, 3.0), 4)
+    points = list(zip(np.cumsum(random.uniform(0.01, 1.0, 12)).tolist(), values.tolist(), strict=True))
+    for hump in humps_of_turns(points):
+        assert hump.heights[0] == hump.heights[-1] == 0.0 and hump.impulse > 0.0
+        assert (hump.heights >= 0.0).all() and (np.diff(hump.times) >= 0.0).all()
+
+
+PULSE = "table(times = [0, 0.502, 0.503, 0.516, 0.517] s, values = [0, 0, 2, 2, 0] rad/s)"
+"""0.028 rad, and 0.02 rad of ticks at 100 Hz: one is in it."""
+
+
+def test_a_pulse_of_which_the_ticks_make_less_is_told_with_both_integrals(tmp_path: Path) -> None:
+    assert (
+        shown(tmp_path, ARM, under(f"rate({PULSE})"), changed(RUN, TICKS))
+        == """\
+warning[D342]: the command of servo `drive` has a pulse that is seen as another: from 0.502 s to 0.517 s its integral \
+is 0.028, and its servo ticks every 0.01 s make it 0.02, 28.6 % less
+ --> deck.ic:9:34
+  |
+9 |     command = rate(table(times = [0, 0.502, 0.503, 0.516, 0.517] s, values = [0, 0, 2, 2, 0] rad/s));
+  |                                  ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+  = help: let it begin, turn and end at instants that see it, or last longer
+  = help: or give what sees it 500 Hz
+"""
+    )
+    assert codes(tmp_path, ARM, under(f"rate({PULSE})"), changed(RUN, ("servos = 1 kHz", "servos = 500 Hz"))) == []
+
+
+def test_what_is_told_of_a_pulse_is_how_far_the_joint_goes(tmp_path: Path) -> None:
+    """An `ideal` servo's way is the integral of the rate that it is asked, whatever its bandwidth."""
+    ideal = f"servo drive {{ model = ideal; bandwidth = 100 1/s; command = rate({PULSE}); }}\n"
+    for hz, way in ((100, 0.02), (500, 0.028)):
+        run = changed(RUN, ("servos = 1 kHz", f"servos = {hz} Hz"), ("1 s;", "2 s;"))
+        found = engine.run(experiment(tmp_path, ARM, ideal, run))
+        assert found.signals["q"][0, -1, 0] == pytest.approx(way, rel=1e-3)
+
+
+def test_of_a_position_the_peak_counts_and_of_others_the_integral(tmp_path: Path) -> None:
+    peak = "table(times = [0, 0.5, 0.524, 0.55, 1] s, values = [0, 0, 1, 0, 0] {})"
+    said = shown(tmp_path, ARM, changed(under(f"position({peak.format('rad')})"), ("kp =", "k_position = 5 1/s; kp =")),
+                 changed(RUN, TICKS))  # fmt: skip
+    assert "from 0.5 s to 0.55 s its peak is 1, and its servo ticks every 0.01 s make it 0.8333, 16.7 % less" in said
+    assert codes(tmp_path, ARM, under(f"rate({peak.format('rad/s')})"), changed(RUN, TICKS)) == []  # 1.3 % of a way
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "rate(table(times = [0, 0.5, 0.51, 0.53, 0.54] s, values = [0, 0, 1, 1, 0] rad/s))",  # at ticks
+        "rate(table(times = [0, 0.503, 0.504, 0.803, 0.804] s, values = [0, 0, 1, 1, 0] rad/s))",  # long
+        "rate(table(times = [0, 0.503, 0.504, 1] s, values = [0, 0, 1, 1] rad/s))",  # a step
+        "rate(table(times = [0, 0.1, 0.503, 0.506, 0.512, 0.9] s, values = [0, 1, 1, 0.95, 1, 0] rad/s))",  # slight
+        "rate(table(times = [0, 0.313, 0.707, 0.913] s, values = [0, 1, -1, 0] rad/s))",  # through zero
+    ],
+)
+def test_pulses_that_the_ticks_carry_are_not_told(tmp_path: Path, command: str) -> None:
+    assert codes(tmp_path, ARM, under(command), changed(RUN, TICKS)) == []
+
+
+def test_a_command_that_begins_in_a_pulse_is_told(tmp_path: Path) -> None:
+    servo = under("rate(table(times = [0.015, 0.016] s, values = [1, 0] rad/s))")
+    said = shown(tmp_path, ARM, servo, changed(RUN, TICKS))
+    assert (
+        "from 0 s to 0.016 s its integral is 0.0155, and its servo ticks every 0.01 s make it 0.02, 29 % more" in said
+    )
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_integrals_of_random_pulses_are_those_of_a_fine_sum(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    times = np.concatenate([[0.0], np.sort(random.uniform(0.1, 0.2, 6)), [1.0]])
+    values = np.concatenate([[0.0, 0.0], random.uniform(0.5, 2.0, 4) * random.choice([-1.0, 1.0]), [0.0, 0.0]])
+    [hump] = humps_from_zero(list(zip(times.tolist(), values.tolist(), strict=True)), 1.0)
+    fine = np.linspace(0.0, 1.0, 200_001)
+    assert hump.impulse == pytest.approx(np.abs(np.interp(fine, times, values)).sum() * 5e-6, rel=1e-5)
+    for found in uncarried(list(zip(times, values, strict=True)), 0.01, 1.0, integral=True):
+        if (found.begins, found.ends) == (times[1], times[-2]):
+            ticks = np.abs(np.interp(np.arange(100) * 0.01, times, values)).sum() * 0.01
+            assert found.seen == pytest.approx(ticks)
 
 
 @pytest.mark.parametrize("seed", range(40))

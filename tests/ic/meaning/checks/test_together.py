@@ -58,6 +58,75 @@ def test_what_is_warned_of_is_so(tmp_path: Path) -> None:
     assert found.signals["q"][0, -1, 0] == pytest.approx(1.0, rel=1e-6)
 
 
+MOUNT = "mount = bushing { link = bar; stiffness = [1e5, 1e5, 1e5] N/m; };"
+PULL = "mount = spring { link = bar; point = [1, 0, 0] m; to = world; to_point = [1, 1, 0] m; length = 1 m; stiffness = 10 N/m; };"
+
+
+def test_a_bushing_on_a_link_that_is_told_its_motion(tmp_path: Path) -> None:
+    assert (
+        shown(tmp_path, ARM, IDEAL, inside(MOUNT))
+        == """\
+warning[D296]: `mount` holds nothing: servo `drive` (ideal) tells joint `hinge` its acceleration, and what holds `bar` \
+gives way to it
+  --> deck.ic:10:19
+   |
+10 |     environment { mount = bushing { link = bar; stiffness = [1e5, 1e5, 1e5] N/m; }; }
+   |                   ^^^^^
+ ::: deck.ic:8:14  its servo
+   = help: give the joint a servo that has a torque, or leave this out
+   = help: if what it takes is what the run is about, `allow D296 because "...";`
+""".replace(" :::", "  :::")
+    )
+
+
+def test_what_is_told_of_a_bushing_is_so(tmp_path: Path) -> None:
+    """The joint goes as without it, to the last bit."""
+    runs = [engine.run(experiment(tmp_path, ARM, IDEAL, deck)) for deck in (inside(MOUNT), RUN)]
+    assert runs[0].signals["q"].tobytes() == runs[1].signals["q"].tobytes()
+
+
+TWO = changed(
+    ARM,
+    ("    joint hinge", "    link tip { mass = 1 kg; shape = rod(length = 1 m, along = x); }\n    joint hinge"),
+    (
+        "axis = z; }\n",
+        "axis = z; }\n    joint wrist revolute { parent = bar; child = tip; axis = z; at = [1, 0, 0] m; }\n",
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    ("arm", "servo", "environment", "more"),
+    [
+        (ARM, SERVO, MOUNT.replace("1e5", "10"), ""),  # it has a torque
+        (ARM, IDEAL, MOUNT.replace("stiffness = [1e5, 1e5, 1e5] N/m", "damping = [1, 1, 1] N*s/m"), ""),
+        (ARM, IDEAL, PULL, "metric most = peak { of = hinge.tau; }"),  # a load
+        (TWO, IDEAL, MOUNT.replace("bar", "tip").replace("1e5", "10"), ""),  # the wrist yields
+        (TWO, IDEAL, MOUNT.replace("link = bar", "link = tip; to = bar; to_at = [1, 0, 0] m").replace("1e5", "10"), ""),
+    ],
+)
+def test_what_moves_something_or_is_a_load_is_not_told(
+    tmp_path: Path, arm: str, servo: str, environment: str, more: str
+) -> None:
+    deck = changed(inside(environment), ("    duration", f"    {more}\n    duration"))
+    assert "D296" not in codes(tmp_path, arm, servo, deck)
+
+
+def test_a_spring_between_two_links_that_are_both_told_is_told(tmp_path: Path) -> None:
+    deck = changed(
+        inside(PULL.replace("to = world; to_point = [1, 1, 0] m", "to = tip")),
+        ("hinge = drive;", "hinge = drive; wrist = drive;"),
+    )
+    said = shown(tmp_path, TWO, IDEAL, deck)
+    assert (
+        "warning[D296]: `mount` holds nothing: servo `drive` (ideal) tells joint `wrist` its acceleration, and" in said
+    )
+    free = changed(deck, ("arm = swing;", "arm = swing; base = free;"))
+    heavy = changed(TWO, ("arm swing {", "arm swing {\n    link base { mass = 9 kg; inertia = [1, 1, 1] kg*m^2; }"))
+    assert "D296" in codes(tmp_path, heavy, IDEAL, free)  # both are of the arm
+    assert "D296" not in codes(tmp_path, heavy, IDEAL, free.replace("to = tip", "to = world"))  # the base yields
+
+
 def test_two_gravities_and_two_attitudes_are_told(tmp_path: Path) -> None:
     twice = "gravity = [0, 0, -9.81] m/s^2; pull = gravity { g = [0, 0, -1] m/s^2; };"
     assert (

@@ -1,0 +1,66 @@
+"""Grapples in an archive that no gripper makes: of what is not at its place, or moves or turns fast by its link."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from batch.queries.signals import number_text
+from ic.meaning.checks.reach import flies_from_afar
+from met.diagnostic import Diagnostic, Label
+from met.plan.outputs import GRAPPLE_FIGURES
+
+if TYPE_CHECKING:
+    from batch.archive.read import ArchiveGroup
+    from met.plan import Experiment
+
+FAST, TURNING = 1.0, 10.0
+"""m/s and rad/s: in the tenth of a second that a gripper needs to close, it is 0.1 m further, or a radian."""
+
+
+def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
+    """The warning of grapples of an experiment, if there is one: of the worst, with the other payloads by name.
+
+    experiment  of the plan, for places; what the check tells of it is not told again
+    """
+    figures: dict[str, dict[str, np.ndarray]] = {}
+    for variable in group.role("grapple"):
+        of, name = (str(variable.attributes.get(each)) for each in ("of", "figure"))
+        figures.setdefault(of, {})[name] = group.values(variable.name)
+    bad = {}
+    for payload, found in figures.items():
+        if set(found) != set(GRAPPLE_FIGURES) or (experiment is not None and flies_from_afar(experiment, payload)):
+            continue
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = [found["distance"] / found["near"], found["speed"] / FAST, found["rate"] / TURNING]
+        worst = np.nan_to_num(np.max(ratios, axis=0), posinf=np.finfo(float).max)
+        if (worst > 1.0).any():
+            bad[payload] = worst
+    if not bad or group.allows("D347"):
+        return []
+    payload = max(bad, key=lambda each: float(bad[each].max()))
+    row, cases = int(bad[payload].argmax()), int((bad[payload] > 1.0).sum())
+    distance, near, speed, rate, energy = (float(figures[payload][name][row]) for name in GRAPPLE_FIGURES)
+    how, helps = [], []
+    if distance > near:
+        how.append(f"{number_text(distance)} m from its place")
+        helps.append(
+            "let it be there by then: change its `position`, `velocity` or `grapple`, or the arm's motion; "
+            f"`payloads.{payload}.distance` is how far it is"
+        )
+    motion = [(speed, FAST, "m/s"), (rate, TURNING, "rad/s")]
+    against = [f"{number_text(value)} {unit}" for value, most, unit in motion if value > most]
+    if against:
+        how.append(f"at {' and '.join(against)} against its link")
+        helps.append("let the link go along with it by then: no gripper closes on what moves so fast")
+    many = f", in {cases:,} of {group.count:,} cases, worst in #{group.values('case')[row]}"
+    if len(bad) > 1:
+        helps.append(f"also grappled so: {', '.join(f'`{each}`' for each in bad if each != payload)}")
+    told = None if experiment is None else experiment.parameters.get(f"payloads.{payload}.grapple")
+    place = None if told is None else told.origin.place
+    message = (
+        f"payload `{payload}` is grappled {', '.join(how)}{many if group.count > 1 else ''}: momentum is kept, and "
+        f"{number_text(energy)} J are lost at once"
+    )
+    return [Diagnostic("D347", message, None if place is None else Label(place), (), tuple(helps), "warning")]

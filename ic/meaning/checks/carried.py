@@ -1,0 +1,79 @@
+"""Pulses of commands and courses of which the instants that sample them make too much or too little.
+
+What is sampled is held until the next instant, or is taken as the mean of a step's two ends: of a pulse between two
+zeros both make the sum of the samples times the interval. The integral of a rate is a way, that of a torque an impulse;
+of a position, the peak is what counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from met.content import Hump, humps_from_zero, humps_of_turns
+from met.frozen import frozen
+
+OFF = 0.05
+"""Share by which an integral, or a peak, may be off."""
+
+FEW = 20.0
+"""Intervals in a pulse, from which on its integral is off by less than `OFF`: half an interval at each end."""
+
+SLIGHT = 0.1
+"""Share of the largest pulse below which another is not looked at."""
+
+ROUNDING = 1e-9
+"""Share of an interval by which an instant may miss what it is at."""
+
+
+@frozen
+class Uncarried:
+    """A pulse that is seen as more or less than it is: from and until, s; its integral, or its peak, as it is and as
+    it is seen."""
+
+    begins: float
+    ends: float
+    truth: float
+    seen: float
+
+    @property
+    def off(self) -> float:
+        """Share by which what is seen is off."""
+        return abs(self.seen / self.truth - 1.0)
+
+
+def uncarried(
+    points: Sequence[tuple[float, float]], interval: float, duration: float, *, integral: bool
+) -> list[Uncarried]:
+    """The pulses of a course of straight lines that instants every so many seconds do not carry.
+
+    integral  whether the integral counts, else the peak
+    """
+    if len(points) < 2:
+        return []
+    inner = [each for each in humps_of_turns(points) if each.times[0] >= 0.0 and each.times[-1] <= duration]
+    known = {(float(each.times[0]), float(each.times[-1])) for each in inner}
+    from_zero = humps_from_zero(points, duration) if integral else ()
+    every = [*inner, *(each for each in from_zero if (float(each.times[0]), float(each.times[-1])) not in known)]
+    truths = [each.impulse if integral else float(each.heights.max()) for each in every]
+    least = SLIGHT * max(truths, default=0.0)
+    looked_at = ((hump, truth) for hump, truth in zip(every, truths, strict=True) if truth > least)
+    return [found for found in _judged(looked_at, interval, duration, integral) if found.off > OFF]
+
+
+def _judged(
+    humps: Iterable[tuple[Hump, float]], interval: float, duration: float, integral: bool
+) -> Iterator[Uncarried]:
+    for hump, truth in humps:
+        begins, ends = float(hump.times[0]), float(hump.times[-1])
+        if integral and ends - begins > FEW * interval:
+            continue
+        first, last = math.ceil(begins / interval - ROUNDING), math.floor(ends / interval + ROUNDING)
+        if integral and duration <= last * interval * (1.0 + ROUNDING):
+            last -= 1  # nothing is held from the run's end on
+        instants = np.clip(np.arange(first, last + 1) * interval, begins, ends)
+        heights = hump.at(instants)
+        seen = interval * float(heights.sum()) if integral else float(heights.max(initial=0.0))
+        yield Uncarried(begins, ends, truth, seen)

@@ -1,0 +1,336 @@
+"""Warnings of numbers and bodies of a size that is not found: nearly always a unit that is missing, or another's.
+
+Nothing is said of what is merely rare. Each bound is beyond what there is by so much that decks of all sorts pass.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ic.meaning.parameters.owner import XYZ, Settled
+from ic.meaning.parameters.scope import Scope
+from met.diagnostic import Place
+from met.frozen import frozen
+from met.plan import BASE, Structure
+from met.trace import Real, Scalar
+
+
+@frozen
+class Magnitude:
+    """The sizes that numbers of one kind have: those of this unit whose whole path the pattern matches.
+
+    low, high  smallest and largest that is let pass, SI; 0 passes always
+    known      the largest, or smallest, that there is, in words
+    """
+
+    unit: str
+    pattern: re.Pattern[str]
+    low: float
+    high: float
+    known: str
+
+
+_BODY = r"(links|payloads)\.[^.]+\."
+_VECTOR = r"\.[xyz]"
+
+LENGTHS = Magnitude(
+    "m",
+    re.compile(rf"[^.]+\.at{_VECTOR}|[^.]+\.dh\.[ad]|{_BODY}((com|at){_VECTOR}|shape\..+)"),
+    0.0,
+    200.0,
+    "the longest links there are have some 60 m",
+)
+MASSES = Magnitude(
+    "kg", re.compile(rf"{_BODY}mass"), 1e-6, 1e7, "links weigh a milligram and more, and the largest some 400 t"
+)
+
+MAGNITUDES = (
+    Magnitude("m/s^2", re.compile(rf"environment\.[^.]+\.g{_VECTOR}"), 0.0, 300.0, "the Sun's surface has 274 m/s^2"),
+    LENGTHS,
+    MASSES,
+    Magnitude("N*m/A", re.compile(r".+"), 0.0, 300.0, "the largest motors have some 100 N*m/A"),
+    *(
+        Magnitude(
+            unit,
+            re.compile(
+                rf"initial\.[^.]+\.(qd|(rate|velocity){_VECTOR})|payloads\.[^.]+\.(rate|velocity){_VECTOR}"
+                r"|[^.]+\.servo\.command(\.(?!max_).+)?"
+            ),
+            0.0,
+            5e4,
+            known,
+        )
+        for unit, known in (("rad/s", "the fastest spindles have some 40,000 rad/s"), ("m/s", "meteors have 70 km/s"))
+    ),
+)
+"""Kinds of numbers. A limit such as `v_max` is none of them: decks write any large number for one that is far away."""
+
+BY_UNIT: dict[str, list[Magnitude]] = {}
+for _kind in MAGNITUDES:
+    BY_UNIT.setdefault(_kind.unit, []).append(_kind)
+
+THIN, DENSE = 0.1, 1e6
+"""kg/m^3 of a shape: the lightest solids have 1, and a shape may stand for something hollow; the densest have 22,600,
+and decks draw a mass as a ball that is far too small."""
+
+HEAVY_ROD = 1e5
+"""kg/m of a rod: steel of 4 m across."""
+
+SOLIDS = (
+    ("kg/m^3", "solids have 1 to 22,600", 10.0, 23e3),
+    ("kg/m", "a bar of steel of 1 m across has 6,200", 0.01, 1e4),
+)
+"""Unit of a solid's density and of a rod's, what there is in words, and what is usual."""
+
+LESS = (
+    ("with 1,000 times less mass", 1e-3, 1.0),
+    ("with sizes 10 times larger", 1.0, 0.1),
+    ("with sizes 1,000 times larger", 1.0, 1e-3),
+)
+MORE = (
+    ("with 1,000 times more mass", 1e3, 1.0),
+    ("with a tenth of the sizes", 1.0, 10.0),
+    ("with a thousandth of the sizes", 1.0, 1e3),
+)
+"""Cures of a density: words, factors of the mass, and of the density for each size."""
+
+GYRATION, LEAST_GYRATION = 10.0, 10.0
+"""Times the length of an arm or a shape, and m: a radius of gyration that is above both is of no link of the arm, one
+above the former of no body of that shape."""
+
+OTHER_UNITS = (1e3, 1e6, 1e9)
+"""What a number is too large or small by where a prefix went wrong."""
+
+OTHER_INERTIAS = ((1e4, "kg*cm^2"), (1e6, "kg*mm^2"), (1e7, "g*cm^2"), (1e9, "g*mm^2"))
+"""What a moment of inertia is too large by where it was in this unit."""
+
+OF_BASE = f"links.{BASE}"
+
+MEANT = 'if it is meant so, `allow {} because "...";`'
+
+
+def check_magnitudes(scope: Scope, structure: Structure) -> None:
+    """Warn of numbers and of bodies that nothing is like; of many of one kind once, with the worst."""
+    if scope.complaints.error_count:
+        return
+    found: dict[Magnitude, list[tuple[str, Settled]]] = {}
+    for path, settled in (*scope.parameters.items(), *scope.auxiliary.items()):
+        for kind in BY_UNIT.get(settled.unit, ()):
+            if _may_be_beyond(kind, settled) and kind.pattern.fullmatch(path):
+                found.setdefault(kind, []).append((path, settled))
+    for kind, those in found.items():
+        _observe(scope, kind, those)
+    bodies = list(_bodies(scope, structure))
+    _observe_densities(scope, [body for body in bodies if body.sizes and body.may_be_odd])
+    of_their_own = [body for body in bodies if any(each.origin.kind != "derived" for each in body.moments)]
+    # the inertia of a shape is its shape's; a base may be as large as it likes, and so may what an arm carries
+    told = [body for body in of_their_own if body.sizes or (body.head.startswith("links.") and body.head != OF_BASE)]
+    _observe_inertias(scope, structure, told)
+
+
+def _observe(scope: Scope, kind: Magnitude, those: list[tuple[str, Settled]]) -> None:
+    """Look at all numbers of a kind, in all cases."""
+    numbers: list[tuple[str, Settled, Real]] = []
+    for path, settled in those:
+        values = settled.value if isinstance(settled.value, tuple) else (settled.value,)
+        numbers += [(path, settled, value) for value in values if not isinstance(value, str)]
+    place = numbers[0][1].origin.place
+    assert place is not None  # by what is looked at
+
+    def warn(rows: np.ndarray) -> None:
+        beyond = np.array([_beyond(kind, column) for column in rows.T]).T
+        if not beyond.any() or scope.complaints.error_count:
+            return
+        worst = np.where(beyond, np.abs(np.log(np.abs(np.where(beyond, rows, 1.0)))), 0.0)
+        row, column = np.unravel_index(int(worst.argmax()), worst.shape)
+        path, settled, _ = numbers[column]
+        value, several = float(rows[row, column]), len({numbers[at][0] for at in np.flatnonzero(beyond.any(axis=0))})
+        unit, small = settled.unit, abs(value) < kind.low
+        helps = [
+            f"{times:,.0f} times {'more' if small else 'less'} would be {value * factor:.6g} {unit}: "
+            "is a unit another, or missing?"
+            for times in OTHER_UNITS
+            for factor in (times if small else 1.0 / times,)
+            if not _beyond(kind, np.array(value * factor))
+        ][:1]
+        if unit == "kg" and small:
+            helps.append("a link without mass is a frame: `mass = 0 kg`")
+        scope.complaints.remark(
+            "D297",
+            f"`{path}` is {value:.6g} {unit}{_others(several)}, and {kind.known}",
+            settled.origin.place or place,
+            help=[*helps, MEANT.format("D297")],
+        )
+
+    scope.checks.observe(tuple(value for _, _, value in numbers), warn, place, needs=tuple(path for path, _ in those))
+
+
+def _may_be_beyond(kind: Magnitude, settled: Settled) -> bool:
+    """True where a number that the deck wrote is beyond what passes, or varies."""
+    if settled.origin.place is None or settled.origin.kind == "derived" or isinstance(settled.value, str):
+        return False
+    values = settled.value if isinstance(settled.value, tuple) else (settled.value,)
+    return any(isinstance(x, Scalar) or (x != 0.0 and not kind.low <= abs(x) <= kind.high) for x in values)
+
+
+def _beyond(kind: Magnitude, values: np.ndarray) -> np.ndarray:
+    sizes = np.abs(values)
+    return np.asarray(np.isfinite(sizes) & (sizes > 0.0) & ((sizes < kind.low) | (sizes > kind.high)))
+
+
+@frozen
+class WeighedBody:
+    """A link or a payload, and what is known of it: mass, largest moments and sizes of its shape.
+
+    name    in words;  head: of its paths
+    place   of its shape, or of its inertia
+    sizes   of its shape by name, m; empty where it has none
+    """
+
+    name: str
+    head: str
+    place: Place
+    mass: Settled
+    moments: tuple[Settled, ...]
+    sizes: Mapping[str, Settled]
+
+    @property
+    def is_rod(self) -> bool:
+        """True of a shape that has no volume."""
+        return set(self.sizes) == {"length"}
+
+    def volume(self, sizes: Iterable[Any]) -> Any:
+        """The volume, m^3, of a rod the length, m, for sizes in the order of `sizes`: numbers, or arrays of them."""
+        ball = set(self.sizes) == {"radius"}
+        factor = 4.0 / 3.0 * math.pi if ball else math.pi if "radius" in self.sizes else 1.0
+        powers = (3 if ball else 2 if name == "radius" else 1 for name in self.sizes)
+        return math.prod((size**power for size, power in zip(sizes, powers, strict=True)), start=factor)
+
+    @property
+    def may_be_odd(self) -> bool:
+        """True where the density is none of a solid, or varies."""
+        numbers = [self.mass.value, *(each.value for each in self.sizes.values())]
+        if any(isinstance(each, Scalar) for each in numbers):
+            return True
+        volume = self.volume(numbers[1:])
+        thin, dense = self.densities
+        return volume > 0.0 and not thin * volume <= self.mass.value <= dense * volume
+
+    @property
+    def densities(self) -> tuple[float, float]:
+        """The least and the largest density that is let pass, kg/m^3, of a rod kg/m."""
+        return (0.0, HEAVY_ROD) if self.is_rod else (THIN, DENSE)
+
+
+def _bodies(scope: Scope, structure: Structure) -> Iterator[WeighedBody]:
+    """Links and payloads whose numbers are known."""
+    named = [("link", "links", each.name) for each in structure.links]
+    named += [("payload", "payloads", each.name) for each in structure.payloads]
+    for word, group, name in named:
+        head = f"{group}.{name}"
+        sizes = {
+            path.removeprefix(f"{head}.shape."): settled
+            for path, settled in scope.auxiliary.items()
+            if path.startswith(f"{head}.shape.") and settled.unit == "m"
+        }
+        mass = scope.parameters.get(f"{head}.mass")
+        moments = [scope.parameters.get(f"{head}.inertia.{axis}{axis}") for axis in XYZ]
+        written = [*sizes.values(), *moments]
+        place = next((each.origin.place for each in written if each is not None and each.origin.place), None)
+        if mass is not None and place is not None and None not in moments:
+            yield WeighedBody(f"{word} `{name}`", head, place, mass, tuple(each for each in moments if each), sizes)
+
+
+def _observe_densities(scope: Scope, bodies: Sequence[WeighedBody]) -> None:
+    """Look at what bodies of these shapes and masses would be made of."""
+    settled = [each for body in bodies for each in (body.mass, *body.sizes.values())]
+    ends = np.cumsum([1 + len(body.sizes) for body in bodies]).tolist()
+
+    def warn(rows: np.ndarray) -> None:
+        found = []
+        for body, first, last in zip(bodies, [0, *ends], ends, strict=False):
+            mass, sizes = rows[:, first], rows[:, first + 1 : last]
+            thin, dense = body.densities
+            with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+                densities = mass / body.volume(sizes.T)
+            fine = ~(_beyond(MASSES, mass) | _beyond(LENGTHS, sizes).any(axis=1))  # else that is told
+            bad = fine & np.isfinite(densities) & (mass > 0.0) & ((densities < thin) | (densities > dense))
+            if bad.any():
+                found.append((body, float(densities[bad][np.abs(np.log(densities[bad])).argmax()])))
+        if not found or scope.complaints.error_count:
+            return
+        body, density = max(found, key=lambda each: abs(math.log(each[1])))
+        cures = MORE if density < 1.0 else LESS
+        unit, known, least, most = SOLIDS[body.is_rod]
+        changed = [(words, density * times * across ** (1 if body.is_rod else 3)) for words, times, across in cures]
+        helps = [f"{words} it would be {x:.4g} {unit}: is a unit another?" for words, x in changed if least < x < most]
+        scope.complaints.remark(
+            "D298",
+            f"{body.name} would be of {density:.4g} {unit}{_others(len(found))}, and {known}",
+            body.place,
+            help=[*helps[:1], "look at the units of its mass and of its shape", MEANT.format("D298")],
+        )
+
+    _together(scope, settled, warn, bodies)
+
+
+def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[WeighedBody]) -> None:
+    """Look at bodies' radii of gyration beside their shapes, and those of links without one beside the arm's length."""
+    if not bodies:
+        return
+    paths = [f"{joint.name}.at" for joint in structure.joints] + [f"links.{each.name}.com" for each in structure.links]
+    vectors = [scope.parameters.get(f"{path}.{axis}") for path in paths for axis in XYZ]
+    if None in vectors:
+        return
+    settled = [each for body in bodies for each in (body.mass, *body.moments, *body.sizes.values())]
+    ends = np.cumsum([4 + len(body.sizes) for body in bodies]).tolist()
+
+    def warn(rows: np.ndarray) -> None:
+        arm = np.sqrt((rows[:, ends[-1] :].reshape(len(rows), -1, 3) ** 2).sum(axis=2)).sum(axis=1)
+        found = []
+        for body, first, last in zip(bodies, [0, *ends], ends, strict=False):
+            mass, largest, sizes = rows[:, first], rows[:, first + 1 : first + 4].max(axis=1), rows[:, first + 4 : last]
+            radius = np.sqrt(np.maximum(largest, 0.0) / np.where(mass > 0.0, mass, np.inf))
+            length = np.sqrt((sizes * sizes).sum(axis=1)) if body.sizes else arm
+            least = GYRATION * length if body.sizes else np.maximum(GYRATION * length, LEAST_GYRATION)
+            bad = (length > 0.0) & (radius > least)
+            if bad.any():
+                row = int(np.where(bad, radius / np.where(bad, least, 1.0), 0.0).argmax())
+                found.append((body, float(radius[row]), float(length[row]), float(largest[row])))
+        if not found or scope.complaints.error_count:
+            return
+        body, radius, length, largest = max(found, key=lambda each: each[1] / each[2])
+        helps = [
+            f"it would be of {radius / math.sqrt(times):.4g} m, were it in {unit}: "
+            f"`{largest:.6g} {unit}` is {largest / times:.4g} kg*m^2"
+            for times, unit in OTHER_INERTIAS
+            if radius / math.sqrt(times) <= 2.0 * length
+        ]
+        beside = f"its shape is {length:.4g} m large" if body.sizes else f"its arm is {length:.4g} m long"
+        scope.complaints.remark(
+            "D298",
+            f"{body.name} has the inertia of a body of {radius:.4g} m (its radius of gyration){_others(len(found))}, "
+            f"and {beside}",
+            next((each.origin.place for each in body.moments if each.origin.place), body.place),
+            help=[*helps[:1], "look at the units of its mass and of its inertia", MEANT.format("D298")],
+        )
+
+    _together(scope, [*settled, *(each for each in vectors if each is not None)], warn, bodies)
+
+
+def _others(count: int) -> str:
+    """A remark in words that others are so too, beside the one that is told."""
+    return f", and {count - 1} more {'is' if count == 2 else 'are'} so" if count > 1 else ""
+
+
+def _together(
+    scope: Scope, settled: Sequence[Settled], warn: Callable[[np.ndarray], None], bodies: Sequence[WeighedBody]
+) -> None:
+    if bodies:
+        values: tuple[Real, ...] = tuple(each.value for each in settled)  # type: ignore[misc]  # they are numbers
+        scope.checks.observe(values, warn, bodies[0].place, needs=tuple(body.head for body in bodies))

@@ -1,0 +1,152 @@
+"""Numbers and bodies of a size that is not found are warned of, with the unit that may have been meant; others are not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, messages
+from tests.oracles.random_deck import random_deck
+
+BODY = "mass = 2 kg; shape = rod(length = 1 m, along = x);"
+ONE = "arm swing {{ link bar {{ {} }} joint hinge revolute {{ parent = base; child = bar; axis = z; {} }} }}\n"
+
+
+def arm(body: str = BODY, joint: str = "") -> str:
+    return ONE.format(body, joint)
+
+
+def inside(text: str) -> str:
+    return changed(RUN, ("duration", f"{text}\n    duration"))
+
+
+def shown(folder: Path, *parts: str) -> str:
+    """What is said of a deck, without the counting line."""
+    return messages(check(folder, *parts, select="all")).rpartition("\n\n")[0] + "\n"
+
+
+def test_a_gravity_in_millimetres_is_told_with_what_would_be_usual(tmp_path: Path) -> None:
+    assert (
+        shown(tmp_path, ARM, SERVO, inside("environment { gravity = [0, 0, -9810] m/s^2; }"))
+        == """\
+warning[D297]: `environment.gravity.g.z` is -9810 m/s^2, and the Sun's surface has 274 m/s^2
+  --> deck.ic:15:36
+   |
+15 |     environment { gravity = [0, 0, -9810] m/s^2; }
+   |                                    ^^^^^
+   = help: 1,000 times less would be -9.81 m/s^2: is a unit another, or missing?
+   = help: if it is meant so, `allow D297 because "...";`
+"""
+    )
+
+
+def test_an_inertia_in_square_millimetres_is_told_with_the_unit(tmp_path: Path) -> None:
+    body = "mass = 1 kg; com = [0.3, 0, 0] m; inertia = [200, 30000, 30000] kg*m^2;"
+    said = shown(tmp_path, arm(body), SERVO, RUN)
+    assert (
+        "warning[D298]: link `bar` has the inertia of a body of 173.2 m (its radius of gyration), and its arm is "
+        in said
+    )
+    assert "  = help: it would be of 0.1732 m, were it in kg*mm^2: `30000 kg*mm^2` is 0.03 kg*m^2\n" in said
+
+
+@pytest.mark.parametrize(
+    ("body", "said", "cure"),
+    [
+        ("1000 kg; shape = box(size = [1, 1, 1] mm)", "1e+12 kg/m^3", "with sizes 1,000 times larger it would be 1000 kg"),
+        ("3000 kg; shape = cylinder(radius = 2 cm, length = 30 cm, along = x)", "7.958e+06 kg/m^3",
+         "with 1,000 times less mass it would be 7958 kg/m^3"),
+        ("1 kg; shape = sphere(radius = 50 m)", "1.91e-06 kg/m^3", "with a thousandth of the sizes it would be 1910 kg"),
+        ("1000 kg; shape = rod(length = 1 mm, along = x)", "1e+06 kg/m", "with 1,000 times less mass it would be 1000 kg/m"),
+    ],
+)  # fmt: skip
+def test_a_body_that_nothing_is_made_of_is_told_with_a_cure(tmp_path: Path, body: str, said: str, cure: str) -> None:
+    found = shown(tmp_path, arm(f"mass = {body};"), SERVO, RUN)
+    assert f"warning[D298]: link `bar` would be of {said}, and " in found and f"= help: {cure}" in found
+
+
+@pytest.mark.parametrize(
+    ("parts", "path"),
+    [
+        ((arm("mass = 1 kg; shape = rod(length = 1e6 m, along = x);"), RUN), "links.bar.shape.length"),
+        ((arm("mass = 1e-9 kg; shape = rod(length = 1 m, along = x);"), RUN), "links.bar.mass"),
+        ((arm("mass = 1 kg; com = [3, 0, 0] km; inertia = [1, 1, 1] kg*m^2;"), RUN), "links.bar.com.x"),
+        ((arm(joint="at = [300, 0, 0] m;"), RUN), "hinge.at.x"),
+        ((ARM, inside("initial { hinge.qd = 1e5 rad/s; }")), "initial.hinge.qd"),
+    ],
+)  # fmt: skip
+def test_numbers_beyond_what_there_is_are_told(tmp_path: Path, parts: tuple[str, str], path: str) -> None:
+    found, run = parts
+    said = [each for each in check(tmp_path, found, SERVO, run, select="all").diagnostics if each.code == "D297"]
+    assert len(said) == 1 and said[0].message.startswith(f"`{path}` is ")
+
+
+def test_of_many_numbers_of_one_kind_the_worst_is_told(tmp_path: Path) -> None:
+    said = shown(tmp_path, arm(joint="at = [300, 450, 0] m;"), SERVO, RUN)
+    assert "warning[D297]: `hinge.at.y` is 450 m, and 1 more is so, and the longest links " in said
+
+
+def test_one_row_of_a_sweep_is_told(tmp_path: Path) -> None:
+    sweep = "sweep s of hold { vary swing.links.bar.mass = [1, 2, 1e-8, 3] kg; }\n"
+    assert codes(tmp_path, ARM, SERVO, RUN, sweep, select="s") == ["D297"]
+    assert codes(tmp_path, ARM, SERVO, RUN, sweep.replace("1e-8", "1e-3"), select="s") == []
+
+
+def test_a_torque_constant_in_milli_is_told(tmp_path: Path) -> None:
+    servo = changed(SERVO, ("kt = 0.05", "kt = 600"), ("resistance = 1 ohm", "resistance = 1e8 ohm"))
+    assert [code for code in codes(tmp_path, ARM, servo, RUN) if code == "D297"] == ["D297"]
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "mass = 1 kg; shape = sphere(radius = 1 cm);",  # a mass that is drawn as a small ball
+        "mass = 0 kg;",
+        "mass = 1 kg; com = [0, 0, 0] m; inertia = [500, 500, 500] kg*m^2;",  # of no length: its mass does not count
+        "mass = 1 kg; com = [0.1, 0, 0] mm; inertia = [1, 1, 1] kg*m^2;",  # a rotor that is nearly balanced
+        "mass = 1 kg; com = [0.5, 0, 0] m; inertia = [1e-9, 1e-9, 1e-9] kg*m^2;",  # nearly a point
+        "mass = 20 kg; shape = box(size = [10, 3, 0.1] m);",  # a panel of solar cells
+        "mass = 400 t; com = [10, 0, 0] m; inertia = [1e8, 2e8, 2e8] kg*m^2;",  # a station
+    ],
+)
+def test_what_is_only_rare_is_not_told(tmp_path: Path, body: str) -> None:
+    found = codes(tmp_path, arm(body), SERVO, RUN)
+    assert not {"D297", "D298"} & set(found)
+
+
+def test_an_inertia_that_no_body_of_the_shape_has_is_told_at_the_inertia(tmp_path: Path) -> None:
+    body = "mass = 2 kg; shape = box(size = [0.3, 0.1, 0.1] m);\n inertia = [3e3, 2e4, 2e4] kg*m^2;"
+    [found] = check(tmp_path, arm(body), SERVO, RUN).diagnostics
+    assert found.code == "D298" and found.at is not None and found.at.place.line == 2
+    assert found.message.endswith(" m (its radius of gyration), and its shape is 0.3317 m large")
+    assert codes(tmp_path, arm(body.replace("3e3", "3e-3").replace("2e4", "2e-2")), SERVO, RUN) == []
+
+
+def test_a_mistake_in_all_links_is_told_once(tmp_path: Path) -> None:
+    two = "arm swing {{ link bar {{ {0} }} link tip {{ {0} }} joint hinge revolute {{ parent = base; child = bar; axis = z; }} "
+    two += "joint wrist revolute {{ parent = bar; child = tip; axis = z; at = [0.3, 0, 0] m; }} }}\n"
+    dense = two.format("mass = 900 kg; shape = cylinder(radius = 1 mm, length = 30 mm, along = x);")
+    [found] = check(tmp_path, dense, SERVO, RUN).diagnostics
+    assert found.message == "link `bar` would be of 9.549e+09 kg/m^3, and 1 more is so, and solids have 1 to 22,600"
+    large = two.format("mass = 1 kg; com = [0.2, 0, 0] m; inertia = [2e4, 2e4, 2e4] kg*m^2;")
+    [found] = check(tmp_path, large, SERVO, RUN).diagnostics
+    assert found.message.startswith(
+        "link `bar` has the inertia of a body of 141.4 m (its radius of gyration), and 1 more"
+    )
+
+
+def test_one_mistake_is_told_once(tmp_path: Path) -> None:
+    """A box of which the sizes are told is not told as a body besides."""
+    assert codes(tmp_path, arm("mass = 2 kg; shape = box(size = [400, 80, 80] m);"), SERVO, RUN) == ["D297"]
+    assert codes(tmp_path, arm("mass = 1e-9 kg; shape = sphere(radius = 1 m);"), SERVO, RUN) == ["D297"]
+
+
+def test_it_may_be_allowed(tmp_path: Path) -> None:
+    run = inside('environment { gravity = [0, 0, -400] m/s^2; } allow D297 because "a centrifuge";')
+    assert codes(tmp_path, ARM, SERVO, run) == []
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_sane_decks_are_told_nothing_of_it(tmp_path: Path, seed: int) -> None:
+    assert not {"D296", "D297", "D298"} & set(codes(tmp_path, random_deck(seed)))
