@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 
 from met import models
-from met.analysis.loops import Loops, Unstable, closed
+from met.analysis.blame import Loops, Unstable, closed
+from met.analysis.loops import ticking
 from met.analysis.modes import FAST, TELLING, Mode, modes, of_lane, slowest
 from met.analysis.step_map import Linearizer, StepMap
 from met.diagnostic import Problem
@@ -95,8 +96,8 @@ def step_size(experiment: Experiment, cases: Sequence[int]) -> StepSize:
     found, sampled = linearizer.map(), linearizer.sampled()
     every = list(modes(found, integrator))
     steps, h = schedule.ticks // schedule.dynamics, found.h
-    loops = closed(experiment, sampled) if sampled is not None else Loops((), frozenset())
-    held = {law.joint for law in sampled.laws} if sampled is not None else set()
+    loops = closed(linearizer, sampled, schedule.duration) if sampled is not None else Loops((), frozenset())
+    held = ticking(sampled) if sampled is not None else frozenset()
     faults: list[StepFault] = []
 
     def fault(kind: Literal["grows", "misses", "fast"], mode: Mode, figure: float, truth: float, after: float) -> None:
