@@ -6,13 +6,13 @@ A loop is to blame for what grows with its gain, and does not without: what fall
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
 
-from met.analysis.loops import Gains, fastest, growing, growths, least, ticking
+from met.analysis.loops import Gains, growths
 from met.analysis.step_map import Linearizer, SampledLoops
 from met.frozen import frozen
 
@@ -55,20 +55,13 @@ class Unstable:
     parameters: Mapping[str, float] = field(default_factory=dict)
 
 
-@frozen
-class Loops:
-    """The findings on the loops: those that are unstable, the one that wants the smallest gain first; and lanes of
-    which nothing grows, whatever the step alone does: their laws hold it."""
-
-    unstable: tuple[Unstable, ...]
-    quiet: frozenset[int]
-
-
-def closed(linearizer: Linearizer, found: SampledLoops, duration: float) -> Loops:
-    """The loops of each lane, over a run of so many seconds."""
-    rates, several, seen = fastest(found), dict[tuple[str, ...], Unstable](), set[str]()
-    opened = Opened(linearizer, found)
-    for lane, limit, ticks in growing(found, rates, duration):
+def closed(
+    linearizer: Linearizer, found: SampledLoops, lanes: Iterable[tuple[int, float, bool]]
+) -> tuple[Unstable, ...]:
+    """The loops that make lanes grow, the one that wants the largest change first; lanes: as
+    `met.analysis.loops.growing` has them."""
+    several, seen, opened = dict[tuple[str, ...], Unstable](), set[str](), Opened(linearizer, found)
+    for lane, limit, ticks in lanes:
         case = opened.lane(lane, limit, ticks)
         concerned = case.concerned()
         if seen and concerned <= seen:
@@ -76,8 +69,7 @@ def closed(linearizer: Linearizer, found: SampledLoops, duration: float) -> Loop
         seen |= concerned
         for each in opened.blamed(case):
             several.setdefault(each.joints, each)
-    quiet = np.flatnonzero(rates <= least(found, duration)).tolist() if ticking(found) else []
-    return Loops(tuple(sorted(several.values(), key=needs)), frozenset(quiet))
+    return tuple(sorted(several.values(), key=needs))
 
 
 def needs(each: Unstable) -> tuple[float, float]:

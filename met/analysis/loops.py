@@ -16,7 +16,6 @@ import numpy as np
 
 from met.analysis.laws import SampledLaw
 from met.analysis.step_map import SampledLoops, linear_step
-from met.frozen import frozen
 
 MOST_EVENTS = 2000
 """Ticks and steps in a frame, above which it is not looked at."""
@@ -34,19 +33,6 @@ Gains = Mapping[str, float]
 """Shares of the gains of joints' laws; 1 where nothing is said."""
 
 
-@frozen
-class _Closed:
-    """The arm over which laws are closed that have no ticks.
-
-    slope  1/s: [..., state, state and memory], the state with these laws' integrals
-    cells  which of all states and memory these are
-    """
-
-    slope: np.ndarray
-    states: int
-    cells: np.ndarray
-
-
 def _rows(law: SampledLaw, lane: int | np.ndarray, gains: Gains | None, direct: bool) -> np.ndarray:
     """The slopes of a law whose gain is scaled; direct: that sees what is so."""
     rows = (law.direct if direct and law.direct.shape[1] else law.slope)[lane].copy()
@@ -56,11 +42,13 @@ def _rows(law: SampledLaw, lane: int | np.ndarray, gains: Gains | None, direct: 
 
 def _over(
     found: SampledLoops, lane: int | np.ndarray, gains: Gains | None, direct: bool, laws: Sequence[SampledLaw]
-) -> _Closed:
-    """The arm with these laws closed as though they had no ticks. Raises LinAlgError where an output answers itself."""
+) -> tuple[np.ndarray, int, np.ndarray]:
+    """The arm with these laws closed as though they had no ticks: slopes by state and memory, 1/s, [..., state, state
+    and memory], where the state has these laws' integrals; how many are of it; and which of all states and memory these
+    are. Raises LinAlgError where an output answers itself."""
     A, (n, m), places = found.slope[lane], (found.states, len(found.held)), {c: k for k, c in enumerate(found.held)}
     if not laws:
-        return _Closed(A, n, np.arange(n + m))
+        return A, n, np.arange(n + m)
     made = np.broadcast_to(np.eye(m, n + m, n), (*A.shape[:-2], m, n + m)).copy()  # what a tick makes of memory
     kinds, periods = np.zeros(m, dtype=int), np.ones(m)
     for law in laws:
@@ -74,7 +62,7 @@ def _over(
     answer = np.linalg.solve(np.eye(len(o)) - own[..., o], own[..., kept])
     integrals = (made[..., i, :] - np.eye(m, n + m, n)[i]) / periods[i, None]
     slopes = np.concatenate([A[..., :n, :], integrals], axis=-2)
-    return _Closed(slopes[..., kept] + slopes[..., o] @ answer, n + len(i), kept)
+    return slopes[..., kept] + slopes[..., o] @ answer, n + len(i), kept
 
 
 def frame(
@@ -87,9 +75,8 @@ def frame(
     direct  whether laws see what is so, without their sensors
     """
     laws = [law for law in found.laws if not law.continuous]
-    base = _over(found, lane, gains, direct, [law for law in found.laws if law.continuous])
-    A, n, p, m = base.slope, base.states, found.positions, base.slope.shape[-1] - base.states
-    held = [found.held[cell - found.states] for cell in base.cells[n:].tolist()]
+    A, n, cells = _over(found, lane, gains, direct, [law for law in found.laws if law.continuous])
+    p, m, held = found.positions, len(cells) - n, [found.held[cell - found.states] for cell in cells[n:].tolist()]
     h, d, hz, over = found.h, found.divisor, found.base_hz, A.shape[:-2]
     size = 2 * n + 2 * m
     x, u, first, before = (slice(a, b) for a, b in ((0, n), (n, n + m), (n + m, n + 2 * m), (n + 2 * m, size)))
@@ -109,7 +96,7 @@ def frame(
     latch = np.eye(size)
     latch[first, u], latch[first, first] = np.eye(m), 0.0
     places = [np.array([n + held.index(name) for name in law.memory], dtype=int) for law in laws]
-    slopes = [_rows(law, lane, gains, direct)[..., base.cells] for law in laws]
+    slopes = [_rows(law, lane, gains, direct)[..., cells] for law in laws]
     ticks: dict[tuple[float, tuple[bool, ...]], np.ndarray] = {}
     length = math.lcm(d, *(each.divisor for each in laws))
     whole = unchanged()
@@ -172,7 +159,7 @@ def growths(
         with np.errstate(divide="ignore"):
             return np.asarray(np.log(sizes) / seconds(found))
     try:
-        return _eigenvalues(_over(found, lanes, gains, direct, found.laws).slope).real
+        return _eigenvalues(_over(found, lanes, gains, direct, found.laws)[0]).real
     except np.linalg.LinAlgError:
         return np.full((len(lanes), 1), math.inf)
 
@@ -190,18 +177,18 @@ def fastest(found: SampledLoops) -> np.ndarray:
     at."""
     length, rates = _length(found), np.full(len(found.case), math.inf)
     if length // found.divisor + sum(length // each.divisor for each in found.laws) <= MOST_EVENTS:
-        lanes = _numbers(found)
+        lanes = np.flatnonzero(_numbers(found))
         if len(lanes):
             rates[lanes] = growths(found, lanes, ticks=True).max(1, initial=-math.inf)
     return rates
 
 
 def _numbers(found: SampledLoops) -> np.ndarray:
-    """The lanes all of whose slopes are numbers."""
+    """True for the lanes all of whose slopes are numbers."""
     numbers = np.isfinite(found.slope).all((1, 2))
     for law in found.laws:
         numbers &= np.isfinite(law.slope).all((1, 2))
-    return np.flatnonzero(numbers)
+    return np.asarray(numbers)
 
 
 def least(found: SampledLoops, duration: float) -> float:
@@ -219,7 +206,7 @@ def growing(found: SampledLoops, rates: np.ndarray, duration: float) -> Iterator
     told = (limit < rates) & (rates < math.inf)
     for lane in np.flatnonzero(told)[np.argsort(-rates[told], kind="stable")].tolist():
         yield lane, limit, True
-    quiet = np.setdiff1d(_numbers(found), np.flatnonzero(told))
+    quiet = np.flatnonzero(_numbers(found) & ~told)
     if slowest < limit and len(quiet):
         analog = growths(found, quiet, ticks=False).max(1, initial=-math.inf)
         for at in np.argsort(-analog, kind="stable").tolist():

@@ -18,7 +18,7 @@ from met.analysis.blame import Opened, Unstable, needs
 from met.analysis.loops import fastest, growing, growths, least, ticking
 from met.analysis.margin import Margin, ends_of_motion, margins, rotor_inertias
 from met.analysis.modes import FAST, TELLING, Mode, modes
-from met.analysis.step_map import Linearizer, SampledLoops, StepMap
+from met.analysis.step_map import Linearizer, StepMap
 from met.analysis.step_size import Remedy, StepFault, chosen_cases, owner_of, remedy, step_size
 from met.frozen import frozen
 from met.integrators.integrator import Integrator
@@ -120,7 +120,7 @@ def lasting(experiment: Experiment, passed: Passed) -> tuple[Lasting, ...]:
         isinstance(each.fault, StepFault) and each.fault.mode.grows_in_truth(schedule.step) for each in every[0]
     ]
     if sampled is not None and all(in_truth):
-        every.append(_loops(Opened(linearizer, sampled), sampled, times, seen.stretches, schedule.duration))
+        every.append(_loops(Opened(linearizer, sampled), times, seen.stretches, schedule.duration))
         every[0] = [] if every[-1] else every[0]
     found = []
     for several in every:
@@ -288,9 +288,10 @@ def _lasting_ones(
 
 
 def _loops(
-    opened: Opened, found: SampledLoops, times: np.ndarray, stretches: Sequence[tuple[int, int]], duration: float
+    opened: Opened, times: np.ndarray, stretches: Sequence[tuple[int, int]], duration: float
 ) -> list[_Candidate]:
-    """The loops that are unstable for longest."""
+    """The loops that are unstable for longest: with nothing wound up in their laws, as in all loose lanes."""
+    found = opened.loops
     rates, ticks = np.full(len(times), -math.inf), np.zeros(len(times), bool)
     for lane, limit, by_ticks in growing(found, fastest(found), duration):
         if opened.lane(lane, limit, by_ticks).concerned():
@@ -301,7 +302,7 @@ def _loops(
         for _, first, last in _lasting_ones(shown, stretches)
     ]
     for grown, first, last in sorted(several, reverse=True):
-        lane = first + int(np.argmax(rates[first : last + 1]))
+        lane = first + int(np.argmax(np.round(rates[first : last + 1] / rates[first : last + 1].max(), 4)))
         limit = GROWS / (times[last] - times[first])
         blame = opened.blamed(opened.lane(lane, limit, bool(ticks[lane]))) if grown > GROWS else []
         if blame:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from met import run as engine
-from met.analysis.blame import Loops, closed
-from met.analysis.loops import frame
+from met.analysis.blame import Unstable, closed
+from met.analysis.loops import fastest, frame, growing
 from met.analysis.step_map import Linearizer
 from met.plan import Experiment
 from tests.ic.small_decks import changed, check, experiment
@@ -42,11 +42,11 @@ def deck(kp: float, command: str = "rate(0.1 rad/s)") -> str:
     return changed(DECK, ("KP", repr(kp)), ("COMMAND", command))
 
 
-def loops(experiment: Experiment) -> Loops:
+def loops(experiment: Experiment) -> tuple[Unstable, ...]:
     linearizer = Linearizer(experiment, [0])
     sampled = linearizer.sampled()
     assert sampled is not None
-    return closed(linearizer, sampled, experiment.structure.schedule.duration)
+    return closed(linearizer, sampled, growing(sampled, fastest(sampled), experiment.structure.schedule.duration))
 
 
 def test_the_factor_of_a_rate_loop_is_that_of_the_closed_form(tmp_path: Path) -> None:
@@ -59,8 +59,8 @@ def test_the_factor_of_a_rate_loop_is_that_of_the_closed_form(tmp_path: Path) ->
 
 def test_its_limit_is_that_of_the_closed_form(tmp_path: Path) -> None:
     """The gain that is named is where the loop grows by e over the run: a little above the limit."""
-    assert loops(experiment(tmp_path, deck(0.99 * LIMIT))).unstable == ()
-    (found,) = loops(experiment(tmp_path, deck(2.0 * LIMIT))).unstable
+    assert loops(experiment(tmp_path, deck(0.99 * LIMIT))) == ()
+    (found,) = loops(experiment(tmp_path, deck(2.0 * LIMIT)))
     assert found.joints == ("hinge",) and found.gain == pytest.approx(0.5, rel=0.01)
 
 
@@ -81,7 +81,7 @@ def test_it_is_on_the_right_side_of_the_limit_of_runs(hz: int, tmp_path: Path) -
         low, high = (low, middle) if grows(middle) else (middle, high)
     for share, count in ((0.95, 0), (1.05, 1)):
         made = experiment(tmp_path, changed(deck(share * high), ("dynamics = 10 kHz", f"dynamics = {hz} Hz")))
-        assert len(loops(made).unstable) == count, (share, high)
+        assert len(loops(made)) == count, (share, high)
 
 
 TWO = """\
@@ -200,6 +200,6 @@ def test_a_sensors_filter_and_its_delay_are_part_of_a_loop(tmp_path: Path) -> No
 def test_steps_and_noise_of_a_sensor_are_no_change_of_its_slope(sensor: str, tmp_path: Path) -> None:
     for made in (deck(0.99 * LIMIT), deck(2.0 * LIMIT)):
         coarse = changed(made, ("    kt", f"    sensor qd = {sensor}\n    kt"))
-        assert [each.gain for each in loops(experiment(tmp_path, coarse)).unstable] == pytest.approx(
-            [each.gain for each in loops(experiment(tmp_path, made)).unstable], rel=2e-3
+        assert [each.gain for each in loops(experiment(tmp_path, coarse))] == pytest.approx(
+            [each.gain for each in loops(experiment(tmp_path, made))], rel=2e-3
         )
