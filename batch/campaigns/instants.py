@@ -24,7 +24,7 @@ from met.passing import Memories, even_ticks
 from met.plan import Experiment
 from met.run import DONE
 
-CODES = ("D317", "D318", "D319", "D320", "D321")
+CODES = ("D317", "D318", "D319", "D320", "D321", "D322")
 
 SHARE = 0.03
 """Of a campaign's steps: so much more is done to look at some of its cases again. A block is run, whatever is in it."""

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from met.analysis.step_map import LaneTape
+from met.analysis.lanes import LaneTape
 from met.backends.reference.plain import PlainTape, follow
 from met.frozen import frozen
 from met.plan import Experiment

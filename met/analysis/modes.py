@@ -77,6 +77,10 @@ class Mode:
             return 0.0
         return max(0.0, steps * (self.growth - max(0.0, h * self.root.real)))
 
+    def grows_in_truth(self, h: float) -> bool:
+        """True where half of its growth and more is none of the step's."""
+        return 0.0 < self.growth <= 2.0 * h * self.root.real
+
     def missed(self, h: float, steps: int) -> tuple[float, float, int]:
         """Its size in the run and in truth, as shares of that at its start, and the step after which they differ most;
         (1, 1, 0) of a mode that grows, or does not swing."""

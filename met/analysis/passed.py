@@ -14,10 +14,11 @@ from typing import TypeVar
 import numpy as np
 
 from met import models
-from met.analysis.loops import LEAST, Unstable, blamed, frame_growths
+from met.analysis.blame import Opened, Unstable, needs
+from met.analysis.loops import fastest, growing, growths, least, ticking
 from met.analysis.margin import Margin, ends_of_motion, margins, rotor_inertias
 from met.analysis.modes import FAST, TELLING, Mode, modes
-from met.analysis.step_map import Linearizer, SampledLoops, StepMap
+from met.analysis.step_map import Linearizer, StepMap
 from met.analysis.step_size import Remedy, StepFault, chosen_cases, owner_of, remedy, step_size
 from met.frozen import frozen
 from met.integrators.integrator import Integrator
@@ -108,16 +109,19 @@ def lasting(experiment: Experiment, passed: Passed) -> tuple[Lasting, ...]:
     linearizer = Linearizer(experiment, passed.case.tolist(), passed.memory)
     sampled, as_it_is, times = linearizer.sampled(), linearizer.sampled(loose=False), passed.tick / schedule.base_hz
     quiet = np.zeros(len(times), bool)
-    if as_it_is is not None:
-        growths, frame = frame_growths(as_it_is)
-        quiet = growths <= max(LEAST, GROWS * frame / schedule.duration)
+    if as_it_is is not None and ticking(as_it_is):
+        quiet = fastest(as_it_is) <= least(as_it_is, schedule.duration)
     seen = _Seen(_by_owner(as_run(linearizer.map()), integrator, len(times)), times, _stretches(passed), schedule.step)
-    held = {law.joint for law in sampled.laws} if sampled is not None else set()
+    held = ticking(sampled) if sampled is not None else frozenset()
     every = [seen.growing(quiet), seen.missed(held)]
     if not any(every):
         every.append(seen.fast())
-    if sampled is not None and not every[0]:
-        every.append(_loops(sampled, times, seen.stretches, schedule.duration))
+    in_truth = [
+        isinstance(each.fault, StepFault) and each.fault.mode.grows_in_truth(schedule.step) for each in every[0]
+    ]
+    if sampled is not None and all(in_truth):
+        every.append(_loops(Opened(linearizer, sampled), times, seen.stretches, schedule.duration))
+        every[0] = [] if every[-1] else every[0]
     found = []
     for several in every:
         if several:
@@ -162,7 +166,7 @@ class _Seen:
                 found.append(_Candidate(grown, fault, worst.lane, first, last))
         return found
 
-    def missed(self, held: set[str]) -> list[_Candidate]:
+    def missed(self, held: frozenset[str]) -> list[_Candidate]:
         """The mode that swings and is damped, or not damped, as it is not in truth: all the time, as of the best
         instant."""
         shown = self._of(lambda mode, _: abs(mode.root.imag) > abs(mode.root.real))
@@ -284,21 +288,25 @@ def _lasting_ones(
 
 
 def _loops(
-    found: SampledLoops, times: np.ndarray, stretches: Sequence[tuple[int, int]], duration: float
+    opened: Opened, times: np.ndarray, stretches: Sequence[tuple[int, int]], duration: float
 ) -> list[_Candidate]:
-    """The loops that are unstable for longest, by their ticks."""
-    growths, frame = frame_growths(found)
-    least = max(LEAST, GROWS * frame / duration)
-    shown = [{"": None} if least < growth < math.inf else {} for growth in growths.tolist()]
+    """The loops that are unstable for longest: with nothing wound up in their laws, as in all loose lanes."""
+    found = opened.loops
+    rates, ticks = np.full(len(times), -math.inf), np.zeros(len(times), bool)
+    for lane, limit, by_ticks in growing(found, fastest(found), duration):
+        if opened.lane(lane, limit, by_ticks).concerned():
+            ticks[lane], rates[lane] = by_ticks, growths(found, np.array([lane]), ticks=by_ticks).max()
+    shown = [{"": None} if rate > 0.0 else {} for rate in rates.tolist()]
     several = [
-        (_over(growths[first : last + 1].tolist(), times[first : last + 1], frame), first, last)
+        (_over(rates[first : last + 1].tolist(), times[first : last + 1], 1.0), first, last)
         for _, first, last in _lasting_ones(shown, stretches)
     ]
     for grown, first, last in sorted(several, reverse=True):
-        lane = first + int(np.argmax(growths[first : last + 1]))
-        blame = blamed(found, lane, GROWS * frame / (times[last] - times[first])) if grown > GROWS else []
+        lane = first + int(np.argmax(np.round(rates[first : last + 1] / rates[first : last + 1].max(), 4)))
+        limit = GROWS / (times[last] - times[first])
+        blame = opened.blamed(opened.lane(lane, limit, bool(ticks[lane]))) if grown > GROWS else []
         if blame:
-            return [_Candidate(grown, min(blame, key=lambda each: each.gain), lane, first, last)]
+            return [_Candidate(grown, min(blame, key=needs), lane, first, last)]
     return []
 
 

@@ -9,33 +9,24 @@ one. Where it does not, the second has the change of A within the step too, and 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from met.analysis import laws
+from met.analysis.lanes import SMALL, SMALL_STATE, LaneTape, differences, to_both_sides
+from met.analysis.laws import SampledLaw
 from met.frozen import frozen
 from met.integrators.integrator import Integrator, Motion, Slope
+from met.parameter import Parameter
 from met.plan import Experiment
 from met.program import cell_names
 from met.program.build import Builder
-from met.program.control import sensing
-from met.program.evaluation import law
 from met.program.motion import bodies
 from met.program.step import STAGE
-from met.program.system import Actuator, System
-from met.program.values import NamedValues
-from met.servos.servo import Setpoint
-from met.trace import Real, Truth
-from met.trace.program import CallPhase, Control, Every, RunPhase, Unless0, WhileAny
-
-SMALL = 1e-6
-"""Change of a position or a rate by which differences are taken, as a share of it, or of 1 rad, 1 m, 1 rad/s, 1 m/s."""
-
-SMALL_STATE = 1e-9
-"""The same of a state of a servo or sensor, in its unit: some live in micrometres, and none of them turns the arm."""
+from met.program.system import System
 
 
 @frozen
@@ -64,27 +55,11 @@ class StepMap:
 
 
 @frozen
-class SampledLaw:
-    """The linearised law of a servo that ticks: what a tick makes of state and memory.
-
-    memory   its cells: outputs, then integrals;  outputs: how many of them are outputs
-    divisor  ticks of the base rate from one to the next
-    slope    [lane, memory, state and all servos' memory]
-    """
-
-    joint: str
-    divisor: int
-    memory: tuple[str, ...]
-    outputs: int
-    slope: np.ndarray
-
-
-@frozen
 class SampledLoops:
-    """Arms, loose or as the run has them, with the laws that tick on them.
+    """Arms, loose or as the run has them, with the laws on them.
 
     case    rows of the case table
-    states  how many cells are of the state, positions first;  held: cells of the laws' memory
+    states  how many cells are of the state, positions first;  held: cells of the memory of laws and their sensors
     slope   A: [lane, state, state and memory], 1/s
     h       length of the step, s;  divisor: in ticks of the base rate, base_hz
     """
@@ -101,98 +76,26 @@ class SampledLoops:
     base_hz: float
 
 
-class LaneTape:
-    """A `Tape` over arrays: one number a lane, where the lanes differ."""
-
-    def __init__(self, base_hz: float, inputs: Mapping[str, np.ndarray], lanes: int) -> None:
-        self.base_hz = base_hz
-        self.inputs = dict(inputs)
-        self.cells: dict[str, Any] = {}
-        self.lanes = lanes
-        self.k = 0
-
-    @property
-    def tick(self) -> Real:
-        return np.float64(self.k)
-
-    @property
-    def time(self) -> Real:
-        return np.float64(self.k) / np.float64(self.base_hz)
-
-    def read(self, name: str) -> Real:
-        found: Real = self.cells.get(name, ZERO)
-        return found
-
-    def write(self, name: str, value: Any) -> None:
-        self.cells[name] = value if value.__class__ is np.ndarray else np.float64(value)
-
-    def read_mask(self, name: str) -> Truth:
-        found: Any = self.cells.get(name, ZERO) != 0.0
-        truth: Truth = found if isinstance(found, np.ndarray) else bool(found)  # type: ignore[assignment]
-        return truth
-
-    def write_mask(self, name: str, value: Any) -> None:
-        self.cells[name] = np.where(value, 1.0, 0.0) if isinstance(value, np.ndarray) else np.float64(bool(value))
-
-    def input(self, name: str) -> Real:
-        found: Any = self.inputs[name]
-        return found
-
-    def record(self, column: int, value: Real) -> None:
-        """Nothing is kept of a row."""
-
-    def output(self, name: str, value: Real) -> None:
-        """Nothing is kept of an end."""
-
-    def part(self, name: str) -> AbstractContextManager[None]:
-        return nullcontext()
-
-    def lane(self, name: str) -> np.ndarray:
-        """A cell, one number a lane."""
-        return np.broadcast_to(np.asarray(self.read(name), dtype=float), (self.lanes,))
-
-    def spread(self, times: int) -> LaneTape:
-        """The same with every lane that often, one beside the other."""
-        made = LaneTape(self.base_hz, {}, self.lanes * times)
-        made.k = self.k
-        made.inputs = {name: np.repeat(value, times) for name, value in self.inputs.items()}
-        made.cells = {
-            name: np.repeat(value, times) if isinstance(value, np.ndarray) else value
-            for name, value in self.cells.items()
-        }
-        return made
-
-    def follow(self, body: Iterable[Control]) -> None:
-        """Runs the body once, at the tape's tick; of loops those in which payloads change hands: what repeats until
-        something is decided is not run."""
-        for node in body:
-            match node:
-                case RunPhase(phase) | CallPhase(phase):
-                    phase.body(self)
-                case Every(divisor, inner):
-                    if self.k % divisor == 0:
-                        self.follow(inner)
-                case Unless0(inner):
-                    if self.k > 0:
-                        self.follow(inner)
-                case WhileAny(cell, _, inner):
-                    if cell in ("grappling", "releasing") and np.any(self.lane(cell) != 0.0):
-                        self.follow(inner)
-
-
-ZERO = np.float64(0.0)
-
-
 class Linearizer:
     """The program of an experiment at an instant, the first one or another, for several cases at once: each as it is
     there, where what is at rest and rubs is held, and loose. A motor on a bed lets its joint turn on as it does."""
 
     def __init__(
-        self, experiment: Experiment, cases: Sequence[int], memory: Mapping[str, np.ndarray] | None = None
+        self,
+        experiment: Experiment,
+        cases: Sequence[int],
+        memory: Mapping[str, np.ndarray] | None = None,
+        *,
+        opened: bool = False,
     ) -> None:
         """memory: cells of these cases at instants that they pass, [lane]; a case may be there several times. None:
-        where they begin."""
-        self.system = System(replace(experiment, structure=replace(experiment.structure, metrics=())))
+        where they begin. opened: laws that are continuous are no part of the slopes, but beside them as those that
+        tick."""
+        structure, self._given = experiment.structure, (experiment, cases, memory)
+        self.continuous = frozenset(use.joint for use in structure.servos if use.continuous)
+        if opened:
+            structure = replace(structure, servos=tuple(replace(use, continuous=False) for use in structure.servos))
+        self.system = System(replace(experiment, structure=replace(structure, metrics=())))
         self.builder = Builder(self.system)
         self.cases = np.asarray(cases, dtype=np.int64)
         table = {each.path: each.values[self.cases] for each in experiment.cases.coordinates}
@@ -205,18 +108,31 @@ class Linearizer:
             begun.follow((*step.grapple.events(), *self.builder.computers()))
             step.modes(begun)
         if memory is not None:
-            begun.cells.update({name: memory[name] for name in begun.cells if name in memory})
+            begun.cells.update(
+                {name: at for name, at in memory.items() if name in begun.cells or name.startswith(bodies.PAYLOAD)}
+            )
         self.tape, self.loose = begun.spread(2), np.tile([False, True], lanes)
         self._loosen()
         self.cells = tuple(f"{name}.{part}" for part in ("q", "qd") for name in step.coordinates) + step.states
-        sampled = [each for each in self.system.working if each.ticks and each.command_kind not in ("torque", "none")]
-        self.laws = () if self.system.structure.substitutions else tuple(sampled)
-        self.held = tuple(f"{each.path}.{part.name}" for each in self.laws for part in each.parts.memory)
-        self.wide, self.moved, self.sizes = self._moved((*self.cells, *self.held))
+        driven = [
+            each
+            for each in self.system.working
+            if each.servo.control is not None and each.command_kind not in ("torque", "none")
+        ]
+        if self.system.structure.substitutions:
+            driven = []
+        self.has_laws = bool(driven)
+        self.laws = tuple(each for each in driven if each.ticks)
+        self.held = tuple(name for each in self.laws for name in laws.memory(each))
+        own = tuple(f"{each.path}.{part.name}" for each in self.laws for part in each.parts.memory)
+        wide, moved, sizes = self._moved((*self.cells, *own))
         with np.errstate(all="ignore"):
-            self.wide.cells.update({name: self.moved[name] for name in self.held})
-            self.wide.cells.update({cell_names.FIRST(name): self.moved[name] for name in self.held})
-            self.slope = self._slopes(self.wide, self.moved, self.sizes)
+            wide.cells.update({name: moved[name] for name in own})
+            wide.cells.update({cell_names.FIRST(name): moved[name] for name in own})
+            slope = self._slopes(wide, moved, sizes)
+        self.slope = np.zeros((*slope.shape[:2], len(self.cells) + len(self.held)))
+        places = {name: at for at, name in enumerate((*self.cells, *self.held))}
+        self.slope[:, :, [places[name] for name in (*self.cells, *own)]] = slope
 
     def map(self, *, stages: bool = False) -> StepMap:
         """The map of each case, as it begins and loose. stages: M is of the program's stages."""
@@ -230,18 +146,44 @@ class Linearizer:
             M = self._of_stages() if stages else linear_step(system.integrator, A, positions, h)
         return StepMap(np.repeat(self.cases, 2), self.loose, self.cells, positions, A, M, rate, h)
 
-    def sampled(self, *, loose: bool = True) -> SampledLoops | None:
-        """The cases with their laws that tick, loose or as the run has them; None where none does, or one is on a
-        bed."""
-        if not self.laws:
+    def opened(self) -> Linearizer:
+        """The same with laws that are continuous beside the slopes."""
+        return Linearizer(*self._given, opened=True)
+
+    def sampled(
+        self, *, loose: bool = True, scaled: Mapping[str, Mapping[str, float]] | None = None
+    ) -> SampledLoops | None:
+        """The cases with their laws, loose or as the run has them; None where there is no law that is closed over the
+        arm, or a motor is on a bed.
+
+        scaled  by joint: what parameters of its servo are multiplied by in its law, by name
+        """
+        if not self.has_laws:
             return None
-        step, schedule = self.builder.step, self.builder.step.schedule
+        step, schedule, here = self.builder.step, self.builder.step.schedule, self.loose == loose
+        tape = self.tape.only(here)
         with np.errstate(all="ignore"):
-            laws = tuple(self._law(each, self.loose == loose) for each in self.laws)
+            found = tuple(
+                laws.linearised(
+                    self.builder,
+                    each,
+                    tape,
+                    (*self.cells, *self.held),
+                    continuous=each.use.joint in self.continuous,
+                    scaled=(scaled or {}).get(each.use.joint),
+                )
+                for each in self.laws
+            )
         return SampledLoops(
-            self.cases, len(self.cells), len(step.coordinates), self.held, self.slope[self.loose == loose], laws,
+            self.cases, len(self.cells), len(step.coordinates), self.held, self.slope[here], found,
             self.system.integrator, schedule.step, schedule.dynamics, schedule.base_hz,
         )  # fmt: skip
+
+    def gains(self, joint: str) -> tuple[Parameter, ...]:
+        """The parameters of a joint's servo that are of its law alone."""
+        (actuator,) = (each for each in self.laws if each.use.joint == joint)
+        with np.errstate(all="ignore"):
+            return laws.gains(self.builder, actuator, self.tape.only(self.loose))
 
     def loads(self) -> np.ndarray:
         """Effective inertias of the joints whose motors are on beds, as the run has them, kg m^2 (prismatic: kg):
@@ -251,25 +193,6 @@ class Linearizer:
         of_lanes: list[list[Any]] = [[np.broadcast_to(np.asarray(x), self.tape.lanes) for x in row] for row in Lambda]
         return np.moveaxis(np.array(of_lanes, dtype=float), -1, 0)[~self.loose]
 
-    def _law(self, actuator: Actuator, lanes: np.ndarray) -> SampledLaw:
-        """A law's slopes in these lanes, under a command that its joint be as it is."""
-        joint, parts, moved = actuator.use.joint, actuator.parts, self.moved
-        p = self.system.servo_values(actuator, self.wide.read)
-        states: dict[str, Any] = {each.name: moved[f"{actuator.path}.{each.name}"] for each in parts.natural}
-        q, qd = sensing.measured(
-            actuator, p, moved[f"{joint}.q"], moved[f"{joint}.qd"], NamedValues(actuator.owner, states)
-        )
-        times = self.wide.lanes // self.tape.lanes
-        still: Any = np.repeat(self.tape.lane(f"{joint}.q"), times) if actuator.command_kind == "position" else ZERO
-        seen = self.builder.seen(actuator, q, qd, Setpoint(actuator.command_kind, still, ZERO), ZERO, states)
-        held = {part.name: moved[f"{actuator.path}.{part.name}"] for part in parts.memory}
-        found = law(actuator, p, NamedValues(actuator.owner, held), seen)
-        after: dict[str, Any] = {f"{actuator.path}.{name}": value for name, value in found.outputs.items()}
-        after |= {f"{actuator.path}.{name}": held[name] + seen.period * x for name, x in found.slopes.items()}
-        memory = tuple(f"{actuator.path}.{part.name}" for part in parts.memory)
-        slope = _differences(after, memory, self.sizes)[lanes]
-        return SampledLaw(joint, actuator.use.divisor, memory, len(parts.outputs), slope)
-
     @property
     def _turned(self) -> tuple[str, ...]:
         """Coordinates of free bodies that are turns: at the start they are 0."""
@@ -278,17 +201,12 @@ class Linearizer:
     def _moved(self, cells: Sequence[str]) -> tuple[LaneTape, dict[str, Any], np.ndarray]:
         """A tape with a lane to each side of each of these cells, their values, and the differences: [lane, cell]."""
         tape, turned = self.tape, {f"{name}.q" for name in self._turned}
-        n, lanes, plain = len(cells), tape.lanes, 2 * len(self.builder.step.coordinates)
-        start = np.array([np.zeros(lanes) if name in turned else tape.lane(name) for name in cells])
+        plain = 2 * len(self.builder.step.coordinates)
+        start = np.array([np.zeros(tape.lanes) if name in turned else tape.lane(name) for name in cells])
         size = np.abs(start) * SMALL + SMALL
         size[plain:] = np.abs(start[plain:]) * 1e-7 + SMALL_STATE
-        made = np.empty((n, lanes, n, 2))
-        made[:] = start[:, :, None, None]
-        each = np.arange(n)
-        made[each, :, each, 0] += size
-        made[each, :, each, 1] -= size
-        sizes = made[each, :, each, 0] - made[each, :, each, 1]
-        return tape.spread(2 * n), dict(zip(cells, made.reshape(n, -1), strict=True)), sizes.T
+        moved, sizes = to_both_sides(start, size)
+        return tape.spread(2 * len(cells)), dict(zip(cells, moved, strict=True)), sizes
 
     def _slopes(self, wide: LaneTape, moved: Mapping[str, Any], sizes: np.ndarray) -> np.ndarray:
         """Slopes of the state: [lane, cell, what was moved]."""
@@ -300,7 +218,7 @@ class Linearizer:
         slopes |= {f"{name}.q": moved[f"{name}.qd"] for name in step.coordinates}
         slopes |= {f"{name}.q": wide.read(f"{STAGE}{name}.qd") for name in self._turned}
         slopes |= {name: wide.read(STAGE + cell_names.SLOPE(name)) for name in step.states}
-        return _differences(slopes, self.cells, sizes)
+        return differences(slopes, self.cells, sizes)
 
     def _loosen(self) -> None:
         """Lets go in the loose lanes: rates and what computers hold are 0, and all dry friction is of sliding."""
@@ -326,15 +244,7 @@ class Linearizer:
         ends = {name: wide.lane(name) for name in self.cells}
         for body in free:
             ends |= _turns(body, wide, len(self.cells))
-        return _differences(ends, self.cells, sizes)
-
-
-def _differences(values: Mapping[str, Any], cells: Sequence[str], sizes: np.ndarray) -> np.ndarray:
-    """[lane, of, by] of values in lanes that were moved to both sides; sizes: [lane, by]."""
-    lanes, n = sizes.shape
-    found = np.array([np.broadcast_to(values[name], (lanes * 2 * n,)) for name in cells])
-    pairs = found.reshape(len(cells), lanes, n, 2)
-    return np.moveaxis((pairs[..., 0] - pairs[..., 1]) / sizes, 0, 1)
+        return differences(ends, self.cells, sizes)
 
 
 def linear_step(integrator: Integrator, A: np.ndarray, positions: int, h: float) -> np.ndarray:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from met import models
-from met.analysis.loops import Loops, Unstable, closed
+from met.analysis.loops import fastest, growing, least, ticking
 from met.analysis.modes import FAST, TELLING, Mode, modes, of_lane, slowest
 from met.analysis.step_map import Linearizer, StepMap
 from met.diagnostic import Problem
 from met.frozen import frozen
 from met.integrators.integrator import Integrator
 from met.plan import BASE, Experiment
+
+if TYPE_CHECKING:
+    from met.analysis.blame import Unstable
 
 LANES = 300
 """Names times cases that are looked at, at most: it bounds the time, some 50 ms."""
@@ -95,16 +98,25 @@ def step_size(experiment: Experiment, cases: Sequence[int]) -> StepSize:
     found, sampled = linearizer.map(), linearizer.sampled()
     every = list(modes(found, integrator))
     steps, h = schedule.ticks // schedule.dynamics, found.h
-    loops = closed(experiment, sampled) if sampled is not None else Loops((), frozenset())
-    held = {law.joint for law in sampled.laws} if sampled is not None else set()
+    held = ticking(sampled) if sampled is not None else frozenset()
+    quiet = np.zeros(len(cases), bool)
+    loops: tuple[Unstable, ...] = ()
+    if sampled is not None:
+        rates = fastest(sampled)
+        quiet = rates <= least(sampled, schedule.duration) if held else quiet
+        lanes = list(growing(sampled, rates, schedule.duration))
+        if lanes:
+            from met.analysis.blame import closed
+
+            loops = closed(linearizer, sampled, lanes)
     faults: list[StepFault] = []
 
     def fault(kind: Literal["grows", "misses", "fast"], mode: Mode, figure: float, truth: float, after: float) -> None:
         faults.append(StepFault(kind, mode, *owner_of(mode), figure, truth, after))
 
-    growing = [each for each in every if each.grown(h, steps) > np.log1p(TELLING) and each.lane // 2 not in loops.quiet]
-    if growing:
-        worst = max(growing, key=lambda each: (each.growth, not each.loose))
+    growing_modes = [each for each in every if each.grown(h, steps) > np.log1p(TELLING) and not quiet[each.lane // 2]]
+    if growing_modes:
+        worst = max(growing_modes, key=lambda each: (each.growth, not each.loose))
         fault("grows", worst, worst.growth, 0.0, 0.0)
     missing = [(each, *each.missed(h, steps)) for each in every]
     missing = [one for one in missing if abs(one[1] - one[2]) > TELLING and owner_of(one[0])[1] not in held]
@@ -124,7 +136,7 @@ def step_size(experiment: Experiment, cases: Sequence[int]) -> StepSize:
         max((each.grown(h, steps) for each in every), default=0.0),
         tuple(faults),
         bool(np.isfinite(found.slope).all()),
-        loops.unstable,
+        loops,
         found,
     )
 

@@ -14,7 +14,7 @@ from met.diagnostic import Diagnostic, Label, Place
 from met.plan import Experiment, Formula
 
 if TYPE_CHECKING:
-    from met.analysis.loops import Unstable
+    from met.analysis.blame import Unstable
     from met.analysis.step_size import Remedy, StepFault
 
 
@@ -46,41 +46,80 @@ def _case(experiment: Experiment, case: int) -> str:
 
 
 def loop_warning(experiment: Experiment, loop: Unstable, place: Place | None, where: str) -> Diagnostic:
-    """A warning of loops of servos that tick, which with this arm are unstable.
+    """A warning of servo loops that are unstable with this arm: by their ticks, D320, or by themselves, D322.
 
     place  where no servo has one;  where: in which pose of which case, in words
     """
     structure = experiment.structure
     uses = [use for use in structure.servos if use.joint in loop.joints]
     every = f"a disturbance grows by e in every {loop.every:.3g} s"
-    rates = " and ".join(dict.fromkeys(f"{hz(structure.schedule.base_hz / use.divisor)} Hz" for use in uses))
-    if len(uses) == 1:
-        (use,) = uses
-        message = f"the loop of servo `{use.definition}` at {rates} is unstable on joint `{use.joint}`: {every}"
+    at = ""
+    if loop.ticks:
+        rates = " and ".join(dict.fromkeys(f"{hz(structure.schedule.base_hz / use.divisor)} Hz" for use in uses))
+        at = f" at {rates}"
+    if loop.weak:
+        message = f"the loop of servo `{uses[0].definition}` is too weak to hold joint `{uses[0].joint}`: {every}"
+    elif len(uses) == 1:
+        by_itself = "" if loop.ticks else " by itself"
+        message = (
+            f"the loop of servo `{uses[0].definition}`{at} is unstable{by_itself} on joint `{uses[0].joint}`: {every}"
+        )
     else:
         joints = ", ".join(f"`{joint}`" for joint in loop.joints)
-        message = f"the servo loops of joints {joints} at {rates} are unstable together: {every}"
-    slower = "dynamics" if any(use.divisor < structure.schedule.dynamics for use in uses) else "servo"
-    case = loop.case
-    gains = [
-        f"{name} = {float(_value(experiment, path, case)) * loop.gain:.3g} {experiment.parameters[path].unit}"
-        for name in ("kp", "ki")
-        for path in (f"{uses[0].joint}.servo.{name}",)
-        if path in experiment.parameters
-    ]
-    fits = f"stable up to {loop.gain:.2g} times the gain"
-    fits += f": {', '.join(gains)}" if len(uses) == 1 and gains else ""
+        message = f"the servo loops of joints {joints}{at} are unstable together: {every}"
+    helps = [_fitting(experiment, loop)]
+    if loop.sensed:
+        helps.append("stable if the law saw what is so: a sensor with less lag or delay, in place of the one it has")
+    if loop.ticks:
+        slower = "dynamics" if any(use.divisor < structure.schedule.dynamics for use in uses) else "servo"
+        helps.append(f"or a faster rate of the {slower}")
+    helps.append(f"reckoned with the arm {where}, within all limits{' and without dry friction' if loop.rubs else ''}")
     place = next((use.place for use in uses if use.place is not None), place)
-    helps = (fits, f"or a faster rate of the {slower}", f"reckoned with the arm {where}, within all limits")
     label = None if place is None else Label(place)
-    return Diagnostic("D320", message, label, tuple(_gain_places(experiment, loop)), helps, "warning")
+    code = "D320" if loop.ticks else "D322"
+    return Diagnostic(code, message, label, tuple(_gain_places(experiment, loop)), tuple(helps), "warning")
 
 
-def _gain_places(experiment: Experiment, loop: Unstable) -> list[Label]:
-    """Where the gains of the loops are written."""
-    paths = (f"{joint}.servo.kp" for joint in loop.joints)
+def _fitting(experiment: Experiment, loop: Unstable) -> str:
+    """The gains with which it is stable, in words."""
+    joint, share = loop.joints[0], loop.gain
+    if loop.parameters:
+        several = [_bound(experiment, loop.case, f"{joint}.servo.{name}", x) for name, x in loop.parameters.items()]
+        return f"stable with {' or '.join(several)}, {'each alone' if several[1:] else 'all else as it is'}"
+    if share is None:
+        return "no share of the gain is stable"
+    gains = [
+        _value_of(experiment, loop.case, path, share)
+        for path in (f"{joint}.servo.{name}" for name in ("kp", "ki"))
+        if path in experiment.parameters and len(loop.joints) == 1
+    ]
+    fits = f"stable {'up to' if share < 1.0 else 'from'} {share:.2g} times the gain"
+    return f"{fits}: {', '.join(gains)}" if gains else fits
+
+
+def _bound(experiment: Experiment, case: int, path: str, share: float) -> str:
+    """A share of a parameter's value in a case, up to which or from which on something is so, in words."""
+    return f"{_value_of(experiment, case, path, share)} and {'less' if share < 1.0 else 'more'}"
+
+
+def _value_of(experiment: Experiment, case: int, path: str, share: float) -> str:
+    """A share of a parameter's value in a case, as a deck writes it."""
+    value, parameter = float(_value(experiment, path, case)) * share, experiment.parameters[path]
+    return f"{path.rpartition('.')[2]} = {value:.3g} {parameter.unit}"
+
+
+def _gain_places(experiment: Experiment, loop: Unstable) -> Iterator[Label]:
+    """Where the gains of the loops are written, and the sensors without which it would not be so."""
+    names = tuple(loop.parameters) or ("kp",)
+    paths = (f"{joint}.servo.{name}" for joint in loop.joints for name in names)
     places = (experiment.parameters[path].origin.place for path in paths if path in experiment.parameters)
-    return [Label(place, "the gain") for place in dict.fromkeys(places) if place is not None]
+    for place in dict.fromkeys(places):
+        if place is not None:
+            yield Label(place, "the gain")
+    for use in experiment.structure.servos if loop.sensed else ():
+        for sensor in use.sensors if use.joint in loop.joints else ():
+            if sensor.place is not None:
+                yield Label(sensor.place, "through this its law sees")
 
 
 def _value(experiment: Experiment, path: str, case: int) -> float:

@@ -55,11 +55,11 @@ def check_steps(scope: Scope, experiment: Experiment) -> Experiment:
         refuted |= set() if grows and found.grown <= BEYOND * declared.get("D249", (0.0, ()))[0] else {"D249"}
     kept = complaints.settle(refuted)
     for each in found.faults:
-        if _is_told(each, kept, declared, found):
+        if _is_told(each, kept, declared, found) or _is_of_loops(each, found):
             continue
         better = remedy(experiment, found.map, each)
         complaints.pass_on(fault_warning(experiment, each, better, scope.rate_place, _where(experiment, each, found)))
-    if not any(each.kind == "grows" for each in found.faults):
+    if "D104" not in kept and not any(each.kind == "grows" and not _is_of_loops(each, found) for each in found.faults):
         for loop in found.loops:
             start = at_the_start(experiment, loop.case)
             complaints.pass_on(loop_warning(experiment, loop, scope.rate_place, f"as it stands {start}"))
@@ -77,6 +77,11 @@ def _is_told(
     if fault.kind == "fast" and any(each.kind != "fast" for each in found.faults):
         return True
     return fault.kind == "fast" and "D105" in kept and fault.figure <= BEYOND * declared.get("D105", (0.0, ()))[0]
+
+
+def _is_of_loops(fault: StepFault, found: StepSize) -> bool:
+    """True where a mode grows in truth, and loops that are unstable say why."""
+    return bool(found.loops) and fault.kind == "grows" and fault.mode.grows_in_truth(found.map.h)
 
 
 def _where(experiment: Experiment, fault: StepFault, found: StepSize) -> str:

@@ -225,6 +225,49 @@ def test_a_loop_is_told_that_only_a_folded_arm_makes_unstable(tmp_path: Path) ->
     assert codes(performed(made(tmp_path, folded), tmp_path / "b.h5")) == []
 
 
+CARRIES = """\
+arm swing {
+    link bar { mass = 1 kg;  com = [0, 0, 0] m;  inertia = [0.01, 0.01, 0.01] kg*m^2; }
+    joint hinge revolute { parent = base;  child = bar;  axis = z; }
+}
+servo turn {
+    model = rigid_gearbox;  ratio = 50;  kp = 0.3 V*s/rad;  ki = 0.1 V/rad;  v_max = 30 V;  resistance = 1 ohm;
+    kt = 0.05 N*m/A;  tau_max = 3 N*m;  j_m = 1e-5 kg*m^2;  command = rate(0.01 rad/s);
+}
+servo place like turn { kp = 0.03 V*s/rad;  ki = 3 V/rad;  k_position = 2 1/s;  RATE  command = position(0.1 rad); }
+run carrying {
+    arm = swing;  servos { hinge = SERVO; }
+    payload box { on = bar;  mass = 20 kg;  shape = box(size = [0.1, 0.1, 0.1] m);  at = [1, 0, 0] m;  EVENT }
+    rates { dynamics = 1 kHz;  servos = 100 Hz;  record = 100 Hz; }  duration = 10 s;  record = [qd];
+}
+"""
+LATER = "position = [1, 0, 0] m;  grapple = 1 s;"
+
+
+@pytest.mark.parametrize(
+    ("servo", "rate", "event", "code"),
+    [
+        ("turn", "", "release = 1 s;", "D320"),
+        ("place", "", LATER, "D322"),
+        ("place", "rate = continuous;", LATER, "D322"),
+    ],
+)
+def test_a_loop_is_told_that_a_payload_makes_unstable_when_it_comes_or_goes(
+    servo: str, rate: str, event: str, code: str, tmp_path: Path
+) -> None:
+    """Ticks are too slow for the bar alone, and a loop of position swings up what is heavy."""
+    deck = changed(CARRIES, ("SERVO", servo), ("RATE", rate), ("EVENT", event))
+    (tmp_path / "deck.ic").write_text(deck)
+    assert [each.code for each in ic.check(tmp_path / "deck.ic").diagnostics] == []
+    found = performed(made(tmp_path, deck), tmp_path / "a.h5")
+    assert codes(found) == [code] and "on joint `hinge`" in found.warned[0].message
+    assert "as it stands at t = 1.25 s, and so it is until 9.695 s, within all limits" in found.warned[0].help[-1]
+    stays = changed(CARRIES, ("SERVO", servo), ("RATE", rate), ("EVENT", ""))
+    if code == "D322":
+        stays = changed(stays, ("mass = 20 kg", "mass = 0.01 kg"))
+    assert codes(performed(made(tmp_path, stays), tmp_path / "b.h5")) == []
+
+
 def test_a_bed_is_told_that_only_an_arm_which_reaches_out_makes_unstable(tmp_path: Path) -> None:
     deck = FOLDS[: FOLDS.index("servo turn")].replace("0.01, 0.01, 0.01", "700, 700, 700")
     deck = "#include <servos/rigid_gearbox.ic>\n" + deck.replace("link out { mass = 1 kg", "link out { mass = 40 kg")

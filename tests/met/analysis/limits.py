@@ -7,6 +7,7 @@ warning is asked for at 0.95 and 1.05 of the limit that runs have. All machines 
 
 from __future__ import annotations
 
+import math
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -19,7 +20,8 @@ import numpy as np
 import ic
 from met import models
 from met import run as engine
-from met.analysis.loops import GROWS, LEAST, blamed, frame_growths
+from met.analysis.blame import Opened
+from met.analysis.loops import fastest, growing
 from met.analysis.modes import modes
 from met.analysis.step_map import Linearizer
 from met.frozen import frozen
@@ -29,10 +31,15 @@ STEPS = 2000
 """Of a run, each of 1 ms."""
 
 EARLY = 12
-"""Rows in which what a run does at first is seen: longer than a tick of `LOOP`."""
+"""Rows in which what a run does at first is seen: longer than a tick of the loops at 100 Hz."""
 
 NEAR = 0.03
 """How far from the step map's limit that of runs is looked for, as a share."""
+
+
+ROUNDED, BEYOND = 1e-6, 1e3
+"""Shares of a run's first moves: below the one what moves may be rounding, above the other it has grown, or is at a
+limit."""
 
 
 @frozen
@@ -121,17 +128,55 @@ MODELS: Mapping[str, Machine] = MappingProxyType({
 
 REST = "rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 1 kHz; }  duration = 2 s;  RECORD"
 
-LOOP = Machine(
-    TURN + "servo s { model = rigid_gearbox;  ratio = 50;  kp = Kx;  ki = Ci*Kx;  v_max = 1e9 V;  resistance = 1 ohm;\n"
-    "kt = 0.05 N*m/A;  tau_max = 1e9 N*m;  j_m = J_m;  command = rate(0 rad/s); }\n"
+DRIVE = (
+    TURN + "servo s { model = MODEL;  ratio = 50;  GAINS  v_max = 1e9 V;  resistance = 1 ohm;  kt = 0.05 N*m/A;\n"
+    "tau_max = 1e9 N*m;  j_m = J_m;  command = COMMAND;  SENSOR }\n"
     "run r { arm = a;  servos { x = s; }  initial { x.qd = 1e-6 rad/s; }\n"
-    "rates { dynamics = 1 kHz;  servos = 100 Hz;  record = 1 kHz; }  duration = 4 s;  record = [q]; }",
-    {
-        "J_bar": (0.01, 1.0, "kg*m^2"), "J_m": (1e-5, 1e-4, "kg*m^2"), "Ci": (0.1, 5.0, "1/s"),
-        "Kx": (1e-4, 1e6, "V*s/rad"),
-    },
-)  # fmt: skip
-"""A loop of rate that ticks at 100 Hz."""
+    "rates { dynamics = 1 kHz;  servos = RATE;  record = 1 kHz; }  duration = 8 s;  record = [q]; }"
+)
+
+
+def loop(ranges: Mapping[str, tuple[float, float, str]], scaled: str, **words: str) -> Machine:
+    """A servo on a joint with these words in the place of the deck's own."""
+    plain = {
+        "MODEL": "rigid_gearbox", "GAINS": "kp = Kx;  ki = Ci*Kx;", "COMMAND": "rate(0 rad/s)", "SENSOR": "",
+        "RATE": "100 Hz",
+    }  # fmt: skip
+    deck = DRIVE
+    for word, text in (plain | words).items():
+        deck = deck.replace(word, text)
+    arm = {"J_bar": (0.01, 1.0, "kg*m^2"), "J_m": (1e-5, 1e-4, "kg*m^2")}
+    return Machine(deck, arm | dict(ranges), scaled)
+
+
+GAIN, RESET = {"Kx": (1e-4, 1e6, "V*s/rad")}, {"Ci": (0.1, 5.0, "1/s")}
+PLACE = "kp = Kp;  ki = Kx;  k_position = Wp;"
+OF_PLACE = {
+    "J_bar": (0.5, 5.0, "kg*m^2"), "Kp": (0.01, 0.05, "V*s/rad"), "Wp": (40.0, 100.0, "1/s"),
+    "Kx": (1e-4, 1e3, "V/rad"),
+}  # fmt: skip
+
+LOOPS: Mapping[str, Machine] = MappingProxyType({
+    "ticks": loop(GAIN | RESET, "Kx"),
+    "filter": loop(
+        {**GAIN, "Ci": (2.0, 50.0, "1/s"), "Fs": (1.0, 20.0, "Hz")},
+        "Kx",
+        RATE="1 kHz",
+        SENSOR="sensor qd = tachometer { filter = butterworth;  cutoff = Fs; }",
+    ),
+    "delay": loop(GAIN | RESET, "Kx", SENSOR="sensor qd = tachometer { delay = 2; }"),
+    "continuous": loop(OF_PLACE, "Kx", RATE="1 kHz", GAINS=PLACE + "  rate = continuous;", COMMAND="position(0 rad)"),
+    "elastic": loop(
+        {**OF_PLACE, "Ks": (200.0, 2000.0, "N*m/rad")},
+        "Kx",
+        RATE="1 kHz",
+        MODEL="compliant_gearbox",
+        GAINS=PLACE + "  stiffness = Ks;  damping = 0.5 N*m*s/rad;",
+        COMMAND="position(0 rad)",
+    ),
+})  # fmt: skip
+"""Loops by what makes them unstable: a rate loop's ticks at 100 Hz, its filter, ticks of delay; and too much of the
+integral of a loop of position, that has no ticks, or is on a gear that winds up."""
 
 
 def experiment(machine: Machine, count: int, rng: np.random.Generator) -> Experiment:
@@ -183,6 +228,18 @@ def by_runs(prepared: engine.Prepared, made: Experiment) -> np.ndarray:
         return ~(np.isfinite(late) & (late < np.e * early))
 
 
+def swings_up(prepared: engine.Prepared, made: Experiment) -> np.ndarray:
+    """Whether what a run does from step to step grows by e over its length, as of its first to its last tenth."""
+    history, _ = engine.compute(replace(prepared, experiment=made), np.arange(made.cases.count))
+    assert history is not None
+    tenth = history.shape[1] // 10
+    with np.errstate(all="ignore"):
+        moves = np.abs(np.diff(history, axis=1)).max(2)
+        early, late = moves[:, tenth // 2 : tenth + tenth // 2].max(1), moves[:, -tenth:].max(1)
+        before = np.maximum(early, ROUNDED * moves[:, 0])
+        return ~((late <= math.exp(0.85) * before) & (late <= BEYOND * moves[:, 0]))
+
+
 def bisect(grows: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray, to: float) -> np.ndarray:
     """Limits between these, to a share; not numbers where it grows at the lower one, or does not at the upper."""
     sound = ~grows(low) & grows(high)
@@ -217,19 +274,23 @@ def errors(name: str, count: int, seed: int = 1) -> np.ndarray:
 
 def warned(made: Experiment) -> np.ndarray:
     """Whether the check calls a loop unstable, of each case."""
-    sampled = Linearizer(made, range(made.cases.count)).sampled()
+    linearizer = Linearizer(made, range(made.cases.count))
+    sampled = linearizer.sampled()
     assert sampled is not None
-    growths, seconds = frame_growths(sampled)
-    limit = max(LEAST, GROWS * seconds / made.structure.schedule.duration)
-    return np.array([growth > limit and bool(blamed(sampled, at, limit)) for at, growth in enumerate(growths.tolist())])
+    told, opened = np.zeros(made.cases.count, bool), Opened(linearizer, sampled)
+    for lane, limit, ticks in growing(sampled, fastest(sampled), made.structure.schedule.duration):
+        told[lane] = bool(opened.lane(lane, limit, ticks).blamed())
+    return told
 
 
-def sides(count: int, seed: int = 1) -> tuple[int, int, int]:
+def sides(name: str, count: int, seed: int = 1) -> tuple[int, int, int]:
     """Of so many loops: how many have a limit by runs, are warned of at 1.05 of it, and are not at 0.95."""
-    made = experiment(LOOP, count, np.random.default_rng(seed))
+    machine = LOOPS[name]
+    made = experiment(machine, count, np.random.default_rng(seed))
     prepared = prepared_for(made)
-    low, high, _ = LOOP.ranges["Kx"]
-    limit = bisect(lambda k: by_runs(prepared, scaled(made, "Kx", k)), np.full(count, low), np.full(count, high), 1e-3)
+    low, high, _ = machine.ranges[machine.scaled]
+    ends = np.full(count, low), np.full(count, high)
+    limit = bisect(lambda k: swings_up(prepared, scaled(made, "Kx", k)), *ends, 1e-3)
     known = np.isfinite(limit)
     limit = np.where(known, limit, low)
     above, below = (warned(scaled(made, "Kx", limit * share))[known] for share in (1.05, 0.95))
@@ -245,8 +306,9 @@ def lines(count: int) -> Iterator[str]:
             f"{100 * np.max(np.abs(found)):.2f} %" if np.isfinite(found).all() else f"{np.isnan(found).sum()} without"
         )
         yield f"| `{name}` | {integrator} | {told} |"
-    known, above, below = sides(max(2, count // 2))
-    yield f"loops: {known} limits, {above} warned of at 1.05 of it, {below} not at 0.95"
+    for name in LOOPS:
+        known, above, below = sides(name, max(2, count // 2))
+        yield f"loops, {name}: {known} limits, {above} warned of at 1.05 of it, {below} not at 0.95"
 
 
 if __name__ == "__main__":

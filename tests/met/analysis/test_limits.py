@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.met.analysis.limits import MODELS, errors, sides
+from tests.met.analysis.limits import LOOPS, MODELS, errors, sides
 
 WITHIN = 0.01
 """Share by which the two limits may differ: a mode that hardly grows is seen late among what else moves."""
@@ -25,5 +25,6 @@ def test_of_a_hundred_machines_too(model: str) -> None:
 
 
 @pytest.mark.parametrize("count", [4, pytest.param(50, marks=pytest.mark.slow)])
-def test_loops_are_warned_of_beyond_their_limit_and_not_before(count: int) -> None:
-    assert sides(count) == (count, count, count)
+@pytest.mark.parametrize("name", LOOPS)
+def test_loops_are_warned_of_beyond_their_limit_and_not_before(name: str, count: int) -> None:
+    assert sides(name, count) == (count, count, count)

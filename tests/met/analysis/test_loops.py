@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from met import run as engine
-from met.analysis.loops import Loops, closed, frame
+from met.analysis.blame import Unstable, closed
+from met.analysis.loops import fastest, frame, growing
 from met.analysis.step_map import Linearizer
 from met.plan import Experiment
 from tests.ic.small_decks import changed, check, experiment
@@ -41,10 +42,11 @@ def deck(kp: float, command: str = "rate(0.1 rad/s)") -> str:
     return changed(DECK, ("KP", repr(kp)), ("COMMAND", command))
 
 
-def loops(experiment: Experiment) -> Loops:
-    sampled = Linearizer(experiment, [0]).sampled()
+def loops(experiment: Experiment) -> tuple[Unstable, ...]:
+    linearizer = Linearizer(experiment, [0])
+    sampled = linearizer.sampled()
     assert sampled is not None
-    return closed(experiment, sampled)
+    return closed(linearizer, sampled, growing(sampled, fastest(sampled), experiment.structure.schedule.duration))
 
 
 def test_the_factor_of_a_rate_loop_is_that_of_the_closed_form(tmp_path: Path) -> None:
@@ -57,8 +59,8 @@ def test_the_factor_of_a_rate_loop_is_that_of_the_closed_form(tmp_path: Path) ->
 
 def test_its_limit_is_that_of_the_closed_form(tmp_path: Path) -> None:
     """The gain that is named is where the loop grows by e over the run: a little above the limit."""
-    assert loops(experiment(tmp_path, deck(0.99 * LIMIT))).unstable == ()
-    (found,) = loops(experiment(tmp_path, deck(2.0 * LIMIT))).unstable
+    assert loops(experiment(tmp_path, deck(0.99 * LIMIT))) == ()
+    (found,) = loops(experiment(tmp_path, deck(2.0 * LIMIT)))
     assert found.joints == ("hinge",) and found.gain == pytest.approx(0.5, rel=0.01)
 
 
@@ -79,7 +81,7 @@ def test_it_is_on_the_right_side_of_the_limit_of_runs(hz: int, tmp_path: Path) -
         low, high = (low, middle) if grows(middle) else (middle, high)
     for share, count in ((0.95, 0), (1.05, 1)):
         made = experiment(tmp_path, changed(deck(share * high), ("dynamics = 10 kHz", f"dynamics = {hz} Hz")))
-        assert len(loops(made).unstable) == count, (share, high)
+        assert len(loops(made)) == count, (share, high)
 
 
 TWO = """\
@@ -112,13 +114,92 @@ def test_only_the_loop_is_blamed_whose_gain_is_too_large(tmp_path: Path) -> None
     assert check(tmp_path, torque, select="all").diagnostics == ()
 
 
-def test_a_loop_that_would_swing_up_without_ticks_too_is_not_told(tmp_path: Path) -> None:
-    """s^3 + (a + b) s^2 + (c + b k) s + c k, a = 12.5, b = 1.25, c = 750, k = 30: (a + b)(c + b k) < c k."""
-    swings = changed(
-        deck(0.05, "position(0.1 rad)"),
-        ("ki = 0 V/rad", "ki = 30 V/rad;  k_position = 30 1/s"),
-        ("servos = 50 Hz", "servos = 5 kHz"),
-    )
-    assert check(tmp_path, swings, select="all").diagnostics == ()
+SWINGS = changed(
+    deck(0.05, "position(0.1 rad)"),
+    ("ki = 0 V/rad", "ki = 30 V/rad;  k_position = 30 1/s"),
+    ("servos = 50 Hz", "servos = 2 kHz"),
+)
+"""s^3 + (a + b) s^2 + (c + b k) s + c k, a = 12.5, b = 1.25, c = 750, k = 30: (a + b)(c + b k) < c k."""
+
+
+@pytest.mark.parametrize("rate", ["", "rate = continuous;  "])
+def test_a_loop_that_swings_up_without_ticks_too_is_told_by_itself(rate: str, tmp_path: Path) -> None:
+    """Below c = (a + b) b k/(k - a - b) it does not: ki = 1.269 V/rad, a little more with e over the run."""
+    swings = changed(SWINGS, ("kp = 0.05", f"{rate}kp = 0.05"))
+    (found,) = check(tmp_path, swings, select="all").diagnostics
+    assert found.code == "D322"
+    assert found.message.startswith("the loop of servo `drive` is unstable by itself on joint `hinge`: a disturbance ")
+    named = {name: float(value) for name, value in re.findall(r"(\w+) = ([0-9.]+)", found.help[0])}
+    longest = changed(swings, ("duration = 4 s", "duration = 1000 s"), ("dynamics = 10 kHz", "dynamics = 2 kHz"))
+    (found,) = check(tmp_path, longest, select="all").diagnostics
+    exact = {name: float(value) for name, value in re.findall(r"(\w+) = ([0-9.]+)", found.help[0])}
+    assert list(named) == ["kp", "ki", "k_position"] and found.help[0].endswith(", each alone")
+    assert exact["ki"] == pytest.approx(13.75 * 1.25 * 30.0 / (30.0 - 13.75) / 25.0, rel=0.03)
     qd = engine.run(experiment(tmp_path, swings)).signals["qd"][0, :, 0]
     assert np.abs(qd[-5000:]).max() > 10.0 * np.abs(qd[:5000]).max()
+
+
+FALLS = changed(
+    deck(0.05), ("com = [0, 0, 0] m", "com = [0, 1, 0] m"), ("    duration", "    GRAVITY\n    duration"),
+    ("servos { hinge = drive; }", "SERVOS"),
+)  # fmt: skip
+UP = "environment { g = gravity { g = [0, -9.81, 0] m/s^2; } }"
+
+
+@pytest.mark.parametrize(
+    "servos",
+    [
+        "",
+        "servos { hinge = drive { command = torque(0 N*m); } }",
+        "servos { hinge = drive { kp = 0 V*s/rad; } }",
+        "servos { hinge = drive; }",
+        "servos { hinge = drive { kp = 1 V*s/rad;  ki = 10 V/rad; } }",
+    ],
+)
+def test_what_falls_by_itself_is_no_loops_fault(servos: str, tmp_path: Path) -> None:
+    """A pendulum upright: without a servo, with one that is off, and with one that lets it creep, or holds it."""
+    falls = changed(FALLS, ("GRAVITY", UP), ("SERVOS", servos))
+    assert check(tmp_path, falls, select="all").diagnostics == ()
+
+
+def test_a_loop_that_is_too_weak_to_hold_its_joint_is_told(tmp_path: Path) -> None:
+    """With k_position alone: it falls where k (N Kt/R) kp N < m g l, and N^2 Kt/R kp k = 9.81 N m/rad is the limit."""
+    weak = "servos { hinge = drive { kp = 0.1 V*s/rad;  k_position = 1 1/s;  command = position(0 rad); } }"
+    deck_of = changed(FALLS, ("GRAVITY", UP), ("SERVOS", weak), ("duration = 4 s", "duration = 100 s"))
+    (found,) = check(tmp_path, deck_of, select="all").diagnostics
+    assert found.code == "D322" and "is too weak to hold joint `hinge`" in found.message
+    kp = re.search(r"kp = ([0-9.]+) V\*s/rad and more", found.help[0])
+    assert kp is not None and float(kp[1]) == pytest.approx(9.81 / 50.0, rel=0.05)
+
+
+def _characteristic(e: float, ticks: int) -> list[float]:
+    """Coefficients of z^(d+1) - e z^d + (1 - e) kp/kt, kp/kt = 0.1."""
+    return [1.0, -e, *([0.0] * (ticks - 1)), 0.1 * (1.0 - e)] if ticks else [1.0, -e + 0.1 * (1.0 - e)]
+
+
+def test_a_sensors_filter_and_its_delay_are_part_of_a_loop(tmp_path: Path) -> None:
+    """A delay of d ticks on a loop of rate, whose factor solves z^(d+1) - e z^d + (1 - e) kp/kt = 0."""
+    e = math.exp(-DECAY * PERIOD)
+    for ticks in (0, 1, 2, 3):
+        late = changed(
+            deck(0.05, "rate(0.1 rad/s)"), ("    kt", f"    sensor qd = tachometer {{ delay = {ticks}; }}\n    kt")
+        )
+        sampled = Linearizer(experiment(tmp_path, late), [0]).sampled()
+        assert sampled is not None
+        roots = np.roots(
+            [1.0, -e, *([0.0] * (ticks - 1)), (1.0 - e) * 0.05 / 0.5] if ticks else [1.0, -e + (1 - e) * 0.1]
+        )
+        sizes = np.linalg.eigvals(frame(sampled, 0))
+        for root in roots:
+            assert np.abs(sizes - root).min() < 1e-6
+
+
+@pytest.mark.parametrize(
+    "sensor", ["encoder { step = 0.01 rad/s; }", "tachometer { resolution = 0.03 rad/s;  noise = 0.1 rad/s; }"]
+)
+def test_steps_and_noise_of_a_sensor_are_no_change_of_its_slope(sensor: str, tmp_path: Path) -> None:
+    for made in (deck(0.99 * LIMIT), deck(2.0 * LIMIT)):
+        coarse = changed(made, ("    kt", f"    sensor qd = {sensor}\n    kt"))
+        assert [each.gain for each in loops(experiment(tmp_path, coarse))] == pytest.approx(
+            [each.gain for each in loops(experiment(tmp_path, made))], rel=2e-3
+        )

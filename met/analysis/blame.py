@@ -1,0 +1,264 @@
+"""Which servo loop is to blame for what grows, and what of it would help: of loops that are closed over the arm.
+
+A loop is to blame for what grows with its gain, and does not without: what falls or drifts by itself is none of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import field, replace
+from functools import cached_property
+
+import numpy as np
+
+from met.analysis.loops import Gains, growths
+from met.analysis.step_map import Linearizer, SampledLoops
+from met.frozen import frozen
+
+SMALLEST, LARGEST = 1e-3, 30.0
+"""Shares of a gain between which one that fits is looked for."""
+
+STRIDE = 0.8
+"""Share from one gain to the next that is tried."""
+
+WORSE = 1.5
+"""Times the growth without a loop, above which the loop is to blame where as much grows without it."""
+
+BY_TICKS = 2.0
+"""Times the growth of the arm with laws that have no ticks, above which the ticks are to blame."""
+
+
+@frozen
+class Unstable:
+    """Loops that are unstable at one pose of one case.
+
+    joints  whose loops: of one the gain alone is to blame; of several those of all of them together
+    gain    share of the gains up to which it is stable, as far as all else stays, or above 1, from which on; None: none
+    every   s in which a disturbance grows by e
+    ticks   whether it would not be so if the laws had no ticks and no delays of them
+    sensed  whether it would not be so if the laws saw what is so, without their sensors
+    weak    whether it falls as it would without the loop, which with more gain would hold it
+    rubs    whether dry friction is on these joints, which is left out
+    parameters  of one joint's loop that is unstable by itself, the numbers of its law that do it alone, by name, each
+            with a share as the gain's
+    """
+
+    case: int
+    joints: tuple[str, ...]
+    gain: float | None
+    every: float
+    ticks: bool = True
+    sensed: bool = False
+    weak: bool = False
+    rubs: bool = False
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+def closed(
+    linearizer: Linearizer, found: SampledLoops, lanes: Iterable[tuple[int, float, bool]]
+) -> tuple[Unstable, ...]:
+    """The loops that make lanes grow, the one that wants the largest change first; lanes: as
+    `met.analysis.loops.growing` has them."""
+    several, seen, opened = dict[tuple[str, ...], Unstable](), set[str](), Opened(linearizer, found)
+    for lane, limit, ticks in lanes:
+        case = opened.lane(lane, limit, ticks)
+        concerned = case.concerned()
+        if seen and concerned <= seen:
+            continue
+        seen |= concerned
+        for each in opened.blamed(case):
+            several.setdefault(each.joints, each)
+    return tuple(sorted(several.values(), key=needs))
+
+
+def needs(each: Unstable) -> tuple[float, float]:
+    """The smaller, the more has to be done."""
+    return _change(each.gain), each.every
+
+
+def _change(share: float | None) -> float:
+    """A number that is the larger, the less a gain has to change."""
+    return 0.0 if share is None else min(share, 1.0 / share)
+
+
+@frozen
+class _Growing:
+    """Modes that grow: their rates, 1/s, the largest first."""
+
+    rates: tuple[float, ...]
+
+    @property
+    def count(self) -> float:
+        return math.inf if math.inf in self.rates else len(self.rates)
+
+    def adds_to(self, without: _Growing, limit: float, times: float = WORSE) -> bool:
+        """True where more modes grow than without something, or they grow faster."""
+        return self.count > without.count or sum(self.rates) > times * sum(without.rates) + limit
+
+    def beyond(self, without: _Growing) -> float:
+        """The largest rate that is not there without a loop."""
+        left = list(self.rates)
+        for each in without.rates[: max(0, len(left) - 1)]:
+            left.remove(min(left, key=lambda one: abs(one - each)))
+        return max(left)
+
+
+@frozen
+class Lane:
+    """The loops of one lane.
+
+    limit  rate above which a mode counts as growing, 1/s;  ticks: whether those of laws have a part in it
+    """
+
+    loops: SampledLoops
+    lane: int
+    limit: float
+    ticks: bool
+
+    def growing(
+        self,
+        gains: Gains | None = None,
+        *,
+        above: float = 1.0,
+        direct: bool = False,
+        ticks: bool | None = None,
+    ) -> _Growing:
+        """Modes that grow, with these shares of gains; above: this share of the limit."""
+        ticks = self.ticks if ticks is None else ticks
+        (rates,) = growths(self.loops, np.array([self.lane]), gains, ticks=ticks, direct=direct)
+        return _Growing(tuple(sorted(rates[rates > above * self.limit].tolist(), reverse=True)))
+
+    def without(self, own: _Growing, joints: Sequence[str], gains: Gains | None = None) -> _Growing | None:
+        """What grows without the loops of these joints, where that is less than with them; else None."""
+        found = self.growing({**(gains or {}), **dict.fromkeys(joints, 0.0)}, above=0.5)
+        return found if own.adds_to(found, self.limit) else None
+
+    def concerned(self) -> frozenset[str]:
+        """The joints whose loops are to blame, each by itself."""
+        own = self.growing()
+        return frozenset(law.joint for law in self.loops.laws if self.without(own, (law.joint,)) is not None)
+
+    def blamed(self) -> list[Unstable]:
+        """The loops that make the lane grow; none where they do not.
+
+        Of loops that are unstable together the one is named whose gain has to change least, then what is still
+        unstable.
+        """
+        own = self.growing()
+        if not 0 < own.count < math.inf:
+            return []
+        together = tuple(law.joint for law in self.loops.laws)
+        gains: dict[str, float] = {}
+        told: list[Unstable] = []
+        while len(gains) < len(together):
+            now = self.growing(gains)
+            groups: list[tuple[str, ...]] = [(joint,) for joint in together if joint not in gains]
+            at_fault = {which: base for which in groups if (base := self.without(now, which, gains)) is not None}
+            if not at_fault and not told and len(together) > 1:
+                base = self.without(now, together)
+                at_fault = {} if base is None else {together: base}
+            if not at_fault:
+                break
+            fits = {which: self._gain(now, base, which, gains) for which, base in at_fault.items()}
+            which = max(fits, key=lambda which: _change(fits[which]))
+            told.append(self._unstable(own, which, fits[which], now.beyond(at_fault[which])))
+            gains |= dict.fromkeys(which, fits[which] or 0.0)
+        return told or self._too_weak(own)
+
+    def _gain(self, own: _Growing, without: _Growing, joints: Sequence[str], gains: Gains) -> float | None:
+        """The share of the gains of these joints at which no more grows than without their loops; None: none."""
+
+        def count(share: float) -> float:
+            return self.growing({**gains, **dict.fromkeys(joints, share)}).count
+
+        return fitting(count, min(without.count, own.count - 1))
+
+    def _unstable(self, own: _Growing, joints: tuple[str, ...], gain: float | None, rate: float) -> Unstable:
+        """Loops that are to blame, and whether ticks or sensors are."""
+        ticks, sensed = False, any(law.joint in joints and law.direct.shape[1] for law in self.loops.laws)
+        if self.ticks:
+            analog = self.growing(above=0.5, ticks=False)
+            ticks = analog.count == math.inf or own.adds_to(analog, 0.0, BY_TICKS)
+        sensed = sensed and self.growing(above=0.5, direct=True).count < own.count
+        return Unstable(int(self.loops.case[self.lane]), joints, gain, 1.0 / rate, ticks, sensed)
+
+    def _too_weak(self, own: _Growing) -> list[Unstable]:
+        """The loops of position that do not hold what falls without them, and with more gain would."""
+        told = []
+        for law in self.loops.laws:
+
+            def count(share: float, joint: str = law.joint) -> float:
+                return self.growing({joint: share}).count
+
+            gain = fitting(count, own.count - 1) if law.command == "position" else None
+            if gain is not None and gain > 1.0:
+                every = 1.0 / max(own.rates)
+                told.append(
+                    Unstable(int(self.loops.case[self.lane]), (law.joint,), gain, every, ticks=False, weak=True)
+                )
+        return told
+
+
+class Opened:
+    """The loops of an experiment's cases with every gain in reach, those of laws that are continuous too."""
+
+    def __init__(self, linearizer: Linearizer, found: SampledLoops) -> None:
+        self._linearizer, self._found = linearizer, found
+        self._rubs = frozenset(each.name.partition(".")[0] for each in linearizer.builder.step.sticking)
+
+    @cached_property
+    def _opened(self) -> Linearizer:
+        own = self._linearizer
+        return own.opened() if own.continuous else own
+
+    @cached_property
+    def loops(self) -> SampledLoops:
+        return self._found if not self._linearizer.continuous else self._with({})
+
+    def _with(self, scaled: Mapping[str, Mapping[str, float]]) -> SampledLoops:
+        found = self._opened.sampled(scaled=scaled)
+        assert found is not None
+        return found
+
+    def lane(self, lane: int, limit: float, ticks: bool) -> Lane:
+        return Lane(self.loops, lane, limit, ticks)
+
+    def blamed(self, lane: Lane) -> list[Unstable]:
+        """The loops that make a lane grow, with what helps."""
+        several = (replace(each, rubs=not self._rubs.isdisjoint(each.joints)) for each in lane.blamed())
+        return [each if each.ticks else self._remedied(lane, each) for each in several]
+
+    def _remedied(self, lane: Lane, found: Unstable) -> Unstable:
+        """The same with the parameters that help a loop which is unstable by itself, each alone."""
+        if len(found.joints) > 1:
+            return found
+        (joint,), own = found.joints, lane.growing()
+        aim = min(own.count - 1, lane.growing({joint: 0.0}).count)
+        several = {}
+        for each in self._opened.gains(joint):
+
+            def count(share: float, name: str = each.name) -> float:
+                return replace(lane, loops=self._with({joint: {name: share}})).growing().count
+
+            share = fitting(count, aim)
+            if share is not None:
+                several[each.name] = share
+        return replace(found, parameters=several)
+
+
+def fitting(count: Callable[[float], float], aim: float) -> float | None:
+    """The largest share below 1 at which no more than so many modes grow, to a thousandth; else the smallest above 1;
+    None: there is none."""
+    for stride in (STRIDE, 1.0 / STRIDE):
+        bad, good = 1.0, stride
+        while count(good) > aim:
+            bad, good = good, good * stride
+            if not SMALLEST <= good <= LARGEST:
+                break
+        else:
+            while max(bad, good) > 1.001 * min(bad, good):
+                middle = math.sqrt(bad * good)
+                bad, good = (middle, good) if count(middle) > aim else (bad, middle)
+            return good
+    return None

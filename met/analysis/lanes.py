@@ -1,0 +1,144 @@
+"""Arrays in the place of numbers: a case's memory over lanes, and slopes as differences between neighbouring lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+import numpy as np
+
+from met.trace import Real, Truth
+from met.trace.program import CallPhase, Control, Every, RunPhase, Unless0, WhileAny
+
+SMALL = 1e-6
+"""Change of a position or a rate by which differences are taken, as a share of it, or of 1 rad, 1 m, 1 rad/s, 1 m/s."""
+
+SMALL_STATE = 1e-9
+"""The same of a state of a servo or sensor, in its unit: some live in micrometres, and none of them turns the arm."""
+
+
+class LaneTape:
+    """A `Tape` over arrays: one number a lane, where the lanes differ."""
+
+    def __init__(self, base_hz: float, inputs: Mapping[str, np.ndarray], lanes: int) -> None:
+        self.base_hz = base_hz
+        self.inputs = dict(inputs)
+        self.cells: dict[str, Any] = {}
+        self.lanes = lanes
+        self.k = 0
+
+    @property
+    def tick(self) -> Real:
+        return np.float64(self.k)
+
+    @property
+    def time(self) -> Real:
+        return np.float64(self.k) / np.float64(self.base_hz)
+
+    def read(self, name: str) -> Real:
+        found: Real = self.cells.get(name, ZERO)
+        return found
+
+    def write(self, name: str, value: Any) -> None:
+        self.cells[name] = value if value.__class__ is np.ndarray else np.float64(value)
+
+    def read_mask(self, name: str) -> Truth:
+        found: Any = self.cells.get(name, ZERO) != 0.0
+        truth: Truth = found if isinstance(found, np.ndarray) else bool(found)  # type: ignore[assignment]
+        return truth
+
+    def write_mask(self, name: str, value: Any) -> None:
+        self.cells[name] = np.where(value, 1.0, 0.0) if isinstance(value, np.ndarray) else np.float64(bool(value))
+
+    def input(self, name: str) -> Real:
+        found: Any = self.inputs[name]
+        return found
+
+    def record(self, column: int, value: Real) -> None:
+        """Nothing is kept of a row."""
+
+    def output(self, name: str, value: Real) -> None:
+        """Nothing is kept of an end."""
+
+    def part(self, name: str) -> AbstractContextManager[None]:
+        return nullcontext()
+
+    def lane(self, name: str) -> np.ndarray:
+        """A cell, one number a lane."""
+        return np.broadcast_to(np.asarray(self.read(name), dtype=float), (self.lanes,))
+
+    def spread(self, times: int) -> LaneTape:
+        """The same with every lane that often, one beside the other."""
+        made = LaneTape(self.base_hz, {}, self.lanes * times)
+        made.k = self.k
+        made.inputs = {name: np.repeat(value, times) for name, value in self.inputs.items()}
+        made.cells = {
+            name: np.repeat(value, times) if isinstance(value, np.ndarray) else value
+            for name, value in self.cells.items()
+        }
+        return made
+
+    def only(self, lanes: np.ndarray) -> LaneTape:
+        """Some of its lanes; lanes: a truth for each."""
+        made = LaneTape(self.base_hz, {}, int(np.count_nonzero(lanes)))
+        made.k = self.k
+        made.inputs = {name: value[lanes] for name, value in self.inputs.items()}
+        made.cells = {
+            name: value[lanes] if isinstance(value, np.ndarray) and value.ndim else value
+            for name, value in self.cells.items()
+        }
+        return made
+
+    def follow(self, body: Iterable[Control]) -> None:
+        """Runs the body once, at the tape's tick; of loops those in which payloads change hands: what repeats until
+        something is decided is not run."""
+        for node in body:
+            match node:
+                case RunPhase(phase) | CallPhase(phase):
+                    phase.body(self)
+                case Every(divisor, inner):
+                    if self.k % divisor == 0:
+                        self.follow(inner)
+                case Unless0(inner):
+                    if self.k > 0:
+                        self.follow(inner)
+                case WhileAny(cell, _, inner):
+                    if cell in ("grappling", "releasing") and np.any(self.lane(cell) != 0.0):
+                        self.follow(inner)
+
+
+ZERO = np.float64(0.0)
+
+
+def to_both_sides(start: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Each of some values moved to both sides while the others stay: [value, any], that many times as many lanes, side
+    by side; and the differences of the two sides, [lane, value].
+
+    start, size  [value, lane]
+    """
+    n, lanes = start.shape
+    made = np.empty((n, lanes, n, 2))
+    made[:] = start[:, :, None, None]
+    each = np.arange(n)
+    made[each, :, each, 0] += size
+    made[each, :, each, 1] -= size
+    return made.reshape(n, -1), (made[each, :, each, 0] - made[each, :, each, 1]).T
+
+
+def spread_over(read: Callable[[str], Any], times: int) -> Callable[[str], Any]:
+    """Reads a cell with each of its lanes that often, one beside the other."""
+
+    def spread(name: str) -> Any:
+        value = read(name)
+        return np.repeat(value, times) if isinstance(value, np.ndarray) else value
+
+    return spread
+
+
+def differences(values: Mapping[str, Any], cells: Sequence[str], sizes: np.ndarray) -> np.ndarray:
+    """[lane, of, by] of values in lanes that were moved to both sides; sizes: [lane, by]."""
+    lanes, n = sizes.shape
+    found = np.array([np.broadcast_to(values[name], (lanes * 2 * n,)) for name in cells])
+    pairs = found.reshape(len(cells), lanes, n, 2)
+    return np.moveaxis((pairs[..., 0] - pairs[..., 1]) / sizes, 0, 1)
