@@ -32,8 +32,15 @@ TELLING = 0.1
 TURNS = 0.1
 """Rate of turning of the arm, as a share of |lambda|, above which a mode is no mode: it changes while it swings."""
 
+FITS = 0.01
+"""The same by which it may differ at a rate that is proposed, where it grows."""
+
 FINEST = 1000
 """Times the base rate: beyond, no rate is proposed."""
+
+NEAR = 0.1
+"""Share by which lambda may differ from the nearest eigenvalue of A, which is taken beyond: a double root that
+semi-implicit Euler makes two of."""
 
 TOGETHER = 300.0
 """Sum of |l_i r_i|, where that of l_i r_i is 1, above which eigenvectors have fallen together."""
@@ -96,7 +103,9 @@ def modes(found: StepMap, integrator: Integrator) -> Iterator[Mode]:
     """All modes that are not slow, of all lanes; of a pair the one that turns forward."""
     h = found.h
     lanes = np.flatnonzero(np.isfinite(found.slope).all((1, 2)) & np.isfinite(found.step).all((1, 2)))
-    lanes = lanes[np.any(np.abs(np.linalg.eigvals(found.slope[lanes])) * h > SLOW, axis=1)]
+    truths = np.linalg.eigvals(found.slope[lanes])
+    wanted = np.any(np.abs(truths) * h > SLOW, axis=1)
+    lanes, truths = lanes[wanted], truths[wanted]
     if not lanes.size:
         return
     A = found.slope[lanes]
@@ -117,6 +126,9 @@ def modes(found: StepMap, integrator: Integrator) -> Iterator[Mode]:
             root, factor = complex(roots[at, i]), complex(factors[at, i])
             if not apart[at, i]:
                 root = complex(made[at][0][np.argmin(np.abs(made[at][1] - factor))])
+            nearest = complex(truths[at][np.argmin(np.abs(truths[at] - root))])
+            if abs(nearest - root) > NEAR * abs(root):
+                root = nearest
             if not max(abs(root) * h, abs(factor - 1.0)) > SLOW:
                 continue
             turns = bool(found.rate[lane] > TURNS * abs(root))
@@ -176,7 +188,7 @@ def slowest(found: StepMap, mode: Mode, integrator: Integrator, schedule: Schedu
 
 
 def _fits(mode: Mode, h: float, steps: int, follows: bool) -> bool:
-    if mode.grown(h, steps) > np.log1p(TELLING):
+    if mode.grown(h, steps) > np.log1p(FITS):
         return False
     run, truth, _ = mode.missed(h, steps)
     return not follows or (abs(run - truth) <= TELLING and h * abs(mode.root) <= FAST * (1.0 + 1e-6))

@@ -50,7 +50,7 @@ class Remedy:
     """The remedy for a mode that the step does not follow.
 
     rate     the slowest rate at which it is followed, Hz; None: none that is sensible
-    others   integrators that follow it at this rate
+    others   integrators that follow it at this rate: of what is fast for its step none of order 1
     cause    the environment model without which it would not be so; "" where none is
     """
 
@@ -151,10 +151,12 @@ def remedy(
     structure, mode = experiment.structure, fault.mode
     integrator, steps = models.find("integrator", structure.integrator), structure.schedule.ticks
     steps //= structure.schedule.dynamics
+    followed = abs(mode.root) * found.h <= FAST
     others = tuple(
         name
         for name, each in models.find_own("integrator").items()
-        if name != integrator.name and fault.kind != "fast" and _followed(found, mode, each, steps)
+        if name != integrator.name and fault.kind != "fast" and (followed or each.order > 1)
+        if _followed(found, mode, each, steps)
     )
     rate = slowest(found, mode, integrator, structure.schedule, follows=fault.kind != "grows")
     return Remedy(rate, others, _cause(experiment, mode, fault.kind, memory))
