@@ -13,6 +13,9 @@ from met.frozen import frozen
 SMALL = 0.1
 """Share of the range of a table's values: what rises and falls again by less is no pulse of it."""
 
+MOST_HUMPS = 500
+"""Humps of one course that are looked at: it bounds the time for a measured one of many rows."""
+
 
 @frozen(kw_only=True)
 class Content:
@@ -66,14 +69,18 @@ class Hump:
 
 
 def humps_of_turns(points: Sequence[tuple[float, float]]) -> Iterator[Hump]:
-    """The humps between the points at which a course turns back (`SMALL`)."""
+    """The humps between the points at which a course turns back (`SMALL`); of very many the highest."""
     times, values = (list(each) for each in zip(*points, strict=True))
     every, heights = np.array(times), np.array(values)
-    for before, at, after in _turned(values):
+    turned = list(_turned(values))
+    if len(turned) > MOST_HUMPS:
+        rises = [min(abs(values[at] - values[each]) for each in (before, after)) for before, at, after in turned]
+        turned = [turned[place] for place in sorted(np.argsort(rises, kind="stable")[-MOST_HUMPS:].tolist())]
+    for before, at, after in turned:
         sign = math.copysign(1.0, values[at] - values[before])
         foot = (max if sign > 0.0 else min)(values[before], values[after])  # one of them, without any rounding
         first, last = _crossing(times, values, at, -1, foot), _crossing(times, values, at, 1, foot)
-        inner = (every > first) & (every < last)
+        inner = slice(int(np.searchsorted(every, first, "right")), int(np.searchsorted(every, last, "left")))
         yield Hump(
             np.concatenate([[first], every[inner], [last]]),
             np.concatenate([[0.0], sign * (heights[inner] - foot), [0.0]]),
@@ -93,7 +100,7 @@ def humps_from_zero(points: Sequence[tuple[float, float]], until: float) -> Iter
     zeros = np.flatnonzero(values == 0.0)
     for first, last in pairwise(sorted({0, *zeros.tolist(), len(values) - 1})):
         part = values[first : last + 1]
-        if part.any():
+        if part.any() and part[-1] == 0.0:  # else it goes on, and is no pulse
             yield Hump(times[first : last + 1], np.abs(part))
 
 

@@ -189,6 +189,11 @@ def test_pulses_that_the_ticks_carry_are_not_told(tmp_path: Path, command: str) 
     assert codes(tmp_path, ARM, under(command), changed(RUN, TICKS)) == []
 
 
+def test_a_short_run_is_not_told_of_a_ramp_that_goes_on(tmp_path: Path) -> None:
+    servo = under("rate(table(times = [0, 0.1] s, values = [0, 1] rad/s))")
+    assert codes(tmp_path, ARM, servo, changed(RUN, TICKS, ("1 s;", "0.1 s;"))) == []
+
+
 def test_a_command_that_begins_in_a_pulse_is_told(tmp_path: Path) -> None:
     servo = under("rate(table(times = [0.015, 0.016] s, values = [1, 0] rad/s))")
     said = shown(tmp_path, ARM, servo, changed(RUN, TICKS))
