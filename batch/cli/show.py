@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 )
 @click.option("--reverse", is_flag=True, help="Of --sort: largest first, by each NAME that does not say it itself.")
 @click.option("--no-plots", is_flag=True, help="Numbers only.")
+@click.option("--evidence", is_flag=True, help="The table of requirements alone: share, bounds, worst case, margin.")
 @format_option
 def show(
     archive: str,
@@ -39,6 +40,7 @@ def show(
     sort: tuple[str, ...],
     reverse: bool,
     no_plots: bool,
+    evidence: bool,
     form: str,
 ) -> int:
     """Show what an archive holds: what was run, how it went, metrics, requirements, and SIGNALs (`qd`, `elbow.q`).
@@ -50,13 +52,15 @@ def show(
 
     from batch.archive.read import ArchiveFile
     from batch.queries.ordering import by_names
-    from batch.terminal.show import as_json, show
+    from batch.terminal.show import as_json, show, show_evidence
     from met.messages.render import wants_colour
 
     if reverse and not sort:
         raise click.UsageError("--reverse is of --sort, and nothing is sorted: `--sort NAME`")
     if case is not None and sort:
         raise click.UsageError("--sort is of many cases, and --case of one")
+    if evidence and (signals or case is not None or sort or all_cases):
+        raise click.UsageError("--evidence is about all cases: of one, or of signals, ask without it")
     by = by_names(sort, reverse=reverse)
     with ArchiveFile(archive) as file:
         if form == "json":
@@ -64,6 +68,9 @@ def show(
             return YES
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
         colour = wants_colour(sys.stdout)
+        if evidence:
+            click.echo(show_evidence(file, experiments, width=width), nl=False)
+            return YES
         text = show(
             file,
             signals,

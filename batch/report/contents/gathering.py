@@ -15,7 +15,7 @@ from batch.queries.step_errors.figures import figures, together
 from batch.queries.step_errors.words import about as about_errors
 from batch.report.contents import comparison
 from batch.report.contents.against import ComparedArchive, EarlierCases, of_groups
-from batch.report.contents.evidence import evidence_table
+from batch.report.contents.evidence import evidence_part
 from batch.report.contents.histories import MOST_VALUES, no_signals, signals
 from batch.report.contents.overview import overview
 from batch.report.contents.parameters import parameters, varied
@@ -122,7 +122,7 @@ def _section(
         varied=varied(pool, own),
         metrics=metric_rows(pool, before, errors),
         structures=structures(pool, before),
-        evidence=evidence_table(pool),
+        evidence=evidence_part(pool, archive, several=bool(only)),
         worst=worst(pool, archive, only, before),
         overview=overview(pool, before),
         signals=drawn,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from batch.queries.colours import Reach
+from batch.queries.evidence_table import EvidenceTexts
 from batch.queries.pool import CaseColumn
 from batch.queries.summary import MetricSpread
 from batch.report.contents.changes import ArchiveChanges, RunChanges
@@ -172,6 +173,27 @@ class WorstCaseTable:
     cases: tuple[int, ...]
     commands: tuple[str, ...]
     left: int
+
+
+@frozen
+class EvidenceLine:
+    """A row of the table of evidence: a requirement at a design point, whether it is met, the number of its worst case
+    and what runs that again, and its numbers as texts."""
+
+    requirement: str
+    at: str
+    ok: bool
+    case: int | None
+    command: str
+    texts: EvidenceTexts
+
+
+@frozen
+class EvidencePart:
+    """The table of evidence of a section, and sentences beneath it."""
+
+    rows: tuple[EvidenceLine, ...]
+    notes: tuple[str, ...]
 
 
 @frozen
@@ -365,7 +387,7 @@ class ReportSection:
     """A run or sweep.
 
     name        as it is asked for;  lede  what it is, in a sentence
-    evidence    what the cases show of requirements over a share of cases;  None where there is none
+    evidence    what the cases show of each requirement;  None where nothing is required
     changes     against another archive, a structure each;  what one of them lacks is in `ArchiveChanges.alone`
     trouble     why parameters and stability are missing; "" where they are not
     by_step     what the errors of metrics by the step rest on; "" where none was verified
@@ -376,7 +398,7 @@ class ReportSection:
     facts: tuple[Fact, ...]
     varied: tuple[VariedParameter, ...]
     metrics: tuple[MetricRow, ...]
-    evidence: TextTable | None
+    evidence: EvidencePart | None
     structures: TextTable | None
     worst: WorstCaseTable | None
     overview: Overview | None

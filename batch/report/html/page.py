@@ -166,9 +166,7 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
     elif table is not None:
         out.append(part("overview", "Metrics", table))
     if section.evidence is not None:
-        note = "The confidence is that of each verdict by itself; of all together it is less."
-        shown = tables.table(section.evidence, "Evidence")
-        out.append(part("evidence", "Evidence", shown, said=note))
+        out.append(part("evidence", "Evidence", tables.evidence(section.evidence)))
     if section.structures is not None:
         out.append(part("structures", "Structures side by side", tables.table(section.structures, "Structures")))
     if section.worst is not None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from batch.report.contents.parts import ParameterRow, SourceListing, Stability, TextTable, WorstCaseTable
-from batch.report.html.blocks import Anchors, case_link, scrolling, spot_link
+from batch.report.contents.parts import EvidencePart, ParameterRow, SourceListing, Stability, TextTable, WorstCaseTable
+from batch.report.html.blocks import Anchors, case_link, mark, scrolling, spot_link
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
 from batch.terminal.margin import stable_head
 
@@ -71,6 +71,43 @@ def worst(found: WorstCaseTable) -> Html:
     left = f"{found.left:,} more cases are in the archive." if found.left else ""
     again = el("p", el("code", found.commands[0]), " runs the first again, to the same bits.", cls="said printed")
     return join([made, el("p", left, cls="said") if left else None, again])
+
+
+EVIDENCE_HEADS = ("verdict", "missed", "of all cases", "percentile", "worst", "margin", "± step")
+
+
+def evidence(found: EvidencePart) -> Html:
+    """The table of evidence: over each row what is required and what runs its worst case again, beneath each number
+    what it is held against; notes."""
+
+    def cell(text: Child, under: str = "", cls: str | None = "right") -> Html:
+        return el("td", el("span", text), el("span", under, cls="under") if under else None, cls=cls)
+
+    rows = []
+    for row in found.rows:
+        texts = row.texts
+        name = [el("code", breaking(row.requirement)), el("span", row.at, cls="under") if row.at else None]
+        again = el("span", command(row.command), cls="under command") if row.command else None
+        worst = texts.worst if row.case is None else [texts.worst, " ", case_link(row.case)]
+        numbers = [
+            cell(
+                [mark(row.ok), texts.verdict],
+                f"{texts.needed} more cases" if texts.needed[:1].isdigit() else "",
+                cls="good" if row.ok else "bad",
+            ),
+            cell(texts.missed, f"{texts.share_met} met"),
+            cell(texts.of_all, f"asked: {texts.asked}"),
+            cell(texts.bound),
+            cell(worst, f"limit {texts.limit}"),
+            cell(texts.margin, f"{texts.sigmas} sigmas" if texts.sigmas[-1:].isdigit() else ""),
+            cell(texts.step_error),
+        ]
+        head = el("tr", el("th", name, again, scope="rowgroup", colspan=len(EVIDENCE_HEADS)), cls="head")
+        rows.append(el("tbody", head, el("tr", numbers)))
+    heads = [el("th", head, scope="col", cls="right" if n else None) for n, head in enumerate(EVIDENCE_HEADS)]
+    made = scrolling(el("table", el("thead", el("tr", heads)), lines(rows), cls="judged"), "Evidence")
+    said = "Each command runs the worst case of its row again, to the same bits."
+    return join([made, [el("p", each, cls="said") for each in (said, *found.notes)]])
 
 
 def command(words: str) -> Html:
