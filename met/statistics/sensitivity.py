@@ -145,9 +145,9 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
         found.append(
             InputShare(
                 first=_share(first[number]),
-                first_by=_width(first[number]),
+                first_by=interval(first[number]),
                 total=None if of_total is None else max(_share(of_total), _share(first[number])),
-                total_by=0.0 if of_total is None else _width(of_total) + cut[number],
+                total_by=0.0 if of_total is None else interval(of_total) + cut[number],
                 rank=_correlation(_ranks(values), ranks),
                 low=mean + deviation * float(means[number][0]),
                 high=mean + deviation * float(means[number][-1]),
@@ -244,10 +244,21 @@ def _share(found: np.ndarray) -> float:
     return float(np.clip(found[0], 0.0, 1.0))
 
 
-def _width(found: np.ndarray) -> float:
-    """Half the width of the jackknife's 95 % interval."""
+def interval(found: np.ndarray) -> float:
+    """Half the width of the jackknife's 95 % interval. found: from all cases, then without each part."""
     each = found[1:]
     return float(QUANTILE * np.sqrt((GROUPS - 1) / GROUPS * ((each - each.mean()) ** 2).sum()))
+
+
+def means_of_ends(values: np.ndarray, output: np.ndarray) -> tuple[float, float]:
+    """The mean output in an input's lowest and in its highest cell."""
+    means = _means(cells(values, max(4, min(CELLS, len(output) // 16))), output)
+    return float(means[0]), float(means[-1])
+
+
+def rank_correlation(values: np.ndarray, output: np.ndarray) -> float:
+    """Spearman's correlation of an input and the output, -1 to 1."""
+    return _correlation(_ranks(values), _ranks(output))
 
 
 def _ranks(values: np.ndarray) -> np.ndarray:
