@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from met.statistics.sensitivity import GROUPS, InputShare, Shares, interval, means_of_ends, rank_correlation
+from met.statistics.sensitivity import GROUPS, ROUNDING, InputShare, Shares, interval, means_of_ends, rank_correlation
 
 FEWEST_PAIRS = 64
 """Pairs of points below which nothing can be said."""
@@ -47,7 +47,7 @@ def saltelli_shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares 
     if len(y) < FEWEST_PAIRS:
         raise ValueError(f"{len(y)} pairs of points are fewer than {FEWEST_PAIRS}")
     size = float(np.abs(y - y.mean()).max())
-    if not size > 0.0:
+    if not size > ROUNDING * abs(float(y.mean())):
         return None
     y = (y - y.mean()) / size
     a, b, mixed = y[:, 0], y[:, -1], y[:, 1:-1]

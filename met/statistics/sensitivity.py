@@ -30,6 +30,9 @@ GROUPS = 20
 QUANTILE = 2.093
 """Of Student's distribution with GROUPS - 1 degrees of freedom: 95 % lie within, two-sided."""
 
+ROUNDING = 1e-12
+"""Of an output's mean: values that differ by no more are the same but for rounding, and nothing explains them."""
+
 FEWEST = 64
 """Cases below which nothing can be said."""
 
@@ -95,7 +98,7 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
         raise ValueError(f"{cases} cases are fewer than {FEWEST}")
     mean = float(output.mean())
     deviation = float(np.abs(output - mean).max())
-    if not deviation > 0.0:
+    if not deviation > ROUNDING * abs(mean):
         return None
     y = (output - mean) / deviation
     part = (np.random.default_rng(0).permutation(cases) % GROUPS).astype(np.uint8)

@@ -17,6 +17,7 @@ from batch.report.contents import comparison
 from batch.report.contents.against import ComparedArchive, EarlierCases, of_groups
 from batch.report.contents.evidence import evidence_part
 from batch.report.contents.histories import MOST_VALUES, no_signals, signals
+from batch.report.contents.influence import influences
 from batch.report.contents.overview import overview
 from batch.report.contents.parameters import parameters, varied
 from batch.report.contents.parts import Fact, Report, ReportSection, SourceListing, Stability
@@ -133,6 +134,7 @@ def _section(
         notes=tuple(dict.fromkeys(note for experiment in own.values() for note in experiment.notes)),
         single=pool.count == 1,
         by_step="" if errors is None else about_errors(errors),
+        influences=influences(pool),
     )
 
 

@@ -197,6 +197,35 @@ class EvidencePart:
 
 
 @frozen
+class InfluenceRow:
+    """A varied parameter that explains a metric: its shares of the variance, alone and with others, the metric's mean
+    where it is lowest and highest, as numbers in the deck's unit and as a text, and the correlation of the ranks."""
+
+    path: str
+    alone: str
+    together: str
+    low: float
+    high: float
+    ends: str
+    rank: str
+
+
+@frozen
+class InfluencePart:
+    """The parameters that explain a metric, those that explain most first; none where nothing can be told, as is said.
+
+    metric  "" where it is said of all;  mean: of the metric, in `unit`
+    """
+
+    metric: str
+    said: str
+    unit: str
+    mean: float
+    rows: tuple[InfluenceRow, ...]
+    notes: tuple[str, ...]
+
+
+@frozen
 class ParameterRow:
     """A resolved parameter: value, unit, where it comes from. among: the structures that have it so, where not all."""
 
@@ -391,6 +420,7 @@ class ReportSection:
     changes     against another archive, a structure each;  what one of them lacks is in `ArchiveChanges.alone`
     trouble     why parameters and stability are missing; "" where they are not
     by_step     what the errors of metrics by the step rest on; "" where none was verified
+    influences  of the varied parameters on each metric;  none where that is not asked: one parameter, or few cases
     """
 
     name: str
@@ -411,6 +441,7 @@ class ReportSection:
     single: bool = False
     changes: tuple[RunChanges, ...] = ()
     by_step: str = ""
+    influences: tuple[InfluencePart, ...] = ()
 
 
 @frozen

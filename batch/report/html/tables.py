@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from batch.report.contents.parts import EvidencePart, ParameterRow, SourceListing, Stability, TextTable, WorstCaseTable
+from batch.report.contents.parts import (
+    EvidencePart,
+    InfluencePart,
+    InfluenceRow,
+    ParameterRow,
+    SourceListing,
+    Stability,
+    TextTable,
+    WorstCaseTable,
+)
 from batch.report.html.blocks import Anchors, case_link, mark, scrolling, spot_link
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
 from batch.terminal.margin import stable_head
@@ -108,6 +117,47 @@ def evidence(found: EvidencePart) -> Html:
     made = scrolling(el("table", el("thead", el("tr", heads)), lines(rows), cls="judged"), "Evidence")
     said = "Each command runs the worst case of its row again, to the same bits."
     return join([made, [el("p", each, cls="said") for each in (said, *found.notes)]])
+
+
+def influence(found: InfluencePart) -> Html:
+    """The parameters that explain a metric, with a tornado; notes."""
+    head = [el("code", found.metric), ": ", found.said] if found.metric else found.said
+    if not found.rows:
+        return el("p", head, cls="said")
+    together = any(row.together for row in found.rows)
+    ends = [value for row in found.rows for value in (row.low, row.high)]
+    low, high = min(found.mean, *ends), max(found.mean, *ends)
+    rows = [
+        el(
+            "tr",
+            el("th", el("code", breaking(row.path)), scope="row"),
+            el("td", _tornado(row, found.mean, low, high)),
+            el("td", row.alone, cls="right"),
+            el("td", row.together, cls="right") if together else None,
+            el("td", row.ends, cls="right"),
+            el("td", row.rank, cls="right"),
+        )
+        for row in found.rows
+    ]
+    heads = ["parameter", "", "alone", *(["with others"] if together else []), "mean, from low to high", "rank"]
+    top = el("tr", [el("th", name, scope="col", cls="right" if n > 1 else None) for n, name in enumerate(heads)])
+    made = scrolling(el("table", el("thead", top), el("tbody", lines(rows))), f"What explains {found.metric}")
+    return join([el("h4", head), made, [el("p", each, cls="said") for each in found.notes]])
+
+
+def _tornado(row: InfluenceRow, mean: float, low: float, high: float) -> Html:
+    """Two bars from the metric's mean, to what it is at both ends of a parameter. low, high: ends of the axis."""
+
+    def at(value: float) -> float:
+        return 160.0 * (value - low) / (high - low) if high > low else 80.0
+
+    bars = [
+        el("rect", x=f"{min(at(end), at(mean)):.2f}", y=3, width=f"{abs(at(end) - at(mean)):.2f}", height=12, cls=cls)
+        for end, cls in ((row.low, "lowest"), (row.high, "highest"))
+    ]
+    middle = el("line", x1=f"{at(mean):.2f}", x2=f"{at(mean):.2f}", y1=0, y2=18, cls="floor")
+    words = f"{row.path}: from {row.ends}"
+    return el("svg", bars, middle, cls="tornado", viewBox="-1 0 162 18", role="img", aria_label=words)
 
 
 def command(words: str) -> Html:

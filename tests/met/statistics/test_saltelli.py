@@ -86,6 +86,7 @@ def test_the_scheme_is_known_by_its_values() -> None:
 def test_what_does_not_vary_has_no_shares_and_few_pairs_are_refused() -> None:
     x = cases(2, 64, 0)
     assert saltelli_shares(x, np.ones(256)) is None
+    assert saltelli_shares(x, np.pi + 1e-15 * x[0]) is None, "that is rounding"
     with pytest.raises(ValueError, match=str(FEWEST_PAIRS)):
         saltelli_shares([each[:252] for each in x], np.arange(252.0))
 
