@@ -74,9 +74,9 @@ def evidence_table_lines(rows: Sequence[RequirementEvidence], width: int) -> lis
     texts = list(map(texts_of, rows))
     out += [
         "",
-        *_half(numbers, texts, OF_CASES, right=(2, 3, 7)),
+        *_half(numbers, texts, OF_CASES, width, right=(2, 3, 7)),
         "",
-        *_half(numbers, texts, OF_VALUES, right=range(1, 6)),
+        *_half(numbers, texts, OF_VALUES, width, right=range(1, 6)),
     ]
     again = [[number, row.again] for number, row in zip(numbers, rows, strict=True) if row.again]
     out += ["", "  the worst case of each, run again to the same bits:", *columns(again)] if again else []
@@ -88,14 +88,32 @@ def evidence_table_lines(rows: Sequence[RequirementEvidence], width: int) -> lis
 
 
 def _half(
-    numbers: Sequence[str], texts: Sequence[EvidenceTexts], which: Sequence[tuple[str, str]], *, right: Iterable[int]
+    numbers: Sequence[str],
+    texts: Sequence[EvidenceTexts],
+    which: Sequence[tuple[str, str]],
+    width: int,
+    *,
+    right: Iterable[int],
 ) -> list[str]:
-    """Some columns of the table, behind the numbers of its rows."""
-    rows = [["", *(head for head, _ in which)]]
-    rows += [
-        [number, *(getattr(each, field) for _, field in which)] for number, each in zip(numbers, texts, strict=True)
-    ]
-    return columns(rows, right=right)
+    """Some columns of the table, behind the numbers of its rows; with signs in place of words where they are too
+    wide."""
+    cells = [[getattr(each, field) for _, field in which] for each in texts]
+    rows = [["", *(head for head, _ in which)], *([number, *row] for number, row in zip(numbers, cells, strict=True))]
+    lines = columns(rows, right=right)
+    if max(map(len, lines)) <= width:
+        return lines
+    return columns([[_short(cell) for cell in row] for row in rows], right=right)
+
+
+def _short(cell: str) -> str:
+    """`at least 99.42 %` as `≥ 99.42 %`, `99 % with 90 %` as `99 %, 90 %`."""
+    for words, sign in (
+        ("at least", "\N{GREATER-THAN OR EQUAL TO}"),
+        ("at most", "\N{LESS-THAN OR EQUAL TO}"),
+        (" with", ","),
+    ):
+        cell = cell.replace(words, sign)
+    return cell
 
 
 def _numbers(rows: Sequence[RequirementEvidence], required: Sequence[str]) -> list[str]:

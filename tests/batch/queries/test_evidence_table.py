@@ -16,6 +16,7 @@ import pytest
 import batch
 from batch.archive.read import ArchiveFile
 from batch.queries.evidence_table import RequirementEvidence, as_data, notes_of, requirement_evidence, texts_of
+from batch.terminal.evidence import evidence_table_lines
 from met.cli import main
 from met.diagnostic import Problem
 from met.statistics.confidence import cases_needed, lower_bound, percentile_rank, upper_bound
@@ -236,3 +237,16 @@ def test_a_margin_that_the_step_decides_is_said() -> None:
     said = ["late < 2 s: the error by the step is as large as the margin; shorter steps may change it"]
     assert notes_of([row]) == said
     assert notes_of([replace(row, step_error=0.009)]) == [] and notes_of([replace(row, step_error=None)]) == []
+
+
+def test_words_are_signs_where_the_table_is_too_wide() -> None:
+    row = RequirementEvidence(
+        run="r", requirement="late < 2 s in 99.99 % of cases with 99.5 % confidence", at="", metric="late", unit="s",
+        si_unit="s", scale=1.0, comparison="<", limit=2.0, share=0.9999, confidence=0.995, verdict="not shown",
+        cases=1_000_000, missed=123_456, share_met=0.876544, at_least=0.8761234, at_most=0.8769, percentile_bound=123.4,
+        worst=1.99, worst_case=0, margin=0.01, more_cases=1_234_567,
+    )  # fmt: skip
+    wide, narrow = (evidence_table_lines([row], width) for width in (120, 100))
+    assert any("at least 87.61 %" in line and "99.99 % with 99.5 %" in line for line in wide)
+    assert any("\u2265 87.61 %" in line and "99.99 %, 99.5 %" in line for line in narrow)
+    assert max(map(len, narrow)) <= 100 < max(map(len, wide))
