@@ -12,6 +12,7 @@ from met.unit_parser import parse_unit
 # what a unit may stand behind: a number, or the end of a sum in parentheses
 _NUMBER = re.compile(r"\d[\d.]*(?:[eE][-+]?\d+)?|\)")
 _OVER_TIME = re.compile(r"(?:\w+: )?\w+\(")
+_OVER_CASES = re.compile(r"\s+(?:in\s.*\sof\s+cases\b.*|with\s.*\sconfidence)$")
 _COMPARED = re.compile(r"[<>]=?\s*\(?[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*([A-Za-z][\w/*^]*)")
 
 
@@ -30,7 +31,7 @@ def written_unit(text: str, unit: str) -> tuple[str, float] | None:
         wanted = parse_unit(unit).dimension
     except ValueError:
         return None
-    limit = re.split(r"[<>]=?", text, maxsplit=1)[-1]
+    limit = _OVER_CASES.sub("", re.split(r"[<>]=?", text, maxsplit=1)[-1])
     for number in _NUMBER.finditer(limit):
         written = limit[number.end() :].strip()
         try:

@@ -35,6 +35,12 @@ if TYPE_CHECKING:
     "[a case of a sweep; an instant where --case or --signals is given].",
 )
 @click.option(
+    "--evidence",
+    is_flag=True,
+    help="Of a table, a row a requirement at a design point: share, bounds, worst case, margin, verdict; "
+    "of all runs unless --run names some.",
+)
+@click.option(
     "--units",
     type=click.Choice(["si", "deck"]),
     default="si",
@@ -53,6 +59,7 @@ def export(
     cases: tuple[str, ...],
     signals: tuple[str, ...],
     histories: bool | None,
+    evidence: bool,
     units: Literal["si", "deck"],
     layout: bool,
     force: bool,
@@ -64,7 +71,7 @@ def export(
 
     MCAP opens in Foxglove and Lichtblick: the arm moves in 3D, without a URDF, beside its signals and what was said of
     it; several cases are overlaid. CSV and Parquet are tables: of a sweep a row a case, with what is varied and its
-    metrics; of a run, or with --histories, a row an instant, with the signals.
+    metrics; of a run, or with --histories, a row an instant, with the signals; with --evidence, a row a requirement.
     """
     import json
 
@@ -72,7 +79,10 @@ def export(
     from ic.printing.columns import size
 
     names = [name.strip() for each in signals for name in each.split(",") if name.strip()]
+    if evidence and histories is not None:
+        raise click.UsageError("--evidence is a table of its own: leave out --histories or --metrics")
     table: Rows | None = None if histories is None else "histories" if histories else "metrics"
+    table = "evidence" if evidence else table
     done = export(
         archive,
         output,

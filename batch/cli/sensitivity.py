@@ -21,7 +21,8 @@ def sensitivity(
     `failure` where some cases fail.
 
     Alone: the first-order index. With others: the total index, as far as two inputs act together. Both with intervals
-    of 95 %. No special design is asked for; any cases do whose parameters vary independently.
+    of 95 %. Any cases do whose parameters vary independently; those of `sample saltelli(n)` are estimated as they were
+    made.
     """
     import json
     from contextlib import ExitStack

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 @click.option("--over", multiple=True, metavar="PATH", help="Of these that differ in PATH alone, the worst.")
 @click.option("--met", is_flag=True, help="Only cases, of these, that meet all requirements.")
 @click.option("--no-plots", is_flag=True, help="Numbers only.")
+@click.option("--evidence", is_flag=True, help="The table of requirements alone: share, bounds, worst case, margin.")
 @format_option
 def show(
     archive: str,
@@ -47,6 +48,7 @@ def show(
     met: bool,
     over: tuple[str, ...],
     no_plots: bool,
+    evidence: bool,
     form: str,
 ) -> int:
     """Show what an archive holds: what was run, how it went, metrics, requirements, and SIGNALs (`qd`, `elbow.q`).
@@ -59,7 +61,7 @@ def show(
     from batch.archive.read import ArchiveFile
     from batch.queries.ordering import by_names
     from batch.queries.selection import CaseSelection
-    from batch.terminal.show import as_json, show
+    from batch.terminal.show import as_json, show, show_evidence
     from met.messages.render import wants_colour
 
     if reverse and not sort:
@@ -69,6 +71,8 @@ def show(
     some = CaseSelection(where or "", over, met)
     if case is not None and not some.everything:
         raise click.UsageError("--where, --met and --over are of many cases, and --case of one")
+    if evidence and (signals or case is not None or sort or all_cases or not some.everything):
+        raise click.UsageError("--evidence is about all cases: of one, or of signals, ask without it")
     by = by_names(sort, reverse=reverse)
     with ArchiveFile(archive) as file:
         if form == "json":
@@ -76,6 +80,9 @@ def show(
             return YES
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
         colour = wants_colour(sys.stdout)
+        if evidence:
+            click.echo(show_evidence(file, experiments, width=width), nl=False)
+            return YES
         text = show(
             file,
             signals,

@@ -6,6 +6,7 @@ import dataclasses
 from typing import Any
 
 from batch.differences.result import Diff, ExperimentDiff, SignalDiff
+from batch.queries.evidence_table import as_data as as_row
 from batch.queries.summary import finite
 
 SCHEMA, VERSION = "met.diff", 2
@@ -56,6 +57,7 @@ def _experiment(found: ExperimentDiff) -> dict[str, Any]:
             }
             for each in found.requirements
         ],
+        "evidence": [{"a": as_row(each.before), "b": as_row(each.now)} for each in found.evidence],
         "required_in_one": found.required_in_one,
         "signals": [_signal(each) for each in found.signals],
         "worst": [dataclasses.asdict(each) for each in found.worst],

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from batch.archive.read import ArchiveGroup
 from batch.differences.matching import MatchedCases
-from batch.differences.result import ExperimentDiff, RequirementDiff
+from batch.differences.result import EvidenceDiff, ExperimentDiff, RequirementDiff
 from batch.differences.words import distinct_texts
 from batch.queries import requirements
+from batch.queries.evidence_table import requirement_evidence
 from batch.queries.signals import deck_unit
 from batch.queries.step_errors.figures import figures
 from batch.queries.step_errors.limits import verdicts
@@ -52,6 +55,7 @@ def compare_requirements(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases
                     f"require {now[text]} is met by as many as before, but by others: {lost:,} no more, {gained:,} now"
                 )
     _compare_step_errors(a, b, out)
+    _compare_evidence(a, b, now, out)
     for known, others, path in ((met_a, now, a.path), (met_b, now.values(), b.path)):
         for text, met in known.items():
             if text not in others:
@@ -72,6 +76,16 @@ def _compare_step_errors(a: ArchiveGroup, b: ArchiveGroup, out: ExperimentDiff) 
             said = f"require {text} is only in {(b if one is None else a).path}, {found.word} ({found.said})"
             out.notes.append(said)
             out.required_in_one.append(said)
+
+
+def _compare_evidence(a: ArchiveGroup, b: ArchiveGroup, now: Mapping[str, str], out: ExperimentDiff) -> None:
+    """Pair the rows of both tables of evidence. now: the text in b of each requirement of a that both have."""
+    one, other = (requirement_evidence([group], str(group.path), several=True) for group in (a, b))
+    rows = {(row.requirement, row.at): row for row in other}
+    for row in one:
+        text = now.get(row.requirement, row.requirement)
+        if (text, row.at) in rows:
+            out.evidence.append(EvidenceDiff(row, rows[text, row.at]))
 
 
 def _met(group: ArchiveGroup, cases: np.ndarray) -> dict[str, np.ndarray]:

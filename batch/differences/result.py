@@ -12,6 +12,7 @@ from batch.differences.matching import MatchedCases
 from batch.differences.provenance import ProvenanceChanges
 from batch.differences.samples import MetricSamples
 from batch.differences.tolerance import SignalTolerance, Tolerances
+from batch.queries.evidence_table import RequirementEvidence
 from met.frozen import frozen
 
 
@@ -157,6 +158,15 @@ class RequirementDiff:
         return self.other or self.before != self.now or self.met_before != self.met_now
 
 
+@frozen
+class EvidenceDiff:
+    """The rows of one requirement at one design point in the tables of evidence of a and of b, whose cases are all of
+    each archive; a limit that was changed is taken for the same requirement."""
+
+    before: RequirementEvidence
+    now: RequirementEvidence
+
+
 @dataclass
 class ExperimentDiff:
     """Two matched experiments. tolerances: what the deck of b and the command line allow; partial: whether one has
@@ -171,6 +181,7 @@ class ExperimentDiff:
     partial: bool = False
     ended: list[EndingDiff] = field(default_factory=list)
     requirements: list[RequirementDiff] = field(default_factory=list)
+    evidence: list[EvidenceDiff] = field(default_factory=list)
     required_in_one: list[str] = field(default_factory=list)
     worst: list[RankedCase] = field(default_factory=list)
     samples: list[MetricSamples] = field(default_factory=list)

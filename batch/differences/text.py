@@ -12,7 +12,7 @@ from met.frozen import frozen
 MOST_LINES, OF_KIND = 12, {"deck": 24, "follows": 6}
 """Lines of one kind of change that are printed; for some kinds another number."""
 
-SHOWN_ENDED, SHOWN_WORST = 8, 5
+SHOWN_ENDED, SHOWN_WORST, SHOWN_EVIDENCE = 8, 5, 12
 
 LONGEST = 120
 """Characters of a deck's line."""
@@ -59,11 +59,19 @@ def _experiment(found: Diff, experiment: ExperimentDiff, cut: Shortening) -> lis
     out += [f"  note: {note}" for note in experiment.notes]
     out += [f"  {line}" for line in words.tolerance_lines(found, experiment)]
     out += [f"  {line}" for line in words.requirement_lines(experiment)]
+    out += _evidence(experiment, cut)
     out += _signals(experiment.signals)
     out += _paired(experiment)
     out += _samples(experiment)
     out += _worst(found, experiment, cut)
     return out
+
+
+def _evidence(experiment: ExperimentDiff, cut: Shortening) -> list[str]:
+    """What the cases show of requirements over a share of cases, where that is something else than before."""
+    both = [f"    {what}\n      {said}" for what, said in words.evidence_pairs(experiment)]
+    lines = [line for each in cut.cut(both, SHOWN_EVIDENCE, "    ") for line in each.split("\n")]
+    return [f"  {words.EVIDENCE}:", *lines] if lines else []
 
 
 def _ended(experiment: ExperimentDiff, cut: Shortening) -> Iterator[str]:

@@ -11,11 +11,15 @@ from batch.differences import paired
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, INCOMPARABLE
 from batch.differences.result import Diff, EndingDiff, ExperimentDiff, RankedCase, RequirementDiff, SignalDiff
 from batch.differences.samples import LEVEL, MetricSamples
+from batch.queries.evidence_table import texts_of
 from batch.queries.failures import STATUS, ranges
 from batch.queries.signals import number_text
 from met.frozen import frozen
 from met.messages.visible import visible
 from met.outputs import quoted
+
+EVIDENCE = "requirements over cases"
+"""What is said before `evidence_lines`."""
 
 PAIRED = "metrics, case by case"
 """The heading of what pairs of the same cases show of metrics."""
@@ -88,6 +92,21 @@ def requirement_lines(experiment: ExperimentDiff) -> list[str]:
         for each in experiment.requirements
         if each.has_changed
     ]
+
+
+def evidence_pairs(experiment: ExperimentDiff) -> list[tuple[str, str]]:
+    """Requirements over a share of cases of which the cases show something else than before, and what."""
+    lines = []
+    for each in experiment.evidence:
+        before, now = texts_of(each.before), texts_of(each.now)
+        named = (("", "verdict"), ("of all cases ", "of_all"), ("margin ", "margin"), ("in sigmas ", "sigmas"))
+        pairs = [(name, getattr(before, field), getattr(now, field)) for name, field in named]
+        if each.now.share is None or all(one == other for _, one, other in pairs):
+            continue
+        said = [f"{name}{one}" if one == other else f"{name}{one}, now {other}" for name, one, other in pairs]
+        at = f", {each.now.at}" if each.now.at else ""
+        lines.append((f"{each.now.requirement}{at}", "; ".join(said)))
+    return lines
 
 
 def pairs_text(each: RequirementDiff) -> str:

@@ -1,18 +1,19 @@
 """Archives in other tools' formats: `met export`.
 
-formats    the registry of file formats, and what each of them offers
-picking    which cases, and which numbers of them
-output     what may be written over, and a file that has its name only when it is whole
-mcap       for Foxglove and Lichtblick: the arm in 3D, signals, what came of it; made of
-  poses      where the links are
-  scene      what they look like
-  case_log   what is logged of a case, and its result
-  wire       messages of our own
-layout     what Foxglove shows when it opens one
-case_table a table of cases: what is varied, metrics, requirements
-csv        a table as text, of cases or of histories
-parquet    the same for other programs; needs pyarrow
-from_run   an export that a run is asked for
+formats        the registry of file formats, and what each of them offers
+picking        which cases, and which numbers of them
+output         what may be written over, and a file that has its name only when it is whole
+mcap           for Foxglove and Lichtblick: the arm in 3D, signals, what came of it; made of
+  poses         where the links are
+  scene         what they look like
+  case_log      what is logged of a case, and its result
+  wire          messages of our own
+layout         what Foxglove shows when it opens one
+case_table     a table of cases: what is varied, metrics, requirements
+evidence_rows  a table of requirements, with what the cases show of each
+csv            a table as text, of cases or of histories
+parquet        the same for other programs; needs pyarrow
+from_run       an export that a run is asked for
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class Exported:
 
     path    the file
     layout  the layout file beside it, where one was asked for
-    cases   how many cases it has, and `rows` how many rows all of them have
+    cases   how many cases it has, 0 of evidence, and `rows` how many rows all of them have
     table   what a row is
     """
 
@@ -61,17 +62,17 @@ def export(
     layout: bool = False,
     force: bool = False,
 ) -> Exported:
-    """Write an archive for another tool: histories, or a table of cases with their metrics.
+    """Write an archive for another tool: histories, or a table of cases with their metrics, or of requirements.
 
     output   the file; None: the archive's name with the ending of `form`
     form     a name in `batch.formats.FORMATS`, such as "csv"; None: by the ending of `output`, and mcap where
              there is no output
-    runs     names of runs and sweeps; none: the first one
+    runs     names of runs and sweeps; none: the first one, of evidence all
     cases    `7`, `"#7"`, or the beginnings of case_ids, in the order in which they are wanted; none: all, of histories
              those that are kept
     signals  as `met plot` takes them: `qd`, `elbow.q`; none: all
-    table    what a row is: "metrics" a case, "histories" an instant; None: a case of what has several, unless cases or
-             signals are named, in a format that can hold a table of metrics
+    table    what a row is: "metrics" a case, "histories" an instant, "evidence" a requirement at a design point; None:
+             a case of what has several, unless cases or signals are named, in a format that can hold a table of metrics
     units    of a table: "deck" for metrics and what is varied as the deck writes them; signals are in SI
     layout   of an MCAP: also write how Foxglove shows it, in `<output>.layout.json`
     force    write over a file that is there, whatever it is
@@ -80,6 +81,7 @@ def export(
     """
     from batch.archive.read import ArchiveFile
     from batch.export import case_table
+    from batch.export.evidence_rows import evidence_columns
     from batch.export.output import check
     from batch.export.picking import pick
 
@@ -91,9 +93,13 @@ def export(
         check(target, file.path, writer.is_own, force=force)
         names = [f"#{case}" if isinstance(case, int) else case for case in cases]
         only = writer.tables[0] if len(writer.tables) == 1 else None
+        if table == "evidence":
+            required = evidence_columns(file, runs, deck=units == "deck")
+            written = writer.write_table(file, required, target)
+            return Exported(target, written.layout, 0, written.rows, "evidence")
         if (only or table or _row(file, runs, names, signals)) == "metrics":
             rows = case_table.table(file, runs, names, deck=units == "deck")
-            written = writer.write_metrics(file, rows, target)
+            written = writer.write_table(file, rows, target)
             return Exported(target, written.layout, rows.count, written.rows, "metrics")
         picked = pick(file, runs, names, signals)
         written = writer.write_histories(file, picked, target, request)
@@ -111,6 +117,8 @@ def _row(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: 
 
 def summary(done: Exported) -> str:
     """Say in words what an export holds, for the line that names its file."""
+    if done.table == "evidence":
+        return f": evidence, {done.rows:,} row{'s' if done.rows != 1 else ''}, one a requirement at a design point"
     cases = f"{done.cases:,} case{'s' if done.cases != 1 else ''}"
     if done.table == "metrics":
         return f": metrics of {cases}, a row each" + ("; `--histories` writes signals" if done.cases != 1 else "")

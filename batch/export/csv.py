@@ -21,6 +21,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile
 from batch.export.case_table import CaseTable, TableColumn, of_varied, value_of, varied
+from batch.export.evidence_rows import EvidenceColumns
 from batch.export.formats import ExportFormat, ExportRequest, WrittenExport
 from batch.export.output import whole
 from batch.export.picking import ExportedCase, SignalColumn
@@ -84,8 +85,8 @@ def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, dec
     return sum(len(case.time) for case in cases)
 
 
-def write_cases(file: ArchiveFile, table: CaseTable, output: Path) -> int:
-    """Write a table of cases and return the number of its rows. Raises Problem E305."""
+def write_rows(file: ArchiveFile, table: CaseTable | EvidenceColumns, output: Path) -> int:
+    """Write a table of cases, or of evidence, and return the number of its rows. Raises Problem E305."""
     with whole(output) as sink:
         sink.write(memoryview(_head(file, table.runs, [(field.name, field.unit) for field in table.fields])))
         for columns in table.blocks():
@@ -144,8 +145,8 @@ class Csv(ExportFormat):
 
     title = "a CSV file"
 
-    def write_metrics(self, file: ArchiveFile, table: CaseTable, target: Path) -> WrittenExport:
-        return WrittenExport(write_cases(file, table, target))
+    def write_table(self, file: ArchiveFile, table: CaseTable | EvidenceColumns, target: Path) -> WrittenExport:
+        return WrittenExport(write_rows(file, table, target))
 
     def write_histories(
         self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: ExportRequest

@@ -18,10 +18,11 @@ if TYPE_CHECKING:
     from batch.archive.read import ArchiveFile
     from batch.campaigns.campaign import Campaign
     from batch.export.case_table import CaseTable
+    from batch.export.evidence_rows import EvidenceColumns
     from batch.export.picking import ExportedCase
 
-Rows = Literal["metrics", "histories"]
-"""The rows of an export: a case with its metrics, or an instant of a case."""
+Rows = Literal["metrics", "histories", "evidence"]
+"""The rows of an export: a case with its metrics, an instant of a case, or a requirement at a design point."""
 
 Option = Literal["units", "layout"]
 """An option of `met export` that only some formats take."""
@@ -65,7 +66,7 @@ class ExportFormat:
     """
 
     title: str
-    tables: tuple[Rows, ...] = ("metrics", "histories")
+    tables: tuple[Rows, ...] = ("metrics", "histories", "evidence")
     options: tuple[Option, ...] = ("units",)
     metrics_in: str = ""
 
@@ -76,8 +77,8 @@ class ExportFormat:
     def check_campaign(self, campaign: Campaign, target: Path) -> None:
         """Refuse, before anything runs, a campaign whose archive could not be exported. Raises Problem."""
 
-    def write_metrics(self, file: ArchiveFile, table: CaseTable, target: Path) -> WrittenExport:
-        """Write a row a case: what is varied, metrics, requirements. Raises Problem."""
+    def write_table(self, file: ArchiveFile, table: CaseTable | EvidenceColumns, target: Path) -> WrittenExport:
+        """Write a row a case, with what is varied, metrics, requirements; or a row a requirement. Raises Problem."""
         raise NotImplementedError
 
     def write_histories(
@@ -95,12 +96,19 @@ class ExportFormat:
             helps = "; ".join(filter(None, ("`-o FILE.csv` writes one", self.metrics_in)))
             message = f"{target} would hold histories: {self.title} is no table of metrics"
             raise Problem(error("E376", message, help=helps))
+        if request.table == "evidence" and "evidence" not in self.tables:
+            message = f"{target} would hold no requirements: {self.title} is no table of evidence"
+            raise Problem(error("E376", message, help="`-o FILE.csv` writes one"))
         if "histories" not in self.tables and (request.table == "histories" or request.signals):
             message = f"{target} would be a table of metrics: {self.title} holds no histories"
             raise Problem(error("E376", message, help="`-o FILE.csv` and `-o FILE.mcap` hold them"))
         if request.units != "si" and "units" not in self.options:
             message = f"{target} would be in SI: {self.title} has no other units"
             raise Problem(error("E376", message, help="`-o FILE.csv` can be in the deck's"))
+        if request.table == "evidence" and (request.signals or request.named):
+            of = f"signal `{request.signals[0]}`" if request.signals else "case"
+            message = f"evidence is of requirements over all cases: its table has no {of}"
+            raise Problem(error("E376", message, help="leave out `--evidence`, or `--signals` and `--case`"))
         if request.table == "metrics" and request.signals:
             message = f"signals are histories: a table of metrics has no `{request.signals[0]}`"
             raise Problem(error("E376", message, help="leave out `--metrics`, or `--signals`"))

@@ -20,6 +20,7 @@ from batch.archive.sink import temporary_of
 from batch.campaigns.campaign import Campaign
 from batch.export.case_table import CaseTable, TableColumn, of_varied, value_of, varied
 from batch.export.csv import all_columns
+from batch.export.evidence_rows import EvidenceColumns
 from batch.export.formats import ExportFormat, ExportRequest, WrittenExport
 from batch.export.output import whole
 from batch.export.picking import ExportedCase, SignalColumn
@@ -55,8 +56,8 @@ def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, dec
     return sum(len(case.time) for case in cases)
 
 
-def write_cases(file: ArchiveFile, table: CaseTable, output: Path) -> int:
-    """Write a table of cases and return the number of its rows. Raises Problem E305, E373."""
+def write_rows(file: ArchiveFile, table: CaseTable | EvidenceColumns, output: Path) -> int:
+    """Write a table of cases, or of evidence, and return the number of its rows. Raises Problem E305, E373."""
     arrow, parquet = pyarrow_here()
     kinds = {"float": arrow.float64(), "int": arrow.int64(), "str": arrow.string()}
     fields = [arrow.field(each.name, kinds[each.kind], metadata=_told(each.unit, each.about)) for each in table.fields]
@@ -159,8 +160,8 @@ class Parquet(ExportFormat):
     def check_campaign(self, campaign: Campaign, target: Path) -> None:
         pyarrow_here()
 
-    def write_metrics(self, file: ArchiveFile, table: CaseTable, target: Path) -> WrittenExport:
-        return WrittenExport(write_cases(file, table, target))
+    def write_table(self, file: ArchiveFile, table: CaseTable | EvidenceColumns, target: Path) -> WrittenExport:
+        return WrittenExport(write_rows(file, table, target))
 
     def write_histories(
         self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: ExportRequest

@@ -36,9 +36,9 @@ def without_internals(function: Callable[P, T]) -> Callable[P, T]:
 class Accessor(Generic[Data]):
     """An archive's cases, chosen by what is varied in them and unfolded over it; where the links are; what was run.
 
-    Selections and blocks are made of the Dataset alone. `frames`, `parameters`, `plan` and `sources` read the archive
-    that it was opened from, which must still be the same one. Everything raises met.diagnostic.Problem for what a
-    user can mend.
+    Selections and blocks are made of the Dataset alone. `frames`, `parameters`, `evidence`, `plan` and `sources` read
+    the archive that it was opened from, which must still be the same one. Everything raises met.diagnostic.Problem for
+    what a user can mend.
     """
 
     def __init__(self, data: Data) -> None:
@@ -128,6 +128,14 @@ class Accessor(Generic[Data]):
             helps = 'name one: `data.met.parameters("#0")`; of several runs, `data.met.sel(run=NAME)` before'
             raise Problem(error("E388", f"parameters are those of one case, and here are {len(cases):,}", help=helps))
         return table(path, *cases[0])
+
+    @without_internals
+    def evidence(self) -> Any:
+        """What the cases show of each requirement, as a pandas.DataFrame with a row for each at each design point: the
+        table of `met show --evidence`, numbers in SI. Of all cases, so ask before any are chosen."""
+        from batch.notebook.evidence import table
+
+        return table(source.file_of(self._data), self._parts())
 
     @property
     @without_internals

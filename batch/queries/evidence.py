@@ -8,7 +8,7 @@ whose metric has no value, misses it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -33,7 +33,8 @@ SOME_OF_THE_TABLE = "only some cases of the table were run: without a confidence
 
 @frozen(kw_only=True)
 class EvidenceRow:
-    """A requirement over a share of cases, and the evidence that the cases of one design point give for it.
+    """A requirement, and the evidence that the cases of one design point give for it; of one that every case is to
+    meet, that all cases give.
 
     requirement  with its limit in SI;  unit, scale: in which its deck writes the metric, shown = SI / scale
     chosen       what was chosen at the design point: path -> text with its unit; empty where nothing was
@@ -73,7 +74,11 @@ class EvidenceRow:
 def evidence(group: ArchiveGroup) -> list[EvidenceRow]:
     """The rows of an experiment's requirements over a share of cases, at each of its design points; none, and no values
     are read, where it has no such requirement."""
-    found = [each for each in requirements.group_requirements(group) if each.share is not None]
+    return evidence_for(group, [each for each in requirements.group_requirements(group) if each.share is not None])
+
+
+def evidence_for(group: ArchiveGroup, found: Sequence[GroupRequirement]) -> list[EvidenceRow]:
+    """The rows of these requirements: a row a design point, and one alone for what every case is to meet."""
     if not found:
         return []
     outcomes = requirements.outcomes(group)
@@ -82,7 +87,7 @@ def evidence(group: ArchiveGroup) -> list[EvidenceRow]:
     for each in found:
         values = group.values(each.metric)
         scale, unit = deck_unit(group.variables[each.metric])
-        for point in points:
+        for point in points if each.share is not None else [DesignPoint({}, np.arange(group.count))]:
             judged = _judged(each, values[point.cases], outcomes[point.cases, each.place], why)
             worst = int(point.cases[judged.pop("worst")])
             out.append(
@@ -142,9 +147,8 @@ def _judged(each: GroupRequirement, values: np.ndarray, outcomes: np.ndarray, wh
         "margin": sign * (each.limit - float(values[worst])),
         "sigmas": sign * (each.limit - float(finite.mean())) / deviation if deviation > 0.0 else None,
     }
-    assert each.share is not None
-    if each.confidence is None or why:
-        share = each.share if each.confidence is None else 1.0
+    if each.share is None or each.confidence is None or why:
+        share = each.share if each.share is not None and each.confidence is None else 1.0
         verdict = "met" if cases - missed >= share * cases * (1.0 - ROUNDING) else "missed"
         return {**found, "verdict": verdict, "why": why if each.confidence is not None else ""}
     verdict = bounds.verdict(cases, missed, each.share, each.confidence)

@@ -12,7 +12,11 @@ from batch.queries.signals import deck_unit
 from met.diagnostic import Problem, did_you_mean, error
 from met.frozen import frozen
 from met.statistics.in_step import in_step
+from met.statistics.saltelli import FEWEST_PAIRS, is_saltelli, saltelli_shares
 from met.statistics.sensitivity import FEWEST, InputShare, dependent, shares
+
+UNCLEAR = 0.1
+"""Half a width of an interval from which on more cases are asked for, and a rest from which on it is told."""
 
 FAILURE = "failure"
 """The name under which failing is asked about: 1 in a case that failed, else 0."""
@@ -43,6 +47,9 @@ class Sensitivity:
     inputs, shares     by the inputs' order; no shares where the output does not vary
     rest               the share that no input and no pair explains; None without pairs
     together           pairs of inputs that do not vary independently, with the correlation of their ranks
+    mean               of the output over the cases that count, SI; not a number where none does
+    design             that the cases were made by and whose own estimators were used, `saltelli`; "" of any others
+    why                the estimators of a design were not used although its cases are there; "" where that is not so
     """
 
     name: str
@@ -55,6 +62,19 @@ class Sensitivity:
     shares: tuple[InputShare, ...]
     rest: float | None
     together: tuple[tuple[str, str, float], ...]
+    mean: float = float("nan")
+    design: str = ""
+    why: str = ""
+
+    @property
+    def order(self) -> list[int]:
+        """Places of the inputs, those that explain most first."""
+        return sorted(range(len(self.shares)), key=lambda i: -(self.shares[i].total or self.shares[i].first))
+
+    @property
+    def fewest(self) -> int:
+        """Cases of this kind below which nothing can be said."""
+        return FEWEST if not self.design else FEWEST_PAIRS * (len(self.inputs) + 2)
 
 
 def sensitivities(
@@ -78,7 +98,33 @@ def sensitivities(
                 helps = ["all cases failed" if failed.any() else "no case failed"]
             raise Problem(error("E362", f"no metric `{name}` in `{group.name}` to explain", help=helps))
     inputs = _inputs(group, positions)
-    return [_explained(group, metrics.get(name), inputs, positions, failed, before) for name in names or known]
+    designed = _designed(group)
+    return [
+        _explained(group, metrics.get(name), inputs, positions, failed, before, designed) for name in names or known
+    ]
+
+
+def _designed(group: ArchiveGroup) -> tuple[list[np.ndarray], str]:
+    """The varied parameters, of each case, where the cases were made by Saltelli's scheme and all of them are there;
+    else none, and why not where a part of what varies was drawn so."""
+    coordinates = group.role("coordinate")
+    designs = {str(variable.attributes.get("design", "")) for variable in coordinates}
+    if "saltelli" not in designs:
+        return [], ""
+    if len(designs) > 1 or ("repeat" in group.variables and group.values("repeat").any()):
+        return [], "more varies than was drawn by `saltelli`"
+    values = [np.asarray(group.values(variable.name), float) for variable in coordinates]
+    if group.count < int(group.attributes.get("cases_in_table", group.count)) or not is_saltelli(values):
+        return [], "not all cases of `saltelli` are there"
+    return values, ""
+
+
+def _whole_pairs(finite: np.ndarray, positions: np.ndarray, count: int, width: int) -> np.ndarray:
+    """Places among all cases, [pair, width], of the pairs of points of which each case counts. finite: of the cases at
+    these positions."""
+    counts = np.zeros(count, bool)
+    counts[positions[finite]] = True
+    return np.arange(count).reshape(-1, width)[counts.reshape(-1, width).all(axis=1)]
 
 
 def _inputs(group: ArchiveGroup, positions: np.ndarray) -> list[VariedInput]:
@@ -102,6 +148,7 @@ def _explained(
     positions: np.ndarray,
     failed: np.ndarray,
     before: tuple[ArchiveGroup, np.ndarray, np.ndarray] | None,
+    designed: tuple[list[np.ndarray], str],
 ) -> Sensitivity:
     scale, unit, of = 1.0, "", ""
     if metric is None:
@@ -113,20 +160,55 @@ def _explained(
             with np.errstate(invalid="ignore"):
                 output, of = output - np.asarray(before[0].values(name), float)[before[1]], "change"
     finite = np.isfinite(output)
-    counted = int(finite.sum())
-    values = [each.values[finite] for each in inputs]
-    found = shares(values, output[finite]) if counted >= FEWEST else None
+    made, why = designed
+    if made:
+        whole = np.full(group.count, np.nan)
+        whole[positions] = output
+        rows = _whole_pairs(finite, positions, group.count, len(made) + 2).ravel()
+        names, values, output = [v.path for v in group.role("coordinate")], [each[rows] for each in made], whole[rows]
+        enough = len(rows) >= FEWEST_PAIRS * (len(made) + 2)
+        found = saltelli_shares(values, output) if enough else None
+    else:
+        rows = np.flatnonzero(finite)
+        names, values, output = [each.name for each in inputs], [each.values[rows] for each in inputs], output[rows]
+        found = shares(values, output) if len(rows) >= FEWEST else None
     return Sensitivity(
         name=name,
         unit=unit,
         scale=scale,
         of=of,
-        cases=counted,
-        left=len(output) - counted,
-        inputs=tuple(each.name for each in inputs),
+        cases=len(rows),
+        left=len(positions) - len(rows),
+        inputs=tuple(names),
         shares=found.inputs if found is not None else (),
         rest=None if found is None else found.rest,
-        together=tuple((inputs[i].name, inputs[j].name, size) for i, j, size in dependent(values))
-        if found is not None
-        else (),
+        together=() if found is None or made else tuple((names[i], names[j], size) for i, j, size in dependent(values)),
+        mean=float(output.mean()) if len(rows) else float("nan"),
+        design="saltelli" if made else "",
+        why=why,
     )
+
+
+def share_text(share: float, by: float) -> str:
+    """A share and half the width of its interval: `0.94 ± 0.01`."""
+    return f"{share:.2f} ± {max(by, 0.005):.2f}"
+
+
+def notes_of(found: Sensitivity) -> list[str]:
+    """Sentences on how the shares were estimated, and what to mind of them."""
+    notes = []
+    if found.design:
+        notes.append("by the estimators of `saltelli`; with others: with any number of them, and with noise")
+    if found.why:
+        notes.append(f"{found.why}: estimated as from any cases")
+    if found.rest is not None and found.rest > UNCLEAR:
+        notes.append(
+            f"{found.rest:.2f} of the variance is of three inputs or more together, of noise, or of too few cases"
+        )
+    if max(max(each.first_by, each.total_by) for each in found.shares) > UNCLEAR:
+        notes.append("not enough cases for narrow intervals: four times as many halve them")
+    for one, other, size in found.together:
+        notes.append(
+            f"{one} and {other} do not vary independently (rank correlation {size:+.2f}): their shares overlap"
+        )
+    return notes

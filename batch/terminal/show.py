@@ -14,8 +14,10 @@ from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries import cases, ordering
 from batch.queries.at_limits import reached_texts
 from batch.queries.deck_units import DeckUnits
+from batch.queries.evidence_table import RequirementEvidence, requirement_evidence
+from batch.queries.evidence_table import as_data as evidence_data
 from batch.queries.failures import failure_lines
-from batch.queries.groups import cases_named
+from batch.queries.groups import cases_named, groups_named
 from batch.queries.ordering import CaseOrder
 from batch.queries.pool import Pool, pools
 from batch.queries.selection import CaseSelection
@@ -24,7 +26,7 @@ from batch.queries.step_errors.words import NONE, about, error_text
 from batch.queries.structures import structures
 from batch.queries.summary import SPREAD_COLUMNS, MetricSummary, Summary, summary_of
 from batch.terminal import braille
-from batch.terminal.evidence import evidence_lines
+from batch.terminal.evidence import evidence_lines, evidence_table_lines
 from ic.printing.columns import count
 from ic.printing.columns import size as size_text
 from met.distinct import distinct
@@ -94,6 +96,22 @@ def show(
     return "\n".join(out.lines).rstrip() + "\n"
 
 
+def show_evidence(archive: ArchiveFile, experiments: Sequence[str] = (), *, width: int = 100) -> str:
+    """The table of evidence of each run and sweep, or of these: what is required, and what the cases show of it."""
+    out = _Lines()
+    out += [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
+    for pool in pools(groups_named(archive, tuple(experiments))):
+        title = f"{pool.name}: {pool.count:,} case{'s' * (pool.count != 1)}"
+        out += ["", title, *evidence_table_lines(_evidence(archive, pool.groups), width)]
+    return "\n".join(out.lines).rstrip() + "\n"
+
+
+def _evidence(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> list[RequirementEvidence]:
+    """The rows of the table of evidence of these groups."""
+    several = len({each.sweep or each.name for each in archive.groups}) > 1
+    return requirement_evidence(groups, str(archive.path), several=several)
+
+
 class _Lines:
     """Lines of text, visible, among them drawings, which are so already and may have colours."""
 
@@ -152,8 +170,9 @@ def as_json(
 ) -> str:
     """An archive for programs: outcome, cases, variables and attributes, without the signals' values.
 
-    `case_table` holds the cases as `show` lists them, the first of many unless `all_cases`; where one `case` is asked
-    for, the outcome is its own, and `case` holds it with all its parameters.
+    `case_table` holds the cases as `show` lists them, the first of many unless `all_cases`, and `evidence` the rows of
+    the table of evidence; where one `case` is asked for, the outcome is its own, and `case` holds it with all its
+    parameters.
     """
     import json
 
@@ -166,7 +185,10 @@ def as_json(
         if position is None:
             among = None if some.everything else _positions(group, some)
             most = None if all_cases else cases.SHOWN_CASES
-            said: dict[str, Any] = {"case_table": cases.rows_json(group, most, by=by, among=among)}
+            said: dict[str, Any] = {
+                "case_table": cases.rows_json(group, most, by=by, among=among),
+                "evidence": outcomes.finite([evidence_data(row) for row in _evidence(archive, [group])]),
+            }
         else:
             [about] = cases.rows_json(group, positions=[position])
             said = {"case": {**about, "parameters": outcomes.finite(cases.parameters(archive, group, position))}}

@@ -30,6 +30,8 @@ OF_DESIGNS: Mapping[str, str] = MappingProxyType(
     {
         "lhs": "a Latin hypercube: each range in n equal parts, one value from each; more samples are other ones",
         "sobol": "a scrambled Sobol sequence, evenly spread; n a power of 2; more samples change no old case",
+        "saltelli": "n times the d + 2 cases for the indices of d parameters (`met sensitivity`); n a power of 2; more "
+        "samples change no old case",
         "random": "independent draws; neither more samples nor more parameters change an old case",
     }
 )

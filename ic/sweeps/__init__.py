@@ -2,7 +2,7 @@
 
 axes      the block of a sweep -> its axes: lists, ranges, zips, files, samples, repeats
 choices   what decides the structure: words, models, rates, macros; a run with one choice of each put in
-designs   samples: lhs, sobol, random, and the distributions they are drawn from
+designs   samples: lhs, sobol, random, saltelli, and the distributions they are drawn from
 table     axes -> rows of the case table, parted by structure, less what `exclude when` drops
 reach     which parameters a coordinate sets, and that each sets something
 confidences  what a confidence asks of the cases: draws of their own, and enough of them

@@ -3,6 +3,9 @@
     lhs(n)      a Latin hypercube: each parameter's range in n equal parts, one value from each
     sobol(n)    a scrambled Sobol sequence: evenly spread, best where n is a power of 2
     random(n)   independent draws
+    saltelli(n) n times the d + 2 cases from which first-order and total indices of d parameters are estimated: a point
+                a of a scrambled Sobol sequence, a with one coordinate after the other from a second point b, and b
+                (A. Saltelli et al., Computer Physics Communications 181 (2010) 259-270)
 
 A design makes n points in the unit cube, a distribution's quantiles turn them into values. Those are rounded to 12
 digits in the deck's unit: so a table that is printed and read back is the same table, and a last place in which
@@ -13,7 +16,7 @@ from __future__ import annotations
 
 import warnings
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -36,7 +39,7 @@ from met.trace import Scalar
 DIGITS = 12
 MOST_SAMPLES = 1_000_000
 MOST_SOBOL = 1 << 30
-DESIGNS: tuple[Design, ...] = ("lhs", "sobol", "random")
+DESIGNS: tuple[Design, ...] = ("lhs", "sobol", "random", "saltelli")
 DISTRIBUTIONS: Mapping[str, tuple[str, ...]] = {
     "uniform": ("from", "to"), "loguniform": ("from", "to"), "normal": ("mean", "deviation"),
     "truncated": ("mean", "deviation", "from", "to"),
@@ -78,8 +81,10 @@ class SampleDesign:
 
     @property
     def note(self) -> str:
-        lasting = ": another count would draw other values" if self.design == "lhs" else ""
-        return f"sample {self.design}({self.count}), seed {self.seed}{lasting}"
+        about = ": another count would draw other values" if self.design == "lhs" else ""
+        if self.design == "saltelli":
+            about = f": {self.count} times {len(self.parts) + 2} cases"
+        return f"sample {self.design}({self.count}), seed {self.seed}{about}"
 
     def draw(self, number: int) -> list[np.ndarray]:
         """The values of each part. number: of the sample in its sweep, from 1. Raises Problem where they are one."""
@@ -87,21 +92,37 @@ class SampleDesign:
         found = [part.values(column) for part, column in zip(self.parts, points.T, strict=True)]
         for part, values in zip(self.parts, found, strict=True):
             different = len(distinct(values))
-            if 2 * different < self.count:
+            if 2 * different < len(values):
                 raise Problem(
                     error(
                         "D225",
-                        f"`{part.path}` hardly varies: {self.count} samples have {different} "
+                        f"`{part.path}` hardly varies: {len(values)} samples have {different} "
                         f"value{'s' * (different != 1)}",
                         part.place,
                         help=[f"values have {DIGITS} digits: draw it from a wider distribution", "or leave it out"],
                     )
                 )
-        return found
+        return _saltelli(found) if self.design == "saltelli" else found
+
+
+def _saltelli(found: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """The values of each part in the cases of Saltelli's scheme, from those at its points: all a, then all b.
+
+    The cases of a pair of points stand together: a, then a with the value of the first part from b, of the second ...,
+    then b.
+    """
+    out = []
+    for place, values in enumerate(found):
+        a, b = np.split(values, 2)
+        cases = np.repeat(a[:, None], len(found) + 2, axis=1)
+        cases[:, place + 1] = cases[:, -1] = b
+        out.append(cases.ravel())
+    return out
 
 
 def _points(design: str, count: int, paths: list[str], seed: int, number: int) -> np.ndarray:
-    """Points of the open unit cube, [count, len(paths)]."""
+    """Points of the open unit cube, [count, len(paths)]; of `saltelli` twice as many, all first points of pairs before
+    all second ones."""
     if design == "random":  # a stream for each path, so that more samples or parameters change no old value
         streams = [
             np.random.Generator(np.random.Philox(key=[seed, zlib.crc32(path.encode()) << 32 | number]))
@@ -112,10 +133,13 @@ def _points(design: str, count: int, paths: list[str], seed: int, number: int) -
         from scipy.stats import qmc  # takes most of a second to import
 
         stream = np.random.Generator(np.random.PCG64([seed, number]))
-        sampler = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}[design](len(paths), rng=stream)
+        pairs = design == "saltelli"
+        method = qmc.LatinHypercube if design == "lhs" else qmc.Sobol
+        sampler = method(len(paths) * (2 if pairs else 1), rng=stream)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of counts that are no power of 2, for which MET has its own
             points = sampler.random(count)
+        points = np.concatenate(np.split(points, 2, axis=1)) if pairs else points
     return np.asarray(np.clip(points, 2.0**-54, 1.0 - 2.0**-53))
 
 
@@ -202,8 +226,12 @@ def read_sample(
         raise Problem(
             error("D224", "this sample is empty", statement.place, help="write `PATH = uniform(a, b) UNIT;` in it")
         )
+    if design == "saltelli" and len(parts) < 2:
+        helps = "draw more of them, or write `sample random(N) { ... }`"
+        message = "`saltelli` shares a metric's variance out among parameters, and there is one"
+        raise Problem(error("D224", message, call.name.place, help=helps))
     warning = None
-    if design == "sobol" and count & (count - 1):
+    if design in ("sobol", "saltelli") and count & (count - 1):
         lower = 1 << (count.bit_length() - 1)
         warning = (
             f"{count} points of a Sobol sequence are less even than {lower} or {2 * lower}",

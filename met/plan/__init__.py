@@ -490,7 +490,7 @@ def ground(links: Iterable[Link], joints: Iterable[Joint]) -> tuple[str, ...]:
     return tuple(link.name for link in links if link.name in found)
 
 
-Design = Literal["", "random", "lhs", "sobol"]
+Design = Literal["", "random", "lhs", "sobol", "saltelli"]
 """The ways in which values of a coordinate are drawn; "" where they are chosen."""
 
 

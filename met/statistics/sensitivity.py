@@ -30,6 +30,9 @@ GROUPS = 20
 QUANTILE = 2.093
 """Of Student's distribution with GROUPS - 1 degrees of freedom: 95 % lie within, two-sided."""
 
+ROUNDING = 1e-12
+"""Of an output's mean: values that differ by no more are the same but for rounding, and nothing explains them."""
+
 FEWEST = 64
 """Cases below which nothing can be said."""
 
@@ -95,7 +98,7 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
         raise ValueError(f"{cases} cases are fewer than {FEWEST}")
     mean = float(output.mean())
     deviation = float(np.abs(output - mean).max())
-    if not deviation > 0.0:
+    if not deviation > ROUNDING * abs(mean):
         return None
     y = (output - mean) / deviation
     part = (np.random.default_rng(0).permutation(cases) % GROUPS).astype(np.uint8)
@@ -145,9 +148,9 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
         found.append(
             InputShare(
                 first=_share(first[number]),
-                first_by=_width(first[number]),
+                first_by=interval(first[number]),
                 total=None if of_total is None else max(_share(of_total), _share(first[number])),
-                total_by=0.0 if of_total is None else _width(of_total) + cut[number],
+                total_by=0.0 if of_total is None else interval(of_total) + cut[number],
                 rank=_correlation(_ranks(values), ranks),
                 low=mean + deviation * float(means[number][0]),
                 high=mean + deviation * float(means[number][-1]),
@@ -244,10 +247,21 @@ def _share(found: np.ndarray) -> float:
     return float(np.clip(found[0], 0.0, 1.0))
 
 
-def _width(found: np.ndarray) -> float:
-    """Half the width of the jackknife's 95 % interval."""
+def interval(found: np.ndarray) -> float:
+    """Half the width of the jackknife's 95 % interval. found: from all cases, then without each part."""
     each = found[1:]
     return float(QUANTILE * np.sqrt((GROUPS - 1) / GROUPS * ((each - each.mean()) ** 2).sum()))
+
+
+def means_of_ends(values: np.ndarray, output: np.ndarray) -> tuple[float, float]:
+    """The mean output in an input's lowest and in its highest cell."""
+    means = _means(cells(values, max(4, min(CELLS, len(output) // 16))), output)
+    return float(means[0]), float(means[-1])
+
+
+def rank_correlation(values: np.ndarray, output: np.ndarray) -> float:
+    """Spearman's correlation of an input and the output, -1 to 1."""
+    return _correlation(_ranks(values), _ranks(output))
 
 
 def _ranks(values: np.ndarray) -> np.ndarray:

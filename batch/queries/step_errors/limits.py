@@ -19,12 +19,21 @@ if TYPE_CHECKING:
 class StepErrorVerdict:
     """Whether all verified cases meet a requirement on an error by the step; None where that is not known.
 
-    said  the worst of them, or why it is not known
+    said   the worst of them, or why it is not known
+    limit  that is required
+    cases  verified ones that have a value;  missed: of these
+    worst  position in the case table of the worst, -1 where none is verified;  size: its error, SI or a share of its
+           value; infinite where it is not known
     """
 
     text: str
     met: bool | None
     said: str
+    limit: StepErrorLimit
+    cases: int = 0
+    missed: int = 0
+    worst: int = -1
+    size: float = math.nan
 
     @property
     def word(self) -> str:
@@ -39,14 +48,14 @@ def verdicts(group: ArchiveGroup, found: Verification | None) -> tuple[StepError
 
 def _verdict(group: ArchiveGroup, limit: StepErrorLimit, found: Verification | None) -> StepErrorVerdict:
     if found is None:
-        return StepErrorVerdict(limit.text, None, "nothing is verified: `met run --verify some`")
+        return StepErrorVerdict(limit.text, None, "nothing is verified: `met run --verify some`", limit)
     metric = found.metrics.get(limit.metric)
     cases = [each for each in metric.cases if not _has_none(each)] if metric is not None else []
     if not cases:
-        return StepErrorVerdict(limit.text, None, "no verified case has a finite value")
+        return StepErrorVerdict(limit.text, None, "no verified case has a finite value", limit)
     worst = max(cases, key=lambda each: _size(each, limit.share))
     size = _size(worst, limit.share)
-    met = size <= limit.limit if limit.comparison == "<=" else size < limit.limit
+    missed = sum(not _is_within(_size(each, limit.share), limit) for each in cases)
     if worst.error is None:
         said = worst.why
     elif limit.share:
@@ -55,7 +64,12 @@ def _verdict(group: ArchiveGroup, limit: StepErrorLimit, found: Verification | N
         scale, unit = deck_unit(group.variables[limit.metric])
         said = f"{rounded(size / abs(scale))} {unit}".removesuffix(" 1")
     of = f", the worst of {len(cases):,} verified cases" if len(cases) > 1 else ""
-    return StepErrorVerdict(limit.text, met, f"{said} in case #{worst.case}{of}")
+    said = f"{said} in case #{worst.case}{of}"
+    return StepErrorVerdict(limit.text, not missed, said, limit, len(cases), missed, worst.case, size)
+
+
+def _is_within(size: float, limit: StepErrorLimit) -> bool:
+    return size <= limit.limit if limit.comparison == "<=" else size < limit.limit
 
 
 def _has_none(case: CaseError) -> bool:

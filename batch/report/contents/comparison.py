@@ -61,7 +61,11 @@ def _run_changes(found: Diff, experiment: ExperimentDiff, several: bool) -> RunC
         word=experiment.verdict,
         alone=tuple(alone),
         endings=tuple(words.endings(experiment)),
-        notes=(*experiment.notes, *([f"{words.PAIRED}: {'; '.join(paired)}"] if paired else [])),
+        notes=(
+            *experiment.notes,
+            *(f"{words.EVIDENCE}: {what}: {said}" for what, said in words.evidence_pairs(experiment)),
+            *([f"{words.PAIRED}: {'; '.join(paired)}"] if paired else []),
+        ),
         allowed=tuple(allowed),
         signals=tuple(map(words.signal_row, experiment.signals)),
         samples=tuple(map(words.distribution, experiment.samples)),

@@ -1,57 +1,35 @@
-"""The table of evidence: what the cases show of each requirement over a share of cases."""
+"""The table of evidence of a page: what the cases show of each requirement, the rows of `met show --evidence`."""
 
 from __future__ import annotations
 
-from batch.queries.evidence import EvidenceRow, evidence, percent_above, percent_below
+from batch.queries.evidence_table import NONE, EvidenceTexts, notes_of, requirement_evidence, texts_of
 from batch.queries.pool import Pool, page_number
-from batch.report.contents.parts import TextTable
+from batch.report.contents.parts import EvidenceLine, EvidencePart
+from met.outputs import quoted
 
-HEADS = (
-    "requirement", "at", "verdict", "cases", "missed", "share of all", "bound", "worst", "margin", "in sigmas",
-)  # fmt: skip
-RIGHT = frozenset(range(3, 10))
-VERDICT = HEADS.index("verdict")
+MOST_ROWS = 200
+"""Rows of a page; of more, those that are not met come first, and the rest is told in a sentence."""
 
 
-def evidence_table(pool: Pool) -> TextTable | None:
-    """A row for each requirement and design point; None where no requirement is over a share of cases.
-
-    share of all  the bound on the share of all cases that may be drawn, with the confidence
-    bound         of the percentile, with the confidence
-    margin        from the worst value to the limit, and from the mean to the limit in standard deviations of the values
-    """
-    found = [(row, int(group.values("case")[row.worst])) for group in pool.groups for row in evidence(group)]
-    texts = [row.requirement.text for row, _ in found]
+def evidence_part(pool: Pool, archive: str, *, several: bool) -> EvidencePart | None:
+    """The rows, those of a requirement together, and notes; None where nothing is required. archive: its name in
+    commands; several: whether these have to name the run or sweep."""
+    found = requirement_evidence(pool.groups, archive, several=several)
     if not found:
         return None
-    return TextTable(
-        heads=HEADS,
-        units=("",) * len(HEADS),
-        rows=tuple(_cells(row, case, at == 0 or texts[at] != texts[at - 1]) for at, (row, case) in enumerate(found)),
-        right=RIGHT,
-        marked=frozenset((place, VERDICT) for place, (row, _) in enumerate(found) if not row.ok),
+    shown = found if len(found) <= MOST_ROWS else sorted(found, key=lambda row: row.ok)[:MOST_ROWS]
+    notes = notes_of(shown)
+    if len(shown) < len(found):
+        command = f"met show {quoted(archive)} --evidence"
+        notes.append(f"{len(found) - len(shown):,} rows more: `{command}`")
+    rows = (
+        EvidenceLine(row.requirement, row.at, row.ok, row.worst_case, row.again, _page(texts_of(row, page_number)))
+        for row in shown
     )
+    return EvidencePart(tuple(rows), tuple(notes))
 
 
-def _cells(row: EvidenceRow, case: int, first: bool) -> tuple[str, ...]:
-    """The texts of a row. case: the number of the worst case; first: True where its requirement is named."""
-
-    def quantity(value: float | None) -> str:
-        return "\N{EN DASH}" if value is None else f"{page_number(value / row.scale)} {row.unit}".removesuffix(" 1")
-
-    of_all = "\N{EN DASH}"
-    if row.lower is not None and row.upper is not None:
-        refuted = row.verdict == "refuted"
-        of_all = f"at most {percent_above(row.upper)}" if refuted else f"at least {percent_below(row.lower)}"
-    return (
-        row.requirement.text if first else "",
-        ", ".join(f"{path} = {text}" for path, text in row.chosen.items()),
-        f"{row.verdict}, {row.more:,} more cases" if row.more else row.verdict,
-        f"{row.cases:,}",
-        f"{row.missed:,}",
-        of_all,
-        quantity(row.bound),
-        f"{quantity(row.value)}, #{case}",
-        quantity(row.margin),
-        "\N{EN DASH}" if row.sigmas is None else f"{row.sigmas:.2f}",
-    )
+def _page(found: EvidenceTexts) -> EvidenceTexts:
+    """The texts with the dash of a page where there is nothing."""
+    names = EvidenceTexts.__dataclass_fields__
+    return EvidenceTexts(**{n: "\N{EN DASH}" if (text := getattr(found, n)) == NONE else text for n in names})

@@ -16,8 +16,9 @@ from batch.queries.step_errors.words import about as about_errors
 from batch.report.contents import comparison
 from batch.report.contents.against import ComparedArchive, EarlierCases, of_groups
 from batch.report.contents.designs import design_answer
-from batch.report.contents.evidence import evidence_table
+from batch.report.contents.evidence import evidence_part
 from batch.report.contents.histories import MOST_VALUES, no_signals, signals
+from batch.report.contents.influence import influences
 from batch.report.contents.overview import overview
 from batch.report.contents.parameters import parameters, varied
 from batch.report.contents.parts import Fact, Report, ReportSection, SourceListing, Stability
@@ -126,7 +127,7 @@ def _section(
         varied=varied(pool, own),
         metrics=metric_rows(pool, before, errors),
         structures=structures(pool, before),
-        evidence=evidence_table(pool),
+        evidence=evidence_part(pool, archive, several=bool(only)),
         designs=design_answer(pool, deck.strip("<>")),
         worst=worst(pool, archive, only, before),
         overview=overview(pool, before),
@@ -138,6 +139,7 @@ def _section(
         notes=tuple(dict.fromkeys(note for experiment in own.values() for note in experiment.notes)),
         single=pool.count == 1,
         by_step="" if errors is None else about_errors(errors),
+        influences=influences(pool),
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from batch.queries.colours import Reach
+from batch.queries.evidence_table import EvidenceTexts
 from batch.queries.pool import CaseColumn
 from batch.queries.summary import MetricSpread
 from batch.report.contents.changes import ArchiveChanges, RunChanges
@@ -172,6 +173,56 @@ class WorstCaseTable:
     cases: tuple[int, ...]
     commands: tuple[str, ...]
     left: int
+
+
+@frozen
+class EvidenceLine:
+    """A row of the table of evidence: a requirement at a design point, whether it is met, the number of its worst case
+    and what runs that again, and its numbers as texts."""
+
+    requirement: str
+    at: str
+    ok: bool
+    case: int | None
+    command: str
+    texts: EvidenceTexts
+
+
+@frozen
+class EvidencePart:
+    """The table of evidence of a section, and sentences beneath it."""
+
+    rows: tuple[EvidenceLine, ...]
+    notes: tuple[str, ...]
+
+
+@frozen
+class InfluenceRow:
+    """A varied parameter that explains a metric: its shares of the variance, alone and with others, the metric's mean
+    where it is lowest and highest, as numbers in the deck's unit and as a text, and the correlation of the ranks."""
+
+    path: str
+    alone: str
+    together: str
+    low: float
+    high: float
+    ends: str
+    rank: str
+
+
+@frozen
+class InfluencePart:
+    """The parameters that explain a metric, those that explain most first; none where nothing can be told, as is said.
+
+    metric  "" where it is said of all;  mean: of the metric, in `unit`
+    """
+
+    metric: str
+    said: str
+    unit: str
+    mean: float
+    rows: tuple[InfluenceRow, ...]
+    notes: tuple[str, ...]
 
 
 @frozen
@@ -402,11 +453,12 @@ class ReportSection:
     """A run or sweep.
 
     name        as it is asked for;  lede  what it is, in a sentence
-    evidence    what the cases show of requirements over a share of cases;  None where there is none
+    evidence    what the cases show of each requirement;  None where nothing is required
     designs     which design of a sweep to use;  None where it chooses none, or requires nothing
     changes     against another archive, a structure each;  what one of them lacks is in `ArchiveChanges.alone`
     trouble     why parameters and stability are missing; "" where they are not
     by_step     what the errors of metrics by the step rest on; "" where none was verified
+    influences  of the varied parameters on each metric;  none where that is not asked: one parameter, or few cases
     """
 
     name: str
@@ -414,7 +466,7 @@ class ReportSection:
     facts: tuple[Fact, ...]
     varied: tuple[VariedParameter, ...]
     metrics: tuple[MetricRow, ...]
-    evidence: TextTable | None
+    evidence: EvidencePart | None
     designs: DesignAnswer | None
     structures: TextTable | None
     worst: WorstCaseTable | None
@@ -428,6 +480,7 @@ class ReportSection:
     single: bool = False
     changes: tuple[RunChanges, ...] = ()
     by_step: str = ""
+    influences: tuple[InfluencePart, ...] = ()
 
 
 @frozen

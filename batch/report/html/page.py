@@ -93,6 +93,7 @@ def _links(number: int, section: ReportSection, report: Report) -> list[tuple[st
         ("run", "What was run", True),
         ("overview", "Cases", section.overview is not None),
         ("evidence", "Evidence", section.evidence is not None),
+        ("influence", "Which parameters matter", bool(section.influences)),
         ("worst", "Worst cases", section.worst is not None),
         ("signals", "Signals", section.signals is not None),
         ("structures", "Structures", section.structures is not None),
@@ -169,9 +170,10 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
     elif table is not None:
         out.append(part("overview", "Metrics", table))
     if section.evidence is not None:
-        note = "The confidence is that of each verdict by itself; of all together it is less."
-        shown = tables.table(section.evidence, "Evidence")
-        out.append(part("evidence", "Evidence", shown, said=note))
+        out.append(part("evidence", "Evidence", tables.evidence(section.evidence)))
+    if section.influences:
+        shown = [tables.influence(each) for each in section.influences]
+        out.append(part("influence", "Which parameters matter", shown, said=ABOUT_INFLUENCE))
     if section.structures is not None:
         out.append(part("structures", "Structures side by side", tables.table(section.structures, "Structures")))
     if section.worst is not None:
@@ -206,6 +208,11 @@ def _notes(notes: Sequence[str]) -> Html | None:
     summary = f"{len(notes)} note{'s' if len(notes) != 1 else ''} of the compiler"
     return el("details", el("summary", summary), [el("p", note) for note in notes], cls="notes")
 
+
+ABOUT_INFLUENCE = (
+    "The shares of each metric's variance that a varied parameter explains, alone and with others. A bar goes from the "
+    "metric's mean to what it is where the parameter is lowest (dark), and where it is highest (light)."
+)
 
 ABOUT_STABILITY = (
     "r is how heavy the arm is at the joint against the rotor of its motor, J_eff/(N² J_m), at the start of the run. "

@@ -4,8 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from batch.report.contents.parts import ParameterRow, SourceListing, Stability, TextTable, WorstCaseTable
-from batch.report.html.blocks import Anchors, case_link, scrolling, spot_link
+from batch.report.contents.parts import (
+    EvidencePart,
+    InfluencePart,
+    InfluenceRow,
+    ParameterRow,
+    SourceListing,
+    Stability,
+    TextTable,
+    WorstCaseTable,
+)
+from batch.report.html.blocks import Anchors, case_link, mark, scrolling, spot_link
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
 from batch.terminal.margin import stable_head
 
@@ -71,6 +80,84 @@ def worst(found: WorstCaseTable) -> Html:
     left = f"{found.left:,} more cases are in the archive." if found.left else ""
     again = el("p", el("code", found.commands[0]), " runs the first again, to the same bits.", cls="said printed")
     return join([made, el("p", left, cls="said") if left else None, again])
+
+
+EVIDENCE_HEADS = ("verdict", "missed", "of all cases", "percentile", "worst", "margin", "± step")
+
+
+def evidence(found: EvidencePart) -> Html:
+    """The table of evidence: over each row what is required and what runs its worst case again, beneath each number
+    what it is held against; notes."""
+
+    def cell(text: Child, under: str = "", cls: str | None = "right") -> Html:
+        return el("td", el("span", text), el("span", under, cls="under") if under else None, cls=cls)
+
+    rows = []
+    for row in found.rows:
+        texts = row.texts
+        name = [el("code", breaking(row.requirement)), el("span", row.at, cls="under") if row.at else None]
+        again = el("span", command(row.command), cls="under command") if row.command else None
+        worst = texts.worst if row.case is None else [texts.worst, " ", case_link(row.case)]
+        numbers = [
+            cell(
+                [mark(row.ok), texts.verdict],
+                f"{texts.needed} more cases" if texts.needed[:1].isdigit() else "",
+                cls="good" if row.ok else "bad",
+            ),
+            cell(texts.missed, f"{texts.share_met} met"),
+            cell(texts.of_all, f"asked: {texts.asked}"),
+            cell(texts.bound),
+            cell(worst, f"limit {texts.limit}"),
+            cell(texts.margin, f"{texts.sigmas} sigmas" if texts.sigmas[-1:].isdigit() else ""),
+            cell(texts.step_error),
+        ]
+        head = el("tr", el("th", name, again, scope="rowgroup", colspan=len(EVIDENCE_HEADS)), cls="head")
+        rows.append(el("tbody", head, el("tr", numbers)))
+    heads = [el("th", head, scope="col", cls="right" if n else None) for n, head in enumerate(EVIDENCE_HEADS)]
+    made = scrolling(el("table", el("thead", el("tr", heads)), lines(rows), cls="judged"), "Evidence")
+    said = "Each command runs the worst case of its row again, to the same bits."
+    return join([made, [el("p", each, cls="said") for each in (said, *found.notes)]])
+
+
+def influence(found: InfluencePart) -> Html:
+    """The parameters that explain a metric, with a tornado; notes."""
+    head = [el("code", found.metric), ": ", found.said] if found.metric else found.said
+    if not found.rows:
+        return el("p", head, cls="said")
+    together = any(row.together for row in found.rows)
+    ends = [value for row in found.rows for value in (row.low, row.high)]
+    low, high = min(found.mean, *ends), max(found.mean, *ends)
+    rows = [
+        el(
+            "tr",
+            el("th", el("code", breaking(row.path)), scope="row"),
+            el("td", _tornado(row, found.mean, low, high)),
+            el("td", row.alone, cls="right"),
+            el("td", row.together, cls="right") if together else None,
+            el("td", row.ends, cls="right"),
+            el("td", row.rank, cls="right"),
+        )
+        for row in found.rows
+    ]
+    heads = ["parameter", "", "alone", *(["with others"] if together else []), "mean, from low to high", "rank"]
+    top = el("tr", [el("th", name, scope="col", cls="right" if n > 1 else None) for n, name in enumerate(heads)])
+    made = scrolling(el("table", el("thead", top), el("tbody", lines(rows))), f"What explains {found.metric}")
+    return join([el("h4", head), made, [el("p", each, cls="said") for each in found.notes]])
+
+
+def _tornado(row: InfluenceRow, mean: float, low: float, high: float) -> Html:
+    """Two bars from the metric's mean, to what it is at both ends of a parameter. low, high: ends of the axis."""
+
+    def at(value: float) -> float:
+        return 160.0 * (value - low) / (high - low) if high > low else 80.0
+
+    bars = [
+        el("rect", x=f"{min(at(end), at(mean)):.2f}", y=3, width=f"{abs(at(end) - at(mean)):.2f}", height=12, cls=cls)
+        for end, cls in ((row.low, "lowest"), (row.high, "highest"))
+    ]
+    middle = el("line", x1=f"{at(mean):.2f}", x2=f"{at(mean):.2f}", y1=0, y2=18, cls="floor")
+    words = f"{row.path}: from {row.ends}"
+    return el("svg", bars, middle, cls="tornado", viewBox="-1 0 162 18", role="img", aria_label=words)
 
 
 def command(words: str) -> Html:

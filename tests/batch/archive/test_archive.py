@@ -126,6 +126,10 @@ def test_a_varied_parameter_whose_repeated_name_is_taken_gets_another(here: Path
         ("always(3 V < x and x < (1 + 1) kV) > 0.1 V", "V", ("V", 1.0)),
         ("holds_for(x < 2 deg/s, 0.2 s)", "s", None),
         ("share_of_time(x < 2 deg/s) > 95 %", "1", ("%", 0.01)),
+        ("sag > -136 deg in 99 % of cases with 90 % confidence", "rad", ("deg", math.pi / 180)),
+        ("over < 2 % in 99 % of cases", "1", ("%", 0.01)),
+        ("percentile(over, 95 %) < 2 % with 90 % confidence", "1", ("%", 0.01)),
+        ("over < 0.02 in 99 % of cases with 90 % confidence", "1", None),
     ],
 )
 def test_the_unit_a_requirement_is_written_in(text: str, unit: str, written: tuple[str, float] | None) -> None:

@@ -1,10 +1,13 @@
-"""`met sensitivity`: inputs that vary as one, failures, changes, and what it refuses."""
+"""`met sensitivity`: inputs that vary as one, failures, changes, cases of a design made for it, what it refuses."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
+import h5py
+import numpy as np
 import pytest
 
 import batch
@@ -14,6 +17,7 @@ from batch.queries.sensitivity import sensitivities
 from batch.terminal.sensitivity import as_data, sensitivity_lines
 from met import cli
 from met.diagnostic import Problem
+from met.statistics.saltelli import saltelli_shares
 from tests.batch import plans
 
 
@@ -72,3 +76,61 @@ def test_few_cases_are_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) 
 def test_against_itself_nothing_changes(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["sensitivity", str(archive), "--against", str(archive)]) == 0
     assert "the change of volts: the same in all cases, 120 cases" in capsys.readouterr().out
+
+
+SALTELLI = """
+#include <two_link.ic>
+run brief like nominal { rates { dynamics = 100 Hz; servos = 100 Hz; record = 20 Hz; } duration = 5 s; record = []; }
+sweep made of brief {
+    VARY
+    sample saltelli(64) { gearbox.kp = uniform(0.015, 0.025) V*s/rad; gearbox.ki = uniform(0.05, 0.125) V/rad; }
+}
+"""
+
+
+def made(folder: Path, vary: str = "", **options: Any) -> Path:
+    (folder / "made.ic").write_text(SALTELLI.replace("VARY", vary))
+    plan = ic.compile(folder / "made.ic", select=["made"])
+    return batch.run(plan, output=folder / "made.h5", histories="none", **options).path
+
+
+def test_cases_of_saltelli_are_estimated_as_their_design_has_it(tmp_path: Path) -> None:
+    with ArchiveFile(made(tmp_path)) as file:
+        [group] = file.groups
+        found = next(each for each in sensitivities(group) if each.name == "volts")
+        values = [group.values(each.name) for each in group.role("coordinate")]
+        wanted = saltelli_shares(values, group.values("volts"))
+    assert wanted is not None and found.shares == wanted.inputs
+    assert (found.design, found.inputs, found.cases, found.left) == ("saltelli", ("gearbox.kp", "gearbox.ki"), 256, 0)
+    said = sensitivity_lines(found)
+    assert "  note: by the estimators of `saltelli`; with others: with any number of them, and with noise" in said
+
+
+def test_a_pair_of_points_with_a_case_that_failed_is_left_out(tmp_path: Path) -> None:
+    path = made(tmp_path)
+    with h5py.File(path, "r+") as file:
+        file["volts"][5] = np.nan
+    with ArchiveFile(path) as file:
+        found = next(each for each in sensitivities(file.groups[0]) if each.name == "volts")
+    assert (found.cases, found.left) == (252, 4)
+    assert sensitivity_lines(found) == [
+        "volts: not enough cases, 252 cases; 4 have no finite value, or are of a pair of points of which one has none; "
+        "256 at least"
+    ]
+
+
+@pytest.mark.parametrize(("vary", "spoilt", "why"), [
+    ("vary links.lower.mass = [20, 30] kg;", False, "more varies than was drawn by `saltelli`"),
+    ("", True, "not all cases of `saltelli` are there"),
+])  # fmt: skip
+def test_of_other_cases_than_saltelli_s_the_estimators_for_any_are_used(
+    tmp_path: Path, vary: str, spoilt: bool, why: str
+) -> None:
+    path = made(tmp_path, vary)
+    if spoilt:
+        with h5py.File(path, "r+") as file:
+            file["gearbox.kp"][7] = 0.016
+    with ArchiveFile(path) as file:
+        found = sensitivities(file.groups[0])[0]
+    assert (found.design, found.why) == ("", why)
+    assert f"  note: {why}: estimated as from any cases" in sensitivity_lines(found)

@@ -162,6 +162,42 @@ warning[D228]: 100 points of a Sobol sequence are less even than 64 or 128
     )
 
 
+def test_saltelli_mixes_two_points_one_parameter_after_the_other(tmp_path: Path) -> None:
+    kp, mass = (each.reshape(8, 4) for each in drawn(tmp_path, f"sample saltelli(8) {{ {KP} {MASS} }}"))
+    for values, mixed, kept in ((kp, 1, 2), (mass, 2, 1)):
+        a, b = values[:, 0], values[:, 3]
+        assert (values[:, mixed] == b).all() and (values[:, kept] == a).all()
+        assert len(np.unique(values)) == 16, "no two points share a value"
+    assert stats.kstest(kp[:, [0, 3]].ravel(), stats.uniform(1, 1).cdf).pvalue > 0.05
+    notes = swept(tmp_path, f"sample saltelli(8) {{ {KP} {MASS} }}").notes
+    assert "sample saltelli(8), seed 0: 8 times 4 cases" in notes
+
+
+def test_more_of_saltelli_changes_no_old_case(tmp_path: Path) -> None:
+    few = drawn(tmp_path, f"sample saltelli(8) {{ {KP} {MASS} }}")
+    many = drawn(tmp_path, f"sample saltelli(16) {{ {KP} {MASS} }}")
+    assert [column[:32].tolist() for column in many] == [column.tolist() for column in few]
+
+
+def test_saltelli_of_one_parameter_is_refused(tmp_path: Path) -> None:
+    text = messages(
+        check(tmp_path, ARM, SERVO, RUN, f"sweep it of hold {{ sample saltelli(8) {{ {KP} }} }}\n", select=["it"])
+    )
+    assert (
+        text
+        == """\
+error[D224]: `saltelli` shares a metric's variance out among parameters, and there is one
+  --> deck.ic:18:27
+   |
+18 | sweep it of hold { sample saltelli(8) { drive.kp = uniform(1, 2) V*s/rad; } }
+   |                           ^^^^^^^^
+   = help: draw more of them, or write `sample random(N) { ... }`
+
+1 error
+"""
+    )
+
+
 def test_what_is_wrong_with_a_distribution_is_placed(tmp_path: Path) -> None:
     text = messages(
         check(

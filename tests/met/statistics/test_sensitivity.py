@@ -73,6 +73,8 @@ def test_noise_is_of_no_input() -> None:
 
 def test_what_does_not_vary_has_no_shares_and_few_cases_are_refused() -> None:
     assert shares([np.arange(100.0)], np.ones(100)) is None
+    assert shares([np.arange(100.0)], np.pi + 1e-17 * np.arange(100.0)) is None, "that is rounding"
+    assert shares([np.arange(100.0)], 1e-17 * np.arange(100.0)) is not None
     with pytest.raises(ValueError, match=str(FEWEST)):
         shares([np.arange(9.0)], np.arange(9.0))
 

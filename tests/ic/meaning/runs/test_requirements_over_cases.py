@@ -115,6 +115,8 @@ CONFIDENT = "require top < 2 rad/s in 99 % of cases with 90 % confidence;"
 
 @pytest.mark.parametrize(("sweep", "part"), [
     ("sample lhs(300) { links.bar.mass = uniform(1, 3) kg; }", "`lhs` does not draw cases"),
+    ("sample saltelli(64) { links.bar.mass = uniform(1, 3) kg; drive.v_max = uniform(20, 30) V; }",
+     "`saltelli` does not draw cases"),
     ("sample sobol(256) { links.bar.mass = uniform(1, 3) kg; }", "`sobol` does not draw cases"),
     (f"{DRAWN} sample random(2) {{ drive.kp = uniform(1, 2) V*s/rad; }}", "the cases of two samples share"),
 ])  # fmt: skip

@@ -1,0 +1,67 @@
+"""Which varied parameters explain each metric: what `met sensitivity` prints, as a table with a tornado."""
+
+from __future__ import annotations
+
+from batch.archive.read import ArchiveGroup
+from batch.queries.pool import Pool, page_number
+from batch.queries.requirements import group_requirements
+from batch.queries.sensitivity import Sensitivity, notes_of, sensitivities, share_text
+from batch.report.contents.parts import InfluencePart, InfluenceRow
+from met.diagnostic import Problem
+from met.statistics.sensitivity import FEWEST
+
+MOST_METRICS, MOST_INPUTS, MOST_CASES = 6, 12, 50_000
+"""Metrics, and parameters of each, that a page has, and the cases of a sweep that are looked at for it."""
+
+
+def influences(pool: Pool) -> tuple[InfluencePart, ...]:
+    """A part for each metric of a sweep of one structure that draws or has cases enough, those that something is
+    required of first; none where one parameter varies."""
+    if len(pool.groups) != 1:
+        return ()
+    [group] = pool.groups
+    coordinates = group.role("coordinate")
+    drawn = any(variable.attributes.get("design") for variable in coordinates)
+    if len(coordinates) < 2 or group.count > MOST_CASES or not (drawn or group.count >= FEWEST):
+        return ()
+    names = _metrics(group)
+    if group.count < FEWEST:
+        return (InfluencePart("", f"Not enough cases to tell: {group.count:,}; {FEWEST} at least.", "", 0.0, (), ()),)
+    try:
+        return tuple(map(_part, sensitivities(group, names[:MOST_METRICS]))) if names else ()
+    except Problem:  # nothing varies
+        return ()
+
+
+def _metrics(group: ArchiveGroup) -> list[str]:
+    """The group's metrics, those that something is required of first."""
+    required = dict.fromkeys(each.metric for each in group_requirements(group))
+    return list(dict.fromkeys([*required, *(variable.name for variable in group.role("metric"))]))
+
+
+def _part(found: Sensitivity) -> InfluencePart:
+    count = f"{found.cases:,} cases" + (f"; {found.left:,} are left out, with no finite value" if found.left else "")
+    if found.cases < found.fewest:
+        said = f"not enough cases, {count}; {found.fewest:,} at least"
+        return InfluencePart(found.name, said, found.unit, 0.0, (), ())
+    if not found.shares:
+        return InfluencePart(found.name, f"the same in all cases, {count}", found.unit, 0.0, (), ())
+    rows = []
+    for place in found.order[:MOST_INPUTS]:
+        share = found.shares[place]
+        low, high = share.low / found.scale, share.high / found.scale
+        rows.append(
+            InfluenceRow(
+                path=found.inputs[place],
+                alone=share_text(share.first, share.first_by),
+                together="" if share.total is None else share_text(share.total, share.total_by),
+                low=low,
+                high=high,
+                ends=f"{page_number(low)} … {page_number(high)} {found.unit}".rstrip(),
+                rank=f"{share.rank:+.2f}",
+            )
+        )
+    notes = notes_of(found)
+    if len(found.order) > len(rows):
+        notes.append(f"{len(found.order) - len(rows):,} parameters more explain less")
+    return InfluencePart(found.name, count, found.unit, found.mean / found.scale, tuple(rows), tuple(notes))
