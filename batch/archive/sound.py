@@ -118,6 +118,9 @@ def _attributes(attributes: dict[str, Any]) -> None:
             raise Unlike(f"attribute `{name}` is missing or of another type")
         if isinstance(value, int | float) and not 1 / MOST < value < MOST:
             raise Unlike(f"attribute `{name}` is {value}")
+    early = attributes.get("until_shown", 1)
+    if not isinstance(early, int) or isinstance(early, bool) or not 0 < early < MOST:
+        raise Unlike("attribute `until_shown` is no number of cases")
     for name in WORDED:
         if not isinstance(attributes.get(name, ""), str):
             raise Unlike(f"attribute `{name}` is missing or of another type")

@@ -174,6 +174,19 @@ def _check_cases(experiment: Experiment, where: str) -> None:
             raise Damaged(f"{path}.path", f"`{coordinate.path}` is there twice")
         paths.add(coordinate.path)
         _check_coordinate(experiment, coordinate, path)
+    if cases.until_shown:
+        _check_until_shown(experiment, f"{where}.until_shown")
+
+
+def _check_until_shown(experiment: Experiment, where: str) -> None:
+    """Cases that are run until something is shown are draws of their own, and something is to be shown."""
+    cases = experiment.cases
+    plan_structure.check_whole(cases.until_shown, 1, 2**53, where)
+    designs = {coordinate.design for coordinate in cases.coordinates} - {""}
+    if designs != {"random"} or cases.repeats is not None:
+        raise Damaged(where, "its cases should be drawn by one `random`, without repeats")
+    if all(requirement.confidence is None for requirement in experiment.requirements):
+        raise Damaged(where, "no requirement has a confidence, so nothing is to be shown")
 
 
 def _check_numbering(numbers: np.ndarray, count: int, rising: bool, where: str) -> None:

@@ -46,7 +46,7 @@ def _cells(row: EvidenceRow, case: int, first: bool) -> tuple[str, ...]:
     return (
         row.requirement.text if first else "",
         ", ".join(f"{path} = {text}" for path, text in row.chosen.items()),
-        f"{row.verdict}, {row.more:,} more cases" if row.more else row.verdict,
+        _verdict(row),
         f"{row.cases:,}",
         f"{row.missed:,}",
         of_all,
@@ -55,3 +55,11 @@ def _cells(row: EvidenceRow, case: int, first: bool) -> tuple[str, ...]:
         quantity(row.margin),
         "\N{EN DASH}" if row.sigmas is None else f"{row.sigmas:.2f}",
     )
+
+
+def _verdict(row: EvidenceRow) -> str:
+    """The verdict, by which test, and what it takes: `not shown, 40 more cases`."""
+    early = row.decided is not None and row.decided < row.cases
+    parts = [f"{row.verdict} after {row.decided:,} cases" if early else row.verdict]
+    parts += [f"{row.more:,} more cases"] * bool(row.more) + ["sequential test"] * row.sequential
+    return ", ".join(parts)
