@@ -25,6 +25,7 @@ import shlex
 import shutil
 import stat
 from collections.abc import Collection, Iterable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -345,7 +346,8 @@ def _checked(data: Any) -> dict[str, Any]:
         and all(isinstance(word, str) or is_count(word) for word in data["histories"])
         and isinstance(data["float32"], bool)
         and data.get("verify", "auto") in VERIFY_WORDS
-        and [each["number"] for each in sections] == list(range(len(sections)))
+        and all(is_count(each["number"]) for each in sections)
+        and all(one["number"] < other["number"] for one, other in pairwise(sections))
     )
     for each in sections if good else ():
         good = good and (

@@ -246,6 +246,35 @@ def test_what_was_interrupted_goes_on_to_the_same_bytes(
     assert batch.run(plan, output="a.h5").path.read_bytes() == undisturbed, "it is whole, and nothing is run"
 
 
+SEVERAL = """
+run bare like spread { record = []; }
+sweep plain of bare { vary gearbox.kp = [0.021, 0.031] V*s/rad; }
+sweep ways of spread {
+    vary integrator = [modified_euler, rk4];
+    vary gearbox.kp = [0.02, 0.04] V*s/rad;
+    sample random(until_shown, at_most = 200) { gearbox.kt = normal(0.1, 0.003) N*m/A; }
+}
+sweep several = plain + built + ways;
+"""
+
+
+@pytest.mark.slow
+def test_sweeps_beside_it_and_structures_of_it_give_the_same_bytes_with_histories_of_some(here: Path) -> None:
+    path = deck(here, gains=[0.02, 0.036])
+    path.write_text(path.read_text(encoding="utf-8") + SEVERAL, encoding="utf-8")
+    several, asked = ic.compile(path, select=["several"]), ["every:40", "worst:2:late"]
+    one = batch.run(several, output="a.h5", threads=1, histories=asked)
+    other = batch.run(several, output="b.h5", processes=2, histories=asked)
+    assert one.path.read_bytes() == other.path.read_bytes()
+    with ArchiveFile(one.path) as file:
+        until = {group.name.partition(".")[2]: group.attributes.get("until_shown") for group in file.groups}
+        counts = [group.count for group in file.groups]
+        recorded = [group.recorded for group in file.groups]
+    assert list(until.values()) == [None, MOST, 200, 200], until
+    assert counts[0] == 2 and all(2 * 16 < count < 400 for count in counts[1:])
+    assert recorded[0] == 0 and all(0 < kept < count for kept, count in zip(recorded[1:], counts[1:], strict=True))
+
+
 @pytest.mark.slow
 def test_what_was_killed_goes_on_to_the_same_bytes(here: Path, place: Path, undisturbed: bytes) -> None:
     words = ["run", str(place / "p.json"), "-o", "a.h5", "--no-picture", "--processes", "2"]
