@@ -84,12 +84,19 @@ class StoppingPoints:
         stretches: list[tuple[int, int]] = []
         for places in undecided:
             known = self._prefix(places)
-            batch = max(busy, min(self._needed(places, known), max(FIRST_CASES, known // GROWTH)))
-            there = places[known : known + -(-batch // GRANULE) * GRANULE]
+            there = places[known : known + self._batch(places, known, busy)]
             there = np.sort(there[~self._known[there]])
             parts = np.split(there, np.flatnonzero(np.diff(there) > 1) + 1)
             stretches += [(int(part[0]), int(part[-1]) + 1) for part in parts]
         return sorted(stretches)
+
+    def _batch(self, places: np.ndarray, known: int, busy: int) -> int:
+        """The number of cases of a design point that are run before it is looked at again, `busy` of them at least; one
+        on motor beds, where each is driven for as long as it lasts."""
+        if self._section.prepared.wire:
+            return 1
+        batch = max(busy, min(self._needed(places, known), max(FIRST_CASES, known // GROWTH)))
+        return -(-batch // GRANULE) * GRANULE
 
     def _outcomes(self, task: Task, found: shard.Shard) -> np.ndarray:
         """Whether each case of a shard misses each of the requirements, as the archive says it: [case, requirement]."""

@@ -98,7 +98,7 @@ def status(
         drawn = "█" * full + (" ▏▎▍▌▋▊▉"[rest] if rest else "")
         drawn = drawn.ljust(WIDTH) + "▏ "
     text = f"{name}  {drawn}{100 * share:3.0f} %  {int(done):,} of {cases:,} cases" if cases else ""
-    text = text or f"{name}  {int(done):,} cases"
+    text = text or f"{name}  {int(done):,} case{'s' * (int(done) != 1)}"
     if failed:
         text += f", {failed:,} failed"
     if more:
