@@ -16,6 +16,7 @@ import ic
 from batch.archive.read import ArchiveFile
 from batch.campaigns import cutting, performing, tasks, until_shown
 from batch.campaigns.campaign import prepare, values_sections
+from batch.campaigns.changes import changes
 from batch.campaigns.folder import Folder
 from batch.queries.evidence import SOME_OF_THE_TABLE, EvidenceRow, evidence
 from batch.terminal.progress import status
@@ -396,6 +397,25 @@ def test_a_difference_pairs_what_both_have_and_says_how_they_were_chosen(
     said = capsys.readouterr().out
     assert f"built: {stop_of(place, 0.03)} cases in both" in said
     assert "note: cases were run until it was shown what is required: chances are those of a fixed number" in said
+
+
+def test_who_finds_an_archive_of_other_requirements_is_told_what_they_were(here: Path, plan: Plan) -> None:
+    [experiment] = plan.experiments
+
+    def with_(number: int, **other: Any) -> Plan:
+        wanted = [replace(each, **other) if n == number else each for n, each in enumerate(experiment.requirements)]
+        return replace(plan, experiments=(replace(experiment, requirements=tuple(wanted)),))
+
+    assert changes(plan, plan) == []
+    assert changes(plan, with_(0, limit=4.1)) == [f"{SETTLE}: with another limit, share or confidence"]
+    assert changes(plan, with_(0, confidence=0.95)) == [f"{SETTLE}: with another limit, share or confidence"]
+    assert changes(plan, with_(1, text="volts < 6 V in 80 % of cases with 95 % confidence")) == [
+        f"{VOLTS} is not to be shown any more",
+        "volts < 6 V in 80 % of cases with 95 % confidence is to be shown now",
+    ]
+    fixed = replace(plan, experiments=(replace(experiment, cases=replace(experiment.cases, until_shown=0)),))
+    assert changes(plan, fixed) == ["all cases are run"]
+    assert changes(fixed, plan) == ["cases are run until it is shown what is required"]
 
 
 def test_a_status_tells_of_cases_and_design_points(
