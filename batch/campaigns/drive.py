@@ -106,10 +106,12 @@ class Driver:
         if self.progress is not None:
             self.progress.end()
 
-    def work(self, section: CampaignSection, missing: Sequence[tuple[int, int]]) -> None:
-        """Run cases of a section of which it is being told. Raises Stopped."""
-        self.check()
-        _SectionWork(self, section, missing).run()
+    def work(self, section: CampaignSection, missing: Sequence[tuple[int, int]], *, checked: bool = True) -> None:
+        """Run cases of a section of which it is being told. Raises Stopped.
+
+        checked  whether it stops in the midst of them where too many fail
+        """
+        _SectionWork(self, section, missing, checked).run()
 
     def tell(self) -> None:
         """Pass on how far the section is that is being run."""
@@ -130,8 +132,10 @@ class Driver:
 class _SectionWork:
     """One section on its way."""
 
-    def __init__(self, driver: Driver, section: CampaignSection, missing: Sequence[tuple[int, int]]) -> None:
-        self._driver, self._section = driver, section
+    def __init__(
+        self, driver: Driver, section: CampaignSection, missing: Sequence[tuple[int, int]], checked: bool
+    ) -> None:
+        self._driver, self._section, self._checked = driver, section, checked
         self._gaps = deque(missing)
         self._again: deque[Task] = deque()
         self._tries: dict[Task, int] = {}
@@ -150,7 +154,8 @@ class _SectionWork:
                 self._open -= 1
                 self._take(outcome)
             driver.tell()
-            driver.check()
+            if self._checked:
+                driver.check()
 
     def _next(self) -> Task | None:
         if self._again:

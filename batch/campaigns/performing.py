@@ -189,10 +189,14 @@ class _CampaignWork:
                 left = sum(last - first for _, stretches in missing for first, last in stretches)
                 if together and left:
                     raise Stopped(f"{left:,} of {self.campaign.cases:,} cases are missing")
-                stops = {}
+                early = [each for each in self.values if self.campaign.parts[each.experiment].stops_early]
+                stops = {each.number: StoppingPoints(each) for each in early}
+                for number, points in stops.items():
+                    points.read(self.folder)
+                    driver.counts[number].failed = points.failed
                 for section, stretches in missing:
-                    if self.campaign.parts[section.experiment].stops_early:
-                        stops[section.number] = run_until_shown(driver, section)
+                    if section.number in stops:
+                        run_until_shown(driver, section, stops[section.number])
                     else:
                         driver.run(section, stretches)
                 try:

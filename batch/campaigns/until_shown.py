@@ -46,6 +46,7 @@ class StoppingPoints:
         self._read: dict[Task, np.ndarray] = {}
         self._known = np.zeros(len(section.rows), bool)
         self._missed = np.zeros((len(section.rows), len(self._wanted)), bool)
+        self._failed = np.zeros(len(section.rows), bool)
         self._stops: list[int | None] = [None] * len(self._places)
 
     @property
@@ -58,6 +59,14 @@ class StoppingPoints:
         """The number of design points that have come to their stop."""
         return sum(stop is not None for stop in self._stops)
 
+    @property
+    def failed(self) -> int:
+        """The number of cases that failed, of those that are not dropped, as far as they are known."""
+        kept = [
+            p[: self._prefix(p) if stop is None else stop] for p, stop in zip(self._places, self._stops, strict=True)
+        ]
+        return sum(int(self._failed[places].sum()) for places in kept)
+
     def read(self, folder: Folder) -> None:
         """Take what the shards hold by now; one that is unsound holds nothing. A case counts once, as it is merged."""
         self._known[:] = False
@@ -68,7 +77,8 @@ class StoppingPoints:
                 except (shard.UnsoundShard, OSError):
                     continue
             new = ~self._known[task.first : task.last]
-            self._missed[task.first : task.last][new] = self._read[task][new]
+            self._missed[task.first : task.last][new] = self._read[task][new, :-1]
+            self._failed[task.first : task.last][new] = self._read[task][new, -1]
             self._known[task.first : task.last] = True
         self._stops = [self._stop(places) for places in self._places]
 
@@ -99,11 +109,12 @@ class StoppingPoints:
         return -(-batch // GRANULE) * GRANULE
 
     def _outcomes(self, task: Task, found: shard.Shard) -> np.ndarray:
-        """Whether each case of a shard misses each of the requirements, as the archive says it: [case, requirement]."""
+        """Whether each case of a shard misses each of the requirements, as the archive says it, and whether it failed:
+        [case, requirement], the last for failed."""
         rows = self._section.rows[task.first : task.last]
         run = engine.results(self._section.prepared, rows, None, found.outputs, dict(found.fates))
         met = [run.met[each.text] & ~np.isnan(run.metrics[each.metric]) & (run.status == DONE) for each in self._wanted]
-        return ~np.stack(met, axis=1)
+        return ~np.stack([*met, run.status == DONE], axis=1)
 
     def _prefix(self, places: np.ndarray) -> int:
         """The number of a design point's first cases that are known."""
@@ -131,20 +142,22 @@ class StoppingPoints:
         return most
 
 
-def run_until_shown(driver: Driver, section: CampaignSection) -> StoppingPoints:
-    """Run a section's cases until all of its design points have come to their stop. Raises Stopped."""
-    points = StoppingPoints(section)
-    points.read(driver.folder)
-    before: list[tuple[int, int]] = []
+def run_until_shown(driver: Driver, section: CampaignSection, points: StoppingPoints) -> None:
+    """Run a section's cases until all of its design points have come to their stop. Raises Stopped.
+
+    Of failures, those of cases that are dropped do not count.
+    """
+    count, before = driver.counts[section.number], list[tuple[int, int]]()
     with driver.telling(section, cases=0):
         while batch := points.next_batch(driver.executor.workers):
             if batch == before:
                 raise Stopped(f"what is computed of {section.name} cannot be read back from {driver.folder.shards}")
             driver.more = f"{points.decided:,} of {points.count:,} design point{'s' * (points.count != 1)} decided"
-            driver.work(section, batch)
+            driver.work(section, batch, checked=False)
             points.read(driver.folder)
+            count.failed = points.failed
+            driver.check()
             before = batch
-    return points
 
 
 def without_dropped(folder: Folder, section: CampaignSection, points: StoppingPoints, number: int) -> CampaignSection:

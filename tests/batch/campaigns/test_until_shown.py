@@ -27,6 +27,7 @@ from met.plan import file as plan_file
 from met.run import LOST
 from met.statistics.sequential import evidence_against, evidence_for, lower_bound, percentile_rank
 from tests.batch import whole
+from tests.batch.door import ARM
 
 GAINS = [0.02, 0.03, 0.033, 0.036, 0.045]
 MOST = 300
@@ -190,6 +191,40 @@ def test_a_case_that_was_lost_misses_every_requirement(plan: Plan, here: Path) -
         stops.append(points.kept())
         assert points.decided == 1
     assert len(stops[0]) > len(stops[1]), "20 lost cases refute what 53 would demonstrate"
+
+
+FAILING = (
+    ARM
+    + """
+run open {
+    arm = door;  initial { grip.q = 0.5 rad; }
+    rates { dynamics = 100 Hz;  record = 20 Hz; }
+    duration = 1 s;  record = [];
+    metric end = final { of = hinge.q; }
+    require end < 1e6 rad in 95 % of cases with 90 % confidence;
+}
+sweep pushes of open {
+    sample random(until_shown, at_most = 200) { initial.hinge.qd = uniform(0.1, 0.9) rad/s; }
+}
+"""
+)
+
+
+def test_failures_beyond_the_stop_do_not_count(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (here / "f.ic").write_text(FAILING, encoding="utf-8")
+    plan = ic.compile("f.ic", select=["pushes"])
+    [experiment] = plan.experiments
+    [push] = experiment.cases.coordinates
+    push.values[2::3] = 1e120 * np.arange(1.0, 67.0)  # too much for its square
+    found = batch.run(plan, output="a.h5")
+    [row] = rows_of(found.path)
+    failed = found.summaries[0].failed
+    assert row.verdict == "refuted" and 0 < failed == row.missed < row.decided == row.cases < 16
+    for name, first in (("b.h5", 1), ("c.h5", 10**6)):
+        monkeypatch.setattr(until_shown, "FIRST_CASES", first)
+        assert batch.run(plan, output=name, max_failures=failed).path.read_bytes() == found.path.read_bytes()
+        with pytest.raises(Problem, match=f"{failed} cases failed, more than the {failed - 1} allowed"):
+            batch.run(plan, output=f"{first}.h5", max_failures=failed - 1)
 
 
 # However it is run
