@@ -14,6 +14,7 @@ import numpy as np
 from batch.archive.stored import Stored, StoredGroup, Unlike
 from met.messages.visible import line
 from met.run import DONE, LOST
+from met.statistics.confidence import can_be_shown
 
 NUMBERS, WHOLE, WORDS = "iuf", "iu", "O"
 """Kinds of numpy's types: of numbers, of whole ones, and of strings as h5py has them."""
@@ -119,6 +120,9 @@ def _attributes(attributes: dict[str, Any]) -> None:
             raise Unlike(f"attribute `{name}` is missing or of another type")
         if isinstance(value, int | float) and not 1 / MOST < value < MOST:
             raise Unlike(f"attribute `{name}` is {value}")
+    early = attributes.get("until_shown", 1)
+    if not isinstance(early, int) or isinstance(early, bool) or not 0 < early < MOST:
+        raise Unlike("attribute `until_shown` is no number of cases")
     for name in WORDED:
         if not isinstance(attributes.get(name, ""), str):
             raise Unlike(f"attribute `{name}` is missing or of another type")
@@ -169,6 +173,10 @@ def _requirements(group: StoredGroup) -> None:
             raise Unlike(f"attribute `{name}` of `requirement` is not of each")
         if name in ("share", "confidence") and not all(0.0 < value <= 1.0 for value in values if value == value):
             raise Unlike(f"attribute `{name}` of `requirement` is no share")
+    shares, confidences = (np.atleast_1d(told.get(name, [])) for name in ("share", "confidence"))
+    for share, confidence in zip(shares, confidences, strict=False):
+        if confidence == 1.0 or (confidence > 0.0 and not can_be_shown(share)):
+            raise Unlike("a requirement asks for what no number of cases shows")
 
 
 def _values(group: StoredGroup) -> None:

@@ -40,6 +40,8 @@ class ArchivePart:
 
     code     key of the program (`met.run.Prepared.code_key`)
     results  keys of what metrics and signals compute beyond the state (`met.run.Prepared.result_keys`)
+    until_shown  the most cases of a design point, of which the rows are those up to the one that decided what is
+                 required; 0 where the rows were chosen otherwise
     """
 
     experiment: Experiment
@@ -48,6 +50,7 @@ class ArchivePart:
     single: bool = False
     code: str = ""
     results: Mapping[str, str] = field(default_factory=dict)
+    until_shown: int = 0
 
 
 @frozen
@@ -146,7 +149,8 @@ class ArchiveWriter:
     def _group(self, node: Any, part: ArchivePart) -> OpenGroup:
         """Lay a group out: every variable in its order, the signals with all their chunks."""
         layout = archive_layout.layout(part.experiment, len(part.rows), len(part.kept), part.single)
-        for name, value in {**layout.attributes, "code_key": part.code}.items():
+        early = {"until_shown": part.until_shown} if part.until_shown else {}
+        for name, value in {**layout.attributes, **early, "code_key": part.code}.items():
             node.attrs[name] = value
         made = {variable.name: _make(node, layout, variable) for variable in layout.variables}
         for variable in layout.variables:

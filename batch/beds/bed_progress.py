@@ -29,15 +29,16 @@ class BedProgress:
         if not self._quiet:
             self._bar.begin(name, cases, done, failed, workers)
 
-    def advance(self, done: int, failed: int) -> None:
+    def advance(self, done: int, failed: int, more: str = "") -> None:
         if self._quiet:
             return
         driving = self._executor.driving
         if driving is None:
-            self._bar.advance(done, failed)
+            self._bar.advance(done, failed, more)
             return
         seconds = driving.done
-        self._bar.advance(done + seconds / driving.seconds, failed, f"{seconds:.3g} of {driving.seconds:.6g} s")
+        driven = f"{seconds:.3g} of {driving.seconds:.6g} s"
+        self._bar.advance(done + seconds / driving.seconds, failed, ", ".join(filter(None, [driven, more])))
 
     def end(self) -> None:
         if not self._quiet:

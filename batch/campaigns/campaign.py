@@ -7,7 +7,7 @@ batch/campaigns/performing.py runs what is missing, and puts it together.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -51,6 +51,7 @@ class CampaignPart:
     later   how many more may be chosen when all are done, at most
     single  whether histories are kept as numbers of four bytes
     wires   whether its beds are real ones, and how late these are (met.program.build.build); None: they are emulated
+    stops_early  whether its cases are run only until what is required of them is decided; then `rows` are the most
     """
 
     experiment: Experiment
@@ -59,6 +60,7 @@ class CampaignPart:
     later: int = 0
     single: bool = False
     wires: Wires | None = None
+    stops_early: bool = False
 
     def prepared(self) -> engine.Prepared:
         """The program that runs it."""
@@ -112,6 +114,11 @@ class Campaign:
         return list(dict.fromkeys(part.experiment.name_in_deck for part in self.parts))
 
     @property
+    def stops_early(self) -> bool:
+        """True if it is not known beforehand how many cases are run: then `cases` and `bytes` are the most."""
+        return any(part.stops_early for part in self.parts)
+
+    @property
     def bytes(self) -> int:
         """About the size of the archive."""
         return sum(part.bytes for part in self.parts)
@@ -140,6 +147,7 @@ def prepare(
     kept: Mapping[str, np.ndarray] | None = None,
     wires: Wires | None = None,
     verify: Verify = "auto",
+    decided: Collection[str] = (),
 ) -> Campaign:
     """Settle what will be run; raises Problem for anything that would stop it later, and writes nothing.
 
@@ -152,6 +160,7 @@ def prepare(
     kept         rows whose histories are kept, by the experiment's name, in place of `histories`
     wires        where it is run on real beds: then nothing is verified
     verify       which cases are run again with shorter steps: "none", "some", "all", or "auto": some where it is cheap
+    decided      experiments, by name, whose rows in `selected` are those after which it was decided what is required
     """
     if verify not in VERIFY_WORDS:
         raise ValueError(f"verify is one of {', '.join(VERIFY_WORDS)}, and not {verify!r}")
@@ -167,16 +176,17 @@ def prepare(
     target = Path(output) if output is not None else default_output(plan, experiments, selected, all_of)
     wanted = keep(histories, named)
     words = tuple(as_list(histories))
-    parts = _parts(selected, wanted, float32)
+    parts = _parts(selected, wanted, float32, decided)
     if kept is not None:
         parts = tuple(replace(part, kept=np.searchsorted(part.rows, kept[part.experiment.name])) for part in parts)
     notes: list[str] = []
     whole = sum(part.bytes for part in parts)
     if wanted.default and whole > KEPT_BYTES:
         wanted, words = Keep(), ("none",)
-        parts = _parts(selected, wanted, float32)
+        take = "may take" if any(part.stops_early for part in parts) else "would take"
+        parts = _parts(selected, wanted, float32, decided)
         notes.append(
-            f"histories would take {size_text(whole)}, over {size_text(KEPT_BYTES)}: metrics only are kept "
+            f"histories {take} {size_text(whole)}, over {size_text(KEPT_BYTES)}: metrics only are kept "
             f"(`--histories all` keeps them; any case can be run again alone: `--case '#0'`)"
         )
     parts = tuple(replace(part, wires=wires) for part in parts)
@@ -189,7 +199,9 @@ def prepare(
     return campaign
 
 
-def _parts(selected: Sequence[tuple[Experiment, np.ndarray]], wanted: Keep, single: bool) -> tuple[CampaignPart, ...]:
+def _parts(
+    selected: Sequence[tuple[Experiment, np.ndarray]], wanted: Keep, single: bool, decided: Collection[str]
+) -> tuple[CampaignPart, ...]:
     """The experiments with what is kept of them. Raises Problem E311, E312 for cases that are none."""
     chosen = choosing.select_rows([experiment for experiment, _ in selected], wanted.cases) if wanted.cases else []
     named = {experiment.name: rows for experiment, rows in chosen}
@@ -206,9 +218,12 @@ def _parts(selected: Sequence[tuple[Experiment, np.ndarray]], wanted: Keep, sing
     for experiment, rows in selected:
         if experiment.structure.history_bytes:
             kept = kept_before(wanted, experiment, rows, named.get(experiment.name, np.empty(0, np.int64)))
-            parts.append(CampaignPart(experiment, rows, kept, wanted.at_most(len(rows)), single))
+            part = CampaignPart(experiment, rows, kept, wanted.at_most(len(rows)), single)
         else:
-            parts.append(CampaignPart(experiment, rows, np.empty(0, np.int64)))
+            part = CampaignPart(experiment, rows, np.empty(0, np.int64))
+        # some that a user chooses are all run, whatever they show
+        whole = len(rows) == experiment.cases.count or experiment.name in decided
+        parts.append(replace(part, stops_early=experiment.cases.until_shown > 0 and whole))
     return tuple(parts)
 
 
@@ -227,13 +242,27 @@ def histories_section(
 
     results  what became of its cases
     """
-    part = campaign.parts[values.number]
-    if part.all_recorded or not part.experiment.structure.history_bytes:
+    part = campaign.parts[values.experiment]
+    if values.recorded or not part.experiment.structure.history_bytes:
         return None
     kept = part.kept
     if campaign.keep.later:
         kept = distinct(np.concatenate([kept, kept_by_outcome(campaign.keep, part.experiment, results())]))
     if not len(kept):
         return None
-    number = len(campaign.parts) + values.number
-    return CampaignSection(number, values.number, values.prepared, part.rows[kept], True, part.single, values.begun)
+    number = len(campaign.parts) + values.experiment
+    return CampaignSection(number, values.experiment, values.prepared, part.rows[kept], True, part.single, values.begun)
+
+
+def without_dropped_rows(campaign: Campaign, sections: Sequence[CampaignSection]) -> tuple[Campaign, list[str]]:
+    """The campaign of the cases that these sections have, one for each part; and a note on each case that is none of
+    them, and whose history was asked for by name."""
+    parts, notes = [], []
+    for part, section in zip(campaign.parts, sections, strict=True):
+        wanted = part.rows[part.kept]
+        parts.append(replace(part, rows=section.rows, kept=np.flatnonzero(np.isin(section.rows, wanted))))
+        experiment = part.experiment
+        for _, named in choosing.select_rows([experiment], campaign.keep.cases) if part.stops_early else ():
+            for case in experiment.cases.table[named[~np.isin(named, section.rows)]].tolist():
+                notes.append(f"no history of case #{case} is kept: what is required was decided without it")
+    return replace(campaign, parts=tuple(parts)), notes

@@ -13,7 +13,20 @@ import numpy as np
 from met.diagnostic import Place
 from met.distinct import distinct
 from met.frozen import frozen
-from met.plan import BASE, Base, Cases, Command, Course, Experiment, Formula, Plan, Quantity, Schedule, Structure
+from met.plan import (
+    BASE,
+    Base,
+    Cases,
+    Command,
+    Course,
+    Experiment,
+    Formula,
+    Plan,
+    Quantity,
+    Requirement,
+    Schedule,
+    Structure,
+)
 from met.plan.keys import in_key, inputs, structure_key
 
 AXES = ("x", "y", "z")
@@ -53,6 +66,7 @@ def between(before: Experiment, now: Experiment, *, ordered: bool) -> list[Chang
     new = {entity for entity, _ in structures if entity}
     out = [Change(text) for _, text in structures if text]
     cases = [Change(text) for text in _cases(before.cases, now.cases, ordered)]
+    cases += [Change(text) for text in _stops(before, now)]
     out += [*_parameters(before, now, new), *cases]
     if before.formulas != now.formulas and not out:
         out.append(Change("what follows from the varied parameters is computed otherwise"))
@@ -197,6 +211,30 @@ def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
     if not np.array_equal(_array(before.repeats), _array(now.repeats)):
         repeats = [len(distinct(_array(each.repeats))) for each in (before, now)]
         yield f"repeats: {repeats[0]} -> {repeats[1]}" if repeats[0] != repeats[1] else "repeats: in other cases"
+
+
+def _stops(before: Experiment, now: Experiment) -> Iterator[str]:
+    """What decides how many cases of a design point are run, where that is decided by results."""
+    early = [bool(each.cases.until_shown) for each in (before, now)]
+    if early[0] != early[1]:
+        yield "cases are run until it is shown what is required" if early[1] else "all cases are run"
+    elif early[1]:
+        old, new = (
+            {each.text: _shown_by(each) for each in run.requirements if each.confidence is not None}
+            for run in (before, now)
+        )
+        for text in dict.fromkeys([*old, *new]):
+            if text not in new:
+                yield f"{text} is not to be shown any more"
+            elif text not in old:
+                yield f"{text} is to be shown now"
+            elif old[text] != new[text]:
+                yield f"{text}: with another limit, share or confidence"
+
+
+def _shown_by(requirement: Requirement) -> tuple[object, ...]:
+    """All that decides which cases meet a requirement, and how many of them are to."""
+    return requirement.metric, requirement.comparison, requirement.limit, requirement.share, requirement.confidence
 
 
 def _same(before: np.ndarray, now: np.ndarray, ordered: bool) -> bool:

@@ -7,7 +7,8 @@ and what is lost in the end is one case, `TRIES` times. Its status says so, and 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -29,10 +30,11 @@ AHEAD = 1
 
 
 class Progress(Protocol):
-    """Who is told how far a campaign is (batch/terminal/progress.py)."""
+    """Who is told how far a campaign is (batch/terminal/progress.py). cases: 0 where nobody knows how many there will
+    be; more: what else is told, in words."""
 
     def begin(self, name: str, cases: int, done: int, failed: int, workers: str) -> None: ...
-    def advance(self, done: int, failed: int) -> None: ...
+    def advance(self, done: int, failed: int, more: str = "") -> None: ...
     def end(self) -> None: ...
 
 
@@ -59,6 +61,7 @@ class Driver:
 
     counts   what is done, by section
     told     what is to be told of shards that did not count
+    more     what else is told of how far it is
     sections of the first pass, whose failures count: those after them run the same cases again
     """
 
@@ -69,6 +72,7 @@ class Driver:
     sections: int | None = None
     counts: dict[int, Count] = field(default_factory=dict)
     told: list[str] = field(default_factory=list)
+    more: str = ""
     _at: int | None = None
 
     def find(self, section: CampaignSection) -> list[tuple[int, int]]:
@@ -86,23 +90,34 @@ class Driver:
         """Run the cases that are missing. cases: of how many it is told how far it is; None: the section's. Raises
         Stopped."""
         self.check()
-        if not missing:
-            return
-        work = _SectionWork(self, section, missing)
+        if missing:
+            with self.telling(section, cases or len(section.rows)):
+                self.work(section, missing)
+
+    @contextmanager
+    def telling(self, section: CampaignSection, cases: int) -> Iterator[None]:
+        """Tell how far a section is, of so many cases, while it is worked at; 0 where their number is not known."""
         if self.progress is not None:
             count = self.counts[section.number]
-            self.progress.begin(section.name, cases or len(section.rows), count.done, count.failed, self.executor.about)
+            self.progress.begin(section.name, cases, count.done, count.failed, self.executor.about)
         self._at = section.number
-        work.run()
-        self._at = None
+        yield
+        self._at, self.more = None, ""
         if self.progress is not None:
             self.progress.end()
+
+    def work(self, section: CampaignSection, missing: Sequence[tuple[int, int]], *, checked: bool = True) -> None:
+        """Run cases of a section of which it is being told. Raises Stopped.
+
+        checked  whether it stops in the midst of them where too many fail
+        """
+        _SectionWork(self, section, missing, checked).run()
 
     def tell(self) -> None:
         """Pass on how far the section is that is being run."""
         if self.progress is not None and self._at is not None:
             count = self.counts[self._at]
-            self.progress.advance(count.done + self.executor.under_way, count.failed)
+            self.progress.advance(count.done + self.executor.under_way, count.failed, self.more)
 
     def check(self) -> None:
         """Stop where too many cases have failed. Raises TooManyFailures."""
@@ -117,8 +132,10 @@ class Driver:
 class _SectionWork:
     """One section on its way."""
 
-    def __init__(self, driver: Driver, section: CampaignSection, missing: Sequence[tuple[int, int]]) -> None:
-        self._driver, self._section = driver, section
+    def __init__(
+        self, driver: Driver, section: CampaignSection, missing: Sequence[tuple[int, int]], checked: bool
+    ) -> None:
+        self._driver, self._section, self._checked = driver, section, checked
         self._gaps = deque(missing)
         self._again: deque[Task] = deque()
         self._tries: dict[Task, int] = {}
@@ -137,7 +154,8 @@ class _SectionWork:
                 self._open -= 1
                 self._take(outcome)
             driver.tell()
-            driver.check()
+            if self._checked:
+                driver.check()
 
     def _next(self) -> Task | None:
         if self._again:

@@ -24,7 +24,8 @@ import re
 import shlex
 import shutil
 import stat
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -146,9 +147,12 @@ class Folder:
 
     # What is computed
 
-    def describe(self, plan: Plan, sections: Iterable[CampaignSection], **about: Any) -> None:
+    def describe(
+        self, plan: Plan, sections: Iterable[CampaignSection], stops_early: Collection[int] = (), **about: Any
+    ) -> None:
         """Write down what is computed, for workers and for who comes back later.
 
+        stops_early  numbers of sections of which no more cases are run than decide what is required
         about   `key` of the campaign, name of its `archive`, words for the `histories` that are kept
         """
         self.shards.mkdir(exist_ok=True)
@@ -174,6 +178,7 @@ class Folder:
                     "recorded": section.recorded,
                     "single": section.single,
                     "code": section.code,
+                    "stops_early": section.number == section.experiment and section.number in stops_early,
                 }
             )
         data = {"schema": SCHEMA, "version": FORMAT, "met": VERSION, "deck": plan.deck, "sections": told, **about}
@@ -341,7 +346,8 @@ def _checked(data: Any) -> dict[str, Any]:
         and all(isinstance(word, str) or is_count(word) for word in data["histories"])
         and isinstance(data["float32"], bool)
         and data.get("verify", "auto") in VERIFY_WORDS
-        and [each["number"] for each in sections] == list(range(len(sections)))
+        and all(is_count(each["number"]) for each in sections)
+        and all(one["number"] < other["number"] for one, other in pairwise(sections))
     )
     for each in sections if good else ():
         good = good and (
@@ -351,6 +357,7 @@ def _checked(data: Any) -> dict[str, Any]:
             and isinstance(each["code"], str)
             and each["rows"] in (None, f"rows.{each['number']}.npy")
             and all(isinstance(each[name], bool) for name in ("again", "recorded", "single"))
+            and isinstance(each.get("stops_early", False), bool)
         )
     if not good:
         raise ValueError("it is no description of a campaign")

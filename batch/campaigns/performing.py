@@ -16,7 +16,7 @@ import numpy as np
 from batch.archive.sink import FileBusy as ArchiveBusy
 from batch.archive.sink import temporary_of
 from batch.campaigns import instants, merge, resuming
-from batch.campaigns.campaign import Campaign, histories_section, values_sections
+from batch.campaigns.campaign import Campaign, histories_section, values_sections, without_dropped_rows
 from batch.campaigns.drive import Driver, Progress, Stopped, TooManyFailures
 from batch.campaigns.executor import Executor
 from batch.campaigns.folder import Folder, FolderBusy, beside, uncovered
@@ -24,6 +24,7 @@ from batch.campaigns.keep import CaseOutcomes
 from batch.campaigns.output import busy, cannot_write, check_room, publish
 from batch.campaigns.status import Reporter, died_lines
 from batch.campaigns.tasks import CampaignSection
+from batch.campaigns.until_shown import StoppingPoints, run_until_shown, without_dropped
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 from met.outputs import quoted
@@ -92,7 +93,10 @@ def perform(
     if not there and not fresh and not together and not resuming.is_begun(Folder(beside(campaign.output)), key):
         resuming.guard(campaign)
     check_room(campaign.output, campaign.bytes_missing)
-    values = instants.with_memories(values)
+    values = [
+        each if part.stops_early else now
+        for part, each, now in zip(campaign.parts, values, instants.with_memories(values), strict=True)
+    ]
     values[0].prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
     folder = Folder(beside(campaign.output))
     try:
@@ -134,7 +138,11 @@ def perform(
 
 
 class _CampaignWork:
-    """A campaign on its way, in its folder."""
+    """A campaign on its way, in its folder.
+
+    whole   the campaign less the cases that are dropped (`until_shown`);  values, kept: its sections, with these cases
+            and without them
+    """
 
     def __init__(
         self,
@@ -149,7 +157,8 @@ class _CampaignWork:
     ) -> None:
         self.campaign, self.folder, self.key, self.say, self.more = campaign, folder, key, say, more
         self.sections = {section.number: section for section in values}
-        self.values = values
+        self.values = self.kept = values
+        self.whole = campaign
         self.notes: list[str] = []
         self.warned: dict[object, Diagnostic] = {}
         self.began = time.time()
@@ -180,9 +189,18 @@ class _CampaignWork:
                 left = sum(last - first for _, stretches in missing for first, last in stretches)
                 if together and left:
                     raise Stopped(f"{left:,} of {self.campaign.cases:,} cases are missing")
+                early = [each for each in self.values if self.campaign.parts[each.experiment].stops_early]
+                stops = {each.number: StoppingPoints(each) for each in early}
+                for number, points in stops.items():
+                    points.read(self.folder)
+                    driver.counts[number].failed = points.failed
                 for section, stretches in missing:
-                    driver.run(section, stretches)
+                    if section.number in stops:
+                        run_until_shown(driver, section, stops[section.number])
+                    else:
+                        driver.run(section, stretches)
                 try:
+                    self._drop(stops)
                     histories = self._histories(driver)
                     self.reporter.state("merging")
                     self._merge(histories)
@@ -214,16 +232,38 @@ class _CampaignWork:
             for section in self.values
             for first, last in uncovered(self.folder.named_tasks(section.number), len(section.rows))
         )
-        done = self.campaign.cases - left
-        return f"{done:,} of {self.campaign.cases:,} cases are kept in {self.folder.path}; the same command goes on"
+        done = self._of_all(self.campaign.cases - left)
+        return f"{done} are kept in {self.folder.path}; the same command goes on"
+
+    def _of_all(self, done: int) -> str:
+        """So many cases of those that are to be run, where it is known how many these are."""
+        return f"{done:,} cases" if self.campaign.stops_early else f"{done:,} of {self.campaign.cases:,} cases"
+
+    def _drop(self, stops: Mapping[int, StoppingPoints]) -> None:
+        """Go on without the cases beyond these stops, by section."""
+        if not stops:
+            return
+        self.kept = [
+            without_dropped(self.folder, each, stops[each.number], 2 * len(self.values) + each.number)
+            if each.number in stops
+            else each
+            for each in self.values
+        ]
+        self.kept = [
+            now if each.number in stops else each
+            for each, now in zip(self.kept, instants.with_memories(self.kept), strict=True)
+        ]
+        self.whole, notes = without_dropped_rows(self.campaign, self.kept)
+        for note in notes:
+            self._note(note)
 
     def _histories(self, driver: Driver) -> dict[int, CampaignSection]:
         """Run the second pass; its sections by experiment."""
         found = {}
-        for section in self.values:
-            histories = histories_section(self.campaign, section, partial(merge.results, self.folder, section))
+        for section in self.kept:
+            histories = histories_section(self.whole, section, partial(merge.results, self.folder, section))
             if histories is not None:
-                self.sections[histories.number] = found[section.number] = histories
+                self.sections[histories.number] = found[section.experiment] = histories
         if found:
             parts = [(self.campaign.parts[section.experiment], len(section.rows)) for section in found.values()]
             check_room(self.campaign.output, self.campaign.bytes_of(parts))
@@ -239,11 +279,11 @@ class _CampaignWork:
         from batch.archive.write import ArchivePart, ArchiveWriter
 
         parts = []
-        for part, values in zip(self.campaign.parts, self.values, strict=True):
+        for part, values in zip(self.whole.parts, self.kept, strict=True):
             kept = part.kept
-            if values.number in histories:
-                rows = histories[values.number].rows
-                lost = merge.without_history(self.folder, values, histories[values.number])
+            if values.experiment in histories:
+                rows = histories[values.experiment].rows
+                lost = merge.without_history(self.folder, values, histories[values.experiment])
                 for row, why in lost.items():
                     case = part.experiment.cases.table[row]
                     again = f"`met run {quoted(self.campaign.output)} --case '#{case}'` tries again"
@@ -251,12 +291,20 @@ class _CampaignWork:
                 kept = np.searchsorted(part.rows, rows[~np.isin(rows, list(lost))])
             program = values.prepared
             parts.append(
-                ArchivePart(part.experiment, part.rows, kept, part.single, program.code_key, program.result_keys)
+                ArchivePart(
+                    part.experiment,
+                    part.rows,
+                    kept,
+                    part.single,
+                    program.code_key,
+                    program.result_keys,
+                    part.experiment.cases.until_shown * part.stops_early,
+                )
             )
         temporary = temporary_of(self.campaign.output)
         writer = ArchiveWriter(temporary, self.campaign.plan, parts)
         try:
-            for number, section in enumerate(self.values):
+            for number, section in enumerate(self.kept):
                 self.reporter.begin(f"{section.name}, merging", len(section.rows), 0, 0, "")
                 merge.merge(
                     writer,
@@ -331,7 +379,7 @@ class _CampaignWork:
                     6,
                 ),
             }
-            for section in self.values
+            for section in self.kept
         ]
 
     def _tell_found(self, *, first: bool) -> None:
@@ -342,7 +390,7 @@ class _CampaignWork:
         driver.told.clear()
         done = sum(count.done for count in driver.counts.values())
         if first and done:
-            self._note(f"goes on: {done:,} of {self.campaign.cases:,} cases are done")
+            self._note(f"goes on: {self._of_all(done)} are done")
 
     def _note(self, text: str) -> None:
         self.notes.append(text)

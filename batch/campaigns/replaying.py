@@ -21,13 +21,15 @@ MOST_TOLD = 8
 @frozen
 class Replay:
     """The cases of an archive that are run again: its plan, and of each experiment the rows of the case table; `kept`,
-    by name: those whose histories the archive has, where all of it is run again."""
+    by name: those whose histories the archive has, where all of it is run again; `decided`: names of the experiments
+    of which these rows are those after which it was decided what is required."""
 
     archive: Path
     plan: Plan
     selected: tuple[tuple[Experiment, np.ndarray], ...]
     word: str
     kept: Mapping[str, np.ndarray] | None = None
+    decided: tuple[str, ...] = ()
 
     @property
     def output(self) -> Path:
@@ -51,6 +53,9 @@ def replay(
                 for position in np.flatnonzero(group.values("status") != 0).tolist():
                     rows.setdefault(group.name, set()).add(_row(group, position))
         positions: dict[str, np.ndarray] = {}
+        decided = [
+            group.name for group in groups_named(file, names) if everything and group.attributes.get("until_shown")
+        ]
         for group in groups_named(file, names) if everything else ():
             rows[group.name] = set(group.values("case").tolist())
             positions[group.name] = group.values("case")[group.recorded_positions]
@@ -77,7 +82,7 @@ def replay(
         word = "again"
     else:
         word = "failed" if failed else "case" + "-".join(map(str, few)) if len(few) <= 4 else "cases"
-    return Replay(Path(archive), plan, tuple(picked_rows), word, kept if everything else None)
+    return Replay(Path(archive), plan, tuple(picked_rows), word, kept if everything else None, tuple(decided))
 
 
 def _row(group: ArchiveGroup, position: int) -> int:

@@ -53,7 +53,7 @@ def as_begun(folder: Folder, campaign: Campaign, values: list[CampaignSection]) 
 
 def settled(campaign: Campaign, values: Sequence[CampaignSection]) -> Campaign:
     """The campaign, with `verify` as "auto" where that asks for the same."""
-    if campaign.verify == "auto":
+    if campaign.verify == "auto" or campaign.stops_early:  # of how many cases is not known yet
         return campaign
     return replace(campaign, verify=when.settled(campaign.verify, ((each.prepared, len(each.rows)) for each in values)))
 
@@ -164,6 +164,7 @@ def describe(folder: Folder, campaign: Campaign, sections: Iterable[CampaignSect
     folder.describe(
         campaign.plan,
         sections,
+        stops_early=[number for number, part in enumerate(campaign.parts) if part.stops_early],
         key=key,
         archive=campaign.output.name,
         histories=campaign.words,

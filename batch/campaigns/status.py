@@ -74,12 +74,13 @@ class Reporter:
         if self._progress is not None:
             self._progress.begin(name, cases, done, failed, workers)
 
-    def advance(self, done: int, failed: int) -> None:
+    def advance(self, done: int, failed: int, more: str = "") -> None:
         self._take(done, failed)
+        self._told["more"] = more
         if time.monotonic() > self._next:
             self._write()
         if self._progress is not None:
-            self._progress.advance(done, failed)
+            self._progress.advance(done, failed, more)
 
     def end(self) -> None:
         if self._progress is not None:
@@ -132,7 +133,13 @@ def report(folder: Folder, now: float) -> dict[str, Any]:
     for each in told_here["sections"]:
         left = sum(last - first for first, last in uncovered(folder.named_tasks(each["number"]), each["cases"]))
         sections.append(
-            {"name": each["name"], "cases": each["cases"], "done": each["cases"] - left, "again": each["again"]}
+            {
+                "name": each["name"],
+                "cases": each["cases"],
+                "done": each["cases"] - left,
+                "again": each["again"],
+                "stops_early": each.get("stops_early", False),
+            }
         )
     workers = []
     for each in status_records(folder):
@@ -151,6 +158,7 @@ def report(folder: Folder, now: float) -> dict[str, Any]:
                 "cases": each["cases"],
                 "done": each["section_done"],
                 "failed": each["failed"],
+                "more": each["more"] if isinstance(each.get("more"), str) else "",
                 "cases_per_s": rate,
                 "seconds_ago": max(0.0, now - each["updated"]),
             }
@@ -170,12 +178,13 @@ def lines(data: dict[str, Any]) -> list[str]:
 
     first = [each for each in data["sections"] if not each["again"]]
     cases, done = (sum(each[name] for each in first) for name in ("cases", "done"))
-    out = [f"{data['folder']}: {done:,} of {cases:,} cases are done"]
+    early = any(each["stops_early"] for each in first)
+    out = [f"{data['folder']}: {done:,} of {'at most ' * early}{cases:,} cases are done"]
     rows = [
         [
             each["name"] + (", again for histories" if each["again"] else ""),
             f"{each['done']:,}",
-            f"of {each['cases']:,}",
+            f"of {'at most ' * each['stops_early']}{each['cases']:,}",
         ]
         for each in data["sections"]
     ]
@@ -185,12 +194,13 @@ def lines(data: dict[str, Any]) -> list[str]:
     if rates and cases > done:
         rate = sum(rates)
         shown = f"{rate:,.3g}" if rate < 1000 else f"{rate:,.0f}"
-        out.append(f"  {shown} cases/s, {duration((cases - done) / rate)} left")
+        out.append(f"  {shown} cases/s, {'at most ' * early}{duration((cases - done) / rate)} left")
     rows = []
     for each in data["workers"]:
         failed = f"{each['failed']:,} failed" if each["failed"] else ""
         job, ago = f"job {each['job']}" if each["job"] else "", f"{duration(each['seconds_ago'])} ago"
-        rows.append([job, each["state"], f"on {each['host']}", f"process {each['pid']}", each["workers"], failed, ago])
+        where, process = f"on {each['host']}", f"process {each['pid']}"
+        rows.append([job, each["state"], where, process, each["workers"], failed, each["more"], ago])
     out += columns(rows, right=())
     if not working and done < cases:
         out.append("  nobody is at work: the command that began it goes on")

@@ -116,6 +116,8 @@ def _experiment(
         out.notes.append("what its deck allows is not known, for the plan cannot be read")
     out.only_a = a.values("case")[matched.only_a].tolist()
     out.only_b = b.values("case")[matched.only_b].tolist()
+    if any(group.attributes.get("until_shown") for group in (a, b)):
+        out.notes.append("cases were run until it was shown what is required: chances are those of a fixed number")
     scores = _Scores(matched.count)
     _ended(a, b, matched, out)
     by_step = of_difference(figures(a), figures(b))

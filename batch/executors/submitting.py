@@ -49,6 +49,13 @@ def submit(
     jobs     of the array; None: `JOBS`, or fewer where there is less to share
     options  further words for sbatch, of both jobs: `--partition=long`
     """
+    if campaign.stops_early:
+        message = "jobs have shares that are fixed beforehand, and `until_shown` runs cases until something is shown"
+        helps = (
+            "`met run --dask` runs it on workers, which may be jobs of SLURM: docs/cluster.md",
+            "or draw a number of cases: `sample random(N) { ... }`",
+        )
+        raise Problem(error("E358", message, help=helps))
     program = shutil.which("sbatch")
     if program is None:
         helps = ("submit where SLURM's commands are, on a login node", "`met run` runs it on this machine")

@@ -63,6 +63,8 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("sigmas", "float", "from the mean to the limit, in standard deviations over the drawn cases"),
     ("step_error", "float", "of the metric by the step, largest of the verified cases"),
     ("more_cases", "int", "that would demonstrate it if none of them misses it"),
+    ("test", "str", "of verdict and bounds: fixed, or sequential, looked at after every case"),
+    ("decided", "int", "cases after which a sequential test decided it"),
     ("why", "str", "it was not judged as it asks for"),
     ("again", "str", "command that runs the worst case"),
 )

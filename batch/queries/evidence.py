@@ -2,7 +2,8 @@
 
 Each is judged at each design point, by the cases that share all that was chosen: with a confidence by an exact bound on
 the share of all cases that may be drawn there, else by the share of the cases that were run. A case that failed, or
-whose metric has no value, misses it.
+whose metric has no value, misses it. Cases that were run until it was decided (`until_shown`) are judged by a test that
+may be looked at after every case, and bounds that hold as well.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from batch.queries import requirements
 from batch.queries.requirements import GroupRequirement
 from batch.queries.signals import deck_unit, number_text
 from met.frozen import frozen
-from met.statistics import confidence as bounds
+from met.statistics import confidence as fixed
+from met.statistics import sequential
 from met.statistics.design_points import design_points
 
 Verdict = Literal["met", "missed", "demonstrated", "not shown", "refuted"]
@@ -46,6 +48,8 @@ class EvidenceRow:
     sigmas       from the mean of the values to the limit, in standard deviations of these; None where they are equal
     verdict      what follows;  more: cases still needed to demonstrate it if none of these misses it, else 0
     why          it was not judged as it asks for; "" where it was
+    sequential   whether verdict and bounds are those of a test that was looked at after every case;  decided: the
+                 number of cases after which it was decided so; None where it was not
     """
 
     requirement: GroupRequirement
@@ -64,6 +68,8 @@ class EvidenceRow:
     bound: float | None = None
     more: int = 0
     why: str = ""
+    sequential: bool = False
+    decided: int | None = None
 
     @property
     def ok(self) -> bool:
@@ -83,12 +89,13 @@ def evidence_for(group: ArchiveGroup, found: Sequence[GroupRequirement]) -> list
         return []
     outcomes = requirements.outcomes(group)
     points, why = _design_points(group)
+    early = bool(group.attributes.get("until_shown"))
     out = []
     for each in found:
         values = group.values(each.metric)
         scale, unit = deck_unit(group.variables[each.metric])
         for point in points if each.share is not None else [DesignPoint({}, np.arange(group.count))]:
-            judged = _judged(each, values[point.cases], outcomes[point.cases, each.place], why)
+            judged = _judged(each, values[point.cases], outcomes[point.cases, each.place], why, early)
             worst = int(point.cases[judged.pop("worst")])
             out.append(
                 EvidenceRow(requirement=each, unit=unit, scale=scale, chosen=point.chosen, worst=worst, **judged)
@@ -115,7 +122,8 @@ def _design_points(group: ArchiveGroup) -> tuple[list[DesignPoint], str]:
     drawn = [variable for variable in coordinates if variable.attributes.get("design")]
     if not drawn and not int(group.values("repeat").max(initial=0)):
         return everything, NOTHING_DRAWN
-    why = SOME_OF_THE_TABLE if group.count < int(group.attributes.get("cases_in_table", group.count)) else ""
+    some = group.count < int(group.attributes.get("cases_in_table", group.count))
+    why = SOME_OF_THE_TABLE if some and not group.attributes.get("until_shown") else ""
     chosen = [(variable, group.values(variable.name)) for variable in coordinates if variable not in drawn]
     if not chosen:
         return everything, why
@@ -129,10 +137,11 @@ def _shown(variable: Stored, value: float) -> str:
     return f"{number_text(value / scale)} {unit}".removesuffix(" 1")
 
 
-def _judged(each: GroupRequirement, values: np.ndarray, outcomes: np.ndarray, why: str) -> dict[str, Any]:
+def _judged(each: GroupRequirement, values: np.ndarray, outcomes: np.ndarray, why: str, early: bool) -> dict[str, Any]:
     """The verdict at a design point and its grounds, by the fields of `EvidenceRow`; `worst` is a place in its cases.
 
-    values  of the metric, SI;  outcomes: 1 met, 0 missed, -1 unknown;  why: no confidence can be had, "" where one can
+    values  of the metric, SI, in the order in which the cases were drawn;  outcomes: 1 met, 0 missed, -1 unknown
+    why     no confidence can be had, "" where one can;  early: True where cases were run until it was decided
     """
     cases, missed, unknown = len(values), int((outcomes != 1).sum()), outcomes == -1
     worst = int(np.where(unknown, np.inf, requirements.beyond(values, each.comparison, each.limit)).argmax())
@@ -151,22 +160,55 @@ def _judged(each: GroupRequirement, values: np.ndarray, outcomes: np.ndarray, wh
         share = each.share if each.share is not None and each.confidence is None else 1.0
         verdict = "met" if cases - missed >= share * cases * (1.0 - ROUNDING) else "missed"
         return {**found, "verdict": verdict, "why": why if each.confidence is not None else ""}
-    verdict = bounds.verdict(cases, missed, each.share, each.confidence)
+    judged = _judged_early if early else _judged_once
+    return {**found, **judged(each, values, outcomes != 1, unknown)}
+
+
+def _judged_once(each: GroupRequirement, values: np.ndarray, missed: np.ndarray, unknown: np.ndarray) -> dict[str, Any]:
+    """The verdict of cases whose number was fixed before they were looked at, and its bounds."""
+    assert each.share is not None and each.confidence is not None
+    cases, misses = len(values), int(missed.sum())
+    verdict = fixed.verdict(cases, misses, each.share, each.confidence)
     return {
-        **found,
-        "lower": bounds.lower_bound(cases, missed, each.confidence),
-        "upper": bounds.upper_bound(cases, missed, each.confidence),
-        "bound": _percentile_bound(each, values, unknown),
+        "lower": fixed.lower_bound(cases, misses, each.confidence),
+        "upper": fixed.upper_bound(cases, misses, each.confidence),
+        "bound": _order_statistic(each, values, unknown, fixed.percentile_rank(cases, each.share, each.confidence)),
         "verdict": verdict,
-        "more": bounds.cases_needed(each.share, each.confidence, missed) - cases if verdict == "not shown" else 0,
+        "more": fixed.cases_needed(each.share, each.confidence, misses) - cases if verdict == "not shown" else 0,
     }
 
 
-def _percentile_bound(each: GroupRequirement, values: np.ndarray, unknown: np.ndarray) -> float | None:
-    """The order statistic that bounds the percentile; None where there are too few cases, or it lies among those that
-    have no value."""
+def _judged_early(
+    each: GroupRequirement, values: np.ndarray, missed: np.ndarray, unknown: np.ndarray
+) -> dict[str, Any]:
+    """The verdict of cases that were looked at one after the other, and its bounds.
+
+    A bound may be taken after any number of cases: the tighter one of those when it was decided and in the end.
+    """
     assert each.share is not None and each.confidence is not None
-    rank = bounds.percentile_rank(len(values), each.share, each.confidence)
+    share, confidence = each.share, each.confidence
+    number, verdict = sequential.decided(missed, share, confidence)
+    looks = [(cases, int(missed[:cases].sum())) for cases in {number, len(values)}]
+    statistics = [
+        _order_statistic(each, values[:cases], unknown[:cases], sequential.percentile_rank(cases, share, confidence))
+        for cases, _ in looks
+    ]
+    tightest = min if each.comparison.startswith("<") else max
+    open_yet = verdict == "not shown"
+    return {
+        "lower": max(sequential.lower_bound(*look, confidence) for look in looks),
+        "upper": min(sequential.upper_bound(*look, confidence) for look in looks),
+        "bound": tightest((found for found in statistics if found is not None), default=None),
+        "verdict": verdict,
+        "more": sequential.cases_needed(share, confidence, int(missed.sum())) - len(values) if open_yet else 0,
+        "sequential": True,
+        "decided": None if open_yet else number,
+    }
+
+
+def _order_statistic(each: GroupRequirement, values: np.ndarray, unknown: np.ndarray, rank: int) -> float | None:
+    """The value of a rank, from the side of the limit, which bounds the percentile; None where there are too few cases,
+    or it lies among those that have no value."""
     if not rank:
         return None
     below = each.comparison.startswith("<")

@@ -40,6 +40,9 @@ class RequirementEvidence:
     sigmas            from the mean to the limit, in standard deviations of the metric over the drawn cases
     step_error        of the metric by the step, the largest of its verified cases
     verdict           what follows;  more_cases: that would demonstrate it if none of them misses it, else 0
+    test              of verdict and bounds: "fixed", of a number of cases that was fixed before; "sequential", looked at
+                      after every case; "" without a confidence
+    decided           the number of cases after which a sequential test decided it; None where none did
     why               it was not judged as it asks for, or is not known;  again: the command that runs the worst case
     Every number but `cases`, `missed` and `limit` is None where there is none.
     """
@@ -68,6 +71,8 @@ class RequirementEvidence:
     sigmas: float | None = None
     step_error: float | None = None
     more_cases: int = 0
+    test: str = ""
+    decided: int | None = None
     why: str = ""
     again: str = ""
 
@@ -142,6 +147,8 @@ def _of_metric(
         sigmas=row.sigmas,
         step_error=_known(error),
         more_cases=row.more,
+        test="" if row.lower is None else "sequential" if row.sequential else "fixed",
+        decided=row.decided,
         why=row.why,
         again=_again(group, case, archive, several),
     )
@@ -228,7 +235,7 @@ def texts_of(row: RequirementEvidence, number: Callable[[float], str] = number_t
     if row.confidence is not None:
         asked += f" with {100.0 * row.confidence:g} %"
     return EvidenceTexts(
-        verdict=row.verdict,
+        verdict=row.verdict if row.decided in (None, row.cases) else f"{row.verdict} after {row.decided:,}",
         missed=f"{row.missed:,} of {row.cases:,}",
         share_met=NONE if row.share_met is None else percent_below(row.share_met).replace(".00 %", " %"),
         of_all=of_all,
@@ -255,6 +262,8 @@ def notes_of(rows: Sequence[RequirementEvidence]) -> list[str]:
             out.append(f"{where}: the error by the step is as large as the margin; shorter steps may change it")
     if any(row.more_cases for row in rows):
         out.append("needed: so many more cases would show it if none of these misses it")
+    if any(row.test == "sequential" for row in rows):
+        out.append("sequential test: the bounds hold although it was looked at after every case")
     told = sum(row.at_least is not None for row in rows)
     if told > 1:
         out.append(f"{told:,} verdicts with a confidence: it is that of each by itself; of all together it is less")

@@ -40,12 +40,13 @@ def _grounds(row: EvidenceRow) -> list[str]:
     if row.lower is None or row.upper is None:
         return [text]
     if row.verdict == "refuted":
-        return [f"{text}: at most {percent_above(row.upper)} of all do"]
+        return [f"{text}: at most {percent_above(row.upper)} of all do{_test(row)}"]
     lines = [f"{text}: at least {percent_below(row.lower)} of all do"]
     if row.bound is not None:
         side = "at most" if row.requirement.comparison.startswith("<") else "at least"
         value = f"{number_text(row.bound / row.scale)} {row.unit}".removesuffix(" 1")
-        lines[0] += f"; in {100.0 * (row.requirement.share or 0.0):g} % of all it is {side} {value}"
+        lines[0] += f"; in {100.0 * (row.requirement.share or 0.0):g} % of all it is {side} {value.strip()}"
+    lines[0] += _test(row)
     if row.more:
         these = "it does not miss it" if row.more == 1 else "none of these misses it"
         lines.append(f"{row.more:,} more case{'s' * (row.more != 1)} would show it if {these}")
@@ -126,3 +127,11 @@ def _numbers(rows: Sequence[RequirementEvidence], required: Sequence[str]) -> li
         point = f".{seen[row.requirement]}" if many[row.requirement] > 1 else ""
         out.append(f"{required.index(row.requirement) + 1}{point}")
     return out
+
+
+def _test(row: EvidenceRow) -> str:
+    """What is said of a test that was looked at after every case, behind what it shows."""
+    if not row.sequential:
+        return ""
+    early = row.decided is not None and row.decided < row.cases
+    return f" (sequential test{f', decided after {row.decided:,} cases' if early else ''})"

@@ -37,7 +37,7 @@ class Bar:
         self._began, self._next, self._drawn = 0.0, 0.0, False
 
     def begin(self, name: str, cases: int, done: int = 0, failed: int = 0, workers: str = "") -> None:
-        """A new experiment starts, of which some cases are done already."""
+        """A new experiment starts, of which some cases are done already. cases: 0 where their number is not known."""
         self._name, self._cases, self._first, self._workers = line(name), cases, done, line(workers)
         self._began = self._now()
         self._next = self._began + (FIRST_SECONDS if self._live else LINE_SECONDS)
@@ -46,7 +46,7 @@ class Bar:
     def advance(self, done: float, failed: int = 0, more: str = "") -> None:
         """So many of its cases are done, parts of one counted, and so many of these failed. more: what else is told."""
         now = self._now()
-        if now < self._next or done >= self._cases:
+        if now < self._next or 0 < self._cases <= done:
             return
         elapsed = now - self._began
         self._next = now + (BAR_SECONDS if self._live else min(max(LINE_SECONDS, 0.2 * elapsed), SELDOM))
@@ -89,15 +89,16 @@ def status(
     more: str = "",
 ) -> str:
     """One line: share, cases, failed ones, what else is told, rate, time left, workers. first: cases that were done
-    when it began."""
-    share = done / cases
+    when it began; cases: 0 where their number is not known."""
+    share = done / cases if cases else 0.0
     drawn = ""
-    if bar:
+    if bar and cases:
         eighths = int(share * WIDTH * 8)
         full, rest = divmod(eighths, 8)
         drawn = "█" * full + (" ▏▎▍▌▋▊▉"[rest] if rest else "")
         drawn = drawn.ljust(WIDTH) + "▏ "
-    text = f"{name}  {drawn}{100 * share:3.0f} %  {int(done):,} of {cases:,} cases"
+    text = f"{name}  {drawn}{100 * share:3.0f} %  {int(done):,} of {cases:,} cases" if cases else ""
+    text = text or f"{name}  {int(done):,} case{'s' * (int(done) != 1)}"
     if failed:
         text += f", {failed:,} failed"
     if more:
@@ -105,5 +106,5 @@ def status(
     if done > first and seconds > 0.0:
         rate = (done - first) / seconds
         text += f"  {rate:,.3g} cases/s" if rate < 1000 else f"  {rate:,.0f} cases/s"
-        text += f"  {duration((cases - done) / rate)} left"
+        text += f"  {duration((cases - done) / rate)} left" if cases else ""
     return f"{text}  {workers}" if workers else text

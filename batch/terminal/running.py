@@ -149,6 +149,7 @@ def _of_archive(
         selected=again.selected,
         histories=histories or ("all" if again.kept is None else "none"),
         kept=again.kept if not histories else None,
+        decided=again.decided,
         float32=float32,
         verify=verify,
     )

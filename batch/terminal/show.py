@@ -211,7 +211,7 @@ def heading(group: ArchiveGroup, width: int) -> list[str]:
     a = group.attributes
     count = f"{group.count:,} case{'s' if group.count != 1 else ''}"
     if group.count < a["cases_in_table"]:
-        count += f" of {a['cases_in_table']:,}"
+        count += f" of {'at most ' * ('until_shown' in a)}{a['cases_in_table']:,}"
     text = (
         f"{count}, {a['duration_s']:g} s, {a['integrator']} at {a['dynamics_hz']:g} Hz, recorded at "
         f"{a['record_hz']:g} Hz, arm {a['arm']}, velocity products {a['velocity_products']}"

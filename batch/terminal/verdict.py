@@ -15,6 +15,7 @@ from batch.queries.step_errors.words import HINT
 from batch.queries.summary import Summary, as_json
 from batch.terminal.show import verdict, warning_lines
 from ic.printing.columns import size as size_text
+from ic.sweeps.confidences import OF_CASES
 from met.frozen import frozen
 from met.outputs import quoted
 
@@ -47,7 +48,8 @@ def announcement(campaign: Campaign, verbose: bool = False, *, notes: bool = Fal
 def writing(campaign: Campaign) -> str:
     """The line that says where the archive will be, and how large: printed once there is a kernel to fill it."""
     instead = ", in place of the one that is there" if campaign.output.exists() else ""
-    return f"writing {campaign.output}, about {size_text(campaign.bytes)}{instead}"
+    most = "at most " * campaign.stops_early
+    return f"writing {campaign.output}, {most}about {size_text(campaign.bytes)}{instead}"
 
 
 def _part_lines(part: CampaignPart, verbose: bool) -> list[str]:
@@ -58,11 +60,16 @@ def _part_lines(part: CampaignPart, verbose: bool) -> list[str]:
     if count == 1 and whole > 1:
         of = f"`{experiment.sweep}`" if experiment.sweep else f"{whole:,}"
         cases = f"case #{experiment.cases.table[part.rows[0]]} of {of}"
+    early = part.stops_early and count == whole
+    if early:
+        cases = f"at most {cases}"
     steps = schedule.ticks // schedule.dynamics
     out = [
         f"{experiment.name}: {cases}, {schedule.duration:g} s in {steps:,} steps of {1e3 * schedule.step:g} ms, "
         f"{experiment.structure.integrator}"
     ]
+    if early:
+        out += [f"  {note.removeprefix(OF_CASES)}" for note in experiment.notes if note.startswith(OF_CASES)]
     recorded = ", ".join(recorded.name for recorded in experiment.structure.record)
     if part.recorded:
         each = size_text(experiment.structure.history_bytes // (2 if part.single else 1))

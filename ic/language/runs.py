@@ -176,7 +176,8 @@ SWEEP = BlockDeclaration(
         Entry(name="from", form="statement", written='from "cases.csv";', default="none",
               doc="an axis of the rows of a file"),
         Entry(name="sample", form="statement", written="sample DESIGN(COUNT) { PATH = DISTRIBUTION; }",
-              default="none", doc="an axis of values drawn at random"),
+              default="none", doc="an axis of values drawn at random; `random(until_shown, at_most = COUNT)`: no more "
+                  "cases than decide the requirements with a confidence"),
         Entry(name="repeat", form="statement", written="repeat COUNT;", default="none",
               doc="each case so many times, with noise of its own"),
         Entry(name="exclude when", form="statement", written="exclude when CONDITION;", default="none",

@@ -22,7 +22,8 @@ def print_cases(groups: Sequence[Experiment], *, everything: bool = False) -> It
     """Line by line the table of one sweep, of which these are the groups; of a long one the head and the tail."""
     rows = _Rows(groups)
     total = len(rows.groups)
-    title = f"{groups[0].name_in_deck}: {count(total, 'case')}"
+    most = "at most " * any(group.cases.until_shown for group in groups)
+    title = f"{groups[0].name_in_deck}: {most}{count(total, 'case')}"
     if len(groups) > 1:
         yield f"{title}, {len(groups)} structures"
         yield from _structures(groups)

@@ -390,7 +390,7 @@ def _cases(experiment: Experiment) -> Iterator[str]:
     cases = experiment.cases
     each = experiment.structure.history_bytes
     written = f"{size(cases.count * each)} of histories" if each else "metrics alone are written"
-    yield f"Cases: {cases.count}, {written}"
+    yield f"Cases: {'at most ' * (cases.until_shown > 0)}{cases.count}, {written}"
     rows = [(choice.path, choice.value) for choice in cases.choices]
     for coordinate in cases.coordinates:
         shown = distinct(coordinate.values) / coordinate.scale

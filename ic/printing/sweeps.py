@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, USAGE
 from ic.printing.columns import columns, exactly
-from ic.sweeps.designs import DESIGNS, DIGITS, DISTRIBUTIONS
+from ic.sweeps.designs import AT_MOST, DESIGNS, DIGITS, DISTRIBUTIONS, UNTIL_SHOWN
 from met.frozen import frozen
 
 Row = tuple[str, str, str]
@@ -36,6 +36,8 @@ OF_DESIGNS: Mapping[str, str] = MappingProxyType(
     }
 )
 
+OF_UNTIL_SHOWN = "the same draws, up to the first that decides all requirements with a confidence; at most n"
+
 OF_DISTRIBUTIONS: Mapping[str, str] = MappingProxyType({
     "uniform": "evenly between two values", "loguniform": "evenly in the logarithm", "normal": "normal, without bounds",
     "truncated": "normal, cut off on either side",
@@ -48,7 +50,8 @@ def _functions() -> list[Row]:
 
 
 def _designs() -> list[Row]:
-    return [(name, f"{name}(n)", OF_DESIGNS[name]) for name in DESIGNS]
+    early = ("random", f"random({UNTIL_SHOWN}, {AT_MOST} = n)", OF_UNTIL_SHOWN)
+    return [*((name, f"{name}(n)", OF_DESIGNS[name]) for name in DESIGNS), early]
 
 
 def _distributions() -> list[Row]:

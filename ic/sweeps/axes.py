@@ -32,7 +32,7 @@ from ic.sweeps.choices import (
     path_place,
     refuse_words,
 )
-from ic.sweeps.designs import DESIGNS, read_sample
+from ic.sweeps.designs import DESIGNS, UNTIL_SHOWN, read_sample
 from ic.text.complaints import Complaints, known_words, where_it_belongs
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
@@ -50,11 +50,13 @@ Column = VariedPath | ChoiceColumn
 @frozen
 class SweepAxis:
     """Columns of one length that vary together. note: how they were made, for `met cases`; design: of the sample that
-    drew them, "" where they were written."""
+    drew them, "" where they were written; until_shown: where it is written that no more of them are run than decide
+    what is required, if it is."""
 
     columns: tuple[Column, ...]
     note: str = ""
     design: Design = ""
+    until_shown: Place | None = None
 
     @property
     def size(self) -> int:
@@ -90,6 +92,11 @@ class Sweep:
     def designs(self) -> dict[str, Design]:
         """The design of the sample that drew each path; without those that were not drawn."""
         return {column.path: axis.design for axis in self.axes if axis.design for column in axis.columns}
+
+    @property
+    def early_axis(self) -> SweepAxis | None:
+        """The axis of which no more cases are run than decide what is required, if there is one."""
+        return next((axis for axis in self.axes if axis.until_shown is not None), None)
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -128,6 +135,15 @@ def read_sweep(
         reader.repeated,
         definition.place,
     )
+    early = sweep.early_axis
+    if early is not None and early is not sweep.axes[-1] and sweep.axes[-1].until_shown is None:
+        complaints.error(
+            "D358",
+            f"cases of a design point are run in order until something is shown, so `{UNTIL_SHOWN}` stands last",
+            early.until_shown,
+            also=[Label(sweep.axes[-1].columns[0].place, "varies faster")],
+            help="write this sample behind what is varied: then the cases of a design point stand together",
+        )
     if not sweep.axes and sweep.repeated is None and not complaints.errors:
         complaints.error(
             "D126",
@@ -283,7 +299,7 @@ class _SweepReader:
             columns.append(replace(column, drawn=part.distribution))
         if sample.warning is not None:
             self.complaints.remark("D228", *sample.warning, help="take a power of 2")
-        self.axes.append(SweepAxis(tuple(columns), sample.note, sample.design))
+        self.axes.append(SweepAxis(tuple(columns), sample.note, sample.design, sample.until_shown))
 
     def repeats(self, statement: Statement) -> None:
         if self.repeated is not None:

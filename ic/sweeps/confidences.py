@@ -12,7 +12,7 @@ from ic.sweeps.reach import without_effect
 from ic.text.complaints import Complaints
 from met.diagnostic import Label
 from met.plan import SEED, Experiment, Requirement
-from met.statistics.confidence import cases_needed
+from met.statistics import confidence, sequential
 from met.statistics.design_points import design_points
 
 OF_CASES = "cases for a confidence: "
@@ -27,6 +27,16 @@ def check_confidences(complaints: Complaints, sweep: Sweep, experiment: Experime
     """
     wanted = [requirement for requirement in experiment.requirements if requirement.confidence is not None]
     drawn = [axis for axis in sweep.axes if axis.design]
+    if sweep.early_axis is not None and not wanted:
+        complaints.error(
+            "D357",
+            f"no requirement of `{experiment.name}` has a confidence, so nothing is to be shown",
+            sweep.early_axis.until_shown,
+            help=[
+                "write one in the run: `require METRIC < LIMIT in 99 % of cases with 90 % confidence;`",
+                "or draw a number of cases: `sample random(200) { ... }`",
+            ],
+        )
     if not wanted or (not drawn and sweep.repeated is None):
         return ()
     before = complaints.error_count
@@ -36,6 +46,8 @@ def check_confidences(complaints: Complaints, sweep: Sweep, experiment: Experime
     if complaints.error_count > before:
         return ()
     each = _fewest_of_a_point(experiment)
+    if sweep.early_axis is not None:
+        return _early_notes(complaints, wanted, each)
     return tuple(_note(complaints, requirement, each) for requirement in wanted)
 
 
@@ -91,7 +103,7 @@ def _fewest_of_a_point(experiment: Experiment) -> int:
 
 def _note(complaints: Complaints, requirement: Requirement, each: int) -> str:
     assert requirement.share is not None and requirement.confidence is not None
-    needed, more = (cases_needed(requirement.share, requirement.confidence, missed) for missed in (0, 1))
+    needed, more = (confidence.cases_needed(requirement.share, requirement.confidence, missed) for missed in (0, 1))
     if each < needed:
         complaints.remark(
             "D352",
@@ -102,3 +114,22 @@ def _note(complaints: Complaints, requirement: Requirement, each: int) -> str:
     return (
         f"{OF_CASES}`{requirement.text}` needs {needed:,} if none misses it, {more:,} if one does; there are {each:,}"
     )
+
+
+def _early_notes(complaints: Complaints, wanted: Sequence[Requirement], most: int) -> tuple[str, ...]:
+    """The note of a sample that is run until all of these requirements are decided, of up to `most` cases for each
+    design point."""
+    fewest = 0
+    for requirement in wanted:
+        assert requirement.share is not None and requirement.confidence is not None
+        needed, more = (sequential.cases_needed(requirement.share, requirement.confidence, missed) for missed in (0, 1))
+        if most < needed:
+            complaints.remark(
+                "D352",
+                f"{most:,} cases at most cannot show this, were it met by all of them",
+                requirement.place,
+                help=f"write `at_most = {needed}` or more; {more:,} show it where one misses it",
+            )
+        fewest = max(fewest, needed)
+    stops = "stops at" if fewest <= most else "would stop at"
+    return (f"{OF_CASES}{stops} {fewest:,} cases for each design point if none misses; at most {most:,}",)

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Expression, Setting, Statement, Unit, WithUnit
+from ic.grammar.syntax import Call, Expression, Name, Setting, Statement, Unit, WithUnit
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names
@@ -37,6 +37,8 @@ from met.plan import Design
 from met.trace import Scalar
 
 DIGITS = 12
+UNTIL_SHOWN, AT_MOST = "until_shown", "at_most"
+"""Words in place of a number of samples."""
 MOST_SAMPLES = 1_000_000
 MOST_SOBOL = 1 << 30
 DESIGNS: tuple[Design, ...] = ("lhs", "sobol", "random", "saltelli")
@@ -71,20 +73,23 @@ class DrawnParameter:
 
 @frozen
 class SampleDesign:
-    """A `sample` statement as read. warning: message and place of a warning about it."""
+    """A `sample` statement as read. warning: message and place of a warning about it; until_shown: where it is written
+    that no more cases are run than decide what is required, if it is: then `count` is the most."""
 
     design: Design
     count: int
     seed: int
     parts: tuple[DrawnParameter, ...]
     warning: tuple[str, Place] | None = None
+    until_shown: Place | None = None
 
     @property
     def note(self) -> str:
         about = ": another count would draw other values" if self.design == "lhs" else ""
         if self.design == "saltelli":
             about = f": {self.count} times {len(self.parts) + 2} cases"
-        return f"sample {self.design}({self.count}), seed {self.seed}{about}"
+        count = f"{UNTIL_SHOWN}, {AT_MOST} = {self.count}" if self.until_shown is not None else f"{self.count}"
+        return f"sample {self.design}({count}), seed {self.seed}{about}"
 
     def draw(self, number: int) -> list[np.ndarray]:
         """The values of each part. number: of the sample in its sweep, from 1. Raises Problem where they are one."""
@@ -194,7 +199,11 @@ def read_sample(
                 help=[*did_you_mean(design, DESIGNS), known_words("designs", DESIGNS)],
             )
         )
-    if len(call.positional) != 1 or call.named:
+    names = Names(definitions, {}, watched=set(paths))
+    until_shown = _until_shown(call, definitions)
+    if until_shown is not None:
+        count = _count(evaluate_number(call.named[0][1], names.find))
+    elif len(call.positional) != 1 or call.named:
         raise Problem(
             error(
                 "D224",
@@ -203,8 +212,8 @@ def read_sample(
                 help=f"write `sample {design}(200) {{ ... }}`",
             )
         )
-    names = Names(definitions, {}, watched=set(paths))
-    count = _count(evaluate_number(call.positional[0], names.find))
+    else:
+        count = _count(evaluate_number(call.positional[0], names.find))
     parts = []
     before = complaints.error_count
     for entry in call.body:
@@ -237,7 +246,31 @@ def read_sample(
             f"{count} points of a Sobol sequence are less even than {lower} or {2 * lower}",
             place_of(call.positional[0]),
         )
-    return SampleDesign(design, count, seed, tuple(parts), warning)
+    return SampleDesign(design, count, seed, tuple(parts), warning, until_shown)
+
+
+def _until_shown(call: Call, definitions: Definitions) -> Place | None:
+    """The place of `until_shown` in `random(until_shown, at_most = 50000)`; None where a number is written, which may
+    have that name. Raises Problem D224, D351."""
+    named = {word.text for word, _ in call.named}
+    word = call.positional[0] if len(call.positional) == 1 else None
+    written = isinstance(word, Name) and word.text == UNTIL_SHOWN
+    if not named and written and UNTIL_SHOWN in definitions.lets:
+        return None
+    usage = f"write `sample random({UNTIL_SHOWN}, {AT_MOST} = 50000) {{ ... }}`"
+    if named & {AT_MOST} and not written:
+        message = f"`{AT_MOST}` goes with `{UNTIL_SHOWN}`, and not with a number of samples"
+        raise Problem(error("D224", message, call.named[0][0].place, help=[usage, "or leave it out"]))
+    if word is None or not written:
+        return None
+    if call.name.text != "random":
+        message = f"`{call.name.text}` does not draw cases each without regard to the others, so it shows nothing early"
+        helps = [usage, f"or `sample {call.name.text}(200) {{ ... }}`, which runs all of them"]
+        raise Problem(error("D351", message, call.name.place, help=helps))
+    if named != {AT_MOST} or len(call.named) > 1:
+        message = f"`{UNTIL_SHOWN}` takes the most cases of a design point, `{AT_MOST}`, and nothing else"
+        raise Problem(error("D224", message, place_of(word), help=usage))
+    return place_of(word)
 
 
 def _count(found: Value) -> int:

@@ -222,6 +222,7 @@ class _Sweep:
             "independent" if there.independent is not None else "common",
             tuple(Choice(column.path, option.text, option.place) for column, option in choices),
             repeats(there, rows[keep]),
+            until_shown=0 if there.early_axis is None else there.early_axis.size,
         )
         made = experiment(scope, there.name, there.place, resolved, cases, allowances)
         made = replace(made, notes=(*(axis.note for axis in there.axes if axis.note), *made.notes))

@@ -534,6 +534,8 @@ class Cases:
     choices      what all these cases share, and other groups of the same sweep have otherwise
     repeats      number of each case's repeat, which has a stream of noise of its own; None where nothing is repeated
     positions    of each case in the table of its sweep, rising; None where they are 0 to count - 1
+    until_shown  the most cases of a design point, which are run in order until its requirements with a confidence are
+                 decided; 0 where all cases are run
     """
 
     count: int
@@ -543,6 +545,7 @@ class Cases:
     choices: tuple[Choice, ...] = ()
     repeats: np.ndarray | None = None
     positions: np.ndarray | None = None
+    until_shown: int = 0
 
     @property
     def noise(self) -> tuple[str, ...]:

@@ -32,6 +32,7 @@ from met.plan import structure as plan_structure
 from met.plan.codec import Damaged
 from met.plan.defaults import INERTIA, declared, heads_of_models, related
 from met.plan.outputs import tolerable
+from met.statistics.confidence import can_be_shown
 from met.trace.graph import Formulas
 from met.trace.nodes import TRUTHS
 from met.unit_parser import parse_unit
@@ -114,7 +115,7 @@ def _check_requirements(experiment: Experiment, where: str) -> None:
         share, confidence = requirement.share, requirement.confidence
         if share is not None and not 0.0 < share <= 1.0:
             raise Damaged(f"{where}[{index}].share", "it should be above 0 and at most 1")
-        if confidence is not None and not (share is not None and share < 1.0 and 0.0 < confidence < 1.0):
+        if confidence is not None and not (share is not None and can_be_shown(share) and 0.0 < confidence < 1.0):
             raise Damaged(f"{where}[{index}].confidence", "it should be between 0 and 1, of a share between 0 and 1")
         first = said.setdefault(requirement.text, requirement)
         if (first.metric, first.comparison, first.limit) != (
@@ -174,6 +175,19 @@ def _check_cases(experiment: Experiment, where: str) -> None:
             raise Damaged(f"{path}.path", f"`{coordinate.path}` is there twice")
         paths.add(coordinate.path)
         _check_coordinate(experiment, coordinate, path)
+    if cases.until_shown:
+        _check_until_shown(experiment, f"{where}.until_shown")
+
+
+def _check_until_shown(experiment: Experiment, where: str) -> None:
+    """Cases that are run until something is shown are draws of their own, and something is to be shown."""
+    cases = experiment.cases
+    plan_structure.check_whole(cases.until_shown, 1, 2**53, where)
+    designs = {coordinate.design for coordinate in cases.coordinates} - {""}
+    if designs != {"random"} or cases.repeats is not None:
+        raise Damaged(where, "its cases should be drawn by one `random`, without repeats")
+    if all(requirement.confidence is None for requirement in experiment.requirements):
+        raise Damaged(where, "no requirement has a confidence, so nothing is to be shown")
 
 
 def _check_numbering(numbers: np.ndarray, count: int, rising: bool, where: str) -> None:

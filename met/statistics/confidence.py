@@ -19,6 +19,11 @@ MOST_CASES = 10**12
 """Where looking for a number of cases ends."""
 
 
+def can_be_shown(share: float) -> bool:
+    """True unless a share lies within a billionth of none or of all cases: no campaign has the cases that show it."""
+    return min(share, 1.0 - share) > 0.999e-9  # what is a billionth but for rounding is one
+
+
 def lower_bound(cases: int, missed: int, confidence: float) -> float:
     """The share of all cases that meet it at least, with this confidence; 0 where no case was run.
 

@@ -7,15 +7,21 @@ confidence) with a probability of at most 1 - confidence (J. Ville, 1939): an e-
 and G. Shafer, Statistical Science 38 (2023) 576-601). Here it is the likelihood of the cases under shares of misses
 that meet the requirement, averaged over a beta distribution that is cut off at the share allowed, against their
 likelihood at the share allowed; and the same on the other side for "refuted".
+
+One more case that meets the requirement always adds to the evidence for it, and one more that misses it takes from it.
+So both verdicts are limits on numbers of cases for each number of misses, `DecisionLimits`, found once.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 
-from met.statistics.confidence import Verdict
+from met.frozen import frozen
+from met.statistics.confidence import MOST_CASES, Verdict
 
 WEIGHT = 0.5
 """First parameter of the beta distribution of shares of misses: Jeffreys'; the second has the mean at a quarter of the
@@ -48,15 +54,119 @@ def _mixture(cases: np.ndarray, counted: np.ndarray, allowed: float) -> np.ndarr
     return found
 
 
+SMALLEST = 2.0**-50
+"""Where looking for a share ends."""
+
+
+@frozen
+class DecisionLimits:
+    """The numbers of cases at which the test of a share decides, by how many of the cases missed the requirement.
+
+    demonstrates  the fewest cases that demonstrate it if so many of them miss it;  refutes: the most that refute it;
+                  [misses], both beyond `at_most` cases where none or all up to there do
+    """
+
+    demonstrates: np.ndarray
+    refutes: np.ndarray
+
+    def verdicts(self, cases: np.ndarray, missed: np.ndarray) -> np.ndarray:
+        """1 where so many cases with so many misses demonstrate it, -1 where they refute it, else 0."""
+        misses = np.minimum(missed, len(self.refutes) - 1)
+        return (cases >= self.demonstrates[misses]).astype(np.int8) - (cases <= self.refutes[misses])
+
+
+@lru_cache(256)
+def limits(share: float, confidence: float, at_most: int) -> DecisionLimits:
+    """The limits of the test of a share, above 0 and below 1, with a confidence, for up to `at_most` cases."""
+
+    def needed(cases: np.ndarray, missed: np.ndarray) -> np.ndarray:
+        return _reached(evidence_for, cases, missed, share, confidence)
+
+    def open_again(cases: np.ndarray, missed: np.ndarray) -> np.ndarray:
+        return ~_reached(evidence_against, cases, missed, share, confidence)
+
+    enough = 1
+    while enough < at_most and open_again(np.array(at_most), np.array(enough)):
+        enough = min(2 * enough, at_most)
+    misses = np.arange(enough + 1)
+    return DecisionLimits(_first(misses, at_most, needed), _first(misses, at_most, open_again) - 1)
+
+
+def _first(misses: np.ndarray, at_most: int, holds: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+    """For each number of misses, the fewest cases from that number on for which it holds; `at_most` + 1 for none."""
+    low, high = misses.copy(), np.full(len(misses), at_most + 1)
+    while (low < high).any():
+        middle = (low + high) // 2
+        found = holds(middle, misses) | (middle > at_most)
+        low, high = np.where(found, low, np.minimum(middle + 1, high)), np.where(found, middle, high)
+    return high
+
+
+def _reached(
+    evidence: Callable[[np.ndarray, np.ndarray, float], np.ndarray],
+    cases: np.ndarray,
+    missed: np.ndarray,
+    share: float,
+    confidence: float,
+) -> np.ndarray:
+    return np.asarray(evidence(cases, missed, share) >= -math.log1p(-confidence))
+
+
 def decided(missed: np.ndarray, share: float, confidence: float) -> tuple[int, Verdict]:
     """The number of cases after which a requirement is decided, and how; all, and "not shown", where they do not do it.
 
     missed  for each case, in the order in which they were drawn, whether it missed the requirement
     """
-    cases, so_far = np.arange(1, len(missed) + 1), np.cumsum(missed)
-    limit = -math.log1p(-confidence)
-    for_it, against = (evidence(cases, so_far, share) >= limit for evidence in (evidence_for, evidence_against))
-    first = [int(each.argmax()) if each.any() else len(missed) for each in (for_it, against)]
-    if min(first) == len(missed):
+    found = limits(share, confidence, len(missed)).verdicts(np.arange(1, len(missed) + 1), np.cumsum(missed))
+    if not found.any():
         return len(missed), "not shown"
-    return min(first) + 1, "demonstrated" if first[0] < first[1] else "refuted"
+    first = int((found != 0).argmax())
+    return first + 1, "demonstrated" if found[first] > 0 else "refuted"
+
+
+def cases_needed(share: float, confidence: float, missed: int = 0) -> int:
+    """The fewest cases that demonstrate the share if so many of them miss the requirement. Raises ValueError where
+    more than `MOST_CASES` were needed."""
+    low, high = missed, max(1, 2 * missed)
+    while not _reached(evidence_for, np.array(high), np.array(missed), share, confidence):
+        low, high = high, 2 * high
+        if high > MOST_CASES:
+            raise ValueError(f"more than {MOST_CASES} cases")
+    while high - low > 1:
+        middle = (low + high) // 2
+        if _reached(evidence_for, np.array(middle), np.array(missed), share, confidence):
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+def lower_bound(cases: int, missed: int, confidence: float) -> float:
+    """The share of all cases that meet it at least, with this confidence however often the cases were looked at; 0
+    where no share is shown."""
+    return _bisected(lambda share: not _reached(evidence_for, np.array(cases), np.array(missed), share, confidence))[0]
+
+
+def upper_bound(cases: int, missed: int, confidence: float) -> float:
+    """The share of all cases that meet it at most, with this confidence however often the cases were looked at."""
+    return _bisected(
+        lambda share: bool(_reached(evidence_against, np.array(cases), np.array(missed), share, confidence))
+    )[1]
+
+
+def _bisected(above: Callable[[float], bool]) -> tuple[float, float]:
+    """Two neighbouring shares, of which what holds above some share holds for the second, or that is 1."""
+    low, high = 0.0, 1.0
+    while low < (middle := 0.5 * (low + high)) < high and high - low > SMALLEST:
+        low, high = (low, middle) if above(middle) else (middle, high)
+    return low, high
+
+
+def percentile_rank(cases: int, share: float, confidence: float) -> int:
+    """The rank, from 1 for the smallest value, of the value that bounds a percentile from above with this confidence,
+    however often the cases were looked at; 0 where there are too few cases for any of their values to bound it.
+
+    share  of the percentile: the value below which this share of all cases lies
+    """
+    allowed = int((limits(share, confidence, cases).demonstrates <= cases).sum()) - 1
+    return cases - allowed if allowed >= 0 else 0

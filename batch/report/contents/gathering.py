@@ -156,7 +156,8 @@ def _lede(pool: Pool) -> str:
     table = sum(group.attributes["cases_in_table"] for group in pool.groups)
     cases = f"{pool.count:,} case{'s' if pool.count != 1 else ''}"
     if pool.count < table:
-        cases += f" of {table:,}"
+        most = "at most " * any("until_shown" in group.attributes for group in pool.groups)
+        cases += f" of {most}{table:,}"
     each = f"{_all(pool, 'duration_s', '{:g} s')}{' each' if pool.count > 1 else ''}"
     kinds = f" in {len(pool.groups)} structures" if len(pool.groups) > 1 else ""
     how = f"{_all(pool, 'integrator')} at {_all(pool, 'dynamics_hz', '{:g} Hz')}"

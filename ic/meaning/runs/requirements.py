@@ -23,6 +23,7 @@ from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Requirement, Structure
 from met.plan.outputs import metric_units
+from met.statistics.confidence import can_be_shown
 from met.trace import Scalar
 
 SHARE = Parameter(name="share", unit="1", doc="the share of all cases", share=True, above=0.0, at_most=1.0)
@@ -202,6 +203,14 @@ def resolve_requirements(scope: Scope, read: list[WrittenRequirement], structure
                 "no number of cases shows that all cases meet a requirement",
                 place_of(each.share) if each.share is not None else each.statement.place,
                 help="write a share below 100 %, or leave the confidence out: then all cases of the run are to meet it",
+            )
+            continue
+        if share is not None and confidence is not None and not can_be_shown(share):
+            scope.complaints.error(
+                "D350",
+                "no campaign has the cases that show a share so near to all or none",
+                place_of(each.share) if each.share is not None else each.statement.place,
+                help="write a share from 0.0000001 % to 99.9999999 %, or leave the confidence out",
             )
             continue
         if number is not None:

@@ -123,6 +123,32 @@ def test_a_forged_share_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "error[E302]" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("name", "forged"), [("share", 1.0), ("share", 1.0 - 1e-12), ("share", 1e-12), ("confidence", 1.0)]
+)
+def test_a_forged_share_that_nothing_shows_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, forged: float
+) -> None:
+    _, path = ran(tmp_path, "require late < 5 s in 95 % of cases with 90 % confidence;", cases=3)
+    with h5py.File(path, "r+") as file:
+        file["requirement"].attrs[name] = [forged]
+    capsys.readouterr()
+    assert main(["show", str(path)]) == 2
+    assert "a requirement asks for what no number of cases shows" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("forged", [0, -3, "many", 2.5])
+def test_a_forged_number_of_cases_at_most_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], forged: object
+) -> None:
+    _, path = ran(tmp_path, "require late < 5 s in 95 % of cases with 90 % confidence;", cases=3)
+    with h5py.File(path, "r+") as file:
+        file.attrs["until_shown"] = forged
+    capsys.readouterr()
+    assert main(["show", str(path)]) == 2
+    assert "attribute `until_shown` is no number of cases" in capsys.readouterr().err
+
+
 def test_shares_are_rounded_to_the_safe_side() -> None:
     assert percent_below(0.99699) == "99.69 %" and percent_above(0.99691) == "99.70 %"
     assert (

@@ -103,6 +103,8 @@ def test_a_plan_file_with_a_share_that_cannot_be_is_damaged(tmp_path: Path, fiel
     ("require percentile(top, 95 %) < 2 rad/s in 95 % of cases;", "D350", "in its brackets"),
     ("require percentile(tip, 95 %) < 2 rad/s;", "D132", "no metric `tip`"),
     ("require top < 2 rad/s in 100 % of cases with 90 % confidence;", "D350", "no number of cases"),
+    ("require top < 2 rad/s in 99.99999999999 % of cases with 90 % confidence;", "D350", "so near to all or none"),
+    ("require percentile(top, 1e-10 %) > 2 rad/s with 90 % confidence;", "D350", "so near to all or none"),
     ("require top < 2 rad/s in 3 kg of cases;", "D06", "share"),
 ])  # fmt: skip
 def test_what_cannot_be_is_told(tmp_path: Path, requirement: str, code: str, part: str) -> None:

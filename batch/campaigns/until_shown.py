@@ -1,0 +1,203 @@
+"""Cases of design points in order, until the requirements with a confidence of each are decided (`until_shown`).
+
+A design point stops at the first of its cases after which a test that may be looked at after every case
+(met/statistics/sequential.py) has decided all of these requirements, or at its last. That is a matter of its cases in
+their order alone. Where the tasks end, who runs them and when they are looked at decide how many cases are computed
+beyond it, and these are dropped: they reach neither the archive nor a verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from batch.campaigns import shard
+from batch.campaigns.drive import Driver, Stopped
+from batch.campaigns.folder import Folder
+from batch.campaigns.merge import Missing
+from batch.campaigns.tasks import GRANULE, CampaignSection, Task
+from met import run as engine
+from met.run import DONE
+from met.statistics.design_points import design_points
+from met.statistics.sequential import limits
+
+FIRST_CASES = 256
+"""Cases of a design point that are run before it is looked at, unless fewer may decide it."""
+
+GROWTH = 2
+"""Of the cases that a design point has, one in so many is run more before it is looked at again."""
+
+
+class StoppingPoints:
+    """The design points of a section: which of their cases are known, and where each of them stops."""
+
+    def __init__(self, section: CampaignSection) -> None:
+        experiment = section.prepared.experiment
+        chosen = [each.values[section.rows] for each in experiment.cases.coordinates if not each.design]
+        points = design_points(chosen, len(section.rows))
+        ordered = np.argsort(points, kind="stable")
+        self._section = section
+        self._places = np.split(ordered, np.cumsum(np.bincount(points))[:-1])
+        self._wanted = [each for each in experiment.requirements if each.confidence is not None]
+        most = max(map(len, self._places))
+        self._limits = [limits(each.share or 0.0, each.confidence or 0.0, most) for each in self._wanted]
+        self._read: dict[Task, np.ndarray] = {}
+        self._known = np.zeros(len(section.rows), bool)
+        self._missed = np.zeros((len(section.rows), len(self._wanted)), bool)
+        self._failed = np.zeros(len(section.rows), bool)
+        self._stops: list[int | None] = [None] * len(self._places)
+
+    @property
+    def count(self) -> int:
+        """The number of design points."""
+        return len(self._places)
+
+    @property
+    def decided(self) -> int:
+        """The number of design points that have come to their stop."""
+        return sum(stop is not None for stop in self._stops)
+
+    @property
+    def failed(self) -> int:
+        """The number of cases that failed, of those that are not dropped, as far as they are known."""
+        kept = [
+            p[: self._prefix(p) if stop is None else stop] for p, stop in zip(self._places, self._stops, strict=True)
+        ]
+        return sum(int(self._failed[places].sum()) for places in kept)
+
+    def read(self, folder: Folder) -> None:
+        """Take what the shards hold by now; one that is unsound holds nothing. A case counts once, as it is merged."""
+        self._known[:] = False
+        for task in folder.named_tasks(self._section.number):
+            if task not in self._read:
+                try:
+                    self._read[task] = self._outcomes(task, folder.read(self._section, task))
+                except (shard.UnsoundShard, OSError):
+                    continue
+            new = ~self._known[task.first : task.last]
+            self._missed[task.first : task.last][new] = self._read[task][new, :-1]
+            self._failed[task.first : task.last][new] = self._read[task][new, -1]
+            self._known[task.first : task.last] = True
+        self._stops = [self._stop(places) for places in self._places]
+
+    def kept(self) -> np.ndarray:
+        """Places in the section of the cases up to each design point's stop, rising."""
+        parts = [places[:stop] for places, stop in zip(self._places, self._stops, strict=True)]
+        return np.sort(np.concatenate(parts))
+
+    def next_batch(self, workers: int) -> list[tuple[int, int]]:
+        """Stretches of cases to run next: of each design point that is undecided, its next ones that are not known."""
+        undecided = [places for places, stop in zip(self._places, self._stops, strict=True) if stop is None]
+        busy = GRANULE * -(-2 * workers // max(1, len(undecided)))
+        stretches: list[tuple[int, int]] = []
+        for places in undecided:
+            known = self._prefix(places)
+            there = places[known : known + self._batch(places, known, busy)]
+            there = np.sort(there[~self._known[there]])
+            parts = np.split(there, np.flatnonzero(np.diff(there) > 1) + 1)
+            stretches += [(int(part[0]), int(part[-1]) + 1) for part in parts]
+        return sorted(stretches)
+
+    def _batch(self, places: np.ndarray, known: int, busy: int) -> int:
+        """The number of cases of a design point that are run before it is looked at again, `busy` of them at least; one
+        on motor beds, where each is driven for as long as it lasts."""
+        if self._section.prepared.wire:
+            return 1
+        batch = max(busy, min(self._needed(places, known), max(FIRST_CASES, known // GROWTH)))
+        return -(-batch // GRANULE) * GRANULE
+
+    def _outcomes(self, task: Task, found: shard.Shard) -> np.ndarray:
+        """Whether each case of a shard misses each of the requirements, as the archive says it, and whether it failed:
+        [case, requirement], the last for failed."""
+        rows = self._section.rows[task.first : task.last]
+        run = engine.results(self._section.prepared, rows, None, found.outputs, dict(found.fates))
+        met = [run.met[each.text] & ~np.isnan(run.metrics[each.metric]) & (run.status == DONE) for each in self._wanted]
+        return ~np.stack([*met, run.status == DONE], axis=1)
+
+    def _prefix(self, places: np.ndarray) -> int:
+        """The number of a design point's first cases that are known."""
+        known = self._known[places]
+        return len(places) if known.all() else int(known.argmin())
+
+    def _stop(self, places: np.ndarray) -> int | None:
+        """The number of cases at which a design point stops; None where its cases that are known do not say it."""
+        known = self._prefix(places)
+        cases, stop = np.arange(1, known + 1), 0
+        for found, missed in zip(self._limits, self._missed[places[:known]].T, strict=True):
+            said = found.verdicts(cases, np.cumsum(missed)) != 0
+            stop = max(stop, int(said.argmax()) + 1 if said.any() else known + 1)
+        if stop <= known:
+            return stop
+        return known if known == len(places) else None
+
+    def _needed(self, places: np.ndarray, known: int) -> int:
+        """The fewest cases more that may decide all requirements of a design point."""
+        most = 1
+        for found, missed in zip(self._limits, self._missed[places[:known]].T, strict=True):
+            if not found.verdicts(np.arange(1, known + 1), np.cumsum(missed)).any():
+                misses = min(int(missed.sum()), len(found.demonstrates) - 1)
+                most = max(most, int(found.demonstrates[misses]) - known)
+        return most
+
+
+def run_until_shown(driver: Driver, section: CampaignSection, points: StoppingPoints) -> None:
+    """Run a section's cases until all of its design points have come to their stop. Raises Stopped.
+
+    Of failures, those of cases that are dropped do not count.
+    """
+    count, before = driver.counts[section.number], list[tuple[int, int]]()
+    with driver.telling(section, cases=0):
+        while batch := points.next_batch(driver.executor.workers):
+            if batch == before:
+                raise Stopped(f"what is computed of {section.name} cannot be read back from {driver.folder.shards}")
+            driver.more = f"{points.decided:,} of {points.count:,} design point{'s' * (points.count != 1)} decided"
+            driver.work(section, batch, checked=False)
+            points.read(driver.folder)
+            count.failed = points.failed
+            driver.check()
+            before = batch
+
+
+def without_dropped(folder: Folder, section: CampaignSection, points: StoppingPoints, number: int) -> CampaignSection:
+    """The section less the cases that are dropped, with shards of its own under this number. Raises Missing."""
+    places = points.kept()
+    if len(places) == len(section.rows):
+        return section
+    kept = replace(section, number=number, rows=section.rows[places], memories=None)
+    for task in folder.named_tasks(number):
+        (folder.shards / task.name).unlink(missing_ok=True)
+    to = np.full(len(section.rows), -1)
+    to[places] = np.arange(len(places))
+    done = 0
+    for task in folder.named_tasks(section.number):
+        wanted = np.arange(task.first, task.last)
+        wanted = wanted[to[wanted] >= 0]
+        if len(wanted):
+            try:
+                found = folder.read(section, task)
+            except (shard.UnsoundShard, OSError) as reason:
+                raise Missing(f"shard {task.name} {reason}") from reason
+            for first, last in _stretches(wanted):
+                at = Task(number, int(to[first]), int(to[last - 1]) + 1)
+                part = _part(found, first - task.first, last - task.first, kept.key(at.first, at.last))
+                shard.write(folder.shards / at.name, part)
+            done += len(wanted)
+            to[wanted] = -1  # a case counts once
+    if done < len(places):
+        raise Missing(f"{len(places) - done:,} cases of {section.name} have no shard any more")
+    return kept
+
+
+def _stretches(places: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Stretches of neighbours among rising places."""
+    for part in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1):
+        yield int(part[0]), int(part[-1]) + 1
+
+
+def _part(found: shard.Shard, first: int, last: int, key: str) -> shard.Shard:
+    """Some cases of a shard as a shard of their own; the time they took stays with the shard that they are of."""
+    history = None if found.history is None else found.history[first:last]
+    fates = {case - first: fate for case, fate in found.fates.items() if first <= case < last}
+    return shard.Shard(key, found.outputs[first:last], history, 0.0, fates)
