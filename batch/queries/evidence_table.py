@@ -40,8 +40,8 @@ class RequirementEvidence:
     sigmas            from the mean to the limit, in standard deviations of the metric over the drawn cases
     step_error        of the metric by the step, the largest of its verified cases
     verdict           what follows;  more_cases: that would demonstrate it if none of them misses it, else 0
-    test              of verdict and bounds: "fixed", of a number of cases that was fixed before; "sequential", looked at
-                      after every case; "" without a confidence
+    test              of verdict and bounds: "fixed", of a number of cases that was chosen before they were looked at;
+                      "sequential", looked at after every case; "" without a confidence
     decided           the number of cases after which a sequential test decided it; None where none did
     why               it was not judged as it asks for, or is not known;  again: the command that runs the worst case
     Every number but `cases`, `missed` and `limit` is None where there is none.
