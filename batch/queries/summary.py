@@ -219,9 +219,10 @@ def median_text(values: np.ndarray, *, infinite: str = "inf", none: str = "-") -
 
 def as_json(summary: Summary) -> dict[str, Any]:
     """Plain data for `--format json`; a number that is not finite is null."""
-    plain = asdict(replace(summary, verified=None, warnings=()))
+    plain = asdict(replace(summary, verified=None, warnings=(), step_errors=()))
     warned = [{"code": each.code, "message": each.message, "help": each.help} for each in summary.warnings]
-    told = {"verified": figures.as_json(summary.verified), "warnings": warned}
+    limits = [{"text": each.text, "met": each.met, "said": each.said} for each in summary.step_errors]
+    told = {"verified": figures.as_json(summary.verified), "step_errors": limits, "warnings": warned}
     data: dict[str, Any] = finite({**plain, "metrics": [_named_first(asdict(m)) for m in summary.metrics], **told})
     return {**data, "ok": summary.ok}
 

@@ -26,7 +26,8 @@ from batch.queries.step_errors.words import NONE, about, error_text
 from batch.queries.structures import structures
 from batch.queries.summary import SPREAD_COLUMNS, MetricSummary, Summary, summary_of
 from batch.terminal import braille
-from batch.terminal.evidence import evidence_lines, evidence_table_lines
+from batch.terminal.evidence import evidence_lines
+from batch.terminal.evidence_table import evidence_table_lines
 from ic.printing.columns import count
 from ic.printing.columns import size as size_text
 from met.distinct import distinct
