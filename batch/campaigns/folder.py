@@ -39,6 +39,7 @@ from met.diagnostic import Problem, error
 from met.host.files import is_count, new_file, read_json, read_regular, whole_file
 from met.plan import Plan
 from met.plan import file as plan_file
+from met.plan.columns import CaseValues, all_rows
 from met.program.step import TOO_FAST
 from met.version import VERSION
 
@@ -155,14 +156,14 @@ class Folder:
         # those that are there are ours, and may be damaged: plan_file writes over nothing but plans
         for path in (self.path / "plan.json", *self.path.glob("plan.*.npy")):
             path.unlink(missing_ok=True)
-        plan_file.write(plan, self.path / "plan.json")
+        plan_file.write(plan, self.path / "plan.json", computed=True)
         told = []
         for section in sections:
             rows = None
             if len(section.rows) < section.prepared.experiment.cases.count:
                 rows = f"rows.{section.number}.npy"
                 with new_file(self.path / rows) as file:
-                    np.save(file, section.rows)
+                    np.save(file, np.asarray(section.rows))
             told.append(
                 {
                     "number": section.number,
@@ -188,14 +189,15 @@ class Folder:
         except (OSError, ValueError, LookupError, TypeError) as reason:
             raise self._damaged(path) from reason
 
-    def plan(self) -> Plan:
-        """The plan that is run here. Raises Problem."""
-        return plan_file.read(self.path / "plan.json")
+    def plan(self, *, every_case: bool = True) -> Plan:
+        """The plan that is run here. every_case: as `met.plan.file.read`. Raises Problem."""
+        return plan_file.read(self.path / "plan.json", every_case=every_case)
 
     def sections(self) -> dict[int, CampaignSection]:
         """The sections by their numbers, for a worker. Raises Problem E353 where the code here is not that of the
         campaign, as after an update of MET or of models while jobs waited: what it gave would count for nothing."""
-        experiments = [engine.prepare(experiment) for experiment in self.plan().experiments]
+        plan = self.plan(every_case=False)  # whoever wrote it had checked all of them
+        experiments = [engine.prepare(experiment) for experiment in plan.experiments]
         out = {}
         described = self.described()
         for told in described["sections"]:
@@ -210,10 +212,11 @@ class Folder:
             )
         return out
 
-    def _rows(self, told: dict[str, Any], count: int) -> np.ndarray:
+    def _rows(self, told: dict[str, Any], count: int) -> CaseValues:
         """The rows of a section of an experiment with so many cases. Raises Problem."""
+        rows: CaseValues
         if told["rows"] is None:
-            rows = np.arange(count)
+            rows = all_rows(count)
         else:
             path = self.path / told["rows"]
             try:

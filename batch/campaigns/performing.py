@@ -20,14 +20,15 @@ from batch.campaigns.campaign import Campaign, histories_section, values_section
 from batch.campaigns.drive import Driver, Progress, Stopped, TooManyFailures
 from batch.campaigns.executor import Executor
 from batch.campaigns.folder import Folder, FolderBusy, beside, uncovered
-from batch.campaigns.keep import CaseOutcomes
+from batch.campaigns.keep import worst_wanted
+from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.output import busy, cannot_write, check_room, publish
 from batch.campaigns.status import Reporter, died_lines
 from batch.campaigns.tasks import CampaignSection
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 from met.outputs import quoted
-from met.run import DONE
+from met.plan.columns import places_among
 
 if TYPE_CHECKING:
     from batch.archive.write import ArchiveWriter
@@ -221,7 +222,7 @@ class _CampaignWork:
         """Run the second pass; its sections by experiment."""
         found = {}
         for section in self.values:
-            histories = histories_section(self.campaign, section, partial(merge.results, self.folder, section))
+            histories = histories_section(self.campaign, section, partial(self._results, section))
             if histories is not None:
                 self.sections[histories.number] = found[section.number] = histories
         if found:
@@ -234,6 +235,10 @@ class _CampaignWork:
                 driver.run(section, stretches)
         return found
 
+    def _results(self, section: CampaignSection) -> CaseOutcomes:
+        wanted = worst_wanted(self.campaign.keep, section.prepared.experiment)
+        return merge.results(self.folder, section, wanted)
+
     def _merge(self, histories: Mapping[int, CampaignSection]) -> None:
         from batch.archive.provenance import machine
         from batch.archive.write import ArchivePart, ArchiveWriter
@@ -242,13 +247,13 @@ class _CampaignWork:
         for part, values in zip(self.campaign.parts, self.values, strict=True):
             kept = part.kept
             if values.number in histories:
-                rows = histories[values.number].rows
+                rows = np.asarray(histories[values.number].rows)
                 lost = merge.without_history(self.folder, values, histories[values.number])
                 for row, why in lost.items():
                     case = part.experiment.cases.table[row]
                     again = f"`met run {quoted(self.campaign.output)} --case '#{case}'` tries again"
                     self._note(f"no history of case #{case} of `{values.name}` is kept: {why}; {again}")
-                kept = np.searchsorted(part.rows, rows[~np.isin(rows, list(lost))])
+                kept = places_among(part.rows, rows[~np.isin(rows, list(lost))])
             program = values.prepared
             parts.append(
                 ArchivePart(part.experiment, part.rows, kept, part.single, program.code_key, program.result_keys)
@@ -258,7 +263,7 @@ class _CampaignWork:
         try:
             for number, section in enumerate(self.values):
                 self.reporter.begin(f"{section.name}, merging", len(section.rows), 0, 0, "")
-                merge.merge(
+                outcomes = merge.merge(
                     writer,
                     number,
                     self.folder,
@@ -266,7 +271,7 @@ class _CampaignWork:
                     histories.get(number),
                     lambda cases: self.reporter.advance(cases, 0),
                 )
-                outcomes = CaseOutcomes(*writer.put_before(number))
+                writer.look_back(number)
                 self._verify(writer, number, section, outcomes)
                 for each in instants.step_warnings(section, outcomes, self._threads):
                     self.warned.setdefault((each.code, each.at), each)
@@ -307,7 +312,8 @@ class _CampaignWork:
         from batch.campaigns.verification.verifying import FACTORS, verify
 
         experiment = self.campaign.parts[number].experiment
-        places = np.flatnonzero(outcomes.status == DONE) if way == "all" else chosen(experiment, outcomes)
+        done = outcomes.done
+        places = done.select(np.arange(done.set)) if way == "all" else chosen(experiment, outcomes)
         if len(places):
             names = {each.key: each.name for each in writer.groups[number].layout.role("metric")}
             self.reporter.begin(f"{section.name}, with shorter steps", len(FACTORS) * len(places), 0, 0, "")

@@ -17,6 +17,8 @@ from batch.campaigns import shard
 from met import run as engine
 from met.frozen import frozen
 from met.passing import Memories
+from met.plan.columns import CaseValues
+from met.plan.swept import BLOCK
 from met.run import Prepared
 
 GRANULE = 32
@@ -43,7 +45,7 @@ class CampaignSection:
     number: int
     experiment: int
     prepared: Prepared
-    rows: np.ndarray
+    rows: CaseValues
     recorded: bool
     single: bool = False
     begun: str = ""
@@ -71,10 +73,14 @@ class CampaignSection:
         """A digest of all that decides what these cases give: the code, how long it runs, what goes into it, what is
         kept."""
         experiment = self.prepared.experiment
-        inputs = engine.inputs(experiment, self.rows[first:last])
+        last = len(self.rows) if last is None else last
         kept = ("recorded" if self.recorded else "outputs", "f4" if self.single else "f8")
-        told = (self.code, experiment.structure.schedule.ticks, *kept, inputs.shape)
-        return hashlib.sha256(f"{told}\n".encode() + inputs.tobytes()).hexdigest()
+        shape = (last - first, len(experiment.cases.coordinates) + len(experiment.cases.noise))
+        told = (self.code, experiment.structure.schedule.ticks, *kept, shape)
+        summed = hashlib.sha256(f"{told}\n".encode())
+        for at in range(first, last, BLOCK):
+            summed.update(engine.inputs(experiment, self.rows[at : min(at + BLOCK, last)]).tobytes())
+        return summed.hexdigest()
 
 
 @frozen

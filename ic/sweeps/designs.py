@@ -5,15 +5,14 @@
     random(n)   independent draws
 
 A design makes n points in the unit cube, a distribution's quantiles turn them into values. Those are rounded to 12
-digits in the deck's unit: so a table that is printed and read back is the same table, and a last place in which
-versions of a library differ makes no other case.
+digits in the deck's unit (met/plan/drawing.py). Those of `random` follow one by one from the seed and their numbers,
+so that a long sample is computed where it is used; the others are made as a whole, a table.
 """
 
 from __future__ import annotations
 
 import warnings
-import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -31,11 +30,13 @@ from met.diagnostic import Place, Problem, did_you_mean, error
 from met.distinct import distinct
 from met.frozen import frozen
 from met.plan import Design
+from met.plan.columns import MOST_SWEPT, CaseValues, listed
+from met.plan.drawing import DIGITS, DrawnColumn, drawn_values, within
 from met.trace import Scalar
 
-DIGITS = 12
-MOST_SAMPLES = 1_000_000
-MOST_SOBOL = 1 << 30
+MOST_LISTED = 1_000_000
+"""Samples of a design that is drawn as a whole; those of `random` are computed one by one."""
+
 DESIGNS: tuple[Design, ...] = ("lhs", "sobol", "random")
 DISTRIBUTIONS: Mapping[str, tuple[str, ...]] = {
     "uniform": ("from", "to"), "loguniform": ("from", "to"), "normal": ("mean", "deviation"),
@@ -54,16 +55,18 @@ class DrawnParameter:
     low: Value
     unit: Unit | None
 
+    @property
+    def measure(self) -> units.Measure | None:
+        return measure_of(self.unit) if self.unit is not None else None
+
     def values(self, points: np.ndarray) -> np.ndarray:
         """Quantiles at these points of (0, 1), SI, rounded in the deck's unit."""
-        scale = measure_of(self.unit).scale if self.unit is not None else 1.0
-        exact = QUANTILES[self.distribution](points, *(x / scale for x in self.arguments))
-        to_si = (measure_of(self.unit) if self.unit is not None else units.ONE).to_si
-        found = np.array([to_si(float(f"{x:.{DIGITS}g}")) for x in exact])
-        if self.distribution == "normal":
-            return found
-        low, high = self.arguments[-2:]
-        return np.clip(found, low, high)
+        return drawn_values(self.distribution, self.arguments, self.measure, points)
+
+    def independent(self, count: int, seed: int, number: int) -> CaseValues:
+        """So many draws without regard to one another, those of a long sample computed where they are asked for."""
+        unit = self.unit.text if self.unit is not None else ""
+        return listed(DrawnColumn(count, seed, self.path, number, self.distribution, self.arguments, unit))
 
 
 @frozen
@@ -81,17 +84,22 @@ class SampleDesign:
         lasting = ": another count would draw other values" if self.design == "lhs" else ""
         return f"sample {self.design}({self.count}), seed {self.seed}{lasting}"
 
-    def draw(self, number: int) -> list[np.ndarray]:
+    def draw(self, number: int) -> list[CaseValues]:
         """The values of each part. number: of the sample in its sweep, from 1. Raises Problem where they are one."""
-        points = _points(self.design, self.count, [part.path for part in self.parts], self.seed, number)
-        found = [part.values(column) for part, column in zip(self.parts, points.T, strict=True)]
+        found: list[CaseValues]
+        if self.design == "random":  # a stream for each path, so that more samples or parameters change no old value
+            found = [part.independent(self.count, self.seed, number) for part in self.parts]
+        else:
+            points = _points(self.design, self.count, len(self.parts), self.seed, number)
+            found = [part.values(column) for part, column in zip(self.parts, points.T, strict=True)]
         for part, values in zip(self.parts, found, strict=True):
-            different = len(distinct(values))
-            if 2 * different < self.count:
+            looked_at = min(self.count, MOST_LISTED)
+            different = len(distinct(values[:looked_at]))
+            if 2 * different < looked_at:
                 raise Problem(
                     error(
                         "D225",
-                        f"`{part.path}` hardly varies: {self.count} samples have {different} "
+                        f"`{part.path}` hardly varies: {looked_at} samples have {different} "
                         f"value{'s' * (different != 1)}",
                         part.place,
                         help=[f"values have {DIGITS} digits: draw it from a wider distribution", "or leave it out"],
@@ -100,44 +108,16 @@ class SampleDesign:
         return found
 
 
-def _points(design: str, count: int, paths: list[str], seed: int, number: int) -> np.ndarray:
-    """Points of the open unit cube, [count, len(paths)]."""
-    if design == "random":  # a stream for each path, so that more samples or parameters change no old value
-        streams = [
-            np.random.Generator(np.random.Philox(key=[seed, zlib.crc32(path.encode()) << 32 | number]))
-            for path in paths
-        ]
-        points = np.stack([stream.random(count) for stream in streams], axis=1)
-    else:
-        from scipy.stats import qmc  # takes most of a second to import
+def _points(design: str, count: int, parts: int, seed: int, number: int) -> np.ndarray:
+    """Points of the open unit cube, [count, parts], each with regard to the others."""
+    from scipy.stats import qmc  # takes most of a second to import
 
-        stream = np.random.Generator(np.random.PCG64([seed, number]))
-        sampler = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}[design](len(paths), rng=stream)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of counts that are no power of 2, for which MET has its own
-            points = sampler.random(count)
-    return np.asarray(np.clip(points, 2.0**-54, 1.0 - 2.0**-53))
-
-
-def _truncated(points: np.ndarray, mean: float, deviation: float, low: float, high: float) -> np.ndarray:
-    from scipy.stats import truncnorm
-
-    found = truncnorm.ppf(points, (low - mean) / deviation, (high - mean) / deviation, loc=mean, scale=deviation)
-    return np.asarray(found, dtype=float)
-
-
-def _normal(points: np.ndarray, mean: float, deviation: float) -> np.ndarray:
-    from scipy.special import ndtri
-
-    return np.asarray(mean + deviation * ndtri(points), dtype=float)
-
-
-QUANTILES: Mapping[str, Callable[..., np.ndarray]] = {
-    "uniform": lambda points, low, high: low + (high - low) * points,
-    "loguniform": lambda points, low, high: low * np.exp(np.log(high / low) * points),
-    "normal": _normal,
-    "truncated": _truncated,
-}
+    stream = np.random.Generator(np.random.PCG64([seed, number]))
+    sampler = {"lhs": qmc.LatinHypercube, "sobol": qmc.Sobol}[design](parts, rng=stream)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of counts that are no power of 2, for which MET has its own
+        drawn = sampler.random(count)
+    return within(drawn)
 
 
 # Reading
@@ -180,7 +160,8 @@ def read_sample(
             )
         )
     names = Names(definitions, {}, watched=set(paths))
-    count = _count(evaluate_number(call.positional[0], names.find))
+    most = MOST_SWEPT if design == "random" else MOST_LISTED
+    count = _count(evaluate_number(call.positional[0], names.find), most)
     parts = []
     before = complaints.error_count
     for entry in call.body:
@@ -212,15 +193,15 @@ def read_sample(
     return SampleDesign(design, count, seed, tuple(parts), warning)
 
 
-def _count(found: Value) -> int:
+def _count(found: Value, most: int) -> int:
     number = found.number
     if (
         isinstance(number, Scalar)
         or found.dimension != PURE
         or not float(number).is_integer()
-        or not 1 <= number <= MOST_SAMPLES
+        or not 1 <= number <= most
     ):
-        raise Problem(error("D113", f"a number of samples is a whole number from 1 to {MOST_SAMPLES}", found.place))
+        raise Problem(error("D113", f"a number of samples is a whole number from 1 to {most}", found.place))
     return int(number)
 
 
