@@ -27,6 +27,9 @@ GRANULE = 32
 MOST_CASES = 1 << 18
 """Cases of a task without histories."""
 
+STRETCH = 1 << 16
+"""Cases whose shards lie in one folder: some thousand files at most, for tasks have `GRANULE` cases or more."""
+
 MOST_BYTES = 128 << 20
 """Histories of a task, which lie in memory at a time."""
 
@@ -100,6 +103,12 @@ class Task:
         """The file name of the task's shard."""
         return f"{self.section}-{self.first:09}-{self.last:09}"
 
+    @property
+    def path(self) -> str:
+        """Where the task's shard lies below `shards/`: those of a long section in folders of a stretch of cases each,
+        so that no folder has very many files."""
+        return self.name if self.first < STRETCH else f"{self.first // STRETCH:05}/{self.name}"
+
 
 @frozen
 class Done:
@@ -121,8 +130,16 @@ def carry_out(
     """Run a task's cases and write its shard into the folder. computed: called in between."""
     found = compute(section, task, threads=threads, progress=progress)
     computed()
-    shard.write(folder / task.name, found)
+    keep(folder, task, found)
     return Done(found.seconds, found.failed)
+
+
+def keep(folder: Path, task: Task, found: shard.Shard) -> None:
+    """Write a task's shard into its place in the folder of shards. Raises OSError."""
+    path = folder / task.path
+    if path.parent != folder:
+        path.parent.mkdir(exist_ok=True)
+    shard.write(path, found)
 
 
 def compute(
