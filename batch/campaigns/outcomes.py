@@ -5,12 +5,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from met.frozen import frozen
 from met.plan import Experiment
 from met.plan.swept import RowBits
 from met.run import DONE, Run
+
+
+@frozen
+class CountedCases:
+    """Numbers of an experiment's cases: all, those that failed, those whose histories are kept; and by the text of each
+    requirement those that meet it, miss it, leave it open, and of these those that reached their end."""
+
+    cases: int
+    failed: int
+    recorded: int
+    met: Mapping[str, tuple[int, ...]]
 
 
 class CaseOutcomes:
@@ -24,6 +37,7 @@ class CaseOutcomes:
         self.count = 0
         self._packed: list[np.ndarray] = []
         self._left = np.zeros(0, bool)
+        self._met: dict[str, Any] = {}
         self._worst: dict[str, _Worst] = {}
         self._finite: dict[str, _Worst] = {}
 
@@ -42,7 +56,25 @@ class CaseOutcomes:
         self.count += len(status)
 
     def add_run(self, run: Run) -> None:
+        """Take the next cases from their results."""
         self.add(run.status, run.metrics)
+        for each in self._experiment.requirements:
+            value = ~np.isnan(run.metrics[each.metric])
+            known = (run.status == DONE) & value
+            counts = np.array(
+                [
+                    np.count_nonzero(known & run.met[each.text]),
+                    np.count_nonzero(known & ~run.met[each.text]),
+                    np.count_nonzero(~known),
+                    np.count_nonzero((run.status == DONE) & ~value),
+                ]
+            )
+            self._met[each.text] = self._met.get(each.text, 0) + counts
+
+    def counted(self, recorded: int) -> CountedCases:
+        """How many cases there are of each kind. recorded: of how many histories are kept."""
+        met = {text: tuple(counts.tolist()) for text, counts in self._met.items()}
+        return CountedCases(self.count, self.count - self.done.set, recorded, met)
 
     @cached_property
     def done(self) -> RowBits:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import field
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ from batch.campaigns.drive import Driver, Progress, Stopped, TooManyFailures
 from batch.campaigns.executor import Executor
 from batch.campaigns.folder import Folder, FolderBusy, beside, uncovered
 from batch.campaigns.keep import worst_wanted
-from batch.campaigns.outcomes import CaseOutcomes
+from batch.campaigns.outcomes import CaseOutcomes, CountedCases
 from batch.campaigns.output import busy, cannot_write, check_room, publish
 from batch.campaigns.status import Reporter, died_lines
 from batch.campaigns.tasks import CampaignSection
@@ -48,12 +49,14 @@ class Performed:
     whole    whether all was there before, so that nothing was run
     notes    what happened on the way: what was resumed, which shards did not count
     warned   what the steps do not follow at instants that cases passed
+    counted  by experiment: how many cases met what is required, as they were merged; empty where nothing was run
     """
 
     seconds: Mapping[str, float]
     whole: bool = False
     notes: tuple[str, ...] = ()
     warned: tuple[Diagnostic, ...] = ()
+    counted: Mapping[str, CountedCases] = field(default_factory=dict)
 
 
 class TooMany(Problem):
@@ -153,6 +156,7 @@ class _CampaignWork:
         self.values = values
         self.notes: list[str] = []
         self.warned: dict[object, Diagnostic] = {}
+        self.counted: dict[str, CountedCases] = {}
         self.began = time.time()
         self.reporter = Reporter(folder, campaign.cases, progress)
         self.max_failures = max_failures
@@ -197,7 +201,8 @@ class _CampaignWork:
         for number, count in driver.counts.items():
             seconds[self.sections[number].name] += count.seconds
         self.folder.remove()
-        return Performed(seconds, notes=tuple(self.notes), warned=tuple(self.warned.values()))
+        notes, warned = tuple(self.notes), tuple(self.warned.values())
+        return Performed(seconds, notes=notes, warned=warned, counted=self.counted)
 
     def leave(self, state: str) -> str:
         """Give up, for now. What is worth keeping stays; in words how much and where, else "" and nothing stays."""
@@ -271,6 +276,7 @@ class _CampaignWork:
                     histories.get(number),
                     lambda cases: self.reporter.advance(cases, 0),
                 )
+                self.counted[section.name] = outcomes.counted(len(parts[number].kept))
                 writer.look_back(number)
                 self._verify(writer, number, section, outcomes)
                 for each in instants.step_warnings(section, outcomes, self._threads):
