@@ -101,15 +101,16 @@ def _rows(piece: slice) -> np.ndarray:
 
 
 def _row_digests(head: bytes, rows: np.ndarray) -> list[str]:
-    """One digest a row of bytes, each begun with the same head; about a microsecond a row."""
-    start = hashlib.sha256(head).digest()
+    """One digest a row of bytes, each begun with the same head; half a microsecond a row."""
+    begun = hashlib.blake2b(hashlib.sha256(head).digest(), digest_size=DIGEST_BYTES).copy
     width = rows.shape[1]
     data = np.ascontiguousarray(rows).tobytes()
-    blake2b = hashlib.blake2b
-    return [
-        blake2b(start + data[at : at + width], digest_size=DIGEST_BYTES).hexdigest()
-        for at in range(0, len(rows) * width, width)
-    ]
+    found = []
+    for at in range(0, len(rows) * width, width):
+        each = begun()
+        each.update(data[at : at + width])
+        found.append(each.hexdigest())
+    return found
 
 
 def _value(value: Any) -> Any:
