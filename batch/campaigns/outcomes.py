@@ -23,7 +23,7 @@ class CountedCases:
     cases: int
     failed: int
     recorded: int
-    met: Mapping[str, tuple[int, ...]]
+    met: Mapping[str, tuple[int, int, int, int]]
 
 
 class CaseOutcomes:
@@ -73,7 +73,7 @@ class CaseOutcomes:
 
     def counted(self, recorded: int) -> CountedCases:
         """How many cases there are of each kind. recorded: of how many histories are kept."""
-        met = {text: tuple(counts.tolist()) for text, counts in self._met.items()}
+        met = {text: (int(a), int(b), int(c), int(d)) for text, (a, b, c, d) in self._met.items()}
         return CountedCases(self.count, self.count - self.done.set, recorded, met)
 
     @cached_property

@@ -222,7 +222,10 @@ def _counted_result(campaign: Campaign, performed: Performed) -> RunResult:
     summaries = []
     for part in campaign.parts:
         experiment, counted = part.experiment, performed.counted[part.experiment.name]
-        required = tuple(RequirementSummary(text, *counts) for text, counts in counted.met.items())
+        required = tuple(
+            RequirementSummary(text, met, missed, unknown, none)
+            for text, (met, missed, unknown, none) in counted.met.items()
+        )
         summaries.append(
             Summary(
                 experiment.name,
