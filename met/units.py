@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Mapping
+from fractions import Fraction
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -66,6 +67,11 @@ class Measure:
     def scale(self) -> float:
         """SI units in one of it, as a double. Raises OverflowError where that is too large."""
         return _divided(self.over, self.under, self.turns)
+
+    @property
+    def exact(self) -> Fraction:
+        """SI units in one of it, with pi to 75 places."""
+        return Fraction(self.over, self.under) * Fraction(_PI, _PI_BELOW) ** self.turns
 
     def __mul__(self, other: Measure) -> Measure:
         over, under = self.over * other.over, self.under * other.under

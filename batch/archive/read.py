@@ -24,6 +24,7 @@ from met.diagnostic import Problem, error
 from met.distinct import distinct
 from met.host.files import open_regular
 from met.plan import Plan
+from met.plan.columns import are_among
 
 
 @contextmanager
@@ -286,15 +287,16 @@ class ArchiveFile:
         from met.plan import file as plan_file
         from met.plan.codec import Damaged
 
-        def fetch(reference: dict[str, Any]) -> np.ndarray:
-            table = np.asarray(node[reference["file"]][...], dtype="<f8")
-            if hashlib.sha256(table.tobytes()).hexdigest() != reference["sha256"]:
+        def find(reference: dict[str, Any]) -> np.ndarray:
+            array = np.asarray(node[reference["file"]][...])
+            if hashlib.sha256(array.tobytes()).hexdigest() != reference["sha256"]:
                 raise Damaged("", "its case table is not the one it was written with (SHA-256 differs)")
-            return np.asarray(table[reference["row"]])
+            return array
 
         with reading(self.path):
             node = self._file["provenance"]
-            plan = plan_file.loads(node["plan"].asstr()[()], str(self.path), fetch, as_written=as_written)
+            text, fetch = node["plan"].asstr()[()], plan_file.fetcher(find)
+            plan = plan_file.loads(text, str(self.path), fetch, as_written=as_written)
             self._check_plan(plan)
             return plan
 
@@ -308,7 +310,7 @@ class ArchiveFile:
             varied = {coordinate.path for coordinate in cases.coordinates}
             if varied != {variable.path for variable in group.role("coordinate")}:
                 raise Unlike(f"the plan of `{group.name}` varies something else")
-            if not np.isin(group.values("case"), cases.table).all():
+            if not are_among(cases.table, group.values("case")).all():
                 raise Unlike(f"the plan of `{group.name}` has not its cases")
 
 

@@ -23,8 +23,10 @@ from batch.archive.provenance import Revision, version
 from batch.archive.sink import Sink
 from met import backends
 from met.frozen import frozen
-from met.plan import Experiment, Plan, keys
+from met.plan import Experiment, Plan, keys, recipes
 from met.plan import file as plan_file
+from met.plan.columns import CaseValues
+from met.plan.swept import blocks
 from met.plan.uses import packages
 
 if TYPE_CHECKING:
@@ -45,7 +47,7 @@ class ArchivePart:
     """
 
     experiment: Experiment
-    rows: np.ndarray
+    rows: CaseValues
     kept: np.ndarray
     single: bool = False
     code: str = ""
@@ -102,11 +104,16 @@ class ArchiveWriter:
             gathered[here] = values[name][group.part.kept[here] - first]
         self._sink.check()
 
-    def put_before(self, number: int) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        """Return what was put of an experiment's cases: the status of each, and the metrics by the engine's names."""
+    def look_back(self, number: int) -> None:
+        """Read what was put of an experiment's cases, its status and its metrics, a bounded number of cases at a time.
+
+        Nothing comes of it but where HDF5 puts what it keeps for itself, which archives have always had after this.
+        """
         group = self.groups[number]
-        metrics = {each.key: group.node[each.name][...] for each in group.layout.role("metric")}
-        return group.node["status"][...], metrics
+        for each in [*(each.name for each in group.layout.role("metric")), "status"]:
+            stored = group.node[each]
+            for rows in blocks(len(stored)):
+                stored[rows]
 
     def put_verified(self, number: int, found: verified.Verified) -> None:
         """Write the metrics that shorter steps gave for some cases of an experiment, in a group of its own."""
@@ -181,12 +188,23 @@ class ArchiveWriter:
         group.attrs["git_dirty"] = changed
         group.attrs["defines"] = " ".join(self.plan.defines)
 
-        tables: dict[str, np.ndarray] = {}
+        tables: dict[str, tuple[Experiment, str]] = {}
+        arrays: dict[str, np.ndarray] = {}
+        keepers: dict[str, recipes.ArrayKeeper] = {}
 
-        def refer(experiment: Experiment, index: int) -> dict[str, Any]:
+        def refer(experiment: Experiment, index: int) -> Any:
             name = f"cases.{experiment.name}"
-            table = tables.setdefault(name, plan_file.table(experiment))
-            return {"file": name, "row": index, "sha256": hashlib.sha256(table.tobytes()).hexdigest()}
+            if experiment.cases.count <= plan_file.TABLE_ROWS:
+                if name not in tables:
+                    tables[name] = experiment, _table_sum(experiment)
+                return {"file": name, "row": index, "sha256": tables[name][1]}
+            if name not in keepers:
+                keepers[name] = recipes.ArrayKeeper(lambda n, array: put(f"{name}.{n}", array))
+            return recipes.encoded(plan_file.columns(experiment)[index], keepers[name].keep)
+
+        def put(name: str, array: np.ndarray) -> dict[str, Any]:
+            arrays[name] = array
+            return {"file": name, "sha256": hashlib.sha256(array.tobytes()).hexdigest()}
 
         text = h5py().string_dtype("utf-8")
         sources = {"source": "name", "source_text": "text", "source_sha256": "sha256"}
@@ -201,8 +219,21 @@ class ArchiveWriter:
             for name in list(sources)[1:]:
                 group[name].dims[0].attach_scale(group["source"])
         group.create_dataset("plan", data=_text(plan_file.dumps(self.plan, refer)), dtype=text, track_order=True)
-        for name, table in tables.items():
-            group.create_dataset(name, data=table, track_order=True)
+        for name, (experiment, _) in tables.items():
+            shape = (len(plan_file.columns(experiment)), experiment.cases.count)
+            dataset = group.create_dataset(name, shape, dtype="<f8", track_order=True)
+            for column, rows, values in plan_file.table_pieces(experiment):
+                dataset[column, rows] = values
+        for name, array in arrays.items():
+            group.create_dataset(name, data=array, track_order=True)
+
+
+def _table_sum(experiment: Experiment) -> str:
+    """SHA-256 of a case table's numbers."""
+    summed = hashlib.sha256()
+    for _, _, values in plan_file.table_pieces(experiment):
+        summed.update(values.tobytes())
+    return summed.hexdigest()
 
 
 def _values(group: OpenGroup, run: Run) -> dict[str, Any]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from batch.beds.campaign_records import CampaignRecords
 from batch.beds.case_result import CaseResult, case_result
-from batch.campaigns import shard
+from batch.campaigns import shard, tasks
 from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.tasks import CampaignSection, Done, Task
@@ -132,7 +132,7 @@ class OnBeds:
             fates,
         )
         try:
-            shard.write(self._folder.shards / task.name, computed)
+            tasks.keep(self._folder.shards, task, computed)
         except OSError as reason:
             return [Outcome(task, "broken", why=shard.cannot_keep(self._folder.path, reason))]
         return [Outcome(task, "done", Done(computed.seconds, computed.failed))]

@@ -16,7 +16,8 @@ import numpy as np
 from batch.archive import layout as archive_layout
 from batch.campaigns import choosing
 from batch.campaigns.folder import Folder, beside
-from batch.campaigns.keep import CaseOutcomes, Keep, as_list, keep, kept_before, kept_by_outcome
+from batch.campaigns.keep import Keep, as_list, keep, kept_before, kept_by_outcome
+from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.output import check_output, check_room, default_output
 from batch.campaigns.tasks import CampaignSection
 from batch.campaigns.verification.when import WORDS as VERIFY_WORDS
@@ -27,6 +28,7 @@ from met.diagnostic import Problem, error
 from met.distinct import distinct
 from met.frozen import frozen
 from met.plan import Experiment, Plan
+from met.plan.columns import CaseValues, are_among, places_among
 
 KEPT_BYTES = 1 << 30
 """Histories are kept by default while the archive stays below this."""
@@ -55,7 +57,7 @@ class CampaignPart:
     """
 
     experiment: Experiment
-    rows: np.ndarray
+    rows: CaseValues
     kept: np.ndarray
     later: int = 0
     single: bool = False
@@ -143,7 +145,7 @@ def prepare(
     cases: Sequence[int | str] | None = None,
     histories: str | int | Sequence[str | int] = "default",
     float32: bool = False,
-    selected: Sequence[tuple[Experiment, np.ndarray]] | None = None,
+    selected: Sequence[tuple[Experiment, CaseValues]] | None = None,
     kept: Mapping[str, np.ndarray] | None = None,
     wires: Wires | None = None,
     verify: Verify = "auto",
@@ -178,7 +180,7 @@ def prepare(
     words = tuple(as_list(histories))
     parts = _parts(selected, wanted, float32, decided)
     if kept is not None:
-        parts = tuple(replace(part, kept=np.searchsorted(part.rows, kept[part.experiment.name])) for part in parts)
+        parts = tuple(replace(part, kept=places_among(part.rows, kept[part.experiment.name])) for part in parts)
     notes: list[str] = []
     whole = sum(part.bytes for part in parts)
     if wanted.default and whole > KEPT_BYTES:
@@ -200,15 +202,15 @@ def prepare(
 
 
 def _parts(
-    selected: Sequence[tuple[Experiment, np.ndarray]], wanted: Keep, single: bool, decided: Collection[str]
+    selected: Sequence[tuple[Experiment, CaseValues]], wanted: Keep, single: bool, decided: Collection[str]
 ) -> tuple[CampaignPart, ...]:
     """The experiments with what is kept of them. Raises Problem E311, E312 for cases that are none."""
     chosen = choosing.select_rows([experiment for experiment, _ in selected], wanted.cases) if wanted.cases else []
     named = {experiment.name: rows for experiment, rows in chosen}
     strays, run = set[int](), set[int]()
     for experiment, rows in selected:
-        own = named.get(experiment.name, rows[:0])
-        among = np.isin(own, rows)
+        own = np.asarray(named.get(experiment.name, rows[:0]))
+        among = are_among(rows, own)
         strays.update(experiment.cases.table[row] for row in own[~among])
         run.update(experiment.cases.table[row] for row in own[among])
     if strays - run:
@@ -217,7 +219,8 @@ def _parts(
     parts = []
     for experiment, rows in selected:
         if experiment.structure.history_bytes:
-            kept = kept_before(wanted, experiment, rows, named.get(experiment.name, np.empty(0, np.int64)))
+            own = np.asarray(named.get(experiment.name, np.empty(0, np.int64)))
+            kept = kept_before(wanted, experiment, rows, own)
             part = CampaignPart(experiment, rows, kept, wanted.at_most(len(rows)), single)
         else:
             part = CampaignPart(experiment, rows, np.empty(0, np.int64))

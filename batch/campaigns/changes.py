@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from met.diagnostic import Place
-from met.distinct import distinct
 from met.frozen import frozen
 from met.plan import (
     BASE,
@@ -27,7 +26,9 @@ from met.plan import (
     Schedule,
     Structure,
 )
+from met.plan.columns import CaseValues, different
 from met.plan.keys import in_key, inputs, structure_key
+from met.plan.swept import blocks
 
 AXES = ("x", "y", "z")
 
@@ -142,7 +143,7 @@ class _Computed:
 def _some_cases(before: Cases, now: Cases) -> dict[str, np.ndarray]:
     """Values of all that is varied, of the cases of `now`; what it does not vary has the values that it had before."""
     rows = np.unique(np.linspace(0, max(0, now.count - 1), MOST_CASES, dtype=np.int64)) if now.count else np.arange(0)
-    found = {each.path: np.resize(each.values, len(rows)) for each in before.coordinates}
+    found = {each.path: np.resize(each.values[: len(rows)], len(rows)) for each in before.coordinates}
     return found | {each.path: each.values[rows] for each in now.coordinates}
 
 
@@ -208,8 +209,8 @@ def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
     for name in ("seed", "seeds"):
         if getattr(before, name) != getattr(now, name):
             yield f"{name}: {getattr(before, name)} -> {getattr(now, name)}"
-    if not np.array_equal(_array(before.repeats), _array(now.repeats)):
-        repeats = [len(distinct(_array(each.repeats))) for each in (before, now)]
+    if not _alike(*(_array(each.repeats) for each in (before, now))):
+        repeats = [len(different(_array(each.repeats))) for each in (before, now)]
         yield f"repeats: {repeats[0]} -> {repeats[1]}" if repeats[0] != repeats[1] else "repeats: in other cases"
 
 
@@ -237,10 +238,16 @@ def _shown_by(requirement: Requirement) -> tuple[object, ...]:
     return requirement.metric, requirement.comparison, requirement.limit, requirement.share, requirement.confidence
 
 
-def _same(before: np.ndarray, now: np.ndarray, ordered: bool) -> bool:
+def _same(before: CaseValues, now: CaseValues, ordered: bool) -> bool:
     """True if a parameter takes the same values; ordered: in the same cases of the table."""
-    one, two = (before, now) if ordered else (distinct(before), distinct(now))
-    return np.array_equal(one, two, equal_nan=True)
+    return _alike(before, now) if ordered else _alike(different(before), different(now))
+
+
+def _alike(one: CaseValues, two: CaseValues) -> bool:
+    """True if two columns have the same numbers."""
+    return len(one) == len(two) and all(
+        np.array_equal(one[rows], two[rows], equal_nan=True) for rows in blocks(len(one))
+    )
 
 
 def _count(cases: Cases) -> str:
@@ -249,14 +256,14 @@ def _count(cases: Cases) -> str:
 
 def _span(coordinate: Any) -> str:
     """Say which values a varied parameter takes, in the deck's unit."""
-    values = distinct(coordinate.values) / coordinate.scale
+    values = different(coordinate.values) / coordinate.scale
     unit = f" {coordinate.unit}" if coordinate.unit not in ("", "1") else ""
     if len(values) <= 3:
         return f"[{', '.join(f'{value:g}' for value in values)}]{unit}"
     return f"{len(values):,} values from {values.min():g} to {values.max():g}{unit}"
 
 
-def _array(values: np.ndarray | None) -> np.ndarray:
+def _array(values: CaseValues | None) -> CaseValues:
     return np.empty(0) if values is None else values
 
 

@@ -10,6 +10,8 @@ import numpy as np
 from batch.archive.rows import row_of
 from met.diagnostic import Problem, error
 from met.plan import Experiment, Plan, keys
+from met.plan.columns import CaseValues, all_rows, row_at
+from met.plan.swept import blocks
 
 
 def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experiment, ...]:
@@ -35,11 +37,11 @@ def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experime
 
 def select_rows(
     experiments: Sequence[Experiment], cases: Sequence[int | str] | None
-) -> list[tuple[Experiment, np.ndarray]]:
+) -> list[tuple[Experiment, CaseValues]]:
     """The rows of each experiment that some cases are, by position (`7`, `"#7"`) or the beginning of a case_id; all for
     None. An experiment that has none of them is left out. Raises Problem E311, E312."""
     if cases is None:
-        return [(experiment, np.arange(experiment.cases.count)) for experiment in experiments]
+        return [(experiment, all_rows(experiment.cases.count)) for experiment in experiments]
     found: dict[str, set[int]] = {experiment.name: set() for experiment in experiments}
     for case in cases:
         matches = [(e, row) for e in experiments for row in _rows(e, case)]
@@ -77,5 +79,10 @@ def _case_text(case: int | str) -> str:
 def _rows(experiment: Experiment, case: int | str) -> list[int]:
     if _is_row(case):
         position = row_of(case) if isinstance(case, str) else int(case)
-        return np.flatnonzero(experiment.cases.table == position).tolist()
-    return [row for row, case_id in enumerate(keys.case_ids(experiment)) if case and case_id.startswith(str(case))]
+        row = None if position is None else row_at(experiment.cases.table, position)
+        return [] if row is None else [row]
+    if not case:
+        return []
+    pieces = (np.arange(piece.start, piece.stop) for piece in blocks(experiment.cases.count))
+    ids = (each for rows in pieces for each in keys.case_ids(experiment, rows))
+    return [row for row, case_id in enumerate(ids) if case_id.startswith(str(case))]

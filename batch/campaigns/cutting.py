@@ -1,12 +1,16 @@
 """How large the next task of a section is: a second or two of work, so that starting it costs nothing and losing it
-little; smaller towards the end, so that nobody waits for the last one. It decides nothing but speed."""
+little, longer where very many workers ask for tasks; smaller towards the end, so that nobody waits for the last one. It
+decides nothing but speed."""
 
 from __future__ import annotations
 
 from batch.campaigns.tasks import GRANULE, CampaignSection
 
 WORK_SECONDS = 1.5
-"""Time that a task is to take on the worker that runs it, s."""
+"""Time that a task is to take on the worker that runs it, s, where workers are few."""
+
+TASKS_A_SECOND = 100.0
+"""Tasks that end on all workers together, at most: a scheduler hands out several hundred, and has more to do."""
 
 FIRST_SECONDS = 0.2
 """Time that the first tasks are to take, s, by a guess that may be off by a factor of ten."""
@@ -33,7 +37,7 @@ class Cutter:
     def size(self, left: int, workers: int) -> int:
         """Cases of the next task, where so many are left for so many workers."""
         if self._cases:
-            wanted = WORK_SECONDS * self._cases / max(self._seconds, 1e-9)
+            wanted = max(WORK_SECONDS, workers / TASKS_A_SECOND) * self._cases / max(self._seconds, 1e-9)
         else:
             wanted = FIRST_SECONDS / self._guess
         wanted = min(wanted, -(-left // (2 * workers)) if workers > 1 else left)

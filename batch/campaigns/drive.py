@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from batch.campaigns import shard, tasks
+from batch.campaigns import tasks
 from batch.campaigns.cutting import Cutter
 from batch.campaigns.executor import Executor, Outcome
 from batch.campaigns.folder import Folder, uncovered
@@ -193,6 +193,6 @@ class _SectionWork:
             if outcome.kind == "lost"
             else (TIMED_OUT, f"timed out: {outcome.why}")
         )
-        shard.write(self._driver.folder.shards / task.name, tasks.not_run(self._section, task, status, why))
+        tasks.keep(self._driver.folder.shards, task, tasks.not_run(self._section, task, status, why))
         count.done += 1
         count.failed += 1

@@ -3,7 +3,7 @@
     two_link.gains.h5.campaign/
       campaign.json     what is computed: sections, the keys of their code and cases
       plan.json         the plan, for workers; large case tables and rows beside it
-      shards/           one file a task, named SECTION-FIRST-LAST
+      shards/           one file a task, named SECTION-FIRST-LAST; those of a long section in folders
       status*.json      how far who is, written every second (batch/campaigns/status.py)
       lock              held while somebody works here: by one driver alone, or by the jobs of a cluster together
 
@@ -24,7 +24,7 @@ import re
 import shlex
 import shutil
 import stat
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -40,6 +40,7 @@ from met.diagnostic import Problem, error
 from met.host.files import is_count, new_file, read_json, read_regular, whole_file
 from met.plan import Plan
 from met.plan import file as plan_file
+from met.plan.columns import CaseValues, all_rows
 from met.program.step import TOO_FAST
 from met.version import VERSION
 
@@ -159,14 +160,14 @@ class Folder:
         # those that are there are ours, and may be damaged: plan_file writes over nothing but plans
         for path in (self.path / "plan.json", *self.path.glob("plan.*.npy")):
             path.unlink(missing_ok=True)
-        plan_file.write(plan, self.path / "plan.json")
+        plan_file.write(plan, self.path / "plan.json", computed=True)
         told = []
         for section in sections:
             rows = None
             if len(section.rows) < section.prepared.experiment.cases.count:
                 rows = f"rows.{section.number}.npy"
                 with new_file(self.path / rows) as file:
-                    np.save(file, section.rows)
+                    np.save(file, np.asarray(section.rows))
             told.append(
                 {
                     "number": section.number,
@@ -193,14 +194,15 @@ class Folder:
         except (OSError, ValueError, LookupError, TypeError) as reason:
             raise self._damaged(path) from reason
 
-    def plan(self) -> Plan:
-        """The plan that is run here. Raises Problem."""
-        return plan_file.read(self.path / "plan.json")
+    def plan(self, *, every_case: bool = True) -> Plan:
+        """The plan that is run here. every_case: as `met.plan.file.read`. Raises Problem."""
+        return plan_file.read(self.path / "plan.json", every_case=every_case)
 
     def sections(self) -> dict[int, CampaignSection]:
         """The sections by their numbers, for a worker. Raises Problem E353 where the code here is not that of the
         campaign, as after an update of MET or of models while jobs waited: what it gave would count for nothing."""
-        experiments = [engine.prepare(experiment) for experiment in self.plan().experiments]
+        plan = self.plan(every_case=False)  # whoever wrote it had checked all of them
+        experiments = [engine.prepare(experiment) for experiment in plan.experiments]
         out = {}
         described = self.described()
         for told in described["sections"]:
@@ -215,10 +217,11 @@ class Folder:
             )
         return out
 
-    def _rows(self, told: dict[str, Any], count: int) -> np.ndarray:
+    def _rows(self, told: dict[str, Any], count: int) -> CaseValues:
         """The rows of a section of an experiment with so many cases. Raises Problem."""
+        rows: CaseValues
         if told["rows"] is None:
-            rows = np.arange(count)
+            rows = all_rows(count)
         else:
             path = self.path / told["rows"]
             try:
@@ -241,16 +244,32 @@ class Folder:
     def named_tasks(self, number: int) -> list[Task]:
         """The tasks of a section that have a file, sound or not, by their first cases."""
         found = []
-        for name in os.listdir(self.shards) if self.shards.is_dir() else ():
-            parts = SHARD.fullmatch(name)
+        for path in self._shard_files():
+            parts = SHARD.fullmatch(path.name)
             task = Task(*map(int, parts.groups())) if parts else None
-            if task is not None and task.section == number and task.name == name:
+            if task is not None and task.section == number and path.name == task.name and path == self._path(task):
                 found.append(task)
         return sorted(found, key=lambda task: (task.first, -task.last))
 
+    def _shard_files(self) -> Iterator[Path]:
+        """Everything in the folder of shards, and in the folders in it."""
+        with contextlib.suppress(OSError):
+            for each in sorted(os.scandir(self.shards), key=lambda each: each.name):
+                if each.name.isdecimal() and each.is_dir(follow_symlinks=False):
+                    with contextlib.suppress(OSError):
+                        yield from (self.shards / each.name / name for name in os.listdir(each.path))
+                else:
+                    yield self.shards / each.name
+
+    def _path(self, task: Task) -> Path:
+        """The file of a task's shard: in its place, or beside all others, as an older MET wrote it."""
+        path = self.shards / task.path
+        beside = self.shards / task.name
+        return beside if path != beside and beside.exists() else path
+
     def read(self, section: CampaignSection, task: Task) -> shard.Shard:
         """A task's shard. Raises shard.UnsoundShard where it is none of this section's, OSError."""
-        found = shard.read(self.shards / task.name, task.cases * _bytes_of_case(section))
+        found = shard.read(self._path(task), task.cases * _bytes_of_case(section))
         if not 0 <= task.first < task.last <= len(section.rows) or len(found.outputs) != task.cases:
             raise shard.UnsoundShard("holds other cases than its name says")
         if found.key != section.key(task.first, task.last):
@@ -271,7 +290,7 @@ class Folder:
             except (shard.UnsoundShard, OSError) as reason:
                 why = str(reason) if isinstance(reason, shard.UnsoundShard) else f"cannot be read: {reason.strerror}"
                 told.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
-                _remove(self.shards / task.name)
+                _remove(self._path(task))
             else:
                 kept[task] = Done(found.seconds, found.failed_from(at - task.first))  # a case counts once
                 at = max(at, task.last)
@@ -281,14 +300,14 @@ class Folder:
         """The size of the shards that are there."""
         sizes = 0
         with contextlib.suppress(OSError):
-            for path in self.shards.glob("*-*-*"):
-                sizes += path.stat().st_size
+            for path in self._shard_files():
+                sizes += path.stat().st_size if SHARD.fullmatch(path.name) else 0
         return sizes
 
     def seconds(self, enough: float) -> float:
         """Computing time of the shards that are there, s; once it is `enough`, no more are looked at."""
         total = 0.0
-        for path in self.shards.glob("*-*-*"):
+        for path in self._shard_files():
             with contextlib.suppress(shard.UnsoundShard, OSError):
                 total += shard.read(path).seconds
             if total >= enough:
@@ -297,8 +316,9 @@ class Folder:
 
     def remove_partial_shards(self) -> None:
         """Remove what workers that were killed had begun to write; there are none at work."""
-        for path in self.shards.glob(".*.tmp"):
-            path.unlink(missing_ok=True)
+        for path in self._shard_files():
+            if path.name.startswith(".") and path.name.endswith(".tmp"):
+                path.unlink(missing_ok=True)
 
 
 def _other_code(name: str, path: Path, described: dict[str, Any]) -> Any:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from batch.campaigns.keep import CaseOutcomes, worst
+from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.tasks import GRANULE, CampaignSection
 from ic.meaning.checks.beds import bed_warning
 from ic.meaning.checks.step_words import fault_warning, from_instants, loop_warning
@@ -22,7 +22,7 @@ from met.analysis.step_size import StepFault, chosen_cases
 from met.diagnostic import Diagnostic, Problem
 from met.passing import Memories, even_ticks
 from met.plan import Experiment
-from met.run import DONE
+from met.plan.columns import are_among
 
 CODES = ("D317", "D318", "D319", "D320", "D321", "D322")
 
@@ -53,10 +53,12 @@ def _memories(section: CampaignSection) -> Memories | None:
     known = structure.integrator in models.find_own("integrator")  # another package's is only recorded
     if section.prepared.wire or not known or not structure.moving or all(map(experiment.allows, CODES)):
         return None
-    cases: Sequence[int] = rows.tolist()
     if len(rows) > GRANULE:
-        cases = [case for case in chosen_cases(experiment) if case in rows]
-        cases = [int(rows[0]), int(rows[-1]), *cases][: MOST_CASES if _is_small(section) else 0]
+        some = np.array(chosen_cases(experiment))
+        cases = [int(rows[0]), int(rows[-1]), *some[are_among(rows, some)].tolist()]
+        cases = cases[: MOST_CASES if _is_small(section) else 0]
+    else:
+        cases = rows.tolist()
     return Memories(even_ticks(structure.schedule, passed.MOST_INSTANTS // 2), frozenset(cases))
 
 
@@ -98,21 +100,17 @@ def _cases(section: CampaignSection, outcomes: CaseOutcomes, memories: Memories)
     out = [int(section.rows[place]) for place in standing_out(outcomes)]
     if memories.cases and len(section.rows) > GRANULE:
         return sorted({*memories.cases, *out})
-    done = np.flatnonzero(outcomes.status == DONE)
-    places = [0, len(section.rows) - 1] if not len(done) else [int(done[0]), int(done[-1])]
-    for name, values in outcomes.metrics.items():
-        ranked = worst(section.prepared.experiment, name, np.where(np.isfinite(values), values, np.nan))
-        places += ranked[:1].tolist()
+    places = [*(outcomes.ends() or (0, len(section.rows) - 1)), *outcomes.worst_finite()]
     most = min(MOST_CASES, passed.instants(section.prepared.experiment) // passed.LEAST_INSTANTS)
     return sorted({*(int(section.rows[place]) for place in list(dict.fromkeys(places))[:most]), *out})
 
 
 def standing_out(outcomes: CaseOutcomes) -> list[int]:
     """Places of the cases of which a metric is far from all others', the furthest first: one row of many that went
-    another way. None of a few cases, nor where metrics are spread evenly."""
+    another way. None of a few cases or of very many, nor where metrics are spread evenly."""
     found: dict[int, float] = {}
-    for values in outcomes.metrics.values():
-        fine = np.flatnonzero((outcomes.status == DONE) & np.isfinite(values))
+    for values in outcomes.few_values():
+        fine = np.flatnonzero(np.isfinite(values))
         if len(fine) < LEAST_CASES:
             continue
         quarter, middle, three_quarters = np.percentile(values[fine], (25.0, 50.0, 75.0))

@@ -7,15 +7,18 @@ worst by a metric, are known when all are done, and are run again for their hist
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from batch.campaigns.outcomes import CaseOutcomes
 from met.diagnostic import Problem, error
+from met.distinct import distinct
 from met.frozen import frozen
 from met.plan import Experiment
-from met.run import Run
+from met.plan.columns import CaseValues, are_among, places_among
+from met.plan.swept import blocks
 
 SINGLE = ("default", "all", "none", "every", "failed", "worst")
 WORDS = "default, all, none, every:N, failed, worst:N, worst:N:METRIC, or cases by '#7' or id"
@@ -105,40 +108,29 @@ def _check_metric(metric: str, experiments: Sequence[Experiment]) -> None:
         raise Problem(error("E351", f"no metric `{metric}` by which cases could be the worst", help=helps))
 
 
-def kept_before(found: Keep, experiment: Experiment, rows: np.ndarray, named: np.ndarray) -> np.ndarray:
+def kept_before(found: Keep, experiment: Experiment, rows: CaseValues, named: np.ndarray) -> np.ndarray:
     """Places in `rows` of the cases whose histories are kept for what they are. named: rows of `found.cases`."""
     if found.everything:
         return np.arange(len(rows))
-    kept = np.isin(rows, named)
-    for every in found.every:
-        kept |= experiment.cases.table[rows] % every == 0
-    return np.flatnonzero(kept)
+    kept = [places_among(rows, named[are_among(rows, named)])]
+    for piece in blocks(len(rows)) if found.every else ():
+        positions = np.asarray(experiment.cases.table[rows[piece]])
+        kept += [piece.start + np.flatnonzero(positions % every == 0) for every in found.every]
+    return distinct(np.concatenate(kept).astype(np.int64))
 
 
-@frozen
-class CaseOutcomes:
-    """Status and metrics of each case of an experiment, as `met.run.Run` has them."""
-
-    status: np.ndarray
-    metrics: Mapping[str, np.ndarray]
-
-
-def kept_by_outcome(found: Keep, experiment: Experiment, results: CaseOutcomes | Run) -> np.ndarray:
-    """Places of the cases whose histories are kept for what became of them: results of all."""
-    kept = np.zeros(len(results.status), dtype=bool)
-    if found.failed:
-        kept |= results.status != 0
+def worst_wanted(found: Keep, experiment: Experiment) -> dict[str, int]:
+    """How many of the worst by each metric have their histories kept, the most of what was asked for."""
+    wanted: dict[str, int] = {}
     for count, by in found.worst:
         metric = by or (experiment.structure.metrics[0].name if experiment.structure.metrics else "")
-        if metric in results.metrics:
-            kept[worst(experiment, metric, results.metrics[metric])[:count]] = True
-    return np.flatnonzero(kept)
+        wanted[metric] = max(count, wanted.get(metric, 0))
+    return {use.name: wanted[use.name] for use in experiment.structure.metrics if use.name in wanted}
 
 
-def worst(experiment: Experiment, metric: str, values: np.ndarray) -> np.ndarray:
-    """Places of the cases that have the metric, worst first: the largest, or the smallest where the first requirement
-    of it sets a lower limit. Equal ones in the order of the table."""
-    limits = [r.comparison for r in experiment.requirements if r.metric == metric]
-    bad = -values if limits and limits[0].startswith(">") else values
-    order = np.argsort(-bad, kind="stable")
-    return np.asarray(order[~np.isnan(values[order])])
+def kept_by_outcome(found: Keep, experiment: Experiment, results: CaseOutcomes) -> np.ndarray:
+    """Places of the cases whose histories are kept for what became of them: results of all."""
+    kept = [results.worst(metric) for metric in worst_wanted(found, experiment)]
+    if found.failed:
+        kept.append(results.failed.select(np.arange(results.failed.set)))
+    return distinct(np.concatenate([np.zeros(0, np.int64), *kept]))

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from batch.campaigns import shard
 from batch.campaigns.folder import Folder
-from batch.campaigns.keep import CaseOutcomes
+from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.tasks import CampaignSection
 from met import run as engine
 from met.diagnostic import Problem, error
+from met.plan.columns import places_among
 from met.run import Run
 
 if TYPE_CHECKING:
@@ -34,14 +35,15 @@ def merge(
     values: CampaignSection,
     histories: CampaignSection | None,
     progress: Callable[[int], None] = lambda _: None,
-) -> None:
-    """Write one experiment. Raises Missing.
+) -> CaseOutcomes:
+    """Write one experiment; what became of its cases. Raises Missing.
 
     values     all of its cases;  histories: those that were run again for them
     progress   told how many cases are written
     """
     kept = histories.rows if histories is not None else np.empty(0, np.int64)
-    places = np.searchsorted(values.rows, kept)
+    places = places_among(values.rows, np.asarray(kept))
+    outcomes = CaseOutcomes(values.prepared.experiment)
     before: list[np.ndarray] = []
     waiting: list[np.ndarray] = []
     fates: dict[int, tuple[int, str]] = {}
@@ -56,7 +58,9 @@ def merge(
         here = places[again] - first
         before.append(outputs[here])
         ended.update({int(k): mine[int(case)] for k, case in zip(again, here, strict=True) if int(case) in mine})
-        writer.put_cases(number, first, _results(values, first, outputs[:cases], None, mine))
+        run = _results(values, first, outputs[:cases], None, mine)
+        writer.put_cases(number, first, run)
+        outcomes.add_run(run)
         fates = {case - cases: fate for case, fate in fates.items() if case >= cases}
         waiting, first, held = [outputs[cases:]], first + cases, held - cases
         progress(first)
@@ -84,6 +88,7 @@ def merge(
                 run = _results(histories, at, found.outputs, found.history, known)
                 writer.put_signals(number, first_kept, run, kept)
             first_kept += int(kept.sum())
+    return outcomes
 
 
 def without_history(folder: Folder, values: CampaignSection, histories: CampaignSection) -> dict[int, str]:
@@ -105,15 +110,12 @@ def _alone(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, str]
         at = max(at, task.last)
 
 
-def results(folder: Folder, section: CampaignSection) -> CaseOutcomes:
-    """Status and metrics of all cases of a section, by which histories are chosen."""
-    status, metrics = np.empty(len(section.rows), np.int8), dict[str, np.ndarray]()
+def results(folder: Folder, section: CampaignSection, most: Mapping[str, int] | None = None) -> CaseOutcomes:
+    """What became of all cases of a section, by which histories are chosen. most: as `CaseOutcomes`."""
+    outcomes = CaseOutcomes(section.prepared.experiment, most)
     for at, found in shards_in_order(folder, section):
-        run = _results(section, at, found.outputs, None, dict(found.fates))
-        status[at : at + len(run.status)] = run.status
-        for name, values in run.metrics.items():
-            metrics.setdefault(name, np.empty(len(section.rows)))[at : at + len(values)] = values
-    return CaseOutcomes(status, metrics)
+        outcomes.add_run(_results(section, at, found.outputs, None, dict(found.fates)))
+    return outcomes
 
 
 def shards_in_order(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, shard.Shard]]:

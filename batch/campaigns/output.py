@@ -11,8 +11,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from batch.archive.sink import FileBusy, Sink, temporary_of
 from batch.campaigns.folder import Folder, beside
 from batch.formats import format_of
@@ -22,12 +20,13 @@ from met.diagnostic import Problem, error
 from met.host.files import new_file
 from met.outputs import check_overwrite, check_place, quoted
 from met.plan import Experiment, Plan
+from met.plan.columns import CaseValues
 
 
 def default_output(
     plan: Plan,
     experiments: Sequence[str] | None = None,
-    selected: Sequence[tuple[Experiment, np.ndarray]] = (),
+    selected: Sequence[tuple[Experiment, CaseValues]] = (),
     whole: int | None = None,
 ) -> Path:
     """`two_link.h5`; `two_link.gains.h5` where runs are named; `two_link.gains.case7.h5` for some of the cases.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import field
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,8 @@ from batch.campaigns.campaign import Campaign, histories_section, values_section
 from batch.campaigns.drive import Driver, Progress, Stopped, TooManyFailures
 from batch.campaigns.executor import Executor
 from batch.campaigns.folder import Folder, FolderBusy, beside, uncovered
-from batch.campaigns.keep import CaseOutcomes
+from batch.campaigns.keep import worst_wanted
+from batch.campaigns.outcomes import CaseOutcomes, CountedCases
 from batch.campaigns.output import busy, cannot_write, check_room, publish
 from batch.campaigns.status import Reporter, died_lines
 from batch.campaigns.tasks import CampaignSection
@@ -28,7 +30,7 @@ from batch.campaigns.until_shown import StoppingPoints, run_until_shown, without
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 from met.outputs import quoted
-from met.run import DONE
+from met.plan.columns import places_among
 
 if TYPE_CHECKING:
     from batch.archive.write import ArchiveWriter
@@ -48,12 +50,14 @@ class Performed:
     whole    whether all was there before, so that nothing was run
     notes    what happened on the way: what was resumed, which shards did not count
     warned   what the steps do not follow at instants that cases passed
+    counted  by experiment: how many cases met what is required, as they were merged; empty where nothing was run
     """
 
     seconds: Mapping[str, float]
     whole: bool = False
     notes: tuple[str, ...] = ()
     warned: tuple[Diagnostic, ...] = ()
+    counted: Mapping[str, CountedCases] = field(default_factory=dict)
 
 
 class TooMany(Problem):
@@ -161,6 +165,7 @@ class _CampaignWork:
         self.whole = campaign
         self.notes: list[str] = []
         self.warned: dict[object, Diagnostic] = {}
+        self.counted: dict[str, CountedCases] = {}
         self.began = time.time()
         self.reporter = Reporter(folder, campaign.cases, progress)
         self.max_failures = max_failures
@@ -214,7 +219,8 @@ class _CampaignWork:
         for number, count in driver.counts.items():
             seconds[self.sections[number].name] += count.seconds
         self.folder.remove()
-        return Performed(seconds, notes=tuple(self.notes), warned=tuple(self.warned.values()))
+        notes, warned = tuple(self.notes), tuple(self.warned.values())
+        return Performed(seconds, notes=notes, warned=warned, counted=self.counted)
 
     def leave(self, state: str) -> str:
         """Give up, for now. What is worth keeping stays; in words how much and where, else "" and nothing stays."""
@@ -261,7 +267,7 @@ class _CampaignWork:
         """Run the second pass; its sections by experiment."""
         found = {}
         for section in self.kept:
-            histories = histories_section(self.whole, section, partial(merge.results, self.folder, section))
+            histories = histories_section(self.whole, section, partial(self._results, section))
             if histories is not None:
                 self.sections[histories.number] = found[section.experiment] = histories
         if found:
@@ -274,6 +280,10 @@ class _CampaignWork:
                 driver.run(section, stretches)
         return found
 
+    def _results(self, section: CampaignSection) -> CaseOutcomes:
+        wanted = worst_wanted(self.campaign.keep, section.prepared.experiment)
+        return merge.results(self.folder, section, wanted)
+
     def _merge(self, histories: Mapping[int, CampaignSection]) -> None:
         from batch.archive.provenance import machine
         from batch.archive.write import ArchivePart, ArchiveWriter
@@ -282,13 +292,13 @@ class _CampaignWork:
         for part, values in zip(self.whole.parts, self.kept, strict=True):
             kept = part.kept
             if values.experiment in histories:
-                rows = histories[values.experiment].rows
+                rows = np.asarray(histories[values.experiment].rows)
                 lost = merge.without_history(self.folder, values, histories[values.experiment])
                 for row, why in lost.items():
                     case = part.experiment.cases.table[row]
                     again = f"`met run {quoted(self.campaign.output)} --case '#{case}'` tries again"
                     self._note(f"no history of case #{case} of `{values.name}` is kept: {why}; {again}")
-                kept = np.searchsorted(part.rows, rows[~np.isin(rows, list(lost))])
+                kept = places_among(part.rows, rows[~np.isin(rows, list(lost))])
             program = values.prepared
             parts.append(
                 ArchivePart(
@@ -306,7 +316,7 @@ class _CampaignWork:
         try:
             for number, section in enumerate(self.kept):
                 self.reporter.begin(f"{section.name}, merging", len(section.rows), 0, 0, "")
-                merge.merge(
+                outcomes = merge.merge(
                     writer,
                     number,
                     self.folder,
@@ -314,7 +324,8 @@ class _CampaignWork:
                     histories.get(number),
                     lambda cases: self.reporter.advance(cases, 0),
                 )
-                outcomes = CaseOutcomes(*writer.put_before(number))
+                self.counted[section.name] = outcomes.counted(len(parts[number].kept))
+                writer.look_back(number)
                 self._verify(writer, number, section, outcomes)
                 for each in instants.step_warnings(section, outcomes, self._threads):
                     self.warned.setdefault((each.code, each.at), each)
@@ -355,7 +366,8 @@ class _CampaignWork:
         from batch.campaigns.verification.verifying import FACTORS, verify
 
         experiment = self.campaign.parts[number].experiment
-        places = np.flatnonzero(outcomes.status == DONE) if way == "all" else chosen(experiment, outcomes)
+        done = outcomes.done
+        places = done.select(np.arange(done.set)) if way == "all" else chosen(experiment, outcomes)
         if len(places):
             names = {each.key: each.name for each in writer.groups[number].layout.role("metric")}
             self.reporter.begin(f"{section.name}, with shorter steps", len(FACTORS) * len(places), 0, 0, "")

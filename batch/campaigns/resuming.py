@@ -10,6 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, prepare
 from batch.campaigns.changes import changes
@@ -21,6 +23,7 @@ from batch.campaigns.verification import when
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, read_json
 from met.plan import file as plan_file
+from met.plan.swept import blocks
 
 WHOLE, DAMAGED = "whole", "damaged"
 
@@ -226,13 +229,16 @@ def _asked_sum(campaign: Campaign) -> str:
 
     def refer(experiment: Any, index: int) -> dict[str, Any]:
         if not index:
-            summed.update(plan_file.table(experiment).tobytes())
+            for _, _, values in plan_file.table_pieces(experiment):
+                summed.update(values.tobytes())
         return {"index": index}
 
     text = plan_file.dumps(campaign.plan, refer)
     summed.update(text.encode())
     for part in campaign.parts:
-        summed.update(part.rows.tobytes() + b"kept" + part.kept.tobytes())
+        for piece in blocks(len(part.rows)):
+            summed.update(np.asarray(part.rows[piece]).tobytes())
+        summed.update(b"kept" + part.kept.tobytes())
     return summed.hexdigest()
 
 

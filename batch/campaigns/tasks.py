@@ -17,6 +17,8 @@ from batch.campaigns import shard
 from met import run as engine
 from met.frozen import frozen
 from met.passing import Memories
+from met.plan.columns import CaseValues
+from met.plan.swept import BLOCK
 from met.run import Prepared
 
 GRANULE = 32
@@ -24,6 +26,9 @@ GRANULE = 32
 
 MOST_CASES = 1 << 18
 """Cases of a task without histories."""
+
+STRETCH = 1 << 16
+"""Cases whose shards lie in one folder: some thousand files at most, for tasks have `GRANULE` cases or more."""
 
 MOST_BYTES = 128 << 20
 """Histories of a task, which lie in memory at a time."""
@@ -43,7 +48,7 @@ class CampaignSection:
     number: int
     experiment: int
     prepared: Prepared
-    rows: np.ndarray
+    rows: CaseValues
     recorded: bool
     single: bool = False
     begun: str = ""
@@ -71,10 +76,14 @@ class CampaignSection:
         """A digest of all that decides what these cases give: the code, how long it runs, what goes into it, what is
         kept."""
         experiment = self.prepared.experiment
-        inputs = engine.inputs(experiment, self.rows[first:last])
+        last = len(self.rows) if last is None else last
         kept = ("recorded" if self.recorded else "outputs", "f4" if self.single else "f8")
-        told = (self.code, experiment.structure.schedule.ticks, *kept, inputs.shape)
-        return hashlib.sha256(f"{told}\n".encode() + inputs.tobytes()).hexdigest()
+        shape = (last - first, len(experiment.cases.coordinates) + len(experiment.cases.noise))
+        told = (self.code, experiment.structure.schedule.ticks, *kept, shape)
+        summed = hashlib.sha256(f"{told}\n".encode())
+        for at in range(first, last, BLOCK):
+            summed.update(engine.inputs(experiment, self.rows[at : min(at + BLOCK, last)]).tobytes())
+        return summed.hexdigest()
 
 
 @frozen
@@ -93,6 +102,12 @@ class Task:
     def name(self) -> str:
         """The file name of the task's shard."""
         return f"{self.section}-{self.first:09}-{self.last:09}"
+
+    @property
+    def path(self) -> str:
+        """Where the task's shard lies below `shards/`: those of a long section in folders of a stretch of cases each,
+        so that no folder has very many files."""
+        return self.name if self.first < STRETCH else f"{self.first // STRETCH:05}/{self.name}"
 
 
 @frozen
@@ -115,8 +130,16 @@ def carry_out(
     """Run a task's cases and write its shard into the folder. computed: called in between."""
     found = compute(section, task, threads=threads, progress=progress)
     computed()
-    shard.write(folder / task.name, found)
+    keep(folder, task, found)
     return Done(found.seconds, found.failed)
+
+
+def keep(folder: Path, task: Task, found: shard.Shard) -> None:
+    """Write a task's shard into its place in the folder of shards. Raises OSError."""
+    path = folder / task.path
+    if path.parent != folder:
+        path.parent.mkdir(exist_ok=True)
+    shard.write(path, found)
 
 
 def compute(

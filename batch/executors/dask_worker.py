@@ -61,7 +61,7 @@ def carry_out(order: Mapping[str, Any]) -> dict[str, Any]:
     told = {"kind": "done", "done": [outcome.done.seconds, outcome.done.failed], "host": host}
     if not kept.proved:
         kept.proved = True
-        told["proof"] = shard.read(folder / "shards" / task.name).key
+        told["proof"] = shard.read(folder / "shards" / task.path).key
     return told
 
 

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 
-from batch.campaigns import shard, tasks
+from batch.campaigns import tasks
 from batch.campaigns.executor import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.shard import cannot_keep
@@ -43,8 +43,7 @@ class Threads:
             task = self._waiting.popleft()
             computed = tasks.compute(self._sections[task.section], task, threads=self.threads, progress=self._progress)
             assert self._writer is not None
-            path = self._folder.shards / task.name
-            writing = self._writer.submit(shard.write, path, computed)
+            writing = self._writer.submit(tasks.keep, self._folder.shards, task, computed)
             self._written.append((task, Done(computed.seconds, computed.failed), writing))
             self._computed = 0
         # one shard may be on its way to the disk, with its histories in memory

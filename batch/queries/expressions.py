@@ -48,7 +48,8 @@ class CaseTable:
             for name, each in choices.items()
         }
         options = {name: each.words for name, each in choices.items()}
-        truths = Truths(self._find, self._graph, self._columns, self.pool.count, words, options)
+        truths = Truths(self._find, self._graph, words, options)
+        truths.take(self._columns, self.pool.count)
         with _shown(condition):
             return truths.of(read_expression(condition), np.ones(self.pool.count, bool))
 

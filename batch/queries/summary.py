@@ -20,6 +20,7 @@ from batch.queries.step_errors.limits import StepErrorVerdict, verdicts
 from batch.queries.warnings import warnings
 from met.diagnostic import Diagnostic
 from met.frozen import frozen
+from met.plan.swept import blocks
 
 
 @frozen
@@ -139,7 +140,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
     failed = np.flatnonzero(status != 0)
     found: tuple[FailureGroup, ...] = ()
     if len(failed):
-        rows, ids, causes = (group.values(name)[here][failed] for name in ("case", "case_id", "cause"))
+        rows, ids, causes = (group.at(name, (position or 0) + failed) for name in ("case", "case_id", "cause"))
         found = failures(status[failed], causes, rows, ids)
     requirements: tuple[RequirementSummary, ...] = ()
     if "met" in group.variables:
@@ -169,20 +170,29 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
         verified=verified,
         step_errors=verdicts(group, verified) if position is None else (),
         warnings=tuple(warnings(group)) if position is None else (),
-        doubts=_doubts(group, here),
+        doubts=_doubts(group, position),
         limits=limit_summaries(group, here),
         limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
     )
 
 
-def _doubts(group: ArchiveGroup, here: slice) -> tuple[FailureGroup, ...]:
-    """The doubts about cases, by what causes them; nothing of an archive of before there were warnings."""
+def _doubts(group: ArchiveGroup, position: int | None) -> tuple[FailureGroup, ...]:
+    """The doubts about cases, or the one at a position, by what causes them; nothing of an archive of before there were
+    warnings."""
     if "warning" not in group.variables:
         return ()
-    causes = group.values("warning")[here]
-    doubtful = np.flatnonzero(causes != "")
-    rows, ids = (group.values(name)[here][doubtful] for name in ("case", "case_id"))
-    found = failures(np.zeros(len(doubtful)), causes[doubtful], rows, ids)
+    doubtful, causes = [], []
+    first, last = (0, group.count) if position is None else (position, position + 1)
+    for piece in blocks(last - first):  # words take ten times the memory of numbers, and most of these are empty
+        words = group.stretch("warning", first + piece.start, first + piece.stop)
+        some = np.flatnonzero(words != "")
+        doubtful.append(first + piece.start + some)
+        causes.append(words[some])
+    those = np.concatenate(doubtful) if doubtful else np.zeros(0, np.int64)
+    if not len(those):
+        return ()
+    rows, ids = (group.at(name, those) for name in ("case", "case_id"))
+    found = failures(np.zeros(len(those)), np.concatenate(causes), rows, ids)
     return tuple(replace(each, status="warning") for each in found)
 
 

@@ -6,8 +6,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from os import PathLike
 
-import numpy as np
-
 from ic.driver.compile import Compiled, Select, check
 from ic.grammar.places import place_of
 from ic.grammar.spell import spell
@@ -20,6 +18,7 @@ from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan import Experiment, Formula, Origin, Quantity
+from met.plan.columns import FormulaColumn, span
 from met.trace import Formulas, Scalar
 
 DEEPEST = 16  # names behind names that are followed
@@ -143,8 +142,7 @@ def _explanation(experiment: Experiment, scope: Scope, path: str, settled: Settl
     varies = isinstance(value, Scalar)
     if isinstance(value, Scalar):
         inputs = {coordinate.path: coordinate.values for coordinate in experiment.cases.coordinates}
-        values = np.asarray(Formulas.of(scope.graph, [value]).replay(inputs)[0], dtype=float)
-        value = (float(values.min()), float(values.max()))
+        value = span(FormulaColumn(Formulas.of(scope.graph, [value]), inputs, experiment.cases.count))
     origin = settled.origin
     written = spell(settled.expression) if settled.expression is not None else ""
     names = tuple(_names(scope, settled.expression)) if settled.expression is not None else ()

@@ -11,17 +11,18 @@ import numpy as np
 from ic.printing.columns import columns, count, number, size
 from ic.sweeps.confidences import OF_CASES
 from met.plan import Coordinate, Experiment, keys
+from met.plan.columns import row_at
 
 HEAD, TAIL = 30, 10
 SHORTEST = 4
+MOST_COMPARED = 10_000_000
 REPEAT = "repeat"
 SAMPLED = "sample"
 
 
 def print_cases(groups: Sequence[Experiment], *, everything: bool = False) -> Iterator[str]:
     """Line by line the table of one sweep, of which these are the groups; of a long one the head and the tail."""
-    rows = _Rows(groups)
-    total = len(rows.groups)
+    total = sum(group.cases.count for group in groups)
     most = "at most " * any(group.cases.until_shown for group in groups)
     title = f"{groups[0].name_in_deck}: {most}{count(total, 'case')}"
     if len(groups) > 1:
@@ -33,15 +34,14 @@ def print_cases(groups: Sequence[Experiment], *, everything: bool = False) -> It
         yield title + (f", {size(each)} of histories each" if each and total > 1 else "")
     for note in dict.fromkeys(note for group in groups for note in group.notes if note.startswith((SAMPLED, OF_CASES))):
         yield f"  {note}"
-    positions = list(range(total))
     cut = not everything and total > HEAD + TAIL
-    if cut:
-        positions = [*positions[:HEAD], *positions[-TAIL:]]
-    short = prefixes(rows.ids)
+    positions = [*range(HEAD), *range(total - TAIL, total)] if cut else range(total)
+    rows = _Rows(groups, positions if cut else None)
+    short = _short(groups, rows.ids)
     heads = ["", "id", *rows.choices, *(path for path, _ in rows.coordinates), *([REPEAT] if rows.repeated else [])]
     units = ["", "", *("" for _ in rows.choices), *(unit for _, unit in rows.coordinates), *([""] * rows.repeated)]
     table = [heads, units] if any(units) else [heads]
-    table += [[f"#{position}", short[position], *rows.shown(position)] for position in positions]
+    table += [[f"#{position}", short[n], *rows.shown(n)] for n, position in enumerate(positions)]
     first = 2 + len(rows.choices)
     lines = columns(table, right=(0, *range(first, len(heads))))
     if cut:
@@ -61,15 +61,16 @@ def _structures(groups: Sequence[Experiment]) -> Iterator[str]:
 
 
 class _Rows:
-    """The rows of all groups of a sweep, by position in its table."""
+    """The rows of all groups of a sweep, by position in its table, or those at some positions, which rise."""
 
-    def __init__(self, groups: Sequence[Experiment]) -> None:
-        everything = np.concatenate([group.cases.table for group in groups])
+    def __init__(self, groups: Sequence[Experiment], positions: Sequence[int] | None = None) -> None:
+        rows = [np.arange(g.cases.count) if positions is None else _rows_at(g, positions) for g in groups]
+        everything = np.concatenate([group.cases.table[own] for group, own in zip(groups, rows, strict=True)])
         order = np.argsort(everything, kind="stable")
         self.experiments = groups
-        self.groups = np.concatenate([np.full(g.cases.count, n) for n, g in enumerate(groups)])[order]
-        self.rows = np.concatenate([np.arange(group.cases.count) for group in groups])[order]
-        ids = [case_id for group in groups for case_id in keys.case_ids(group)]
+        self.groups = np.concatenate([np.full(len(own), n) for n, own in enumerate(rows)])[order]
+        self.rows = np.concatenate(rows)[order]
+        ids = [each for group, own in zip(groups, rows, strict=True) for each in keys.case_ids(group, own)]
         self.ids = [ids[n] for n in order]
         self.choices = list(dict.fromkeys(choice.path for group in groups for choice in group.cases.choices))
         named = (coordinate for group in groups for coordinate in group.cases.coordinates)
@@ -96,6 +97,12 @@ class _Rows:
         found = [self.value(position, path) for path, _ in self.coordinates]
         made += ["" if value is None else number(value[0] / value[1]) for value in found]
         return [*made, *([str(self.repeat(position))] if self.repeated else [])]
+
+
+def _rows_at(group: Experiment, positions: Sequence[int]) -> np.ndarray:
+    """The rows of a group at these positions of its sweep's table, those that it has."""
+    rows = [row_at(group.cases.table, position) for position in positions]
+    return np.array([row for row in rows if row is not None], np.int64)
 
 
 def cases_json(groups: Sequence[Experiment]) -> dict[str, Any]:
@@ -127,6 +134,20 @@ def cases_json(groups: Sequence[Experiment]) -> dict[str, Any]:
         "coordinates": [{"path": c.path, "deck_unit": c.unit, "scale": c.scale} for c in first.values()],
         "cases": made,
     }
+
+
+def _short(groups: Sequence[Experiment], ids: list[str]) -> list[str]:
+    """The beginnings of these ids that tell all cases apart; the whole of them where there are very many."""
+    total = sum(group.cases.count for group in groups)
+    if len(ids) == total:
+        return prefixes(ids)
+    if total > MOST_COMPARED:
+        return ids
+    numbers = np.sort(np.concatenate([keys.id_numbers(group).astype(np.uint64) for group in groups]))
+    apart = numbers[1:] ^ numbers[:-1]
+    least = int(apart[apart > 0].min(initial=2**64 - 1))  # of the two that are alike for longest
+    shared = (64 - least.bit_length()) // 4
+    return [each[: max(SHORTEST, 1 + shared)] for each in ids]
 
 
 def prefixes(names: list[str]) -> list[str]:

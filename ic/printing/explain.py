@@ -22,6 +22,7 @@ from met.models import parameter as declared
 from met.parameter import Parameter
 from met.plan import Coordinate, Experiment, Formula, Origin, Quantity
 from met.plan.channel import recordable
+from met.plan.columns import span
 
 SAID = {
     "deck": "written here",
@@ -188,7 +189,7 @@ def explain_json(
         records.append(
             {
                 "path": name,
-                "value": _values(experiment, found).tolist() if varied else found.value,
+                "value": experiment.column(found.value).tolist() if isinstance(found.value, Formula) else found.value,
                 "varies": varied,
                 "unit": found.unit,
                 "origin": found.origin.kind,
@@ -238,7 +239,7 @@ def _one(
         yield f"  {parameter.doc} ({owner})"
     for coordinate in _varied_by(experiment, name):
         unit = "" if coordinate.unit == "1" else f" {coordinate.unit}"
-        yield f"  varied by {coordinate.path}: {_series(coordinate.values / coordinate.scale)}{unit}"
+        yield f"  varied by {coordinate.path}: {_series_of(coordinate)}{unit}"
     note = _note(origin)
     said = note if note == ON_COMMAND_LINE else SAID[origin.kind] + (f": {note}" if note else "")
     if origin.place is None and origin.kind == "deck":
@@ -291,22 +292,24 @@ def _shown(experiment: Experiment, found: Quantity) -> str:
         case tuple():
             return vector(found.value, found.unit)
         case Formula():
-            values = _values(experiment, found)
-            low, high = float(values.min()), float(values.max())
+            low, high = span(experiment.column(found.value))
             return f"{number(low)} to {quantity(high, found.unit)}, varies with the case"
         case float() | int():
             return quantity(found.value, found.unit)
     raise AssertionError(found)
 
 
-def _values(experiment: Experiment, found: Quantity) -> np.ndarray:
-    assert isinstance(found.value, Formula)
-    inputs = {coordinate.path: coordinate.values for coordinate in experiment.cases.coordinates}
-    return np.asarray(experiment.formulas.replay(inputs)[found.value.output], dtype=float)
-
-
 def _varied_by(experiment: Experiment, name: str) -> list[Coordinate]:
     return [coordinate for coordinate in experiment.cases.coordinates if name in coordinate.sets]
+
+
+def _series_of(coordinate: Coordinate) -> str:
+    """A coordinate's values in the unit of the deck; of a long table its ends."""
+    values = coordinate.values
+    if isinstance(values, np.ndarray):
+        return _series(values / coordinate.scale)
+    low, high = span(values)
+    return f"{number(low / coordinate.scale)} to {number(high / coordinate.scale)}, {len(values):,} cases"
 
 
 def _series(values: np.ndarray) -> str:

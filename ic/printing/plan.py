@@ -11,32 +11,32 @@ import numpy as np
 from ic.printing.columns import columns, count, number, quantity, size, vector
 from ic.printing.settings import kept_keys
 from met import models
-from met.distinct import distinct
 from met.parameter import Parameter
 from met.plan import BASE, Base, Experiment, Formula, Joint, Plan, Structure
+from met.plan.columns import different, span
 from met.plan.defaults import OF_FREE_BASE
 from met.plan.uses import sensor_parts
 
 CHOSEN = 88  # columns, of parameters that stand in one cell
 FIXED_SPACE = "\u00a0"  # no line ends at one
+COUNTED = 1_000_000  # drawn values at most that are told apart
 STEP_SIZE = "step size: "  # how the compiler's note on it begins
 
 
 class _Values:
-    """The parameters of an experiment, those that vary over all cases."""
+    """The parameters of an experiment, those that vary by their first, least and largest value."""
 
     def __init__(self, experiment: Experiment) -> None:
-        self._parameters = experiment.parameters
-        inputs = {coordinate.path: coordinate.values for coordinate in experiment.cases.coordinates}
-        self._outputs = experiment.formulas.replay(inputs) if experiment.formulas.outputs else []
+        self._experiment, self._parameters = experiment, experiment.parameters
 
     def array(self, path: str) -> np.ndarray | None:
-        """The value, of one case or all; None where the plan has no number of that name."""
+        """The value; three of what varies; None where the plan has no number of that name."""
         found = self._parameters.get(path)
         if found is None or isinstance(found.value, (str, tuple)):
             return None
         if isinstance(found.value, Formula):
-            return np.asarray(self._outputs[found.value.output], dtype=float)
+            column = self._experiment.column(found.value)
+            return np.array([column[0], *span(column)] if len(column) else [])
         return np.asarray(found.value, dtype=float)
 
     def shown(self, path: str) -> str:
@@ -393,16 +393,19 @@ def _cases(experiment: Experiment) -> Iterator[str]:
     yield f"Cases: {'at most ' * (cases.until_shown > 0)}{cases.count}, {written}"
     rows = [(choice.path, choice.value) for choice in cases.choices]
     for coordinate in cases.coordinates:
-        shown = distinct(coordinate.values) / coordinate.scale
-        if shown.size == 0:
+        if not cases.count:
             continue
-        if shown.size <= 4:
+        many = coordinate.design == "random" and cases.count > COUNTED
+        shown = (np.array(span(coordinate.values)) if many else different(coordinate.values)) / coordinate.scale
+        if many:
+            several = f"drawn, from {number(float(shown[0]))} to {number(float(shown[-1]))}"
+        elif shown.size <= 4:
             several = f"{', '.join(number(float(value)) for value in shown)}"
         else:
             several = f"{shown.size} values from {number(float(shown[0]))} to {number(float(shown[-1]))}"
         rows.append((coordinate.path, f"{several} {coordinate.unit}" if coordinate.unit != "1" else several))
     if cases.repeats is not None:
-        rows.append(("repeat", f"{len(distinct(cases.repeats))} times each"))
+        rows.append(("repeat", f"{different(cases.repeats).size} times each"))
     if cases.seeds == "independent":
         rows.append(("seeds", "each case has noise of its own"))
     yield from columns(rows)

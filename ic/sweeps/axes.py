@@ -38,9 +38,9 @@ from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan import Design
+from met.plan.columns import MOST_SWEPT, CaseValues
 from met.trace import Graph, Scalar
 
-MOST_CASES = 10_000_000
 MOST_COUNTED = 16  # axes that are read of a sweep that has too many cases
 KNOWN = tuple(entry.name for entry in SWEEP.entries)
 
@@ -123,7 +123,7 @@ def read_sweep(
     for entry in definition.group.body:
         with complaints.gather():
             reader.enter(entry)
-        if len(reader.axes) >= MOST_COUNTED and _product(reader) > MOST_CASES:
+        if len(reader.axes) >= MOST_COUNTED and _product(reader) > MOST_SWEPT:
             break
     sweep = Sweep(
         definition.name,
@@ -151,14 +151,14 @@ def read_sweep(
             definition.place,
             help="write `vary PATH = [...] UNIT;`",
         )
-    if math.prod(sweep.sizes) > MOST_CASES:
+    if math.prod(sweep.sizes) > MOST_SWEPT:
         sizes = [str(size) for size in sweep.sizes[: None if sweep.repeated else -1]]
         more = "more than " if len(sweep.axes) >= MOST_COUNTED else ""
         complaints.error(
             "D134",
             f"sweep `{definition.name}` has {more}{math.prod(sweep.sizes)} cases",
             definition.place,
-            help=f"{MOST_CASES} are possible: {' x '.join(sizes)} is more",
+            help=f"{MOST_SWEPT} are possible: {' x '.join(sizes)} is more",
         )
     return sweep
 
@@ -395,7 +395,7 @@ class _SweepReader:
             unit,
         )
 
-    def varied(self, path: str, place: Place, numbers: np.ndarray, like: Value, unit) -> VariedPath:  # type: ignore[no-untyped-def]
+    def varied(self, path: str, place: Place, numbers: CaseValues, like: Value, unit) -> VariedPath:  # type: ignore[no-untyped-def]
         """A column of numbers in SI. like: a value of its dimension; unit: the one that the deck wrote."""
         scale = 1.0
         if unit is not None and measure_of(unit).dimension == like.dimension:
@@ -418,7 +418,7 @@ def whole_number(definitions: Definitions, expression: Expression, what: str, *,
         or not float(number).is_integer()
         or not least <= number <= 2**53
     ):
-        most = "2^53" if least == 0 else f"{MOST_CASES}"
+        most = "2^53" if least == 0 else f"{MOST_SWEPT}"
         raise Problem(error("D113", f"{what} is a whole number from {least} to {most}", found.place))
     return int(number)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,6 +13,8 @@ from ic.sweeps.reach import without_effect
 from ic.text.complaints import Complaints
 from met.diagnostic import Label
 from met.plan import SEED, Experiment, Requirement
+from met.plan.columns import AxisColumn
+from met.plan.swept import blocks
 from met.statistics import confidence, sequential
 from met.statistics.design_points import design_points
 
@@ -98,7 +101,23 @@ def _fewest_of_a_point(experiment: Experiment) -> int:
     """The number of cases of the design point that has the fewest."""
     cases = experiment.cases
     chosen = [each.values for each in cases.coordinates if not each.design]
-    return int(np.bincount(design_points(chosen, cases.count)).min())
+    if not chosen:
+        return cases.count
+    if all(isinstance(values, AxisColumn) for values in chosen):
+        return _fewest_of_a_choice([values for values in chosen if isinstance(values, AxisColumn)])
+    return int(np.bincount(design_points([np.asarray(values) for values in chosen], cases.count)).min())
+
+
+def _fewest_of_a_choice(chosen: Sequence[AxisColumn]) -> int:
+    """The same of a long table, whose values are told by their axes: equal ones are one value of an axis."""
+    rows, axes = chosen[0].rows, sorted({values.axis for values in chosen})
+    found = np.zeros(math.prod(rows.sizes[axis] for axis in axes), np.int64)
+    for piece in blocks(rows.count):
+        here, point = np.arange(piece.start, piece.stop), np.zeros(piece.stop - piece.start, np.int64)
+        for axis in axes:
+            point = point * rows.sizes[axis] + rows.index(axis, here)
+        found += np.bincount(point, minlength=len(found))
+    return int(found[found > 0].min())
 
 
 def _note(complaints: Complaints, requirement: Requirement, each: int) -> str:

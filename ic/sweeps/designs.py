@@ -8,15 +8,14 @@
                 (A. Saltelli et al., Computer Physics Communications 181 (2010) 259-270)
 
 A design makes n points in the unit cube, a distribution's quantiles turn them into values. Those are rounded to 12
-digits in the deck's unit: so a table that is printed and read back is the same table, and a last place in which
-versions of a library differ makes no other case.
+digits in the deck's unit (met/plan/drawing.py). Those of `random` follow one by one from the seed and their numbers,
+so that a long sample is computed where it is used; the others are made as a whole, a table.
 """
 
 from __future__ import annotations
 
 import warnings
-import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,13 +33,16 @@ from met.diagnostic import Place, Problem, did_you_mean, error
 from met.distinct import distinct
 from met.frozen import frozen
 from met.plan import Design
+from met.plan.columns import MOST_SWEPT, CaseValues, listed
+from met.plan.drawing import DIGITS, DrawnColumn, drawn_values, within
 from met.trace import Scalar
 
-DIGITS = 12
 UNTIL_SHOWN, AT_MOST = "until_shown", "at_most"
 """Words in place of a number of samples."""
-MOST_SAMPLES = 1_000_000
-MOST_SOBOL = 1 << 30
+
+MOST_LISTED = 1_000_000
+"""Samples of a design that is drawn as a whole; those of `random` are computed one by one."""
+
 DESIGNS: tuple[Design, ...] = ("lhs", "sobol", "random", "saltelli")
 DISTRIBUTIONS: Mapping[str, tuple[str, ...]] = {
     "uniform": ("from", "to"), "loguniform": ("from", "to"), "normal": ("mean", "deviation"),
@@ -59,16 +61,18 @@ class DrawnParameter:
     low: Value
     unit: Unit | None
 
+    @property
+    def measure(self) -> units.Measure | None:
+        return measure_of(self.unit) if self.unit is not None else None
+
     def values(self, points: np.ndarray) -> np.ndarray:
         """Quantiles at these points of (0, 1), SI, rounded in the deck's unit."""
-        scale = measure_of(self.unit).scale if self.unit is not None else 1.0
-        exact = QUANTILES[self.distribution](points, *(x / scale for x in self.arguments))
-        to_si = (measure_of(self.unit) if self.unit is not None else units.ONE).to_si
-        found = np.array([to_si(float(f"{x:.{DIGITS}g}")) for x in exact])
-        if self.distribution == "normal":
-            return found
-        low, high = self.arguments[-2:]
-        return np.clip(found, low, high)
+        return drawn_values(self.distribution, self.arguments, self.measure, points)
+
+    def independent(self, count: int, seed: int, number: int) -> CaseValues:
+        """So many draws without regard to one another, those of a long sample computed where they are asked for."""
+        unit = self.unit.text if self.unit is not None else ""
+        return listed(DrawnColumn(count, seed, self.path, number, self.distribution, self.arguments, unit))
 
 
 @frozen
@@ -91,17 +95,22 @@ class SampleDesign:
         count = f"{UNTIL_SHOWN}, {AT_MOST} = {self.count}" if self.until_shown is not None else f"{self.count}"
         return f"sample {self.design}({count}), seed {self.seed}{about}"
 
-    def draw(self, number: int) -> list[np.ndarray]:
+    def draw(self, number: int) -> list[CaseValues]:
         """The values of each part. number: of the sample in its sweep, from 1. Raises Problem where they are one."""
-        points = _points(self.design, self.count, [part.path for part in self.parts], self.seed, number)
-        found = [part.values(column) for part, column in zip(self.parts, points.T, strict=True)]
+        found: list[CaseValues]
+        if self.design == "random":  # a stream for each path, so that more samples or parameters change no old value
+            found = [part.independent(self.count, self.seed, number) for part in self.parts]
+        else:
+            points = _points(self.design, self.count, len(self.parts), self.seed, number)
+            found = [part.values(column) for part, column in zip(self.parts, points.T, strict=True)]
         for part, values in zip(self.parts, found, strict=True):
-            different = len(distinct(values))
-            if 2 * different < len(values):
+            looked_at = min(self.count, MOST_LISTED)
+            different = len(distinct(values[:looked_at]))
+            if 2 * different < looked_at:
                 raise Problem(
                     error(
                         "D225",
-                        f"`{part.path}` hardly varies: {len(values)} samples have {different} "
+                        f"`{part.path}` hardly varies: {looked_at} samples have {different} "
                         f"value{'s' * (different != 1)}",
                         part.place,
                         help=[f"values have {DIGITS} digits: draw it from a wider distribution", "or leave it out"],
@@ -110,63 +119,34 @@ class SampleDesign:
         return _saltelli(found) if self.design == "saltelli" else found
 
 
-def _saltelli(found: Sequence[np.ndarray]) -> list[np.ndarray]:
+def _saltelli(found: Sequence[CaseValues]) -> list[CaseValues]:
     """The values of each part in the cases of Saltelli's scheme, from those at its points: all a, then all b.
 
     The cases of a pair of points stand together: a, then a with the value of the first part from b, of the second ...,
     then b.
     """
-    out = []
+    out: list[CaseValues] = []
     for place, values in enumerate(found):
-        a, b = np.split(values, 2)
+        a, b = np.split(np.asarray(values), 2)
         cases = np.repeat(a[:, None], len(found) + 2, axis=1)
         cases[:, place + 1] = cases[:, -1] = b
         out.append(cases.ravel())
     return out
 
 
-def _points(design: str, count: int, paths: list[str], seed: int, number: int) -> np.ndarray:
-    """Points of the open unit cube, [count, len(paths)]; of `saltelli` twice as many, all first points of pairs before
-    all second ones."""
-    if design == "random":  # a stream for each path, so that more samples or parameters change no old value
-        streams = [
-            np.random.Generator(np.random.Philox(key=[seed, zlib.crc32(path.encode()) << 32 | number]))
-            for path in paths
-        ]
-        points = np.stack([stream.random(count) for stream in streams], axis=1)
-    else:
-        from scipy.stats import qmc  # takes most of a second to import
+def _points(design: str, count: int, parts: int, seed: int, number: int) -> np.ndarray:
+    """Points of the open unit cube, [count, parts], each with regard to the others; of `saltelli` twice as many, all
+    first points of pairs before all second ones."""
+    from scipy.stats import qmc  # takes most of a second to import
 
-        stream = np.random.Generator(np.random.PCG64([seed, number]))
-        pairs = design == "saltelli"
-        method = qmc.LatinHypercube if design == "lhs" else qmc.Sobol
-        sampler = method(len(paths) * (2 if pairs else 1), rng=stream)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of counts that are no power of 2, for which MET has its own
-            points = sampler.random(count)
-        points = np.concatenate(np.split(points, 2, axis=1)) if pairs else points
-    return np.asarray(np.clip(points, 2.0**-54, 1.0 - 2.0**-53))
-
-
-def _truncated(points: np.ndarray, mean: float, deviation: float, low: float, high: float) -> np.ndarray:
-    from scipy.stats import truncnorm
-
-    found = truncnorm.ppf(points, (low - mean) / deviation, (high - mean) / deviation, loc=mean, scale=deviation)
-    return np.asarray(found, dtype=float)
-
-
-def _normal(points: np.ndarray, mean: float, deviation: float) -> np.ndarray:
-    from scipy.special import ndtri
-
-    return np.asarray(mean + deviation * ndtri(points), dtype=float)
-
-
-QUANTILES: Mapping[str, Callable[..., np.ndarray]] = {
-    "uniform": lambda points, low, high: low + (high - low) * points,
-    "loguniform": lambda points, low, high: low * np.exp(np.log(high / low) * points),
-    "normal": _normal,
-    "truncated": _truncated,
-}
+    stream = np.random.Generator(np.random.PCG64([seed, number]))
+    pairs = design == "saltelli"
+    method = qmc.LatinHypercube if design == "lhs" else qmc.Sobol
+    sampler = method(parts * (2 if pairs else 1), rng=stream)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of counts that are no power of 2, for which MET has its own
+        drawn = sampler.random(count)
+    return within(np.concatenate(np.split(drawn, 2, axis=1)) if pairs else drawn)
 
 
 # Reading
@@ -201,9 +181,7 @@ def read_sample(
         )
     names = Names(definitions, {}, watched=set(paths))
     until_shown = _until_shown(call, definitions)
-    if until_shown is not None:
-        count = _count(evaluate_number(call.named[0][1], names.find))
-    elif len(call.positional) != 1 or call.named:
+    if until_shown is None and (len(call.positional) != 1 or call.named):
         raise Problem(
             error(
                 "D224",
@@ -212,8 +190,9 @@ def read_sample(
                 help=f"write `sample {design}(200) {{ ... }}`",
             )
         )
-    else:
-        count = _count(evaluate_number(call.positional[0], names.find))
+    most = MOST_SWEPT if design == "random" else MOST_LISTED
+    written = call.positional[0] if until_shown is None else call.named[0][1]
+    count = _count(evaluate_number(written, names.find), most)
     parts = []
     before = complaints.error_count
     for entry in call.body:
@@ -273,15 +252,15 @@ def _until_shown(call: Call, definitions: Definitions) -> Place | None:
     return place_of(word)
 
 
-def _count(found: Value) -> int:
+def _count(found: Value, most: int) -> int:
     number = found.number
     if (
         isinstance(number, Scalar)
         or found.dimension != PURE
         or not float(number).is_integer()
-        or not 1 <= number <= MOST_SAMPLES
+        or not 1 <= number <= most
     ):
-        raise Problem(error("D113", f"a number of samples is a whole number from 1 to {MOST_SAMPLES}", found.place))
+        raise Problem(error("D113", f"a number of samples is a whole number from 1 to {most}", found.place))
     return int(number)
 
 

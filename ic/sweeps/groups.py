@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
@@ -29,13 +30,13 @@ from ic.text.complaints import Complaints, known_words
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan import Allowance, Cases, Choice, Experiment, keys
+from met.plan.columns import PositionColumn, ShiftedColumn, listed
+from met.plan.swept import RowBits, SweptRows, blocks
 from met.trace import Formulas, Graph, Scalar
 
 ScopedExperiment = tuple[Experiment, Scope]
 Reread = Callable[[Sequence[str]], Deck]
 """The deck read again with further macros, `NAME=VALUE`. Raises Problem."""
-
-MOST_STRUCTURES = 256
 
 
 @frozen
@@ -111,19 +112,7 @@ class _Sweep:
             return []
         self.read_so_far[()] = read
         found = structures(sweep)
-        if len(found) > MOST_STRUCTURES:
-            raise Problem(
-                error(
-                    "D229",
-                    f"sweep `{sweep.name}` is of {len(found)} structures",
-                    sweep.place,
-                    help=[
-                        f"{MOST_STRUCTURES} are possible, each with a program of its own",
-                        "what is a number of a model, varied as such, needs no other structure",
-                    ],
-                )
-            )
-        made: list[tuple[ScopedExperiment, np.ndarray]] = []
+        made: list[tuple[ScopedExperiment, SweptRows]] = []
         dropped: dict[Place, int] = {}  # by each `exclude when`, of which a macro may bring other ones
         for choices, rows in found:
             faults = self.complaints.error_count
@@ -160,8 +149,8 @@ class _Sweep:
         lost = varied_paths(read.definitions, self.definition) - set(varied)
         excludes = [each for each in sweep.excludes if not names_in(each.value) & lost]
         if resolved is not None and excludes and not self.complaints.is_known_to_lack(read.base.place):
-            first = np.zeros(1, dtype=np.int64)
-            kept(scope, replace(sweep, excludes=tuple(excludes)), columns(sweep, first), (), 1, resolved.structure)
+            first = SweptRows(sweep.sizes, tuple(np.zeros(1, np.int64) for _ in sweep.sizes))
+            kept(scope, replace(sweep, excludes=tuple(excludes)), first, (), resolved.structure)
 
     def _read(self, definitions: Definitions, definition: Definition) -> _Read:
         settings = self.source.settings
@@ -174,8 +163,8 @@ class _Sweep:
         return _Read(definitions, definition, base, sweep, graph)
 
     def _group(
-        self, sweep: Sweep, choices: Choices, rows: np.ndarray
-    ) -> tuple[tuple[ScopedExperiment, np.ndarray] | None, list[tuple[Place, int]]] | None:
+        self, sweep: Sweep, choices: Choices, rows: SweptRows
+    ) -> tuple[tuple[ScopedExperiment, SweptRows] | None, list[tuple[Place, int]]] | None:
         """The cases of one structure, with their rows of the product; and how many each `exclude when` drops."""
         read = self._with_macros(sweep, choices)
         definitions, run = with_choices(read.definitions, read.base, choices)
@@ -189,9 +178,9 @@ class _Sweep:
         definitions: Definitions,
         run: Definition,
         choices: Choices,
-        rows: np.ndarray,
+        rows: SweptRows,
         allowances: tuple[Allowance, ...],
-    ) -> tuple[tuple[ScopedExperiment, np.ndarray] | None, list[tuple[Place, int]]] | None:
+    ) -> tuple[tuple[ScopedExperiment, SweptRows] | None, list[tuple[Place, int]]] | None:
         """The same, of what was read and chosen for this structure."""
         there = read.sweep
         scope = Scope(
@@ -207,13 +196,12 @@ class _Sweep:
         if resolved is None:
             self.complaints.settle()
             return None
-        values = columns(there, rows)
-        keep, counts = kept(scope, there, values, choices, len(rows), resolved.structure)
+        rows, counts = kept(scope, there, rows, choices, resolved.structure)
         dropped = [(statement.place, count) for statement, count in zip(there.excludes, counts, strict=True)]
-        if not keep.any():
+        count = rows.count
+        if not count:
             return None, dropped
-        values = {path: column[keep] for path, column in values.items()}
-        count = int(np.count_nonzero(keep))
+        values = columns(there, rows)
         scope.checks.run(values, count)
         cases = Cases(
             count,
@@ -221,7 +209,7 @@ class _Sweep:
             resolved.seed if there.seed is None else there.seed,
             "independent" if there.independent is not None else "common",
             tuple(Choice(column.path, option.text, option.place) for column, option in choices),
-            repeats(there, rows[keep]),
+            repeats(there, rows),
             until_shown=0 if there.early_axis is None else there.early_axis.size,
         )
         made = experiment(scope, there.name, there.place, resolved, cases, allowances)
@@ -235,7 +223,7 @@ class _Sweep:
             check_beds(self.complaints, made)
         self.complaints.settle()
         self.source.effects.examine(scope, run, made, self.definition.group.body)
-        return ((made, scope), rows[keep]), dropped
+        return ((made, scope), rows), dropped
 
     def _with_macros(self, sweep: Sweep, choices: Choices) -> _Read:
         """The deck as it is with the macros that are chosen."""
@@ -351,19 +339,31 @@ def _dependents(scope: Scope) -> dict[str, list[str]]:
     return found
 
 
-def _numbered(name: str, made: Sequence[tuple[ScopedExperiment, np.ndarray]]) -> list[ScopedExperiment]:
+def _numbered(name: str, made: Sequence[tuple[ScopedExperiment, SweptRows]]) -> list[ScopedExperiment]:
     """The groups with their names, and the positions of their cases in the sweep's table."""
     if len(made) == 1:
         return [made[0][0]]
-    everything = np.sort(np.concatenate([rows for _, rows in made]))
+    among = _all_of([rows for _, rows in made])
     slugs = _slugs([group for (group, _), _ in made])
     out = []
     for ((group, scope), rows), slug in zip(made, slugs, strict=True):
-        positions = np.searchsorted(everything, rows).astype(float)
+        positions = listed(PositionColumn(rows, among))
         out.append(
             (replace(group, name=f"{name}.{slug}", sweep=name, cases=replace(group.cases, positions=positions)), scope)
         )
     return out
+
+
+def _all_of(groups: Sequence[SweptRows]) -> RowBits | None:
+    """The rows of a sweep's product that are cases of one of its structures; None where that is every row."""
+    whole = math.prod(groups[0].sizes)
+    if sum(rows.count for rows in groups) == whole:
+        return None
+    flags = np.zeros(whole, dtype=bool)
+    for rows in groups:
+        for piece in blocks(rows.count):
+            flags[rows.number(np.arange(piece.start, piece.stop))] = True
+    return RowBits.of(flags)
 
 
 def _slugs(groups: Sequence[Experiment]) -> list[str]:
@@ -404,7 +404,7 @@ def _sum(source: DeckSource, definition: Definition, within: tuple[str, ...]) ->
             return []
         parts.append((named, found))
     made: list[ScopedExperiment] = []
-    seen: dict[tuple[str, str], str] = {}
+    seen: dict[str, list[tuple[np.ndarray, str]]] = {}  # by program, the ids of groups and the parts they are of
     first = 0
     names = [name.text for name in definition.parts]
     if len(set(names)) < len(names):
@@ -414,10 +414,13 @@ def _sum(source: DeckSource, definition: Definition, within: tuple[str, ...]) ->
         size = sum(group.cases.count for group, _ in found)
         for group, scope in found:
             program = keys.structure_key(group.structure)
-            ids = [(program, each) for each in keys.case_ids(group)]
-            again = [n for n, each in enumerate(ids) if each in seen]
-            if again and not source.complaints.errors:  # parts that are wrong may be the same until they are mended
-                there, position = seen[ids[again[0]]], int(group.cases.table[again[0]])
+            ids, before = keys.id_numbers(group), seen.setdefault(program, [])
+            again = np.flatnonzero(
+                np.any([np.zeros(len(ids), bool), *(np.isin(ids, each) for each, _ in before)], axis=0)
+            )
+            if len(again) and not source.complaints.errors:  # parts that are wrong may be the same until mended
+                there = next(part for each, part in reversed(before) if ids[again[0]] in each)
+                position = int(group.cases.table[again[0]])
                 message = f"case #{position} of `{named.text}` is in `{there}` too"
                 if len(again) > 1:
                     message = f"{len(again)} cases of `{named.text}` are in `{there}` too, the first is #{position}"
@@ -434,8 +437,8 @@ def _sum(source: DeckSource, definition: Definition, within: tuple[str, ...]) ->
                         ],
                     )
                 )
-            seen |= dict.fromkeys(ids, named.text)
-            positions = (group.cases.table + first).astype(float)
+            before.append((ids, named.text))
+            positions = listed(ShiftedColumn(group.cases.table, first))
             made.append(
                 (
                     replace(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ic.meaning.parameters.scope import Scope
 from ic.sweeps.axes import Sweep
 from ic.sweeps.choices import ONE_OF_TWO
@@ -11,6 +9,7 @@ from ic.text.complaints import Complaints, known_words
 from met import units
 from met.diagnostic import Label, did_you_mean
 from met.plan import REPEAT, Coordinate, Experiment
+from met.plan.columns import CaseValues
 
 
 def check_coordinates(scope: Scope, *, complete: bool) -> None:
@@ -101,7 +100,7 @@ def parameters_nearby(scope: Scope, path: str) -> list[str]:
 def plan_coordinates(
     scope: Scope,
     sweep: Sweep,
-    columns: dict[str, np.ndarray],
+    columns: dict[str, CaseValues],
     dependents: dict[str, list[str]],
 ) -> tuple[Coordinate, ...]:
     """The coordinates as a plan holds them. dependents: parameters whose formulas need each coordinate."""

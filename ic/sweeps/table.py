@@ -2,138 +2,201 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ic.grammar.syntax import Binary, Name
+from ic.grammar.syntax import Name
+from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.quantity import Value, ValueList
-from ic.meaning.expressions.truths import Truths
+from ic.meaning.expressions.truths import NumberComparison, Truths
 from ic.meaning.parameters.scope import Scope
-from ic.sweeps.axes import Sweep
-from ic.sweeps.choices import OF_JOINT, OF_RUN, Choices
+from ic.sweeps.axes import Sweep, SweepAxis
+from ic.sweeps.choices import OF_JOINT, OF_RUN, ChoiceColumn, Choices
 from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
 from met.plan import Structure
 from met.plan.channel import channels
+from met.plan.columns import AxisColumn, CaseValues, CountedRows, listed
+from met.plan.swept import RowBits, SweptRows, blocks
 from met.trace import Scalar
 from met.unit_parser import parse_unit
 
 MOST_NAMED = 4
+MOST_STRUCTURES = 256
 ROUNDING = 1e-12  # relative: some thousand roundings, and far below what anyone means to tell apart
 
 
-def _index(sweep: Sweep, rows: np.ndarray) -> dict[str, np.ndarray]:
-    """By path, which value of its column each of these rows of the product has."""
-    found: dict[str, np.ndarray] = {}
-    after = math.prod(sweep.sizes)
-    for axis, size in zip(sweep.axes, sweep.sizes, strict=False):
-        after //= size
-        index = (rows // after) % size
-        found |= {column.path: index for column in axis.columns}
-    return found
-
-
-def columns(sweep: Sweep, rows: np.ndarray) -> dict[str, np.ndarray]:
+def columns(sweep: Sweep, rows: SweptRows) -> dict[str, CaseValues]:
     """Values of the numbers that vary, by path, in these rows of the product."""
-    index = _index(sweep, rows)
-    return {column.path: column.values[index[column.path]] for column in sweep.varied}
+    return {
+        column.path: listed(AxisColumn(rows, number, column.values))
+        for number, axis in enumerate(sweep.axes)
+        for column in axis.columns
+        if isinstance(column, VariedPath)
+    }
 
 
-def repeats(sweep: Sweep, rows: np.ndarray) -> np.ndarray | None:
+def repeats(sweep: Sweep, rows: SweptRows) -> CaseValues | None:
     """Number of the repeat of each of these rows; None where nothing is repeated."""
-    return None if sweep.repeated is None else (rows % sweep.repeat).astype(float)
+    return None if sweep.repeated is None else listed(AxisColumn(rows, len(sweep.axes), CountedRows(sweep.repeat)))
 
 
-def structures(sweep: Sweep) -> list[tuple[Choices, np.ndarray]]:
-    """The structures that a sweep is of: what is chosen, and the rows of the product; in order of first appearance."""
-    rows = np.arange(math.prod(sweep.sizes))
-    if not sweep.chosen:
-        return [((), rows)]
-    index = _index(sweep, rows)
-    code = np.zeros(len(rows), dtype=np.int64)
-    for column in sweep.chosen:
-        known: dict[str, int] = {}
-        numbers = np.array([known.setdefault(option.text, len(known)) for option in column.options])
-        code = code * len(known) + numbers[index[column.path]]
-    order = np.argsort(code, kind="stable")
-    parts = np.split(order, np.flatnonzero(np.diff(code[order])) + 1)
+def structures(sweep: Sweep) -> list[tuple[Choices, SweptRows]]:
+    """The structures that a sweep is of: what is chosen, and the rows of the product; in order of first appearance.
+
+    What is chosen on an axis goes with some of its values, whatever the others are. Raises Problem D229 where there are
+    too many structures.
+    """
+    by_axis = [_by_choice(axis) for axis in sweep.axes]
+    count = math.prod(len(parts) for parts in by_axis)
+    if count > MOST_STRUCTURES:
+        raise Problem(
+            error(
+                "D229",
+                f"sweep `{sweep.name}` is of {count} structures",
+                sweep.place,
+                help=[
+                    f"{MOST_STRUCTURES} are possible, each with a program of its own",
+                    "what is a number of a model, varied as such, needs no other structure",
+                ],
+            )
+        )
     made = []
-    for there in sorted(parts, key=lambda part: int(part[0])):
-        chosen = tuple((column, column.options[int(index[column.path][there[0]])]) for column in sweep.chosen)
-        made.append((chosen, there))
-    return made
+    for parts in itertools.product(*by_axis):
+        chosen = tuple(
+            (column, column.options[0 if places is None else int(places[0])])
+            for axis, places in zip(sweep.axes, parts, strict=True)
+            for column in axis.columns
+            if isinstance(column, ChoiceColumn)
+        )
+        made.append((chosen, SweptRows(sweep.sizes, (*parts, None))))
+    return sorted(made, key=lambda one: int(one[1].number(np.zeros(1, np.int64))[0]))
+
+
+def _by_choice(axis: SweepAxis) -> list[np.ndarray | None]:
+    """The places of an axis' values that share what is chosen with them; None: all of them."""
+    chosen = [column for column in axis.columns if isinstance(column, ChoiceColumn)]
+    if not chosen:
+        return [None]
+    alike: dict[tuple[str, ...], list[int]] = {}
+    for place, options in enumerate(zip(*(column.options for column in chosen), strict=True)):
+        alike.setdefault(tuple(option.text for option in options), []).append(place)
+    return [None] if len(alike) == 1 else [np.array(places) for places in alike.values()]
 
 
 # Exclusion
 
 
-def kept(
-    scope: Scope, sweep: Sweep, values: Mapping[str, np.ndarray], choices: Choices, count: int, structure: Structure
-) -> tuple[np.ndarray, list[int]]:
-    """The rows that no `exclude when` drops, as a mask, and how many each drops; warns where rounding decides.
+PIECE = 1 << 18
+"""Rows for which conditions are asked together."""
 
-    values, choices  what varies in the `count` rows, and what they have in common
-    structure        theirs
+
+def kept(
+    scope: Scope, sweep: Sweep, rows: SweptRows, choices: Choices, structure: Structure
+) -> tuple[SweptRows, list[int]]:
+    """Those of the rows that no `exclude when` drops, and how many each drops; warns where rounding decides.
+
+    choices    what the rows have in common;  structure: theirs
     """
-    keep = np.ones(count, dtype=bool)
-    dropped = []
-    truths = _Truths(scope, values, choices, count, structure)
-    for statement in sweep.excludes:
-        drops = np.zeros(count, dtype=bool)
+    if not sweep.excludes:
+        return rows, []
+    values = columns(sweep, rows)
+    truths = _Truths(scope, choices, rows.count, structure)
+    packed, dropped, wrong = [], [0] * len(sweep.excludes), set[int]()  # statements that are reported as wrong
+    for piece in blocks(rows.count, PIECE):
+        truths.take({path: column[piece] for path, column in values.items()}, piece.stop - piece.start)
+        keep = np.ones(truths.length, dtype=bool)
+        for number, statement in enumerate(sweep.excludes):
+            drops = np.zeros(truths.length, dtype=bool)
+            if number in wrong:
+                continue
+            wrong.add(number)
+            truths.statement = number
+            with scope.complaints.gather():
+                drops = np.broadcast_to(truths.of(statement.value, keep), truths.length)
+                wrong.remove(number)
+            dropped[number] += int(drops.sum())
+            keep &= ~drops
+        packed.append(np.packbits(keep))
+    for number in range(len(sweep.excludes)):
         with scope.complaints.gather():
-            drops = np.broadcast_to(truths.of(statement.value, keep), count)
-        dropped.append(int(drops.sum()))
-        keep &= ~drops
-    return keep, dropped
+            truths.report(number)
+    return rows.only(RowBits(np.concatenate(packed), rows.count)), dropped
+
+
+@dataclass
+class _SeenComparison:
+    """What is found of a comparison of numbers, over all pieces.
+
+    lost  rows in which a side has no value;  close: rows in which rounding decides;  edge: the sides in the first
+    """
+
+    compared: NumberComparison
+    lost: int = 0
+    close: int = 0
+    edge: tuple[float, float] = (0.0, 0.0)
 
 
 class _Truths(Truths):
-    """Conditions over rows of the table of a sweep."""
+    """Conditions over rows of the table of a sweep, piece by piece, and what is to be said of them in the end.
 
-    def __init__(
-        self, scope: Scope, values: Mapping[str, np.ndarray], choices: Choices, count: int, structure: Structure
-    ) -> None:
+    statement  the number of the `exclude when` that is asked
+    """
+
+    def __init__(self, scope: Scope, choices: Choices, count: int, structure: Structure) -> None:
         words = {column.path: option.text for column, option in choices}
         options = {column.path: [option.text for option in column.options] for column, _ in choices}
-        super().__init__(self._find, scope.graph, values, count, words, options)
-        self.scope, self.structure = scope, structure
+        super().__init__(self._find, scope.graph, words, options)
+        self.scope, self.count, self.structure = scope, count, structure
+        self.statement = 0
+        self._seen: dict[tuple[int, int], _SeenComparison] = {}  # by statement, and by the expression
 
     def warn(self, found: Diagnostic) -> None:
         self.scope.complaints.add(replace(found, severity="warning"))
 
-    def look_at(
-        self, expression: Binary, sides: Sequence[Value], left: np.ndarray, right: np.ndarray, asked: np.ndarray
-    ) -> None:
-        """Refuse a side that has no value, and warn where rounding decides."""
-        lost = asked & (np.isnan(left) | np.isnan(right))
-        cases = f"of {self.count} {'case' if self.count == 1 else 'cases'}"
-        if lost.any():
-            raise Problem(
-                error(
-                    "D066",
-                    f"a side of this comparison has no value in {int(lost.sum())} {cases}",
-                    expression.place,
-                    help=[
-                        "it is the root of a negative number, or zero divided by zero",
-                        "ask before whether there is one: `exclude when x >= 0 m^2 and sqrt(x) > 1 m;`",
-                    ],
-                )
-            )
+    def look_at(self, compared: NumberComparison, left: np.ndarray, right: np.ndarray, asked: np.ndarray) -> None:
+        key = self.statement, id(compared.expression)
+        seen = self._seen.setdefault(key, _SeenComparison(compared))
+        seen.lost += int(np.count_nonzero(asked & (np.isnan(left) | np.isnan(right))))
         finite = np.isfinite(left) & np.isfinite(right) & (left != right) & asked
         edge = finite.copy()
         edge[finite] = np.abs(left - right)[finite] <= ROUNDING * np.maximum(np.abs(left), np.abs(right))[finite]
         if edge.any():
-            row = int(np.flatnonzero(edge)[0])
-            self.scope.complaints.remark(
-                "D127",
-                f"rounding decides this comparison in {int(edge.sum())} {cases}",
-                expression.place,
-                also=[Label(sides[0].place, f"{float(left[row])!r}"), Label(sides[1].place, f"{float(right[row])!r}")],
-                help="compare with a limit between two values, not with one of them",
-            )
+            if not seen.close:
+                row = int(np.flatnonzero(edge)[0])
+                seen.edge = float(left[row]), float(right[row])
+            seen.close += int(edge.sum())
+
+    def report(self, number: int) -> None:
+        """Report what was found of the comparisons of a statement, in their order. Raises Problem D066 where one has no
+        value, and then nothing of those behind it."""
+        cases = f"of {self.count} {'case' if self.count == 1 else 'cases'}"
+        for seen in (each for (statement, _), each in self._seen.items() if statement == number):
+            place = seen.compared.expression.place
+            if seen.lost:
+                raise Problem(
+                    error(
+                        "D066",
+                        f"a side of this comparison has no value in {seen.lost} {cases}",
+                        place,
+                        help=[
+                            "it is the root of a negative number, or zero divided by zero",
+                            "ask before whether there is one: `exclude when x >= 0 m^2 and sqrt(x) > 1 m;`",
+                        ],
+                    )
+                )
+            if seen.close:
+                shown = zip(seen.compared.sides, seen.edge, strict=True)
+                self.scope.complaints.remark(
+                    "D127",
+                    f"rounding decides this comparison in {seen.close} {cases}",
+                    place,
+                    also=[Label(side.place, f"{value!r}") for side, value in shown],
+                    help="compare with a limit between two values, not with one of them",
+                )
 
     def _find(self, name: Name) -> Value | ValueList:
         """Names in `exclude when`: coordinates, parameters of the run, then what any expression may name."""

@@ -16,6 +16,7 @@ from met.diagnostic import Problem
 from met.frozen import frozen
 from met.integrators.integrator import Integrator
 from met.plan import BASE, Experiment
+from met.plan.columns import ends
 
 if TYPE_CHECKING:
     from met.analysis.blame import Unstable
@@ -81,7 +82,7 @@ def chosen_cases(experiment: Experiment, also: Iterable[int] = ()) -> tuple[int,
     """The first case, those in which each coordinate is least and largest, and `also`; as many as time allows."""
     wanted = [0, *also]
     for coordinate in experiment.cases.coordinates:
-        wanted += [int(np.argmin(coordinate.values)), int(np.argmax(coordinate.values))]
+        wanted += ends(coordinate.values)
     joints, states = len(experiment.structure.moving), 6 * len(experiment.structure.servos)
     most = max(2, LANES // (2 * joints + states + 12))
     found = list(dict.fromkeys(case for case in wanted if case < experiment.cases.count))[:most]

@@ -49,6 +49,7 @@ import numpy as np
 from met.diagnostic import Place
 from met.frozen import frozen, keyed
 from met.parameter import BASE, Parameter
+from met.plan.columns import CaseValues, FormulaColumn, ShiftedColumn, all_rows, listed
 from met.plan.run_keys import RunKey, run_key
 from met.trace.graph import Formulas
 
@@ -496,7 +497,8 @@ Design = Literal["", "random", "lhs", "sobol", "saltelli"]
 
 @frozen
 class Coordinate:
-    """One varied parameter of a sweep, as the deck wrote its path; values are in SI, one a case.
+    """One varied parameter of a sweep, as the deck wrote its path; values are in SI, one a case, and computed where
+    they are asked for in a long table.
 
     sets: paths of the parameters that follow it directly. unit, scale: as the deck wrote it, for display;
     shown = value / scale.
@@ -506,7 +508,7 @@ class Coordinate:
     path: str
     unit: str
     scale: float
-    values: np.ndarray
+    values: CaseValues
     sets: tuple[str, ...]
     place: Place | None = None
     design: Design = keyed("never", default="")
@@ -543,8 +545,8 @@ class Cases:
     seed: int = 0
     seeds: Literal["common", "independent"] = "common"
     choices: tuple[Choice, ...] = ()
-    repeats: np.ndarray | None = None
-    positions: np.ndarray | None = None
+    repeats: CaseValues | None = None
+    positions: CaseValues | None = None
     until_shown: int = 0
 
     @property
@@ -553,9 +555,13 @@ class Cases:
         return (*([REPEAT] if self.repeats is not None else []), *([SEED] if self.seeds == "independent" else []))
 
     @property
-    def table(self) -> np.ndarray:
+    def table(self) -> CaseValues:
         """Position of each case in the table of its sweep."""
-        return np.arange(self.count) if self.positions is None else self.positions.astype(np.int64)
+        if self.positions is None:
+            return all_rows(self.count)
+        if isinstance(self.positions, np.ndarray):
+            return self.positions.astype(np.int64)
+        return ShiftedColumn(self.positions, 0, np.int64)
 
 
 @frozen
@@ -583,6 +589,12 @@ class Experiment:
     def allows(self, code: str) -> bool:
         """Return True if a warning with this code is not to be given of this experiment, at a check or at a run."""
         return any(each.code == code for each in self.allowances)
+
+    def column(self, formula: Formula) -> CaseValues:
+        """The values of a parameter that varies, one a case."""
+        one = Formulas(self.formulas.inputs, self.formulas.nodes, (self.formulas.outputs[formula.output],))
+        inputs = {coordinate.path: coordinate.values for coordinate in self.cases.coordinates}
+        return listed(FormulaColumn(one, inputs, self.cases.count))
 
     @property
     def name_in_deck(self) -> str:

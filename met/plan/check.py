@@ -30,8 +30,10 @@ from met.plan import relations as relations
 from met.plan import rest as rest
 from met.plan import structure as plan_structure
 from met.plan.codec import Damaged
+from met.plan.columns import CaseValues
 from met.plan.defaults import INERTIA, declared, heads_of_models, related
 from met.plan.outputs import tolerable
+from met.plan.swept import blocks
 from met.statistics.confidence import can_be_shown
 from met.trace.graph import Formulas
 from met.trace.nodes import TRUTHS
@@ -190,13 +192,18 @@ def _check_until_shown(experiment: Experiment, where: str) -> None:
         raise Damaged(where, "no requirement has a confidence, so nothing is to be shown")
 
 
-def _check_numbering(numbers: np.ndarray, count: int, rising: bool, where: str) -> None:
-    if numbers.shape != (count,):
-        raise Damaged(where, f"there are {numbers.size} for {count} cases")
-    if not (np.isfinite(numbers).all() and (numbers == np.rint(numbers)).all()):
-        raise Damaged(where, "they should be whole numbers")
-    if not ((numbers >= 0) & (numbers < 2**32)).all() or (rising and not (np.diff(numbers) > 0).all()):
-        raise Damaged(where, "they should be at least 0" + (", and rise" if rising else " and below 2^32"))
+def _check_numbering(column: CaseValues, count: int, rising: bool, where: str) -> None:
+    if column.shape != (count,):
+        raise Damaged(where, f"there are {column.size} for {count} cases")
+    before = -1.0
+    for rows in blocks(count):
+        numbers = np.asarray(column[rows])
+        if not (np.isfinite(numbers).all() and (numbers == np.rint(numbers)).all()):
+            raise Damaged(where, "they should be whole numbers")
+        good = bool(((numbers >= 0) & (numbers < 2**32)).all())
+        if not good or (rising and not (numbers[0] > before and (np.diff(numbers) > 0).all())):
+            raise Damaged(where, "they should be at least 0" + (", and rise" if rising else " and below 2^32"))
+        before = float(numbers[-1])
 
 
 def _check_coordinate(experiment: Experiment, coordinate: Coordinate, where: str) -> None:

@@ -16,9 +16,10 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from met.plan import Formula, Quantity
+from met.plan.columns import CaseValues
 from met.trace.graph import Formulas
 
-Fetch = Callable[[dict[str, Any]], np.ndarray]
+Fetch = Callable[[dict[str, Any]], CaseValues]
 
 NOT_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
@@ -60,7 +61,7 @@ def encode(hint: Any, value: Any) -> Any:
     if origin is Mapping:
         return {str(key): encode(arguments[1], item) for key, item in value.items()}
     if origin in (Union, types.UnionType):
-        return None if value is None else encode(_chosen(arguments, value), value)
+        return None if value is None else encode(_chosen(arguments), value)
     if hint is int:
         return int(value)
     return value
@@ -86,8 +87,8 @@ def _encode_quantity(value: Any) -> Any:
     return encode(float, value)
 
 
-def _chosen(arguments: tuple[Any, ...], value: Any) -> Any:
-    """The one type of an optional field that is not None."""
+def _chosen(arguments: tuple[Any, ...]) -> Any:
+    """The one type of an optional field that is not None; of a column of a case table, that of an array."""
     return next(argument for argument in arguments if argument is not type(None))
 
 
@@ -113,7 +114,8 @@ def decode(hint: Any, data: Any, where: str = "", fetch: Fetch | None = None) ->
         _expect(isinstance(data, dict), where, "an object")
         return {key: decode(arguments[1], item, f"{where}.{key}".lstrip("."), fetch) for key, item in data.items()}
     if origin in (Union, types.UnionType):
-        return None if data is None else decode(_chosen(arguments, data), data, where, fetch)
+        optional = type(None) in arguments
+        return None if data is None and optional else decode(_chosen(arguments), data, where, fetch)
     if origin is Literal:
         _expect(data in arguments, where, "one of " + ", ".join(map(str, arguments)))
         return data
@@ -202,7 +204,7 @@ def _number(data: Any, where: str) -> float:
         raise Damaged(where, "the number is too large") from None
 
 
-def _array(data: Any, where: str, fetch: Fetch | None) -> np.ndarray:
+def _array(data: Any, where: str, fetch: Fetch | None) -> CaseValues:
     if isinstance(data, dict):
         if fetch is None:
             raise Damaged(where, "its values are kept elsewhere")

@@ -6,10 +6,13 @@ Every dataclass of `met.plan` is an object of its fields, those that equal their
 shortest text that reads back to the same bits; "nan", "inf" and "-inf" are words. A parameter's value is a number, a
 list, {"word": ...} or {"formula": output}.
 
-A case table of more than `INLINE_ROWS` rows lies beside the plan, one binary file an experiment
-(`plan.gains.cases.npy`: coordinate by case, little-endian doubles), named in the plan with its SHA-256.
+A case table of more than `LISTED_ROWS` rows lies beside the plan, one binary file an experiment
+(`plan.gains.cases.npy`: coordinate by case, little-endian doubles), named in the plan with its SHA-256. One of more
+than `TABLE_ROWS` is kept as what it is computed from (met/plan/recipes.py): sizes of axes, seeds; long lists lie beside
+(`plan.gains.0.npy`). A plan that is written for workers keeps every long table so.
 
-Version 1 is the first. A plan of a newer version is refused. In an older one, parameters that its models have got
+Version 1 is the first; a plan with a table that is computed is of version 2. A plan of a newer version is refused. In
+an older one, parameters that its models have got
 since take their defaults, and the experiment's notes list them.
 """
 
@@ -19,7 +22,7 @@ import hashlib
 import io
 import json
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,19 +32,27 @@ import numpy as np
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, read_regular, whole_file
 from met.outputs import check_regular, not_overwritten
-from met.plan import Experiment, Formula, Plan
+from met.plan import Experiment, Formula, Plan, recipes
 from met.plan.codec import Damaged, decode, encode
+from met.plan.columns import LISTED_ROWS, CaseValues
+from met.plan.swept import blocks
 
 SCHEMA = "met.plan"
-VERSION = 1
-INLINE_ROWS = 10_000
+VERSION = 2
+TABLE_ROWS = 10_000_000
+"""Rows up to which a plan or an archive holds a case table as numbers."""
 
-Refer = Callable[[Experiment, int], dict[str, Any]]
-Fetch = Callable[[dict[str, Any]], np.ndarray]
+PIECE = 1 << 18
+"""Rows of a table that are written together."""
+
+Refer = Callable[[Experiment, int], Any]
+Fetch = Callable[[dict[str, Any]], CaseValues]
 
 
-def write(plan: Plan, path: str | os.PathLike[str]) -> tuple[Path, ...]:
+def write(plan: Plan, path: str | os.PathLike[str], *, computed: bool = False) -> tuple[Path, ...]:
     """Write a plan, and its large case tables beside it; the files written.
+
+    computed  whether all tables that are not listed are kept as what they are computed from, not the longest alone
 
     Raises Problem E300, and writes nothing, where it cannot, or where something else than a plan is there already.
     """
@@ -50,11 +61,23 @@ def write(plan: Plan, path: str | os.PathLike[str]) -> tuple[Path, ...]:
         raise Problem(error("E300", f"cannot write {path}: it is a folder", help="name a file: `-o plan.json`"))
     files: dict[Path, bytes] = {}
 
-    def refer(experiment: Experiment, index: int) -> dict[str, Any]:
-        beside = path.with_name(f"{path.stem}.{experiment.name}.cases.npy")
-        if beside not in files:
-            files[beside] = table_bytes(experiment)
-        return {"file": beside.name, "row": index, "sha256": hashlib.sha256(files[beside]).hexdigest()}
+    def beside(experiment: Experiment, what: str, data: bytes) -> dict[str, Any]:
+        target = path.with_name(f"{path.stem}.{experiment.name}.{what}.npy")
+        files[target] = data
+        return {"file": target.name, "sha256": hashlib.sha256(data).hexdigest()}
+
+    tables: dict[str, dict[str, Any]] = {}
+    keepers: dict[str, recipes.ArrayKeeper] = {}
+
+    def refer(experiment: Experiment, index: int) -> Any:
+        name = experiment.name
+        if experiment.cases.count <= (LISTED_ROWS if computed else TABLE_ROWS):
+            if name not in tables:
+                tables[name] = beside(experiment, "cases", table_bytes(experiment))
+            return {**tables[name], "row": index}
+        if name not in keepers:
+            keepers[name] = recipes.ArrayKeeper(lambda n, array: beside(experiment, str(n), array_bytes(array)))
+        return recipes.encoded(columns(experiment)[index], keepers[name].keep)
 
     files[path] = dumps(plan, refer).encode()  # last, so that a plan never names a table that is not there yet
     _check_targets(path, files)
@@ -63,8 +86,9 @@ def write(plan: Plan, path: str | os.PathLike[str]) -> tuple[Path, ...]:
     return tuple(files)
 
 
-def read(path: str | os.PathLike[str]) -> Plan:
-    """The plan in a file. Raises Problem E301 (no file), E302 (damaged), E303 (newer), E304 (a model's parameter)."""
+def read(path: str | os.PathLike[str], *, every_case: bool = True) -> Plan:
+    """The plan in a file. every_case: whether all cases of a long table are checked, or the first alone, as where that
+    was done before. Raises Problem E301 (no file), E302 (damaged), E303 (newer), E304 (a model's parameter)."""
     path = Path(path)
     try:
         text = read_regular(path).decode("utf-8")
@@ -72,43 +96,70 @@ def read(path: str | os.PathLike[str]) -> Plan:
         raise Problem(error("E301", f"cannot read the plan {path}: {_why(reason)}")) from reason
     except UnicodeDecodeError as reason:
         raise Problem(_damaged(str(path), "it is not text")) from reason
-    tables: dict[str, tuple[np.ndarray, str]] = {}
+    arrays: dict[str, tuple[np.ndarray, str]] = {}
 
-    def fetch(reference: dict[str, Any]) -> np.ndarray:
-        name, row = _word(reference, "file"), reference.get("row")
-        if name not in tables:
-            tables[name] = _read_table(path, name)
-        table, digest = tables[name]
+    def find(reference: dict[str, Any]) -> np.ndarray:
+        name = _word(reference, "file")
+        if name not in arrays:
+            arrays[name] = _read_array(path, name)
+        array, digest = arrays[name]
         if digest != reference.get("sha256"):
             raise Damaged("", f"the case table {name} beside it is not the one it was written with (SHA-256 differs)")
+        return array
+
+    return loads(text, str(path), fetcher(find), every_case=every_case)
+
+
+def fetcher(find: recipes.Find) -> Fetch:
+    """Give what reads a column that a plan refers to: a row of a table that `find` gives, or what computes it."""
+    reader = recipes.RecipeReader(find)
+
+    def fetch(reference: dict[str, Any]) -> CaseValues:
+        if "row" not in reference:
+            try:
+                return reader.column(reference)
+            except (ValueError, LookupError, TypeError, OverflowError) as reason:
+                raise Damaged("", f"its case table is not told as it should be: {reason}") from reason
+        table, row, name = find(reference), reference["row"], reference.get("file")
+        if table.ndim != 2 or table.dtype != np.dtype("<f8"):
+            raise Damaged("", f"the case table {name} is not a table of doubles")
         if type(row) is not int or not 0 <= row < len(table):
             raise Damaged("", f"the case table {name} has no row {row}")
-        return table[row]
+        return np.asarray(table[row])
 
-    return loads(text, str(path), fetch)
+    return fetch
 
 
 def dumps(plan: Plan, refer: Refer | None = None) -> str:
     """A plan as canonical JSON. refer: what to write in place of a large table's coordinate; None: all values."""
-    kept_elsewhere = [refer is not None and experiment.cases.count > INLINE_ROWS for experiment in plan.experiments]
+    kept_elsewhere = [refer is not None and experiment.cases.count > LISTED_ROWS for experiment in plan.experiments]
     bare = [
         _without_values(e) if elsewhere else e for e, elsewhere in zip(plan.experiments, kept_elsewhere, strict=True)
     ]
-    body = encode(Plan, replace(plan, experiments=tuple(bare)))
+    body, computed = encode(Plan, replace(plan, experiments=tuple(bare))), False
     for experiment, written, elsewhere in zip(plan.experiments, body["experiments"], kept_elsewhere, strict=True):
         if refer is not None and elsewhere:
             cases = written["cases"]
-            columns = [(coordinate, "values") for coordinate in cases.get("coordinates", ())]
-            columns += [(cases, name) for name in ("repeats", "positions") if name in cases]
-            for index, (holder, name) in enumerate(columns):
+            places = [(coordinate, "values") for coordinate in cases.get("coordinates", ())]
+            places += [(cases, name) for name in ("repeats", "positions") if name in cases]
+            for index, (holder, name) in enumerate(places):
                 holder[name] = refer(experiment, index)
-    document = {"schema": SCHEMA, "version": VERSION, **body}
+                computed = computed or not holder[name].keys() & {"row", "index"}
+    document = {"schema": SCHEMA, "version": VERSION if computed else 1, **body}
     return json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def loads(text: str, name: str = "plan", fetch: Fetch | None = None, *, as_written: bool = False) -> Plan:
+def loads(
+    text: str,
+    name: str = "plan",
+    fetch: Fetch | None = None,
+    *,
+    as_written: bool = False,
+    every_case: bool = True,
+) -> Plan:
     """A plan from its JSON. name: for messages. fetch: gives the values of a coordinate that are kept elsewhere.
     as_written: to be looked at, not run: whatever models there are here, and without what they have got since.
+    every_case: as `read`.
     """
     from met.plan.check import check, check_text
 
@@ -132,7 +183,7 @@ def loads(text: str, name: str = "plan", fetch: Fetch | None = None, *, as_writt
         plan: Plan = decode(Plan, document, "", fetch)
         if as_written:
             return plan
-        check(plan.experiments)
+        check(plan.experiments if every_case else map(_beginning, plan.experiments))
     except RecursionError as reason:
         raise Problem(_damaged(name, "it is nested too deeply")) from reason
     except Damaged as reason:
@@ -172,17 +223,41 @@ def completed(plan: Plan, name: str = "plan", version: int = VERSION) -> Plan:
 
 def table_bytes(experiment: Experiment) -> bytes:
     """A case table as the bytes of a .npy file: coordinate by case, little-endian doubles."""
+    return array_bytes(np.array(columns(experiment), dtype="<f8").reshape(-1, experiment.cases.count))
+
+
+def array_bytes(array: np.ndarray) -> bytes:
+    """An array as the bytes of a .npy file."""
     buffer = io.BytesIO()
-    np.lib.format.write_array(buffer, table(experiment), version=(1, 0), allow_pickle=False)
+    np.lib.format.write_array(buffer, array, version=(1, 0), allow_pickle=False)
     return buffer.getvalue()
 
 
-def table(experiment: Experiment) -> np.ndarray:
-    """The values of all coordinates, SI, then repeats and positions where there are any: (column, case)."""
+def columns(experiment: Experiment) -> list[CaseValues]:
+    """The values of all coordinates, SI, then repeats and positions where there are any."""
     cases = experiment.cases
-    columns = [coordinate.values for coordinate in cases.coordinates]
-    columns += [column for column in (cases.repeats, cases.positions) if column is not None]
-    return np.array(columns, dtype="<f8").reshape(len(columns), cases.count)
+    found = [coordinate.values for coordinate in cases.coordinates]
+    return found + [column for column in (cases.repeats, cases.positions) if column is not None]
+
+
+def table_pieces(experiment: Experiment) -> Iterator[tuple[int, slice, np.ndarray]]:
+    """A case table piece by piece: number of the column, rows, their values as little-endian doubles."""
+    for number, column in enumerate(columns(experiment)):
+        for rows in blocks(len(column), PIECE):
+            yield number, rows, np.asarray(column[rows], dtype="<f8")
+
+
+def _beginning(experiment: Experiment) -> Experiment:
+    """The experiment with the first rows alone of a long case table."""
+    cases = experiment.cases
+    if cases.count <= LISTED_ROWS or any(column.size != cases.count for column in columns(experiment)):
+        return experiment
+    coordinates = tuple(replace(each, values=np.asarray(each.values[:LISTED_ROWS])) for each in cases.coordinates)
+    repeats, positions = (
+        None if column is None else np.asarray(column[:LISTED_ROWS]) for column in (cases.repeats, cases.positions)
+    )
+    shorter = replace(cases, count=LISTED_ROWS, coordinates=coordinates, repeats=repeats, positions=positions)
+    return replace(experiment, cases=shorter)
 
 
 def _without_values(experiment: Experiment) -> Experiment:
@@ -192,7 +267,7 @@ def _without_values(experiment: Experiment) -> Experiment:
     return replace(experiment, cases=replace(cases, coordinates=coordinates, repeats=repeats, positions=positions))
 
 
-def _read_table(plan: Path, name: str) -> tuple[np.ndarray, str]:
+def _read_array(plan: Path, name: str) -> tuple[np.ndarray, str]:
     if Path(name).name != name or not name:
         raise Damaged("", f"it names a case table outside its folder: {name}")
     try:
@@ -205,8 +280,6 @@ def _read_table(plan: Path, name: str) -> tuple[np.ndarray, str]:
         array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
     except (ValueError, EOFError, OSError, TypeError, OverflowError, MemoryError) as reason:
         raise Damaged("", f"the case table {name} beside it is damaged") from reason
-    if array.ndim != 2 or array.dtype != np.dtype("<f8"):
-        raise Damaged("", f"the case table {name} beside it is not a table of doubles")
     return array, hashlib.sha256(data).hexdigest()
 
 

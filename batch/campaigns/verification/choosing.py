@@ -6,10 +6,9 @@ import hashlib
 
 import numpy as np
 
-from batch.campaigns.keep import CaseOutcomes, worst
+from batch.campaigns.outcomes import CaseOutcomes
 from met.distinct import distinct
 from met.plan import Experiment
-from met.run import DONE
 
 SEEDED = 2
 """Cases that the seed chooses among all."""
@@ -18,19 +17,24 @@ SEEDED = 2
 def chosen(experiment: Experiment, results: CaseOutcomes) -> np.ndarray:
     """Places of the cases to verify, rising, among those that reached their end: the first, the last, the worst of each
     metric, and `SEEDED` more by the seed of the experiment's noise. None where no case did."""
-    done = np.flatnonzero(results.status == DONE)
-    if not len(done):
-        return done
-    places = [int(done[0]), int(done[-1])]
-    for name, values in results.metrics.items():
-        ranked = worst(experiment, name, np.where(np.isfinite(values), values, np.nan))
-        places += ranked[:1].tolist()
+    ends = results.ends()
+    if ends is None:
+        return np.zeros(0, np.int64)
+    places = [*ends, *results.worst_finite()]
     for number in range(SEEDED):
-        left = done[~np.isin(done, places)]
-        if len(left):
+        left = results.done.set - len(set(places))
+        if left:
             digest = hashlib.sha256(f"verified {experiment.cases.seed} {number}".encode()).digest()
-            places.append(int(left[int.from_bytes(digest[:8], "big") % len(left)]))
+            places.append(_done_beside(results, places, int.from_bytes(digest[:8], "big") % left))
     return distinct(np.array(places, np.int64))
+
+
+def _done_beside(results: CaseOutcomes, places: list[int], number: int) -> int:
+    """The case of this number among those that reached their end, without these, all of which did."""
+    ranks = np.sort(results.done.rank(distinct(np.array(places, np.int64))))
+    for rank in ranks.tolist():
+        number += rank <= number
+    return int(results.done.select(np.array([number]))[0])
 
 
 def most(metrics: int, cases: int) -> int:

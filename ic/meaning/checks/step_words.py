@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ic.meaning.control.schedule import hz
 from ic.text.complaints import known_words
 from met.diagnostic import Diagnostic, Label, Place
@@ -127,8 +125,7 @@ def _value(experiment: Experiment, path: str, case: int) -> float:
     value: Any = experiment.parameters[path].value
     if not isinstance(value, Formula):
         return float(value)
-    inputs = {each.path: each.values for each in experiment.cases.coordinates}
-    return float(np.asarray(experiment.formulas.replay(inputs)[value.output])[case])
+    return float(experiment.column(value)[case])
 
 
 def _words(experiment: Experiment, fault: StepFault, better: Remedy) -> tuple[str, str, str, list[str]]:

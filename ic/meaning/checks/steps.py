@@ -19,6 +19,7 @@ from met import models
 from met.diagnostic import Problem
 from met.messages.render import shown_place
 from met.plan import Experiment
+from met.plan.columns import ends
 
 if TYPE_CHECKING:
     from met.analysis.step_size import StepFault, StepSize
@@ -117,7 +118,9 @@ def _looked_at(experiment: Experiment, rows: Sequence[int]) -> str:
     cases = experiment.cases
     if len(rows) >= cases.count:
         return ""
-    ends = [np.ptp(each.values[list(rows)]) == np.ptp(each.values) for each in cases.coordinates]
-    of = "all that varies" if all(ends) else f"{sum(ends)} of the {len(ends)} that vary"
-    those = f", with the least and the largest of {of}" if any(ends) else ""
+    both = [
+        np.ptp(each.values[list(rows)]) == np.ptp(each.values[list(ends(each.values))]) for each in cases.coordinates
+    ]
+    of = "all that varies" if all(both) else f"{sum(both)} of the {len(both)} that vary"
+    those = f", with the least and the largest of {of}" if any(both) else ""
     return f"; looked at {len(rows)} of {cases.count:,} cases{those}: the others are left to the run"

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ic.meaning.control.schedule import slowest_that_fits
 from ic.text.complaints import Complaints
 from met import models
 from met.diagnostic import Label
 from met.plan import Experiment, Formula, Quantity
+from met.plan.columns import ends
 
 ENOUGH = {1: 10.0, 2: 10.0}
 """Steps in a contact, by the integrator's order, with which it gives or takes 3 % of the energy at most."""
@@ -65,8 +64,7 @@ def _stiffest(experiment: Experiment, stiffness: Quantity) -> int:
     """The first case in which it is largest."""
     if not isinstance(stiffness.value, Formula):
         return 0
-    values = experiment.formulas.replay({each.path: each.values for each in experiment.cases.coordinates})
-    return int(np.argmax(np.asarray(values[stiffness.value.output])))
+    return ends(experiment.column(stiffness.value))[1]
 
 
 def _unit(experiment: Experiment, joint: str) -> str:

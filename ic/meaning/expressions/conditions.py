@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from ic.meaning.expressions.quantity import Value
 from ic.text.complaints import Complaints
 from met.diagnostic import Label, Place
 from met.frozen import frozen
+from met.plan.columns import AxisColumn, CaseValues, ends
+from met.plan.swept import blocks
 from met.trace import Formulas, Graph, Real, Scalar
 
 Test = Callable[[np.ndarray], tuple[np.ndarray, list[str]]]
@@ -18,6 +21,16 @@ Test = Callable[[np.ndarray], tuple[np.ndarray, list[str]]]
 
 PIECE = 1 << 16
 """Cases that `in_pieces` tests at a time."""
+
+
+WHOLE = 1 << 20
+"""Cases up to which a test is given all of them at once; more are tested piece by piece."""
+
+SHOWN = 1 << 16
+"""Cases of more that are looked at for warnings, evenly spread, besides those where what varies has its ends."""
+
+MOST_BAD = 1000
+"""Cases that fail a check in pieces that it is asked about once more, for the reason."""
 
 
 def in_pieces(test: Test, values: np.ndarray) -> tuple[np.ndarray, list[str]]:
@@ -39,7 +52,7 @@ class VariedPath:
 
     path: str
     place: Place
-    values: np.ndarray
+    values: CaseValues
     value: Value
     unit: Unit | None
     scale: float
@@ -61,6 +74,7 @@ class Check:
     help: tuple[str, ...] = ()
     path: str = ""
     needs: tuple[str, ...] = ()
+    warns: bool = False
 
 
 class Checks:
@@ -70,6 +84,7 @@ class Checks:
         self.complaints, self.graph, self.varied = complaints, graph, varied
         self._waiting: list[Check] = []
         self._failed: set[str] = set()
+        self._rows: np.ndarray | None = None  # the cases that a test is looking at, where that is not all of them
 
     def fail(self, path: str) -> None:
         self._failed.add(path)
@@ -92,14 +107,18 @@ class Checks:
         help: str | tuple[str, ...] = (),
         path: str = "",
         needs: tuple[str, ...] = (),
+        warns: bool = False,
     ) -> None:
         """Tests [n, k] values now, or once the cases are known where one of them varies.
 
         path   what the check is about; needs: paths whose own checks must hold for this one to say anything
+        warns  whether some of very many cases are enough for it
         """
         if any(self.failed(each) for each in needs):
             return
-        check = Check(values, test, code, message, place, (help,) if isinstance(help, str) else help, path, needs)
+        check = Check(
+            values, test, code, message, place, (help,) if isinstance(help, str) else help, path, needs, warns
+        )
         if any(isinstance(value, Scalar) for value in values):
             self._waiting.append(check)
             return
@@ -111,35 +130,84 @@ class Checks:
     def observe(
         self, values: tuple[Real, ...], act: Callable[[np.ndarray], None], place: Place, needs: tuple[str, ...] = ()
     ) -> None:
-        """Call `act` with [n, k] values now, or once the cases are known where one of them varies: for warnings."""
+        """Call `act` with [n, k] values now, or once the cases are known where one of them varies: for warnings. Of
+        very many cases it gets some, with all ends of what varies."""
 
         def test(table: np.ndarray) -> tuple[np.ndarray, list[str]]:
             act(table)
             return np.zeros(len(table), bool), []
 
-        self.require(values, test, code="", message="", place=place, needs=needs)
+        self.require(values, test, code="", message="", place=place, needs=needs, warns=True)
 
-    def run(self, cases: dict[str, np.ndarray], count: int) -> None:
+    def case_of(self, row: int) -> int | None:
+        """The case in this row of what a test is looking at; None while that is a piece of a long table, of which only
+        the outcome counts."""
+        if self._rows is None:
+            return row
+        return int(self._rows[row]) if len(self._rows) else None
+
+    def run(self, cases: Mapping[str, CaseValues], count: int) -> None:
         """Every check that waited for the cases, over all of them; names the first case that fails one."""
         if not self._waiting or count == 0:
             return
-        formulas = Formulas.of(self.graph, [x for check in self._waiting for x in check.values])
-        columns = iter(formulas.replay(cases))
-        for check in self._waiting:
-            table = np.stack([np.broadcast_to(np.asarray(next(columns), dtype=float), count) for _ in check.values], -1)
+        if count > WHOLE:
+            self._run_in_pieces(cases, count)
+            return
+        for check, table in self._tables({path: np.asarray(values) for path, values in cases.items()}, count):
             bad, causes = check.test(table)
-            if not bad.any() or any(self.failed(each) for each in check.needs):
-                continue
-            self.fail(check.path)
-            row = int(np.flatnonzero(bad)[0])
-            where = ", ".join(f"{path} = {self.shown(path, cases[path][row])}" for path in cases)
-            more = f", and {int(bad.sum()) - 1} more" if bad.sum() > 1 else ""
-            self.complaints.error(
-                check.code,
-                f"{check.message}; case #{row} breaks it{more}",
-                Label(check.place, causes[0] if causes else ""),
-                help=(f"case #{row}: {where}", *(self._narrower(check) or check.help)),
-            )
+            if bad.any():
+                self._refuse(check, cases, int(np.flatnonzero(bad)[0]), int(bad.sum()), causes)
+
+    def _tables(self, values: Mapping[str, np.ndarray], count: int) -> Iterator[tuple[Check, np.ndarray]]:
+        """Every check that waited, with what it tests of so many cases, [n, k]."""
+        formulas = Formulas.of(self.graph, [x for check in self._waiting for x in check.values])
+        columns = iter(formulas.replay(values))
+        for check in self._waiting:
+            parts = [np.broadcast_to(np.asarray(next(columns), dtype=float), count) for _ in check.values]
+            yield check, np.stack(parts, -1)
+
+    def _run_in_pieces(self, cases: Mapping[str, CaseValues], count: int) -> None:
+        """The same of a long table: each check is tested on all of it, and asked for its reason, or what it warns of,
+        on some rows."""
+        shown = _shown_rows(cases, count)
+        some: list[list[np.ndarray]] = [[] for _ in self._waiting]
+        rows: list[list[np.ndarray]] = [[] for _ in self._waiting]
+        failing = [0] * len(self._waiting)
+        for piece in blocks(count):
+            here = shown[np.searchsorted(shown, piece.start) : np.searchsorted(shown, piece.stop)]
+            values, length = {path: column[piece] for path, column in cases.items()}, piece.stop - piece.start
+            for number, (check, table) in enumerate(self._tables(values, length)):
+                taken = here - piece.start
+                if not check.warns:
+                    self._rows = np.empty(0)
+                    bad = np.flatnonzero(check.test(table)[0])
+                    taken = bad[: max(0, MOST_BAD - failing[number])]
+                    failing[number] += len(bad)
+                some[number].append(table[taken])
+                rows[number].append(piece.start + taken)
+        for number, check in enumerate(self._waiting):
+            self._rows = np.concatenate(rows[number])
+            if check.warns or failing[number]:
+                causes = check.test(np.concatenate(some[number]))[1]
+            if failing[number]:
+                self._refuse(check, cases, int(self._rows[0]), failing[number], causes)
+        self._rows = None
+
+    def _refuse(
+        self, check: Check, cases: Mapping[str, CaseValues], row: int, count: int, causes: Sequence[str]
+    ) -> None:
+        """Report a check that fails in so many cases, of which this is the first."""
+        if any(self.failed(each) for each in check.needs):
+            return
+        self.fail(check.path)
+        where = ", ".join(f"{path} = {self.shown(path, cases[path][row])}" for path in cases)
+        more = f", and {count - 1} more" if count > 1 else ""
+        self.complaints.error(
+            check.code,
+            f"{check.message}; case #{row} breaks it{more}",
+            Label(check.place, causes[0] if causes else ""),
+            help=(f"case #{row}: {where}", *(self._narrower(check) or check.help)),
+        )
 
     def _narrower(self, check: Check) -> tuple[str, ...]:
         """The remedy where what is checked was drawn from a normal distribution, which has no bounds."""
@@ -162,3 +230,17 @@ class Checks:
             return value
         formulas = Formulas.of(self.graph, [value])
         return float(formulas.replay({path: float(varied.values[0]) for path, varied in self.varied.items()})[0])
+
+
+MOST_ENDS = 10
+"""Axes whose ends are looked at together, each with each."""
+
+
+def _shown_rows(cases: Mapping[str, CaseValues], count: int) -> np.ndarray:
+    """Rows of a long table that stand for all of it, rising: some in even steps, and those where coordinates are least
+    and largest, in a product also several of them at once."""
+    corners: list[int] = [row for column in cases.values() for row in ends(column)]
+    axes = {column.axis: column for column in cases.values() if isinstance(column, AxisColumn)}
+    if axes and all(column.rows.kept is None for column in axes.values()) and len(axes) <= MOST_ENDS:
+        corners += [sum(rows) for rows in itertools.product(*(ends(column) for column in axes.values()))]
+    return np.unique(np.concatenate([np.linspace(0, count - 1, SHOWN).astype(np.int64), corners]).astype(np.int64))

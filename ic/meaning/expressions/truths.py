@@ -14,6 +14,7 @@ from ic.meaning.expressions.quantity import Value, in_words
 from ic.text.complaints import known_words
 from met import units
 from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
+from met.frozen import frozen
 from met.trace import Formulas, Graph, Scalar
 from met.units import PURE
 
@@ -28,11 +29,19 @@ HOLDS = {
 EXAMPLE = "such as `gearbox.kp > 0.03 V*s/rad`, joined by `and`, `or`, `not`"
 
 
+@frozen
+class NumberComparison:
+    """A comparison of numbers, read: its expression, its sides, and these as formulas of columns."""
+
+    expression: Binary
+    sides: tuple[Value, Value]
+    formulas: Formulas
+
+
 class Truths:
-    """The rows of a table in which conditions hold.
+    """The rows of a table in which conditions hold, piece by piece of the table.
 
     find     gives names their values: numbers, or inputs of `graph` that stand for a column
-    columns  the values of these inputs by name, [row]
     words    of what is a word in each row: one for all rows, or one a row; options: all the words that there are
     Where a side of a comparison has no value, it does not hold.
     """
@@ -41,13 +50,17 @@ class Truths:
         self,
         find: Lookup,
         graph: Graph,
-        columns: Mapping[str, np.ndarray],
-        count: int,
         words: Mapping[str, str | np.ndarray],
         options: Mapping[str, Sequence[str]],
     ) -> None:
-        self.find, self.graph, self.columns, self.count = find, graph, columns, count
-        self.words, self.options = words, options
+        self.find, self.graph, self.words, self.options = find, graph, words, options
+        self.columns: Mapping[str, np.ndarray] = {}
+        self.length = 0
+        self._read: dict[int, NumberComparison] = {}  # by the expression: read once, whatever the pieces
+
+    def take(self, columns: Mapping[str, np.ndarray], length: int) -> None:
+        """Take a piece of the table, of so many rows. columns: the values of the graph's inputs by name, [row]"""
+        self.columns, self.length = columns, length
 
     def of(self, expression: Expression, asked: np.ndarray) -> np.ndarray:
         """Rows for which it holds. asked: rows for which it matters, as behind an `and` those that may still hold.
@@ -80,35 +93,41 @@ class Truths:
                     helps = [*did_you_mean(written, known), known_words("it varies over", known)]
                     raise Problem(error("D130", message, place_of(other), help=helps))
                 holds = (np.asarray(text) == written) == (expression.operator == "==")
-                return np.array(np.broadcast_to(holds, self.count))
+                return np.array(np.broadcast_to(holds, self.length))
         return None
 
     def _of_numbers(self, expression: Binary, asked: np.ndarray) -> np.ndarray:
-        sides = [evaluate_number(side, self.find) for side in (expression.left, expression.right)]
-        if not units.same(sides[0].dimension, sides[1].dimension):
+        compared = self._read.get(id(expression))
+        if compared is None:
+            compared = self._read[id(expression)] = self._comparison(expression)
+        left, right = (
+            np.broadcast_to(np.asarray(x, float), self.length) for x in compared.formulas.replay(self.columns)
+        )
+        self.look_at(compared, left, right, asked)
+        return np.asarray(HOLDS[expression.operator](left, right)) & ~(np.isnan(left) | np.isnan(right))
+
+    def _comparison(self, expression: Binary) -> NumberComparison:
+        """A comparison of numbers, read. Raises Problem where its sides cannot be compared."""
+        left, right = (evaluate_number(side, self.find) for side in (expression.left, expression.right))
+        if not units.same(left.dimension, right.dimension):
             helps = "both must be of one dimension"
-            for one, other in (sides, sides[::-1]):
+            for one, other in ((left, right), (right, left)):
                 if one.bare and one.dimension == PURE and not isinstance(one.number, Scalar):
                     helps = f"write `{one.number:g} {units.text(other.dimension)}`"
-            message = f"`{expression.operator}` of {in_words(sides[0])} and {in_words(sides[1])}"
-            also = [Label(side.place, in_words(side)) for side in sides]
+            message = f"`{expression.operator}` of {in_words(left)} and {in_words(right)}"
+            also = [Label(side.place, in_words(side)) for side in (left, right)]
             raise Problem(error("D063", message, expression.place, also=also, help=helps))
-        if None not in (hertz := [side.hertz for side in sides]) and hertz[0] != hertz[1]:
+        if left.hertz is not None and right.hertz is not None and left.hertz != right.hertz:
             message = f"`{expression.operator}` of Hz and 1/s, which are taken for one"
             helps_hertz = [
                 "if that is meant, write both sides in the same of the two",
                 "if cycles a second are meant, write 2 pi times the number of Hz, in `1/s`",
             ]
             self.warn(error("D305", message, expression.place, help=helps_hertz))
-        formulas = Formulas.of(self.graph, [side.number for side in sides])
-        left, right = (np.broadcast_to(np.asarray(x, float), self.count) for x in formulas.replay(self.columns))
-        self.look_at(expression, sides, left, right, asked)
-        return np.asarray(HOLDS[expression.operator](left, right)) & ~(np.isnan(left) | np.isnan(right))
+        return NumberComparison(expression, (left, right), Formulas.of(self.graph, [left.number, right.number]))
 
     def warn(self, found: Diagnostic) -> None:
         """Called with what may be meant otherwise; nothing is done with it here."""
 
-    def look_at(
-        self, expression: Binary, sides: Sequence[Value], left: np.ndarray, right: np.ndarray, asked: np.ndarray
-    ) -> None:
-        """Called with the numbers of each comparison before it is decided."""
+    def look_at(self, compared: NumberComparison, left: np.ndarray, right: np.ndarray, asked: np.ndarray) -> None:
+        """Called with the numbers of each comparison of a piece before it is decided."""

@@ -91,7 +91,9 @@ class Scope:
     def note_rate(self, code: str, figure: float, case: int) -> None:
         """Notes a figure that a servo or a sensor gives for itself, and the case that has it."""
         before, cases = self.declared_rates.get(code, (0.0, ()))
-        self.declared_rates[code] = (max(before, figure), (*cases, case))
+        known = self.checks.case_of(case)
+        if known is not None:
+            self.declared_rates[code] = (max(before, figure), (*cases, known))
 
     def settled(self, path: str) -> Settled | None:
         """The settled value of a path, whether or not it is a parameter of the plan."""

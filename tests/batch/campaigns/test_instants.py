@@ -12,12 +12,13 @@ import pytest
 import ic
 from batch.campaigns import instants
 from batch.campaigns.campaign import prepare, values_sections
-from batch.campaigns.keep import CaseOutcomes
+from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.performing import Performed, perform
 from batch.executors.threads import Threads
 from met import run as engine
 from met.passing import Memories, even_ticks, run_past
 from met.plan import Plan
+from tests.batch import plans
 from tests.ic.small_decks import changed
 
 SLIP = """\
@@ -140,7 +141,8 @@ def test_one_row_of_many_that_goes_another_way_is_looked_at(tmp_path: Path) -> N
     ],
 )
 def test_a_case_stands_out_where_all_others_are_alike(values: list[float], out: list[int]) -> None:
-    outcomes = CaseOutcomes(np.zeros(len(values), np.int8), {"way": np.array(values, float)})
+    outcomes = CaseOutcomes(plans.nominal())
+    outcomes.add(np.zeros(len(values), np.int8), {"way": np.array(values, float)})
     assert instants.standing_out(outcomes) == out
 
 

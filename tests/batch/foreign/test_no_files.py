@@ -61,7 +61,7 @@ def test_a_pipe_in_the_place_of_a_plan_and_of_its_table(here: Path) -> None:
     assert met("run", "plan.json").text == (
         "error[E301]: cannot read the plan plan.json: it is a named pipe, not a regular file\n\n1 error\n"
     )
-    made = plans.plan(plans.gains(plan_file.INLINE_ROWS + 1))
+    made = plans.plan(plans.gains(plan_file.LISTED_ROWS + 1))
     _, table = sorted(plan_file.write(made, "big.json"))
     table.unlink() if table.suffix == ".npy" else None
     [name] = Path().glob("big.*.npy") or [Path("big.gains.cases.npy")]
@@ -73,12 +73,12 @@ def test_a_pipe_in_the_place_of_a_plan_and_of_its_table(here: Path) -> None:
 
 def test_a_pipe_where_a_plans_table_is_to_be_written(here: Path) -> None:
     [plan_there, table] = sorted(
-        plan_file.write(plans.plan(plans.gains(plan_file.INLINE_ROWS + 1)), "big.json"), key=lambda path: path.suffix
+        plan_file.write(plans.plan(plans.gains(plan_file.LISTED_ROWS + 1)), "big.json"), key=lambda path: path.suffix
     )
     table.unlink()
     os.mkfifo(table)
     with pytest.raises(Problem) as caught:
-        plan_file.write(plans.plan(plans.gains(plan_file.INLINE_ROWS + 1)), plan_there)
+        plan_file.write(plans.plan(plans.gains(plan_file.LISTED_ROWS + 1)), plan_there)
     assert render(caught.value.diagnostics) == (
         "error[E300]: cannot write big.gains.cases.npy: it is not a regular file\n\n1 error\n"
     )

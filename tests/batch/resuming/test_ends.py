@@ -162,7 +162,7 @@ def test_a_disk_that_is_full_when_it_goes_on_keeps_what_there_is(
     monkeypatch.setattr(performing, "WORTH_SECONDS", 1e-9)
     kept = begin(archive)
 
-    def full(*_: object) -> None:
+    def full(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patch:

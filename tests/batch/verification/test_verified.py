@@ -14,7 +14,7 @@ import batch
 import ic
 from batch.archive.read import ArchiveFile
 from batch.campaigns import tasks
-from batch.campaigns.keep import CaseOutcomes
+from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.verification import when
 from batch.campaigns.verification.choosing import chosen, most
 from batch.queries.step_errors.figures import case_error, figures
@@ -54,7 +54,9 @@ def datasets(path: Path) -> dict[str, bytes]:
 
 
 def outcomes(status: list[int], **metrics: list[float]) -> CaseOutcomes:
-    return CaseOutcomes(np.array(status), {name: np.array(values) for name, values in metrics.items()})
+    found = CaseOutcomes(plans.gains(len(status)))
+    found.add(np.array(status), {name: np.array(values) for name, values in metrics.items()})
+    return found
 
 
 # Which

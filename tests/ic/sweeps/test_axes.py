@@ -219,7 +219,7 @@ def test_a_definition_and_one_of_its_joints_on_one_parameter_is_an_error(tmp_pat
         ("require settle < 1 s;", "D136"),
         ("vary links.bar.inertia.xx = [0.2, 0.3] kg*m^2;", "D137"),
         ("duration = 3 s; vary drive.kp = [1, 2] V*s/rad;", "D136"),
-        ("vary drive.kp = linspace(1, 2, 10000) V*s/rad; vary drive.ki = linspace(1, 2, 10000) V/rad;", "D134"),
+        ("vary drive.kp = linspace(1, 2, 10001) V*s/rad; vary drive.ki = linspace(1, 2, 10001) V/rad;", "D134"),
         ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kp > 0 V*s/rad;", "D139"),
         ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kp > 1.5;", "D063"),
         ("vary drive.kp = [1, 2] V*s/rad; exclude when drive.kq > 1 V*s/rad;", "D065"),

@@ -82,7 +82,7 @@ def test_formulas_replay_as_before() -> None:
 
 
 def test_a_large_case_table_lies_beside_the_plan(tmp_path: Path) -> None:
-    plan = plans.plan(plans.gains(plan_file.INLINE_ROWS + 1))
+    plan = plans.plan(plans.gains(plan_file.LISTED_ROWS + 1))
     files = plan_file.write(plan, tmp_path / "p.json")
     assert [file.name for file in files] == ["p.gains.cases.npy", "p.json"]
     assert (tmp_path / "p.json").stat().st_size < 100_000  # the table itself is 160 kB
@@ -124,10 +124,10 @@ def test_a_table_elsewhere_is_not_followed() -> None:
 
 def test_a_newer_plan_is_refused() -> None:
     document = json.loads(plan_file.dumps(plans.plan()))
-    document["version"] = 2
+    document["version"] = 3
     with pytest.raises(Problem) as caught:
         plan_file.loads(json.dumps(document), "p.json")
-    assert messages(caught) == ["E303: p.json was written by a newer MET: plan schema 2, and this one reads up to 1"]
+    assert messages(caught) == ["E303: p.json was written by a newer MET: plan schema 3, and this one reads up to 2"]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,200 @@
+"""Columns of a case table: arrays, or numbers that are computed where they are asked for.
+
+A sweep of a hundred million cases takes no memory: whoever runs cases `first` to `last` computes their values alone,
+the same bits each time. A computed column is used as an array is: `column[rows]`, `len(column)`; numpy takes it for
+one, and then it is all in memory.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from met.distinct import distinct
+from met.plan.swept import RowBits, SweptRows, blocks
+from met.trace.graph import Formulas
+
+LISTED_ROWS = 10_000
+"""Rows up to which a table's columns are arrays."""
+
+MOST_SWEPT = 100_000_000
+"""Cases of a sweep at most: as many were run (docs/cluster.md)."""
+
+
+class ComputedColumn:
+    """Numbers that are computed where they are asked for, by `at`; to be used as an array of one dimension is."""
+
+    ndim = 1
+
+    def __init__(self, count: int, dtype: Any = np.float64) -> None:
+        self.size, self.dtype = count, np.dtype(dtype)
+
+    def at(self, rows: np.ndarray) -> np.ndarray:
+        """The numbers of these rows, which are in the column."""
+        raise NotImplementedError
+
+    @property
+    def shape(self) -> tuple[int]:
+        return (self.size,)
+
+    def __len__(self) -> int:
+        return self.size
+
+    def __getitem__(self, key: Any) -> Any:
+        if isinstance(key, slice):
+            return self.at(np.arange(*key.indices(self.size)))
+        rows = np.asarray(key)
+        if rows.dtype == bool:
+            rows = np.flatnonzero(rows)
+        rows = rows.astype(np.int64)
+        rows = np.where(rows < 0, rows + self.size, rows)
+        if ((rows < 0) | (rows >= self.size)).any():
+            raise IndexError(f"a row beyond the {self.size} of this column")
+        return self.at(rows) if rows.ndim else self.at(rows[None])[0]
+
+    def __array__(self, dtype: Any = None, copy: Any = None) -> np.ndarray:
+        out = np.empty(self.size, self.dtype if dtype is None else dtype)
+        for rows in blocks(self.size):
+            out[rows] = self[rows]
+        return out
+
+    @cached_property
+    def ends(self) -> tuple[int, int]:
+        """The first row in which the column is least, and the first in which it is largest."""
+        low = high = 0
+        least, largest = np.inf, -np.inf
+        for rows in blocks(self.size):
+            values = self[rows]
+            first, last = int(np.argmin(values)), int(np.argmax(values))
+            if values[first] < least:
+                low, least = rows.start + first, values[first]
+            if values[last] > largest:
+                high, largest = rows.start + last, values[last]
+        return low, high
+
+    def tolist(self) -> list[Any]:
+        return np.asarray(self).tolist()
+
+
+CaseValues = np.ndarray | ComputedColumn
+"""A column of a case table, a number a case."""
+
+
+class CountedRows(ComputedColumn):
+    """Whole numbers one after the other from 0, or another `first`: all rows of a table."""
+
+    def __init__(self, count: int, first: int = 0) -> None:
+        super().__init__(count, np.int64)
+        self.first = first
+
+    def at(self, rows: np.ndarray) -> np.ndarray:
+        return rows + self.first if self.first else rows
+
+
+class AxisColumn(ComputedColumn):
+    """A coordinate of a sweep: of each case, one of the values of an axis."""
+
+    def __init__(self, rows: SweptRows, axis: int, values: CaseValues) -> None:
+        super().__init__(rows.count)
+        self.rows, self.axis, self.values = rows, axis, values
+
+    def at(self, rows: np.ndarray) -> np.ndarray:
+        return np.asarray(self.values[self.rows.index(self.axis, rows)], dtype=float)
+
+    @cached_property
+    def ends(self) -> tuple[int, int]:
+        if self.rows.kept is not None:
+            return super().ends
+        chosen = self.rows.chosen[self.axis]
+        least, largest = ends(self.values if chosen is None else np.asarray(self.values[chosen]))
+        return self.rows.first_with(self.axis, least), self.rows.first_with(self.axis, largest)
+
+
+class PositionColumn(ComputedColumn):
+    """Positions of the cases of one structure in the table of their sweep, which has other structures besides.
+
+    among  rows of the product of all axes that are cases of any structure; None: all of them
+    """
+
+    def __init__(self, rows: SweptRows, among: RowBits | None = None) -> None:
+        super().__init__(rows.count)
+        self.rows, self.among = rows, among
+
+    def at(self, rows: np.ndarray) -> np.ndarray:
+        numbers = self.rows.number(rows)
+        return (numbers if self.among is None else self.among.rank(numbers)).astype(float)
+
+
+class ShiftedColumn(ComputedColumn):
+    """Numbers of another column, and a number more; as whole numbers where `dtype` says so."""
+
+    def __init__(self, of: CaseValues, by: int, dtype: Any = np.float64) -> None:
+        super().__init__(len(of), dtype)
+        self.of, self.by = of, by
+
+    def at(self, rows: np.ndarray) -> np.ndarray:
+        return (self.of[rows] + self.by).astype(self.dtype)
+
+
+class FormulaColumn(ComputedColumn):
+    """What a formula of one output gives in each case. values: of its inputs, by name."""
+
+    def __init__(self, formula: Formulas, values: Mapping[str, CaseValues], count: int) -> None:
+        super().__init__(count)
+        self.formula, self.values = formula, {name: values[name] for name in formula.inputs}
+
+    def at(self, rows: np.ndarray) -> np.ndarray:
+        found = self.formula.replay({name: np.asarray(column[rows]) for name, column in self.values.items()})[0]
+        return np.array(np.broadcast_to(np.asarray(found, dtype=float), len(rows)))
+
+
+def listed(column: ComputedColumn) -> CaseValues:
+    """The column as an array where it is short."""
+    return np.asarray(column) if column.size <= LISTED_ROWS else column
+
+
+def all_rows(count: int) -> CaseValues:
+    """The rows of a table of so many, each once and in order."""
+    return np.arange(count) if count <= LISTED_ROWS else CountedRows(count)
+
+
+def places_among(rows: CaseValues, wanted: np.ndarray) -> np.ndarray:
+    """The places in `rows`, which rise, at which these rows would be put in."""
+    if isinstance(rows, CountedRows):
+        return np.clip(wanted - rows.first, 0, rows.size)
+    return np.searchsorted(rows, wanted)
+
+
+def are_among(rows: CaseValues, wanted: np.ndarray) -> np.ndarray:
+    """True for each of these rows that is one of `rows`, which rise."""
+    if isinstance(rows, CountedRows):
+        return np.asarray((wanted >= rows.first) & (wanted < rows.first + rows.size))
+    return np.isin(wanted, rows)
+
+
+def row_at(column: CaseValues, number: int) -> int | None:
+    """The row with this number in a column whose numbers rise; None where it has none."""
+    row = bisect_left(column, number)
+    return row if row < len(column) and column[row] == number else None
+
+
+def ends(column: CaseValues) -> tuple[int, int]:
+    """The first row in which a column is least, and the first in which it is largest."""
+    return column.ends if isinstance(column, ComputedColumn) else (int(np.argmin(column)), int(np.argmax(column)))
+
+
+def span(column: CaseValues) -> tuple[float, float]:
+    """The least and the largest number of a column."""
+    least, largest = ends(column)
+    return float(column[least]), float(column[largest])
+
+
+def different(column: CaseValues) -> np.ndarray:
+    """The different values of a column, rising."""
+    if isinstance(column, AxisColumn):
+        return distinct(np.asarray(column.values[column.rows.present(column.axis)]))
+    return distinct(np.asarray(column))

@@ -1,0 +1,192 @@
+"""Values drawn from distributions: the quantiles of points of (0, 1), rounded to 12 digits in the deck's unit.
+
+So a table that is printed and read back is the same table, and a last place in which versions of a library differ makes
+no other case. Independent draws come from a counter-based generator, Philox 4x64-10 as numpy has it: value k of a
+parameter follows from the seed, the parameter's path and k, so any of them is computed without those before it.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+
+from met import units
+from met.plan.columns import ComputedColumn
+from met.plan.swept import blocks
+from met.unit_parser import parse_unit
+
+DIGITS = 12
+
+CHUNK = 1 << 12
+"""Points of a stream that are drawn together where some between the first and the last are not wanted."""
+
+A_COUNT = 4
+"""Numbers that the generator gives at each count."""
+
+TENS = np.cumprod(np.concatenate([[1], np.full(27, 10)]).astype(np.longdouble))
+"""Powers of ten that are exact with 64 bits: 10^27 has 63 besides its twos."""
+
+SURE = np.longdouble(2.0) ** -61
+"""Relative: more than what the extended arithmetic below is off."""
+
+
+def points(seed: int, path: str, number: int, first: int, last: int) -> np.ndarray:
+    """Points `first` to `last` (not itself) of a parameter's stream, independent and even in the open unit interval.
+
+    number  of the sample in its sweep, from 1: each has streams of its own
+    """
+    source = np.random.Philox(key=[seed, zlib.crc32(path.encode()) << 32 | number])
+    source.advance(first // A_COUNT)
+    before = first % A_COUNT
+    drawn = np.random.Generator(source).random(before + last - first)[before:]
+    return within(drawn)
+
+
+def within(drawn: np.ndarray) -> np.ndarray:
+    """Points of the closed unit interval moved off its ends."""
+    return np.asarray(np.clip(drawn, 2.0**-54, 1.0 - 2.0**-53))
+
+
+def drawn_values(
+    distribution: str, arguments: tuple[float, ...], measure: units.Measure | None, at: np.ndarray
+) -> np.ndarray:
+    """Quantiles at these points of (0, 1), SI, rounded in a unit; None: the number 1. arguments: SI."""
+    scale = measure.scale if measure is not None else 1.0
+    exact = QUANTILES[distribution](at, *(x / scale for x in arguments))
+    found = rounded(exact, measure if measure is not None else units.ONE)
+    if distribution == "normal":
+        return found
+    low, high = arguments[-2:]
+    return np.clip(found, low, high)
+
+
+class DrawnColumn(ComputedColumn):
+    """Independent draws of one parameter. unit: in which they are rounded, as text; "": none. The rest as above."""
+
+    def __init__(
+        self, count: int, seed: int, path: str, number: int, distribution: str, arguments: tuple[float, ...], unit: str
+    ) -> None:
+        super().__init__(count)
+        self.seed, self.path, self.number = seed, path, number
+        self.distribution, self.arguments, self.unit = distribution, arguments, unit
+        self._measure = parse_unit(unit) if unit else None
+
+    def at(self, rows: np.ndarray) -> np.ndarray:
+        if not len(rows):
+            return np.empty(0)
+        if len(rows) > 1 and not (np.diff(rows) >= 0).all():
+            wanted, back = np.unique(rows, return_inverse=True)
+            return np.asarray(self.at(wanted)[back.ravel()])
+        if rows[-1] - rows[0] < len(rows) + CHUNK:
+            return np.asarray(self._between(int(rows[0]), int(rows[-1]) + 1)[rows - rows[0]])
+        edges = np.flatnonzero(np.diff(rows // CHUNK)) + 1
+        parts = np.split(rows, edges)
+        return np.concatenate([self._between(int(part[0]), int(part[-1]) + 1)[part - part[0]] for part in parts])
+
+    @cached_property
+    def ends(self) -> tuple[int, int]:
+        """A row with the least value, and one with the largest: values rise with the points. Of equal ones it is the
+        first, where these are not more than are looked at."""
+        low, high = _Nearest(), _Nearest()
+        for rows in blocks(self.size):
+            at = points(self.seed, self.path, self.number, rows.start, rows.stop)
+            low.add(at, rows.start)
+            high.add(-at, rows.start)
+        values = [self.at(np.sort(each.rows)) for each in (low, high)]
+        first, last = int(np.argmin(values[0])), int(np.argmax(values[1]))
+        return int(np.sort(low.rows)[first]), int(np.sort(high.rows)[last])
+
+    def _between(self, first: int, last: int) -> np.ndarray:
+        at = points(self.seed, self.path, self.number, first, last)
+        return drawn_values(self.distribution, self.arguments, self._measure, at)
+
+
+class _Nearest:
+    """Rows of the smallest points so far: more than are rounded to one value."""
+
+    MOST = 64
+
+    def __init__(self) -> None:
+        self._at, self.rows = np.zeros(0), np.zeros(0, np.int64)
+
+    def add(self, at: np.ndarray, first: int) -> None:
+        some = np.flatnonzero(at < self._at[-1]) if len(self._at) == self.MOST else np.arange(len(at))
+        if len(some):
+            both = np.concatenate([self._at, at[some]])
+            order = np.argsort(both, kind="stable")[: self.MOST]
+            self._at, self.rows = both[order], np.concatenate([self.rows, first + some])[order]
+
+
+# Rounding
+
+
+def rounded(exact: np.ndarray, measure: units.Measure) -> np.ndarray:
+    """Numbers of a unit rounded to 12 digits, then in SI rounded once more: `measure.to_si(float(f"{x:.12g}"))`.
+
+    It is done with 64 bits for all at once, and number by number where these cannot tell which of two doubles is the
+    nearest: of 1 % of them, or of all on a machine that has no more than 53 bits.
+    """
+    found, extended, scale = np.empty(len(exact)), np.finfo(np.longdouble).nmant >= 63, _scale(measure)
+    for first in range(0, len(exact), CHUNK):  # what fits into the processor's cache takes a tenth of the time
+        some, left = exact[first : first + CHUNK], list(range(min(CHUNK, len(exact) - first)))
+        if extended:
+            made, sure = _in_extended(some, scale)
+            found[first : first + CHUNK], left = made, np.flatnonzero(~sure).tolist()
+        for n in left:
+            found[first + n] = measure.to_si(float(f"{some[n]:.{DIGITS}g}"))
+    return found
+
+
+def _in_extended(exact: np.ndarray, scale: np.longdouble) -> tuple[np.ndarray, np.ndarray]:
+    """The same, and of which numbers it is sure. scale: SI units in one of the unit."""
+    with np.errstate(all="ignore"):
+        size = np.abs(exact)
+        shift = (DIGITS - 1) - np.floor(np.log10(size))
+        sure = np.abs(shift) < len(TENS)
+        steps = np.where(sure, shift, 0.0).astype(np.int64)
+        tens, up = TENS[np.abs(steps)], steps >= 0
+        scaled = np.where(up, size * tens, size / tens)
+        digits = np.rint(scaled)
+        sure &= (scaled >= 10.0 ** (DIGITS - 1)) & (scaled < 10.0**DIGITS - 1.0)
+        sure &= np.abs(np.abs(scaled - digits) - 0.5) > 2.0**-20
+        value = np.where(up, digits / tens, digits * tens) * scale
+        nearest = value.astype(np.float64)
+        off = np.abs(value - nearest)
+        sure &= 0.5 * np.spacing(nearest) - off > SURE * value
+        sure &= (np.frexp(nearest)[0] != 0.5) & (nearest > 2.0**-1000) & (nearest < 2.0**1000)
+    return np.copysign(nearest, exact), sure
+
+
+def _scale(measure: units.Measure) -> np.longdouble:
+    """SI units in one of a unit, with as many bits as there are."""
+    whole = measure.exact
+    high = float(whole)
+    return np.longdouble(high) + np.longdouble(float(whole - Fraction(high)))
+
+
+def _truncated(at: np.ndarray, mean: float, deviation: float, low: float, high: float) -> np.ndarray:
+    from scipy.stats import truncnorm
+
+    found = truncnorm.ppf(at, (low - mean) / deviation, (high - mean) / deviation, loc=mean, scale=deviation)
+    return np.asarray(found, dtype=float)
+
+
+def _normal(at: np.ndarray, mean: float, deviation: float) -> np.ndarray:
+    from scipy.special import ndtri
+
+    return np.asarray(mean + deviation * ndtri(at), dtype=float)
+
+
+ARGUMENTS: Mapping[str, int] = {"uniform": 2, "loguniform": 2, "normal": 2, "truncated": 4}
+"""How many arguments each distribution has."""
+
+QUANTILES: Mapping[str, Callable[..., np.ndarray]] = {
+    "uniform": lambda at, low, high: low + (high - low) * at,
+    "loguniform": lambda at, low, high: low * np.exp(np.log(high / low) * at),
+    "normal": _normal,
+    "truncated": _truncated,
+}

@@ -1,0 +1,150 @@
+"""Rows of a sweep's product that are cases, told by a few numbers instead of listed: which values each row has.
+
+The cases of a sweep are the product of its axes, the last of which varies fastest, as digits of a number do. So the
+values of a row follow by dividing its number. What `exclude when` drops is kept as a bit a row of the product.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from functools import cached_property
+
+import numpy as np
+
+from met.frozen import frozen
+
+BLOCK = 1 << 16
+"""Rows that are looked at together: so much of a table is in memory, however long it is."""
+
+
+def blocks(count: int, size: int = BLOCK) -> Iterator[slice]:
+    """Stretches of so many rows, one after the other."""
+    return (slice(first, min(first + size, count)) for first in range(0, count, size))
+
+
+class RowBits:
+    """A bit a row, set where the row counts. packed: eight to a byte, the first row in the highest bit."""
+
+    def __init__(self, packed: np.ndarray, count: int) -> None:
+        self.packed, self.count = packed, count
+
+    @staticmethod
+    def of(flags: np.ndarray) -> RowBits:
+        return RowBits(np.packbits(flags), len(flags))
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        """Whether each of these rows counts, as truths; they begin at a multiple of 8."""
+        return np.unpackbits(self.packed[rows.start // 8 : -(-rows.stop // 8)], count=rows.stop - rows.start).view(bool)
+
+    @cached_property
+    def _before(self) -> np.ndarray:
+        """The number of rows that count before each block, then of all."""
+        counts = [int(np.count_nonzero(self[rows])) for rows in blocks(self.count)]
+        return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
+
+    @property
+    def set(self) -> int:
+        """The number of rows that count."""
+        return int(self._before[-1])
+
+    def select(self, places: np.ndarray) -> np.ndarray:
+        """The rows that count at these places among those that do."""
+        block = np.searchsorted(self._before, places, side="right") - 1
+        found = np.empty(len(places), np.int64)
+        for number, here in _alike(block):
+            first = number * BLOCK
+            rows = np.flatnonzero(self[slice(first, min(first + BLOCK, self.count))])
+            found[here] = first + rows[places[here] - self._before[number]]
+        return found
+
+    def rank(self, rows: np.ndarray) -> np.ndarray:
+        """The number of rows that count before each of these."""
+        found = np.empty(len(rows), np.int64)
+        for number, here in _alike(rows // BLOCK):
+            first = number * BLOCK
+            flags = self[slice(first, min(first + BLOCK, self.count))]
+            before = np.cumsum(flags, dtype=np.int64) - flags
+            found[here] = self._before[number] + before[rows[here] - first]
+        return found
+
+
+def _alike(numbers: np.ndarray) -> Iterator[tuple[int, np.ndarray | slice]]:
+    """Each different number, with the places that have it."""
+    if len(numbers) and (np.diff(numbers) >= 0).all():
+        edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist(), len(numbers)]
+        for first, last in itertools.pairwise(edges):
+            yield int(numbers[first]), slice(first, last)
+        return
+    for number in np.unique(numbers).tolist():
+        yield number, np.flatnonzero(numbers == number)
+
+
+@frozen
+class SweptRows:
+    """Rows of the product of a sweep's axes, rising: the cases of one of its structures.
+
+    sizes   the number of values of each axis, the outermost first
+    chosen  of each axis, the values that these cases have by their places, rising; None: all
+    kept    of the product of these values, the rows that are cases; None: all
+    """
+
+    sizes: tuple[int, ...]
+    chosen: tuple[np.ndarray | None, ...]
+    kept: RowBits | None = None
+
+    @cached_property
+    def lengths(self) -> tuple[int, ...]:
+        """The number of values of each axis that these cases have."""
+        pairs = zip(self.sizes, self.chosen, strict=True)
+        return tuple(size if chosen is None else len(chosen) for size, chosen in pairs)
+
+    @cached_property
+    def product(self) -> int:
+        """The number of rows of the product of the values that these cases have."""
+        return math.prod(self.lengths)
+
+    @property
+    def count(self) -> int:
+        return self.product if self.kept is None else self.kept.set
+
+    def only(self, kept: RowBits) -> SweptRows:
+        """Those of these rows, of which none is left out yet, that are kept."""
+        return SweptRows(self.sizes, self.chosen, kept)
+
+    def index(self, axis: int, rows: np.ndarray) -> np.ndarray:
+        """Which value of an axis each of these rows has, by its place."""
+        inner = rows if self.kept is None else self.kept.select(rows)
+        return self._index(axis, inner)
+
+    def first_with(self, axis: int, place: int) -> int:
+        """The first row of the product with the value of an axis at this place among those that these cases have."""
+        return place * math.prod(self.lengths[axis + 1 :])
+
+    def number(self, rows: np.ndarray) -> np.ndarray:
+        """The place of each of these rows in the product of all values of all axes."""
+        inner = rows if self.kept is None else self.kept.select(rows)
+        if all(chosen is None for chosen in self.chosen):
+            return inner
+        found = np.zeros(len(rows), np.int64)
+        for axis, size in enumerate(self.sizes):
+            found = found * size + self._index(axis, inner)
+        return found
+
+    def present(self, axis: int) -> np.ndarray:
+        """The places of the values of an axis that some of these rows have, rising."""
+        size, chosen = self.sizes[axis], self.chosen[axis]
+        if self.kept is None:
+            return np.arange(size) if chosen is None else chosen
+        seen = np.zeros(size, bool)
+        for here in blocks(self.count):
+            seen[self.index(axis, np.arange(here.start, here.stop))] = True
+        return np.flatnonzero(seen)
+
+    def _index(self, axis: int, inner: np.ndarray) -> np.ndarray:
+        after, length, chosen = math.prod(self.lengths[axis + 1 :]), self.lengths[axis], self.chosen[axis]
+        place = inner if after == 1 else inner // after
+        if axis and any(other > 1 for other in self.lengths[:axis]):
+            place = place % length
+        return place if chosen is None else chosen[place]
