@@ -206,7 +206,7 @@ def _result(campaign: Campaign, performed: Performed, no_picture: bool, say: Cal
 
 
 MOST_READ = 10_000_000
-"""Cases of a campaign up to which its archive is read for the verdict: a million take 200 MB of memory."""
+"""Cases of a campaign up to which its archive is read for verdict and picture: a million take 150 MB of memory."""
 
 
 def _is_counted(campaign: Campaign, performed: Performed) -> bool:
@@ -239,7 +239,7 @@ def _counted_result(campaign: Campaign, performed: Performed) -> RunResult:
                 sweep=experiment.sweep,
             )
         )
-    excuse = f"of more than {MOST_READ:,} cases `met show` says more and `met plot` draws: 200 MB of memory a million"
+    excuse = f"of more than {MOST_READ:,} cases `met show` says more and `met plot` draws: 150 MB of memory a million"
     return RunResult(tuple(summaries), (WorstCaseLines(),) * len(summaries), (), None, excuse, performed.warned)
 
 

@@ -19,8 +19,9 @@ BLOCK = 1 << 16
 """Rows that are looked at together: so much of a table is in memory, however long it is."""
 
 
-def blocks(count: int, size: int = BLOCK) -> Iterator[slice]:
-    """Stretches of so many rows, one after the other."""
+def blocks(count: int, size: int | None = None) -> Iterator[slice]:
+    """Stretches of so many rows, one after the other; None: `BLOCK`."""
+    size = size or BLOCK
     return (slice(first, min(first + size, count)) for first in range(0, count, size))
 
 

@@ -46,7 +46,7 @@ def test_it_says_where_the_rest_is(here: Path, monkeypatch: pytest.MonkeyPatch) 
     said = met("run", "deck.ic", "some", "-o", "a.h5")
     assert said.status == 1
     assert (
-        "picture  none: of more than 2 cases `met show` says more and `met plot` draws: 200 MB of memory a million"
+        "picture  none: of more than 2 cases `met show` says more and `met plot` draws: 150 MB of memory a million"
     ) in said.text
     assert "exit 1: not met everywhere: " in said.text
     again = met("run", "deck.ic", "some", "-o", "a.h5")  # nothing is run, so it is read
