@@ -15,6 +15,7 @@ def pytest_configure() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
     os.environ["MET_CHECK_RECORDINGS"] = "1"  # also of the processes that tests start
+    os.environ.pop("COLUMNS", None)  # what is printed is not as wide as the window in which tests run
 
 
 def pytest_report_header() -> str:

@@ -31,7 +31,6 @@ def install(folder: Path, version: int, text: str) -> None:
 def met(folder: Path, *words: str, status: int) -> str:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(folder / "packages")])}
     environment["PYTHONDONTWRITEBYTECODE"] = "1"
-    environment.pop("COLUMNS", None)  # what is printed is not as wide as the window in which tests run
     command = [sys.executable, "-m", "met.cli", *words]
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
     assert done.returncode == status, done.stdout + done.stderr

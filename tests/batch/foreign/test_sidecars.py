@@ -68,7 +68,7 @@ def test_a_description_that_is_none_is_told(text: str, campaign: Path) -> None:
         ("rows", "../../rows.0.npy"),
         ("rows", "/etc/passwd"),
         ("rows", 0),
-        ("number", 1),
+        ("number", -1),
         ("number", "0"),
         ("cases", -1),
         ("cases", 1e3),

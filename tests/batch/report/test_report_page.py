@@ -30,8 +30,9 @@ def test_the_limits_are_those_of_the_code() -> None:
     assert stability.MOST_LOOPS == 6
 
 
-def test_its_pictures_are_there_and_made_by_one_command() -> None:
-    shown = set(re.findall(r"figures/(report_\w+\.png)", PAGE))
+def test_pictures_of_reports_are_there_and_made_by_one_command() -> None:
+    pages = PAGE + (figures.FOLDER.parent / "best.md").read_text(encoding="utf-8")
+    shown = set(re.findall(r"figures/(report_\w+\.png)", pages))
     assert shown == set(re.findall(r"report_\w+\.png", figures.__doc__ or ""))
     assert shown == {path.name for path in figures.FOLDER.glob("report_*.png")}
     assert "python -m tests.batch.report.figures" in PAGE

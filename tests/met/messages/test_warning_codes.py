@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[3]
 SPOKEN = ("warn", "remark", "_warning")
 """Functions whose first argument is a code."""
 
-ELSEWHERE = {"D003", "D015", "D317", "D318", "D319"}
+ELSEWHERE = {"D003", "D015", "D317", "D318", "D319", "D320", "D322"}
 """Given by a function that is chosen, `tell`, an error or a warning; or by a code that is chosen, of a step."""
 
 OF_NO_RUN = {"D333", "E405"}
