@@ -19,6 +19,9 @@ from met.frozen import frozen
 SMALLEST, LARGEST = 1e-3, 30.0
 """Shares of a gain between which one that fits is looked for."""
 
+POOR = 0.02
+"""Share of a gain up to which one that fits is little help: then single numbers of the law are looked at."""
+
 STRIDE = 0.8
 """Share from one gain to the next that is tried."""
 
@@ -40,8 +43,8 @@ class Unstable:
     sensed  whether it would not be so if the laws saw what is so, without their sensors
     weak    whether it falls as it would without the loop, which with more gain would hold it
     rubs    whether dry friction is on these joints, which is left out
-    parameters  of one joint's loop that is unstable by itself, the numbers of its law that do it alone, by name, each
-            with a share as the gain's
+    parameters  of one joint's loop that is unstable by itself, or no gain of which fits well: the numbers of its law
+            that do it alone, by name, each with a share as the gain's
     """
 
     case: int
@@ -227,10 +230,10 @@ class Opened:
     def blamed(self, lane: Lane) -> list[Unstable]:
         """The loops that make a lane grow, with what helps."""
         several = (replace(each, rubs=not self._rubs.isdisjoint(each.joints)) for each in lane.blamed())
-        return [each if each.ticks else self._remedied(lane, each) for each in several]
+        return [each if each.ticks and (each.gain or 0.0) > POOR else self._remedied(lane, each) for each in several]
 
     def _remedied(self, lane: Lane, found: Unstable) -> Unstable:
-        """The same with the parameters that help a loop which is unstable by itself, each alone."""
+        """The same with the parameters that help, each alone."""
         if len(found.joints) > 1:
             return found
         (joint,), own = found.joints, lane.growing()

@@ -15,8 +15,8 @@ NAMES = [f"x{place}" for place in range(8)]
 
 def cases(inputs: int, count: int, seed: int) -> list[np.ndarray]:
     """The values of inputs between 0 and 1 in the cases of `sample saltelli(count)`."""
-    points = designs._points("saltelli", count, NAMES[:inputs], seed, 1)
-    return designs._saltelli(list(points.T))
+    points = designs._points("saltelli", count, inputs, seed, 1)
+    return list(map(np.asarray, designs._saltelli(list(points.T))))
 
 
 def ishigami(x: list[np.ndarray]) -> np.ndarray:
