@@ -24,7 +24,7 @@ from met.program.system import PARAMETER, System
 SHARE = 0.2
 """Of what was commanded over the run: whoever is off by no more follows, if not well."""
 
-STAYS, STRAYS = 1e-3, 0.05
+STAYS, STRAYS = 1e-3, 0.2
 """rad, m, rad/s, m/s: what is told to do no more than the first is told to stay, and strays if off by the second."""
 
 SETTLED = 0.01
@@ -63,13 +63,15 @@ def unfollowed(
     experiment: Experiment, ticks: Sequence[int], memories: Mapping[int, np.ndarray], cells: Sequence[str]
 ) -> list[Unfollowed]:
     """The joints with a command of position or rate, and the guides, that are not followed: each in its worst case,
-    worst first. Joints whose servo fails are told to by the deck. Raises Problem where a model's function does.
+    worst first. Not looked at are joints whose servo fails, which the deck wants, and those of which a requirement
+    wants more than a limit. Raises Problem where a model's function does.
 
     ticks     of the base rate, rising;  memories: row of the case table -> [tick, cell], as `cells` names these
     """
     system, whole = System(experiment), [case for case, at in memories.items() if np.isfinite(at).all()]
     judged = [each for each in system.working if each.command_kind in ("position", "rate")]
     judged = [each for each in judged if each.use.joint not in system.failing and _is_own(experiment, each.use.command)]
+    judged = [each for each in judged if not _is_required(experiment, each.use.joint, each.command_kind)]
     guides = [use for use in guiding.ticking(system) if models.find("guide", use.model, use.place).error]
     if not whole or not (judged or guides):
         return []
@@ -109,6 +111,13 @@ def _is_own(experiment: Experiment, command: object) -> bool:
     return use is None or models.find("guide", use.model, use.place).course is not None
 
 
+def _is_required(experiment: Experiment, joint: str, kind: str) -> bool:
+    """True where a requirement wants much of a joint's position or rate: it judges how much is come to."""
+    most = {each.metric for each in experiment.requirements if each.comparison.startswith(">")}
+    channel = f"{joint}.{'q' if kind == 'position' else 'qd'}"
+    return any(use.name in most and use.of == channel for use in experiment.structure.metrics)
+
+
 def _lanes(
     system: System,
     ticks: Sequence[int],
@@ -142,7 +151,7 @@ def _told(
     for case, told, away in zip(cases, way, off, strict=True):
         most = float(np.max(np.abs(told)))
         asked = most if most > STAYS else 0.0
-        unsettled = np.flatnonzero(np.abs(told - told[-1]) > SETTLED * max(most, STRAYS))
+        unsettled = np.flatnonzero(np.abs(told - told[-1]) > SETTLED * max(most, 0.1))
         first = max(int(unsettled[-1]) + 1 if len(unsettled) else 0, int(np.searchsorted(times, FIRST * end)))
         if first >= len(times) or end - times[first] < LEAST * end:
             continue

@@ -38,6 +38,14 @@ run on_its_way like move { servos { j = slow; } }
 run late like parked { servos { j { command = position(step(to = 1 rad, at = 2.9 s)); } } }
 run swinging like parked { servos { j { command = position(sine(amplitude = 1 rad, frequency = 2 Hz)); } } }
 run pushed like parked { servos { j { command = torque(1 N*m); } } }
+run fastest like move {
+    servos { j { command = rate(20 rad/s); } }  metric top = max { of = j.qd; }  require top > 4.5 rad/s;
+}
+run soft like move {
+    servos { j { model = compliant_gearbox;  stiffness = 300 N*m/rad;  damping = 2 N*m*s/rad;
+                 command = position(0 rad); } }
+    environment { gravity = [0, 0, -9.81] m/s^2; }
+}
 run let_go like hanging { environment { broken = free_swinging { joint = j;  from = 0.5 s; } } }
 sweep brakes of parked { vary environment.parking.torque = [0, 10, 500, 600] N*m; }
 """
@@ -105,7 +113,9 @@ def test_a_rate_that_is_not_come_to_within_the_run_is_told(tmp_path: Path) -> No
     assert " rad/s off, of 0.5 rad/s that it is told, and `j.servo.tau_max`" in found.message
 
 
-@pytest.mark.parametrize("name", ["move", "sagging", "on_its_way", "late", "swinging", "pushed", "let_go"])
+@pytest.mark.parametrize(
+    "name", ["move", "sagging", "on_its_way", "late", "swinging", "pushed", "let_go", "fastest", "soft"]
+)
 def test_who_follows_comes_nearer_or_is_not_told_to_is_left_alone(tmp_path: Path, name: str) -> None:
     assert warned(tmp_path, name) == []
 
