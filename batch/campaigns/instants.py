@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from batch.campaigns.follow_words import not_followed
 from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.tasks import GRANULE, CampaignSection
 from ic.meaning.checks.beds import bed_warning
@@ -24,7 +25,7 @@ from met.passing import Memories, even_ticks
 from met.plan import Experiment
 from met.plan.columns import are_among
 
-CODES = ("D317", "D318", "D319", "D320", "D321", "D322")
+CODES = ("D317", "D318", "D319", "D320", "D321", "D322", "D348")
 
 SHARE = 0.03
 """Of a campaign's steps: so much more is done to look at some of its cases again. A block is run, whatever is in it."""
@@ -89,6 +90,7 @@ def step_warnings(section: CampaignSection, outcomes: CaseOutcomes, threads: int
             )
             for each, since in passed.lasting_beds(experiment, at)
         ]
+        said += not_followed(experiment, memories, section.prepared.recording.cells, said)
         return [each for each in said if not experiment.allows(each.code)]
     except Problem:  # a program that cannot be put together but for a kernel
         return []

@@ -1,4 +1,5 @@
-"""What an archive warns of once its cases are run: errors by the step, limits of machines and joints, grapples."""
+"""What an archive warns of once its cases are run: errors by the step, limits of machines and joints, grapples,
+times that are not seen."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from batch.queries import at_limits, grapples
+from batch.queries import at_limits, grapples, undecided
 from batch.queries.step_errors import warning as step_errors
 from ic.printing.columns import count as counted
 from met.diagnostic import Diagnostic
@@ -37,5 +38,5 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
 
     experiment  of the plan, for places
     """
-    about = (step_errors, at_limits, grapples)
+    about = (step_errors, at_limits, grapples, undecided)
     return [warning for each in about for warning in each.warnings(group, experiment)]

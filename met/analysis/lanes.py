@@ -19,14 +19,14 @@ SMALL_STATE = 1e-9
 
 
 class LaneTape:
-    """A `Tape` over arrays: one number a lane, where the lanes differ."""
+    """A `Tape` over arrays: one number a lane, where the lanes differ. `k`, the tick, may differ too."""
 
     def __init__(self, base_hz: float, inputs: Mapping[str, np.ndarray], lanes: int) -> None:
         self.base_hz = base_hz
         self.inputs = dict(inputs)
         self.cells: dict[str, Any] = {}
         self.lanes = lanes
-        self.k = 0
+        self.k: Any = 0
 
     @property
     def tick(self) -> Real:

@@ -24,6 +24,7 @@ from met.parameter import Parameter
 from met.plan import Experiment
 from met.program import cell_names
 from met.program.build import Builder
+from met.program.evaluation import brake_levels
 from met.program.motion import bodies
 from met.program.step import STAGE
 from met.program.system import System
@@ -111,8 +112,9 @@ class Linearizer:
             begun.cells.update(
                 {name: at for name, at in memory.items() if name in begun.cells or name.startswith(bodies.PAYLOAD)}
             )
+        held = self._braked(begun) if memory is None else {}
         self.tape, self.loose = begun.spread(2), np.tile([False, True], lanes)
-        self._loosen()
+        self._loosen(held)
         self.cells = tuple(f"{name}.{part}" for part in ("q", "qd") for name in step.coordinates) + step.states
         driven = [
             each
@@ -220,8 +222,28 @@ class Linearizer:
         slopes |= {name: wide.read(STAGE + cell_names.SLOPE(name)) for name in step.states}
         return differences(slopes, self.cells, sizes)
 
-    def _loosen(self) -> None:
-        """Lets go in the loose lanes: rates and what computers hold are 0, and all dry friction is of sliding."""
+    def _braked(self, tape: LaneTape) -> dict[str, np.ndarray]:
+        """The joints that brakes hold where a case begins, and are as strong as the run ends: a truth for each lane.
+        Where one slips later, the instants that the case passes show it."""
+        system, step = self.system, self.builder.step
+        if not system.braked:
+            return {}
+        begun, end = tape.spread(1), step.schedule.duration - step.schedule.step
+        with np.errstate(all="ignore"):
+            step.derive(begun)
+            y = step.state(begun)
+            first, last = (brake_levels(system, begun.read, y, time, time) for time in (0.0, end))
+        return {
+            joint: np.broadcast_to(
+                (np.abs(begun.lane(cell_names.HOLDING(joint))) <= first[joint]) & (first[joint] <= last[joint]),
+                tape.lanes,
+            )
+            for joint in first
+        }
+
+    def _loosen(self, held: Mapping[str, np.ndarray]) -> None:
+        """Lets go in the loose lanes: rates and what computers hold are 0, and all dry friction is of sliding, but for
+        that of joints which brakes hold."""
         tape, step, loose = self.tape, self.builder.step, self.loose
         memory = [f"{each.path}.{part.name}" for each in self.system.working for part in each.parts.memory]
         first = [cell_names.FIRST(name) for name in memory]
@@ -230,7 +252,10 @@ class Linearizer:
                 tape.cells[name] = np.where(loose, 0.0, tape.lane(name))
         for each in step.sticking:
             name = cell_names.FRICTION_MODE(each.name)
-            tape.cells[name] = np.where(loose & (tape.lane(name) == 0.0), 1.0, tape.lane(name))
+            lets_go = loose & (tape.lane(name) == 0.0)
+            if each.name in held:
+                lets_go &= ~np.repeat(held[each.name], 2)
+            tape.cells[name] = np.where(lets_go, 1.0, tape.lane(name))
 
     def _of_stages(self) -> np.ndarray:
         """M as the program's own phases make it of changed states."""

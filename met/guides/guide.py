@@ -84,6 +84,7 @@ class Guide:
     components  (p) -> which of the pose (`met.plan.COMPONENTS`) the path has; None: there is no path. Words of p alone
     commands    kinds of command that its joints may take of it
     memory      what its computer shows of a tick
+    error       name of that memory which is the distance from the path, m; "": none is
     fastest     (p) -> the rate constant with which its error falls, 1/s: 2 over its period, and it grows; None: unknown
     steer       (p, joints, sight) -> Steered, joints the parameters of each; None: it is a course
     idle        (p, duration) -> the parameters because of which it, or some part of it, does nothing in a run of this
@@ -100,6 +101,7 @@ class Guide:
     components: Callable[[Any], tuple[str, ...]] | None = None
     commands: tuple[str, ...]
     memory: tuple[Memory, ...] = ()
+    error: str = ""
     fastest: Callable[[Any], Real] | None = None
     steer: Steer | None = None
     idle: Callable[[Any, float], tuple[tuple[str, ...], str] | None] | None = None

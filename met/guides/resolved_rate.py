@@ -158,6 +158,7 @@ GUIDE = Guide(
         Memory(name="damping", unit="m", doc="lambda, the damping of the rates"),
         Memory(name="share", unit="1", doc="share of the rates that the joints' limits leave"),
     ),
+    error="error",
     fastest=fastest,
     steer=steer,
     idle=idle,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 WHILE_RUNNING: frozenset[str] = frozenset(
-    {"D310", "D311", "D312", "D317", "D318", "D319", "D320", "D321", "D322", "D344", "D345", "D347"}
+    {"D310", "D311", "D312", "D317", "D318", "D319", "D320", "D321", "D322", "D341", "D344", "D345", "D347", "D348"}
 )
 """Codes of warnings that a run itself may give: the check does not know whether an `allow` of one is of use."""
 

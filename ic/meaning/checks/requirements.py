@@ -37,8 +37,8 @@ def check_requirements(scope: Scope, requirements: Sequence[Requirement], struct
             _ = (
                 _remark_bound(scope, requirement, metric, place)
                 or _remark_begin(scope, requirement, use, metric, place)
+                or (metric.times and duration < requirement.limit < math.inf)  # only the run shows if it is seen
                 or _remark_target(scope, requirement, use, metric, structure, place)
-                or _remark_times(scope, requirement, metric, duration, place)
                 or _remark_window(scope, requirement, use, metric, duration, place)
             )
     _remark_contradictions(scope, requirements)
@@ -79,20 +79,6 @@ def _remark_contradictions(scope: Scope, requirements: Iterable[Requirement]) ->
                 also=[Label(high.place, "the other")],
                 help="leave one of them out, or let the limits meet",
             )
-
-
-def _remark_times(scope: Scope, requirement: Requirement, metric: Metric, duration: float, place: Place) -> bool:
-    """Return True, with a warning, for a time after the run's end."""
-    late = metric.times and duration < requirement.limit < math.inf
-    if late:
-        scope.complaints.remark(
-            "D341",
-            f"`require {requirement.text}` looks beyond this run, which ends at {duration:.9g} s: what a metric "
-            f"`{metric.name}` does not see by then is infinite",
-            place,
-            help="let the run last longer, or write an earlier limit",
-        )
-    return late
 
 
 def _remark_window(

@@ -33,7 +33,7 @@ from met.program.motion import base, bodies, payloads
 from met.program.motion.base import BaseMotion
 from met.program.system import ReadCell, System
 from met.program.values import answer, returned
-from met.trace import Real
+from met.trace import Real, sqrt
 from met.trace.program import Tape
 
 
@@ -83,6 +83,12 @@ def tick(system: System, tape: Tape, use: GuideUse) -> None:
         tape.write(cell_names.GUIDE_POSITION(joint), positions[joint])
         tape.write(cell_names.GUIDE_RATE(joint), rate)
     tape.write(cell_names.GUIDE_TIME(use.name), tape.time)
+
+
+def way_along(system: System, tape: Tape, use: GuideUse) -> Real:
+    """The distance of a guide's path at this time from where it begins, m."""
+    way = sub(_wanted(system, tape, use).p, tuple(tape.read(name) for name in _begun(use)[9:]))  # type: ignore[arg-type]
+    return sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
 
 
 class _ArmAt:

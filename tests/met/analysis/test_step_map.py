@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import ic
 from met import models
 from met import run as engine
 from met.analysis.modes import modes, slowest
@@ -174,3 +175,33 @@ run hold { arm = swing; servos { hinge = drive; } rates { dynamics = 100 Hz; ser
     held, loose = found.slope
     assert list(found.loose) == [False, True] and held[1, 1] == 0.0
     assert loose[1, 1] == pytest.approx(-(0.5**2) * 100.0 / 2.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("brake", "held"),
+    [
+        ("torque = 6 N*m;", True),
+        ("torque = 4 N*m;", False),
+        ("torque = 6 N*m;  until = 0.5 s;", False),
+        ("torque = 6 N*m;  from = 0.5 s;", False),
+    ],
+)
+def test_a_joint_that_its_brake_holds_from_the_start_to_the_end_stays_held(
+    tmp_path: Path, brake: str, held: bool
+) -> None:
+    """A bar of 1 kg whose weight takes 9.81 N * 0.5 m cos(0.2) about the hinge."""
+    deck = f"""\
+arm swing {{ link bar {{ mass = 1 kg; com = [0.5, 0, 0] m; inertia = [1, 1, 1] kg*m^2; }}
+    joint hinge revolute {{ parent = base; child = bar; axis = y; }} }}
+run hold {{ arm = swing; initial {{ hinge.q = 0.2 rad; }} rates {{ dynamics = 100 Hz; }} duration = 1 s; record = [q];
+    environment {{ gravity = [0, 0, -9.81] m/s^2;  grip = brake {{ joint = hinge;  {brake} }} }} }}
+sweep several of hold {{ vary links.bar.com.x = [0.5, 0.4, 0.3] m; }}
+"""
+    (tmp_path / "deck.ic").write_text(deck)
+    made = ic.compile(tmp_path / "deck.ic", select=["several"]).experiments[0]
+    found = Linearizer(made, [0]).map()
+    assert list(found.loose) == [False, True]
+    assert bool(found.slope[1, 1, 0] == 0.0) is held
+    several = Linearizer(made, [0, 1, 2]).map()
+    lighter = held or ("until" not in brake and "from" not in brake)  # 0.4 m and less: 4 N m hold that
+    assert [bool(each) for each in several.slope[1::2, 1, 0] == 0.0] == [held, lighter, lighter]

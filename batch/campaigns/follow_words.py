@@ -1,0 +1,81 @@
+"""The warning of a joint, or a guided point, that does not follow what it is commanded (D348), in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from batch.queries.signals import number_text
+from met.analysis.following import Unfollowed, unfollowed
+from met.analysis.step_size import chosen_cases, step_size
+from met.diagnostic import Diagnostic, Label, Place
+from met.passing import Memories
+from met.plan import Experiment
+
+LOOPS = frozenset({"D317", "D320", "D321", "D322"})
+"""Warnings of a loop or a step with which nothing follows: what they tell, at the check too, is not told again."""
+
+
+def not_followed(
+    experiment: Experiment, memories: Memories, cells: Sequence[str], said: Sequence[Diagnostic]
+) -> list[Diagnostic]:
+    """The warning of what does not follow its command, if there is one: of the worst, with the others by name.
+
+    said  what else is told of the same instants
+    """
+    if experiment.allows("D348") or any(each.code in LOOPS for each in said):
+        return []
+    found = unfollowed(experiment, memories.ticks, memories.by_case, cells)
+    if not found:
+        return []
+    begun = step_size(experiment, chosen_cases(experiment))
+    if begun.loops or any(each.kind == "grows" for each in begun.faults):
+        return []
+    worst, *others = found
+    place, what = _place(experiment, worst), "path of guide" if worst.kind == "path" else "joint"
+    does = "is not followed" if worst.kind == "path" else "does not follow its command"
+    at_limit = f", and `{worst.limit}` was reached for most of that time" if worst.limit else ""
+    case = f" in case #{int(experiment.cases.table[worst.case])}" if experiment.cases.count > 1 else ""
+    message = f"{what} `{worst.of}` {does}{case}: it is {_off(experiment, worst)}{at_limit}"
+    helps = [_remedy(experiment, worst)]
+    if others:
+        helps.append(f"the same of {', '.join(f'`{each.of}`' for each in others)}")
+    helps.append(f"root mean square from {worst.since:.4g} s to {worst.until:.4g} s, and it does not fall")
+    return [Diagnostic("D348", message, None if place is None else Label(place), (), tuple(helps), "warning")]
+
+
+def _off(experiment: Experiment, found: Unfollowed) -> str:
+    """`1.047 rad off, of 1.047 rad that it is told to move`."""
+    straight = found.kind == "path" or any(
+        each.name == found.of and each.kind == "prismatic" for each in experiment.structure.joints
+    )
+    unit = ("m" if straight else "rad") + ("/s" if found.kind == "rate" else "")
+    off = f"{number_text(found.off)} {unit} off"
+    if not found.asked:
+        return f"{off}, and is told to stay"
+    does = {"position": "it is told to move", "rate": "it is told", "path": "it leads"}[found.kind]
+    return f"{off}, of {number_text(found.asked)} {unit} that {does}"
+
+
+def _remedy(experiment: Experiment, found: Unfollowed) -> str:
+    """The ways to let it follow, in words."""
+    if found.kind == "path":
+        return "let the path stay where the arm reaches, and within what rates and damping leave"
+    structure, beside = experiment.structure, []
+    for use in structure.environment:
+        about = experiment.parameters.get(f"environment.{use.name}.joint")
+        if about is not None and about.value == found.of:
+            beside.append(f"`{use.name}`")
+    other = f", or take away what holds it: {', '.join(beside)}" if beside else ""
+    if found.limit:
+        return f"raise `{found.limit}`, give it less to move{other}"
+    return f"look at its servo's gains, ratio and friction, and at what it has to move{other}"
+
+
+def _place(experiment: Experiment, found: Unfollowed) -> Place | None:
+    """Where the command, or the guide, is written."""
+    if found.kind == "path":
+        return next(use.place for use in experiment.structure.guides if use.name == found.of)
+    asked = (one for path, one in experiment.parameters.items() if path.startswith(f"{found.of}.servo.command."))
+    places = [one.origin.place for one in asked if one.origin.place is not None]
+    servos = [use.place for use in experiment.structure.servos if use.joint == found.of]
+    return (places or servos)[0]

@@ -1,0 +1,179 @@
+"""Joints and guided points that do not follow what they are commanded: found at instants that cases have passed.
+
+A command is judged where it stays what it is for a last part of the run, in which the joint has time to come to it:
+told is who is off by a large share of what it was told to do, on the mean of that part, and does not come nearer. The
+setpoints are those of the program's own functions, and positions and rates those of the run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from met import models
+from met.analysis.lanes import LaneTape
+from met.frozen import frozen
+from met.plan import Experiment
+from met.plan.limits import limits
+from met.program import cell_names
+from met.program.control import guiding, setpoints
+from met.program.system import PARAMETER, System
+
+SHARE = 0.2
+"""Of what was commanded over the run: whoever is off by no more follows, if not well."""
+
+STAYS, STRAYS = 1e-3, 0.2
+"""rad, m, rad/s, m/s: what is told to do no more than the first is told to stay, and strays if off by the second."""
+
+SETTLED = 0.01
+"""Share of what was commanded, by which a command that has settled still changes."""
+
+FIRST, LEAST = 0.75, 0.1
+"""Shares of the run: what is judged lies after the first of it, and is not shorter than the second."""
+
+FALLS = 0.25
+"""Whoever loses this share of its error in a time as long as the run is on its way."""
+
+
+@frozen
+class Unfollowed:
+    """Joint or guided point that is not where, or as fast as, it is commanded to be as a case ends.
+
+    of     name of the joint, or of the guide;  kind: `position` or `rate` of a joint, `path` of a guide
+    off    root of the mean square of the distance from the setpoint, from `since` to `until`, s
+    asked  what was commanded over the run, 0: to stay: rad, m, rad/s or m/s, as `off`
+    weight of the distance, by what is told at all;  case: row of the case table
+    limit  path of the limit of its servo that it was at for most of that time; "": none
+    """
+
+    of: str
+    kind: str
+    off: float
+    asked: float
+    weight: float
+    since: float
+    until: float
+    case: int
+    limit: str = ""
+
+
+def unfollowed(
+    experiment: Experiment, ticks: Sequence[int], memories: Mapping[int, np.ndarray], cells: Sequence[str]
+) -> list[Unfollowed]:
+    """The joints with a command of position or rate, and the guides, that are not followed: each in its worst case,
+    worst first. Not looked at are joints whose servo fails, which the deck wants, and those of which a requirement
+    wants more than a limit. Raises Problem where a model's function does.
+
+    ticks     of the base rate, rising;  memories: row of the case table -> [tick, cell], as `cells` names these
+    """
+    system, whole = System(experiment), [case for case, at in memories.items() if np.isfinite(at).all()]
+    judged = [each for each in system.working if each.command_kind in ("position", "rate")]
+    judged = [each for each in judged if each.use.joint not in system.failing and _is_own(experiment, each.use.command)]
+    judged = [each for each in judged if not _is_required(experiment, each.use.joint, each.command_kind)]
+    guides = [use for use in guiding.ticking(system) if models.find("guide", use.model, use.place).error]
+    if not whole or not (judged or guides):
+        return []
+    tape = _lanes(system, ticks, memories, whole, cells)
+    times = np.asarray(ticks) / tape.base_hz
+    found: list[Unfollowed] = []
+
+    def by_case(value: object) -> np.ndarray:
+        return np.broadcast_to(np.asarray(value, dtype=float), (tape.lanes,)).reshape(len(whole), len(ticks))
+
+    with np.errstate(all="ignore"):
+        for each in judged:
+            joint, kind = each.use.joint, each.command_kind
+            asked = by_case(setpoints.setpoint(system, each, tape.read, tape.time).value)
+            begun = by_case(tape.lane(f"{joint}.q"))[:, :1] if kind == "position" else 0.0
+            is_at = by_case(tape.lane(f"{joint}.{'q' if kind == 'position' else 'qd'}"))
+            for one in _told(joint, kind, whole, times, asked - begun, np.abs(asked - is_at)):
+                first = int(np.searchsorted(times, one.since))
+                steps = (ticks[-1] - ticks[first]) // experiment.structure.schedule.dynamics
+                counted = dict(zip(cells, memories[one.case][-1] - memories[one.case][first], strict=True))
+                found.append(replace(one, limit=_limit(experiment, joint, counted, steps)))
+        for use in guides:
+            guiding.tick(system, tape, use)
+            way = by_case(guiding.way_along(system, tape, use))
+            off = by_case(tape.lane(f"guides.{use.name}.{models.find('guide', use.model, use.place).error}"))
+            found += _told(use.name, "path", whole, times, way, off)
+    worst: dict[tuple[str, bool], Unfollowed] = {}
+    for one in sorted(found, key=lambda one: (-one.weight, one.case)):
+        worst.setdefault((one.of, one.kind == "path"), one)
+    return list(worst.values())
+
+
+def _is_own(experiment: Experiment, command: object) -> bool:
+    """True for a course in time; the setpoint of a guide that steers is judged by the guide's own error."""
+    guide = getattr(command, "guide", "")
+    use = next((use for use in experiment.structure.guides if use.name == guide), None)
+    return use is None or models.find("guide", use.model, use.place).course is not None
+
+
+def _is_required(experiment: Experiment, joint: str, kind: str) -> bool:
+    """True where a requirement wants much of a joint's position or rate: it judges how much is come to."""
+    most = {each.metric for each in experiment.requirements if each.comparison.startswith(">")}
+    channel = f"{joint}.{'q' if kind == 'position' else 'qd'}"
+    return any(use.name in most and use.of == channel for use in experiment.structure.metrics)
+
+
+def _lanes(
+    system: System,
+    ticks: Sequence[int],
+    memories: Mapping[int, np.ndarray],
+    cases: Sequence[int],
+    cells: Sequence[str],
+) -> LaneTape:
+    """A lane for each instant of each case, with all that is in its memory, and the parameters of its own."""
+    experiment = system.experiment
+    rows = np.repeat(cases, len(ticks))
+    given = {each.path: each.values[rows] for each in experiment.cases.coordinates}
+    tape = LaneTape(experiment.structure.schedule.base_hz, given, len(rows))
+    tape.k = np.tile(np.asarray(ticks), len(cases))
+    values = experiment.formulas.replay(given)
+    for path in system.varying:
+        tape.write(PARAMETER + path, values[experiment.parameters[path].value.output])  # type: ignore[union-attr]
+    system.keep_tree(tape.read, tape.write)
+    every = np.concatenate([memories[case] for case in cases])
+    tape.cells.update({name: every[:, slot] for slot, name in enumerate(cells)})
+    return tape
+
+
+def _told(
+    of: str, kind: str, cases: Sequence[int], times: np.ndarray, way: np.ndarray, off: np.ndarray
+) -> Iterator[Unfollowed]:
+    """The cases in which a setpoint is not followed.
+
+    way  what is commanded, from where it begins;  off: distance from the setpoint: [case, instant]
+    """
+    end = float(times[-1])
+    for case, told, away in zip(cases, way, off, strict=True):
+        most = float(np.max(np.abs(told)))
+        asked = most if most > STAYS else 0.0
+        unsettled = np.flatnonzero(np.abs(told - told[-1]) > SETTLED * max(most, 0.1))
+        first = max(int(unsettled[-1]) + 1 if len(unsettled) else 0, int(np.searchsorted(times, FIRST * end)))
+        if first >= len(times) or end - times[first] < LEAST * end:
+            continue
+        late, half = away[first:], (first + len(times)) // 2
+        mean = float(np.sqrt(np.mean(late * late)))
+        bound = SHARE * asked if asked else STRAYS
+        one, other = first + int(np.argmax(away[first:half])), half + int(np.argmax(away[half:]))
+        falls = (away[one] - away[other]) * end > FALLS * away[other] * (times[other] - times[one])
+        if mean > bound and not falls:
+            yield Unfollowed(of, kind, mean, asked, mean / bound, float(times[first]), end, case)
+
+
+def _limit(experiment: Experiment, joint: str, counted: Mapping[str, float], steps: int) -> str:
+    """The limit of a joint's servo at which more than half of so many steps began: of several that nearest to the
+    joint.
+
+    counted  change of the memory over these steps, by cell
+    """
+    servo = [
+        each.path
+        for each in limits(experiment.structure, experiment.parameters)
+        if each.joint == joint and each.machine and each.channels
+    ]
+    half = 0.5 * steps
+    return next((path for path in reversed(servo) if counted.get(cell_names.AT_LIMIT(path), 0.0) > half), "")
