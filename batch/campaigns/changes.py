@@ -215,7 +215,7 @@ def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
 
 
 def _stops(before: Experiment, now: Experiment) -> Iterator[str]:
-    """What decides how many cases of a design point are run, where that is decided by results."""
+    """Changes of what decides how many cases of a design point are run, where that is decided by results."""
     early = [bool(each.cases.until_shown) for each in (before, now)]
     if early[0] != early[1]:
         yield "cases are run until it is shown what is required" if early[1] else "all cases are run"

@@ -111,7 +111,7 @@ def _alone(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, str]
 
 
 def results(folder: Folder, section: CampaignSection, most: Mapping[str, int] | None = None) -> CaseOutcomes:
-    """What became of all cases of a section, by which histories are chosen. most: as `CaseOutcomes`."""
+    """The outcomes of all cases of a section, by which histories are chosen. most: as `CaseOutcomes`."""
     outcomes = CaseOutcomes(section.prepared.experiment, most)
     for at, found in shards_in_order(folder, section):
         outcomes.add_run(_results(section, at, found.outputs, None, dict(found.fates)))

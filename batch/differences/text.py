@@ -68,7 +68,7 @@ def _experiment(found: Diff, experiment: ExperimentDiff, cut: Shortening) -> lis
 
 
 def _evidence(experiment: ExperimentDiff, cut: Shortening) -> list[str]:
-    """What the cases show of requirements over a share of cases, where that is something else than before."""
+    """Lines on what the cases show of requirements over a share of cases, where that is something else than before."""
     both = [f"    {what}\n      {said}" for what, said in words.evidence_pairs(experiment)]
     lines = [line for each in cut.cut(both, SHOWN_EVIDENCE, "    ") for line in each.split("\n")]
     return [f"  {words.EVIDENCE}:", *lines] if lines else []

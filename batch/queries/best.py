@@ -15,7 +15,7 @@ import numpy as np
 
 from batch.queries import requirements
 from batch.queries.evidence import ROUNDING
-from batch.queries.expressions import CaseTable
+from batch.queries.expressions import CaseExpressions
 from batch.queries.grids import levels
 from batch.queries.pool import CaseColumn, Pool
 from met.diagnostic import Problem, did_you_mean, error
@@ -40,7 +40,7 @@ ENDS, FAILS, UNKNOWN = "the sweep ends", "a case fails", "it was not run"
 
 @frozen
 class DesignAxis:
-    """What is chosen as one: a choice, a parameter, or several that go in step.
+    """Parameters that are chosen as one: a choice, a parameter, or several that go in step.
 
     columns  of these, in the deck's units;  values: of the first, rising
     level    of each design, its place in `values`
@@ -69,7 +69,7 @@ class Stretch:
 
 @frozen
 class Goal:
-    """What is to be least, or largest: a metric, or an expression of metrics and parameters.
+    """A number that is to be least, or largest: a metric, or an expression of metrics and parameters.
 
     text    as it was asked for;  largest: whether it is to be that
     values  of each case, SI;  dimension: theirs
@@ -126,7 +126,7 @@ class Designs:
 
     @cached_property
     def demands(self) -> tuple[str, ...]:
-        """What makes a design good: the requirements; of a sweep that has none, that its cases reach their end."""
+        """The demands that make a design good: the requirements; of a sweep that has none, that its cases reach their end."""
         return self.pool.requirements or (FAILS,)
 
     @cached_property
@@ -172,12 +172,12 @@ class Designs:
         return out
 
     def goal(self, text: str) -> Goal:
-        """What `METRIC`, `EXPRESSION`, `METRIC:largest` asks for. Raises Problem."""
+        """The goal that `METRIC`, `EXPRESSION` or `METRIC:largest` asks for. Raises Problem."""
         name, colon, way = text.rpartition(":")
         largest = bool(colon) and way.strip() == "largest"
         if not colon or way.strip() not in ("largest", "smallest"):
             name = text
-        values, dimension = CaseTable(self.pool).values(name)
+        values, dimension = CaseExpressions(self.pool).values(name)
         return Goal(name.strip(), largest, values, dimension)
 
     # The border

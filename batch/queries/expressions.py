@@ -26,7 +26,7 @@ from met.unit_parser import parse_unit
 from met.units import Dimension
 
 
-class CaseTable:
+class CaseExpressions:
     """The cases of a pool as a table whose columns expressions may name."""
 
     def __init__(self, pool: Pool) -> None:

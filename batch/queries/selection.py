@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from batch.queries.best import check_varied, varied_columns
-from batch.queries.expressions import CaseTable
+from batch.queries.expressions import CaseExpressions
 from batch.queries.pool import ENDED, Pool
 from met.frozen import frozen
 from met.statistics.design_points import design_points
@@ -33,7 +33,7 @@ class CaseSelection:
         """Places of these cases, in the pool's order. Raises Problem for a condition that is none, or another path."""
         keep = np.ones(pool.count, bool)
         if self.where:
-            keep &= CaseTable(pool).holds(self.where)
+            keep &= CaseExpressions(pool).holds(self.where)
         if self.over:
             check_varied(pool, self.over)
             others = [column.values for column in varied_columns(pool) if column.label not in self.over]

@@ -39,7 +39,7 @@ class BestRow:
 
 
 class BestAnswer:
-    """What is to be said of the designs of one run or sweep.
+    """The answer on the designs of one run or sweep.
 
     deck   of the archive;  name: of the sweep where the deck has several;  seed: the campaign's
     front  goals that are traded off against each other
@@ -113,7 +113,7 @@ class BestAnswer:
         ]
 
     def notes(self) -> list[str]:
-        """What is to be known besides: that better ones may lie beyond the sweep, that all is taken for chosen."""
+        """Notes besides: that better ones may lie beyond the sweep, that all is taken for chosen."""
         assert self.best is not None
         designs = self.designs
         at = [
@@ -131,7 +131,7 @@ class BestAnswer:
 
     @property
     def why(self) -> str:
-        """What the best has for it, and how many designs meet all."""
+        """The reasons for the best, and how many designs meet all."""
         assert self.best is not None
         designs, best = self.designs, self.best
         cases, good = int(designs.cases[best]), int(designs.good.sum())
@@ -243,7 +243,7 @@ class BestAnswer:
         return f"met run {quoted(self.deck)}{name}{settings}{other}"
 
     def confirmation(self) -> tuple[str, str]:
-        """What the best is worth, in words, and the command that runs it: with other draws where its cases were
+        """The worth of the best, in words, and the command that runs it: with other draws where its cases were
         drawn."""
         assert self.best is not None
         if not any(each.attributes.get("design") for each in self.designs.pool.variables("coordinate")):
@@ -315,7 +315,7 @@ def _value(column: CaseColumn, place: int) -> str:
 
 
 def _range(column: CaseColumn) -> str:
-    """What a design is held against, in words."""
+    """The range of what a design is held against, in words."""
     if column.role == "choice":
         return f"{column.label} {', '.join(column.words)}"
     ends = column.values[np.isfinite(column.values)]

@@ -50,7 +50,7 @@ def _grounds(row: EvidenceRow) -> list[str]:
 
 
 def _test(row: EvidenceRow) -> str:
-    """What is said of a test that was looked at after every case, behind what it shows."""
+    """Words on a test that was looked at after every case, behind what it shows."""
     if not row.sequential:
         return ""
     early = row.decided is not None and row.decided < row.cases

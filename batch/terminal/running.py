@@ -219,7 +219,7 @@ def _is_counted(campaign: Campaign, performed: Performed) -> bool:
 
 
 def _counted_result(campaign: Campaign, performed: Performed) -> RunResult:
-    """What is known of very many cases without reading their archive: how many failed, and met what is required."""
+    """The result of very many cases without reading their archive: how many failed, and met what is required."""
     summaries = []
     for part in campaign.parts:
         experiment, counted = part.experiment, performed.counted[part.experiment.name]

@@ -129,7 +129,7 @@ def kept(
 
 @dataclass
 class _SeenComparison:
-    """What is found of a comparison of numbers, over all pieces.
+    """The findings on a comparison of numbers, over all pieces.
 
     lost  rows in which a side has no value;  close: rows in which rounding decides;  edge: the sides in the first
     """

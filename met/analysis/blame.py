@@ -133,7 +133,7 @@ class Lane:
         return _Growing(tuple(sorted(rates[rates > above * self.limit].tolist(), reverse=True)))
 
     def without(self, own: _Growing, joints: Sequence[str], gains: Gains | None = None) -> _Growing | None:
-        """What grows without the loops of these joints, where that is less than with them; else None."""
+        """The growth without the loops of these joints, where that is less than with them; else None."""
         found = self.growing({**(gains or {}), **dict.fromkeys(joints, 0.0)}, above=0.5)
         return found if own.adds_to(found, self.limit) else None
 

@@ -171,7 +171,7 @@ class _Linearised:
         return differences(after, own, sizes)
 
     def drive(self, scaled: Mapping[str, float]) -> tuple[Any, ...]:
-        """What nature does with outputs and states of no particular size, to be compared."""
+        """The slopes of nature under outputs and states of no particular size, to be compared."""
         actuator, parts = self.actuator, self.actuator.parts
         held = dict.fromkeys(_held(parts), 0.3)
         states = NamedValues(actuator.owner, {part.name: 0.2 for part in parts.natural})
@@ -182,7 +182,7 @@ class _Linearised:
         return tuple(tuple(np.atleast_1d(np.asarray(each, dtype=float)).tolist()) for each in numbers)
 
     def _seen(self) -> list[np.ndarray]:
-        """What the law sees as it is: joint's motion as measured, then states of the servo."""
+        """A law's inputs without its sensors: joint's motion as measured, then states of the servo."""
         actuator, tape = self.actuator, self.tape
         states: Any = {each.name: tape.lane(f"{actuator.path}.{each.name}") for each in actuator.parts.natural}
         q, qd = (tape.lane(f"{actuator.use.joint}.{part}") for part in ("q", "qd"))
@@ -236,7 +236,7 @@ def _sizes(start: np.ndarray, plain: int) -> np.ndarray:
 
 
 def _agreed(slopes: np.ndarray) -> np.ndarray:
-    """Of slopes over changes of several sizes, [lane, size, of, by], those that differ least from that of the next
+    """The slopes, of those over changes of several sizes, [lane, size, of, by], that differ least from that of the next
     size; 0 where none is anything else."""
     one, other = slopes[:, :-1], slopes[:, 1:]
     larger = np.maximum(np.abs(one), np.abs(other))

@@ -141,7 +141,7 @@ class ShiftedColumn(ComputedColumn):
 
 
 class FormulaColumn(ComputedColumn):
-    """What a formula of one output gives in each case. values: of its inputs, by name."""
+    """The values of a formula of one output in each case. values: of its inputs, by name."""
 
     def __init__(self, formula: Formulas, values: Mapping[str, CaseValues], count: int) -> None:
         super().__init__(count)

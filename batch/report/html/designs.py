@@ -66,5 +66,5 @@ def _map(found: DesignMap) -> Html:
 
 
 def _side(name: str, texts: Sequence[str], unit: str, way: str) -> str:
-    """What a side of the map is: `drive.kp from 0.05 to 1 V*s/rad, to the right`."""
+    """A side of the map in words: `drive.kp from 0.05 to 1 V*s/rad, to the right`."""
     return f"{name} from {texts[0]} to {texts[-1]} {unit}".rstrip() + f", {way}"

@@ -11,7 +11,7 @@ import pytest
 
 import batch
 from batch.archive.read import ArchiveFile
-from batch.queries.expressions import CaseTable
+from batch.queries.expressions import CaseExpressions
 from batch.queries.pool import Pool
 from batch.queries.selection import CaseSelection
 from batch.terminal.show import as_json, show
@@ -45,14 +45,14 @@ def pool(sweep: ArchiveFile) -> Pool:
 ])  # fmt: skip
 def test_a_condition_holds_in_the_cases_that_numpy_says(condition: str, holds, pool: Pool) -> None:  # type: ignore[no-untyped-def]
     values = {name: pool.gathered(name) for name in ("settle", "volts", "gearbox.kp", "links.lower.mass")}
-    assert CaseTable(pool).holds(condition).tolist() == holds(values).tolist()
+    assert CaseExpressions(pool).holds(condition).tolist() == holds(values).tolist()
 
 
 def test_what_has_no_value_holds_in_no_comparison(pool: Pool) -> None:
     late = pool.gathered("settle")
     root = "sqrt(settle / (1 s) - 4)"
-    assert CaseTable(pool).holds(f"{root} >= 0").tolist() == (late >= 4.0).tolist()
-    assert CaseTable(pool).holds(f"{root} != 7").tolist() == (late >= 4.0).tolist()
+    assert CaseExpressions(pool).holds(f"{root} >= 0").tolist() == (late >= 4.0).tolist()
+    assert CaseExpressions(pool).holds(f"{root} != 7").tolist() == (late >= 4.0).tolist()
 
 
 def test_of_cases_that_differ_in_one_thing_alone_the_worst_is_kept(pool: Pool) -> None:
