@@ -111,30 +111,41 @@ def _observe(scope: Scope, sampled: SampledContent, schedule: Schedule) -> None:
     def warn(rows: np.ndarray) -> None:
         if scope.complaints.error_count:
             return  # a number may be out of its range
-        rows = np.unique(rows, axis=0)
+        rows, cases, counts = np.unique(rows, axis=0, return_index=True, return_counts=True)
         if len(rows) > MOST_ROWS:
-            rows = rows[np.linspace(0, len(rows) - 1, MOST_ROWS).astype(int)]
+            chosen = np.linspace(0, len(rows) - 1, MOST_ROWS).astype(int)
+            rows, cases, counts = rows[chosen], cases[chosen], counts[chosen]
         found = [
             sampled.content(SimpleNamespace(**fixed, **dict(zip(numbers, row, strict=True))), schedule.duration)
             for row in rows.tolist()
         ]
         _remark(scope, sampled, found, schedule, place)
+        late = [at for at, each in enumerate(found) if schedule.duration <= each.begins < math.inf]
+        if 0 < len(late) < len(found) and not sampled.path.startswith("environment."):
+            first = min(late, key=lambda at: cases[at])
+            others = " and others" if counts[late].sum() > 1 else ""
+            _remark_late(scope, sampled, found[first].begins, schedule, place, f" in case #{cases[first]}{others}")
 
     scope.checks.observe(tuple(numbers.values()), warn, place, needs=(sampled.path,))
+
+
+def _remark_late(
+    scope: Scope, sampled: SampledContent, begins: float, schedule: Schedule, place: Place, where: str
+) -> None:
+    scope.complaints.remark(
+        "D334",
+        f"{sampled.label} does nothing{where}: it first changes at {begins:.9g} s, and the run ends at "
+        f"{schedule.duration:.9g} s",
+        place,
+        help="let it begin earlier, or the run last longer; or write the value that it keeps",
+    )
 
 
 def _remark(scope: Scope, sampled: SampledContent, found: list[Content], schedule: Schedule, place: Place) -> None:
     duration, base = schedule.duration, schedule.base_hz
     first = min(found, key=lambda each: each.begins)
     if duration <= first.begins < math.inf:
-        scope.complaints.remark(
-            "D334",
-            f"{sampled.label} does nothing in this run: it first changes at {first.begins:.9g} s, and the run ends at "
-            f"{duration:.9g} s",
-            place,
-            help="let it begin earlier, or the run last longer; or write the value that it keeps",
-        )
-        return
+        return _remark_late(scope, sampled, first.begins, schedule, place, " in this run")
     hz = 1.0 / sampled.interval
     fastest = max(each.frequency for each in found)
     if 2.0 * fastest >= hz * (1.0 - ROUNDING):

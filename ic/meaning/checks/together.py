@@ -5,28 +5,36 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
 
 from ic.meaning.control.servos import Use
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.analysis.probe import accelerates
 from met.diagnostic import Label
+from met.environments.environment import Environment
 from met.parameter import WORLD
 from met.plan import EnvironmentUse, Structure
 from met.trace import Scalar
+
+INSTANTS = 1000
+"""Instants of a run at which a command is looked at."""
 
 
 def check_together(scope: Scope, uses: Iterable[Use], structure: Structure) -> None:
     """Warn of environment models that the servos, or each other, contradict."""
     servos = {use.joint: use for use in uses}
     for load in structure.environment:
-        _remark_stop(scope, load, servos)
+        _remark_stop(scope, load, servos, structure.schedule.duration)
         _remark_hold(scope, load, servos, structure)
     _remark_alone(scope, structure.environment)
 
 
-def _remark_stop(scope: Scope, load: EnvironmentUse, servos: dict[str, Use]) -> None:
-    """Report a model that would keep a joint between two ends, where the servo goes on whatever the torque."""
+def _remark_stop(scope: Scope, load: EnvironmentUse, servos: dict[str, Use], duration: float) -> None:
+    """Report a model that would keep a joint between two ends, where the servo goes on whatever the torque; not where
+    its positions, in a run of so many seconds, are all between them."""
     model = models.find("environment", load.model, load.place)
     named = next((each.name for each in model.parameters if each.names == "joint"), None)
     settled = scope.parameters.get(f"environment.{load.name}.{named}") if model.initial_range and named else None
@@ -34,7 +42,7 @@ def _remark_stop(scope: Scope, load: EnvironmentUse, servos: dict[str, Use]) -> 
     place = (settled.origin.place if settled is not None else None) or load.place
     if servo is None or servo.parameters is None or servo.servo.at_rest is not None or place is None:
         return
-    if accelerates(servo.bare, servo.parameters):
+    if accelerates(servo.bare, servo.parameters) and not _stays_between(scope, load, model, servo, duration):
         scope.complaints.remark(
             "D337",
             f"`{load.name}` cannot stop joint `{servo.joint}`: servo `{servo.definition}` ({servo.servo.name}) tells "
@@ -47,6 +55,25 @@ def _remark_stop(scope: Scope, load: EnvironmentUse, servos: dict[str, Use]) -> 
                 f"`metric most = max {{ of = {servo.joint}.q; }}`",
             ],
         )
+
+
+def _stays_between(scope: Scope, load: EnvironmentUse, model: Environment, servo: Use, duration: float) -> bool:
+    """True where a joint begins at rest between the ends, and its position command has no instant outside of them."""
+    command = servo.command
+    if command is None or command.kind != "position" or command.guide:
+        return False
+    profile = models.find("command", command.model)
+    declared = [f"{servo.joint}.servo.command.{each.name}" for each in profile.parameters]
+    ends = [f"environment.{load.name}.{name}" for name in model.initial_range]
+    begins, moves = (f"initial.{servo.joint}.{part}" for part in ("q", "qd"))
+    found: dict[str, Any] = {path: _value(scope, path, False) for path in (*declared, *ends, begins, moves)}
+    if None in found.values() or found[moves] != 0.0:
+        return False
+    p = SimpleNamespace(**{each.name: found[path] for each, path in zip(profile.parameters, declared, strict=True)})
+    with np.errstate(all="ignore"):
+        asked = np.append(profile.course(p, np.linspace(0.0, duration, INSTANTS))[0], found[begins])
+    lower, upper = (found[path] for path in ends)
+    return bool(np.all((asked > lower) & (asked < upper)))
 
 
 def _remark_hold(scope: Scope, load: EnvironmentUse, servos: Mapping[str, Use], structure: Structure) -> None:

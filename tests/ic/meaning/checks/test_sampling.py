@@ -97,10 +97,28 @@ def test_a_sweep_is_told_of_a_command_that_no_case_sees_change_and_of_the_fastes
     assert codes(tmp_path, ARM, late, RUN, "sweep s of hold { vary drive.command.at = [2, 3] s; }\n", select="s") == [
         "D334"
     ]
-    assert not codes(tmp_path, ARM, late, RUN, "sweep s of hold { vary drive.command.at = [0.5, 3] s; }\n", select="s")
+    assert not codes(
+        tmp_path, ARM, late, RUN, "sweep s of hold { vary drive.command.at = [0.5, 0.7] s; }\n", select="s"
+    )
     fast = under("rate(sine(amplitude = 1 rad/s, frequency = 10 Hz))")
     sweep = "sweep s of hold { vary drive.command.frequency = [10, 60] Hz; }\n"
     assert codes(tmp_path, ARM, fast, changed(RUN, TICKS), sweep, select="s") == ["D335"]
+
+
+@pytest.mark.parametrize(
+    ("times", "where"),
+    [
+        ("[0.5, 3, 0.7]", "in case #1: it first changes at 3 s"),
+        ("[0.5, 4, 0.7, 3]", "in case #1 and others: it first changes at 4 s"),
+    ],
+)
+def test_of_a_sweep_the_first_case_whose_command_begins_after_the_end_is_named(
+    tmp_path: Path, times: str, where: str
+) -> None:
+    late = under("rate(step(to = 1 rad/s, at = 0.5 s))")
+    sweep = f"sweep s of hold {{ vary drive.command.at = {times} s; }}\n"
+    said = shown(tmp_path, ARM, late, RUN, sweep)
+    assert f"warning[D334]: the command of servo `drive` does nothing {where}, and the run ends at 1 s" in said
 
 
 def test_a_continuous_law_sees_its_command_at_the_dynamics_steps(tmp_path: Path) -> None:

@@ -52,6 +52,26 @@ an end
     )
 
 
+@pytest.mark.parametrize(
+    ("command", "begin", "told"),
+    [
+        ("position(0.4 rad)", 0.4, False),
+        ("position(sine(amplitude = 0.49 rad, frequency = 2 Hz))", 0.0, False),
+        ("position(sine(amplitude = 0.51 rad, frequency = 2 Hz))", 0.0, True),
+        ("position(table(times = [0, 0.5, 1] s, values = [0, 0.4, 0] rad))", 0.0, False),
+        ("position(table(times = [0, 0.5, 1] s, values = [0, 0.6, 0] rad))", 0.0, True),
+        ("position(step(to = 0.4 rad, at = 0.1 s))", 0.6, True),
+        ("rate(0.1 rad/s)", 0.0, True),
+    ],
+)
+def test_a_stop_that_no_position_comes_to_is_not_told(tmp_path: Path, command: str, begin: float, told: bool) -> None:
+    servo = f"servo drive {{ model = ideal;  bandwidth = 40 1/s;  command = {command}; }}\n"
+    run = changed(
+        inside(STOP.replace("1e3", "10")), ("environment", f"initial {{ hinge.q = {begin} rad; }} environment")
+    )
+    assert ("D337" in codes(tmp_path, ARM, servo, run)) is told
+
+
 def test_what_is_warned_of_is_so(tmp_path: Path) -> None:
     deck = changed(inside(STOP), ("duration = 1 s", "initial { hinge.qd = 1 rad/s; }  duration = 1 s"))
     found = engine.run(experiment(tmp_path, ARM, IDEAL, deck))
