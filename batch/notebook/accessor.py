@@ -131,7 +131,7 @@ class Accessor(Generic[Data]):
 
     @without_internals
     def evidence(self) -> Any:
-        """The evidence of the cases for each requirement, as a pandas.DataFrame with a row for each at each design point: the
+        """The evidence of the cases for each requirement at each design point, a row each of a pandas.DataFrame: the
         table of `met show --evidence`, numbers in SI. Of all cases, so ask before any are chosen."""
         from batch.notebook.evidence import table
 

@@ -126,7 +126,7 @@ class Designs:
 
     @cached_property
     def demands(self) -> tuple[str, ...]:
-        """The demands that make a design good: the requirements; of a sweep that has none, that its cases reach their end."""
+        """The demands on a good design: the requirements; of a sweep that has none, that its cases reach their end."""
         return self.pool.requirements or (FAILS,)
 
     @cached_property
