@@ -24,6 +24,9 @@ from met.plan.columns import ends
 if TYPE_CHECKING:
     from met.analysis.step_size import StepFault, StepSize
 
+LARGEST = 700.0
+"""The largest logarithm that a number has in double precision, rounded down."""
+
 NOTE = "step size: "
 """The beginning of the plan's note on it."""
 
@@ -104,7 +107,8 @@ def _note(experiment: Experiment, found: StepSize) -> Iterator[str]:
         yield f"{NOTE}nothing changes by more than 1 % in a step{looked}"
         return
     h, mode = experiment.structure.schedule.step, found.mode
-    truth = math.exp(h * mode.root.real)
+    grown = h * mode.root.real
+    truth = math.exp(grown) if grown < LARGEST else math.inf
     lines = (use.place for use in experiment.structure.servos if use.joint == found.joint)
     where = next((f" ({each.file}:{each.line})" for each in map(shown_place, filter(None, lines))), "")
     yield (
