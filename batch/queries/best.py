@@ -96,6 +96,9 @@ class Designs:
         varied = varied_columns(pool)
         check_varied(pool, (*over, *choose))
         borne = {each.path for each in pool.variables("coordinate") if each.attributes.get("design")}
+        _check_chosen([column.label for column in varied if column.label in borne], choose)
+        self.draws = bool(borne - {*choose})
+        """Whether something is drawn that a design must bear."""
         borne = ({*borne, *(column.label for column in varied if column.label.startswith(BORNE))} - {*choose}) | {*over}
         chosen = [column for column in varied if column.label not in borne]
         self.against = tuple(column for column in varied if column.label in borne)
@@ -130,15 +133,21 @@ class Designs:
         return self.pool.requirements or (FAILS,)
 
     @cached_property
+    def shares(self) -> np.ndarray:
+        """[demand] the share of a design's cases that is to meet it."""
+        known = {each.text: each.share for group in self.pool.groups for each in requirements.group_requirements(group)}
+        return np.array([known.get(text) or 1.0 for text in self.demands])
+
+    @cached_property
+    def met(self) -> np.ndarray:
+        """[design, demand] the share of its cases that meet it."""
+        holds = self.pool.outcomes == 1 if self.pool.requirements else (self.pool.status == DONE)[:, None]
+        return self._share(holds)
+
+    @cached_property
     def meets(self) -> np.ndarray:
         """[design, demand] whether it meets it."""
-        if not self.pool.requirements:
-            return np.asarray(self._share((self.pool.status == DONE)[:, None]) == 1.0)
-        shares = {
-            each.text: each.share for group in self.pool.groups for each in requirements.group_requirements(group)
-        }
-        wanted = np.array([shares.get(text) or 1.0 for text in self.demands])
-        return np.asarray(self._share(self.pool.outcomes == 1) >= wanted * (1.0 - ROUNDING))
+        return np.asarray(self.met >= self.shares * (1.0 - ROUNDING))
 
     def _share(self, holds: np.ndarray) -> np.ndarray:
         """The share of each design's cases in which each of these holds."""
@@ -250,12 +259,13 @@ class Designs:
 
     def order(self, goals: Sequence[Goal] = ()) -> np.ndarray:
         """The good designs, the best first: by the goals in the worst of their cases, one after the other; then, and
-        without any, by the steps to the border and by the room to the nearest limit."""
+        without any, by the steps to the border, by the share of cases that meet each demand, and by the room to the
+        nearest limit."""
         good = np.flatnonzero(self.good)
         keys = [self._wanted(goal)[good] for goal in goals]
         if self.steps is not None:
             keys.append(-self.steps[good].astype(float))
-        keys.append(-self.room[good])
+        keys += [-self.met.min(axis=1)[good], -self.room[good]]
         return good[np.lexsort(keys[::-1])]
 
     def _wanted(self, goal: Goal) -> np.ndarray:
@@ -279,6 +289,16 @@ def varied_columns(pool: Pool) -> list[CaseColumn]:
     """The choices and parameters in which cases differ."""
     columns = [column for column in pool.columns if column.role in ("choice", "parameter")]
     return [column for column in columns if len(distinct(column.values[np.isfinite(column.values)])) > 1]
+
+
+def _check_chosen(drawn: Sequence[str], choose: Sequence[str]) -> None:
+    """Raises Problem E394 where some of what is drawn is chosen: each value of it comes with others of its own."""
+    chosen = [path for path in drawn if path in choose]
+    others = [path for path in drawn if path not in choose]
+    if chosen and others:
+        message = f"`{chosen[0]}` is drawn, and each of its values comes with one of `{others[0]}`"
+        helps = [f"choose both: `--choose {others[0]}`", f"or `vary {chosen[0]} = [...];` beside the sample"]
+        raise Problem(error("E394", message, help=helps))
 
 
 def check_varied(pool: Pool, paths: Sequence[str]) -> None:

@@ -139,20 +139,28 @@ class BestAnswer:
         what = "it reaches the end"
         if number:
             what = f"it meets {'the requirement' if number == 1 else f'all {number} requirements'}"
-        where = "" if cases == 1 else f" in {'both' if cases == 2 else f'all {cases:,}'} of its cases"
+        of = "both" if cases == 2 else f"all {cases:,}"
+        where = "" if cases == 1 else f" in {of} of its cases"
+        if cases > 1 and (designs.shares < 1.0).any():
+            where = f", each in the share of its {cases:,} cases that is asked for"
         if designs.against:
             where += f" ({', '.join(map(_range, designs.against))})"
         steps = "" if designs.steps is None else f", {count(int(designs.steps[best]), 'cell')} from the border"
         room = float(designs.room[best])
         room_said = f", {100.0 * room:.3g} % of a limit from the nearest one" if math.isfinite(room) else ""
-        return f"{what}{where}{steps}{room_said}. So do {good:,} of {designs.count:,} designs."
+        so = f"So {'does' if good == 1 else 'do'} {good:,} of {designs.count:,} designs."
+        return f"{what}{where}{steps}{room_said}. {so}"
 
     def _none(self) -> list[str]:
         """Where no design is good: those that are nearest."""
         designs = self.designs
         out = [self.headline]
         for text, met in zip(designs.demands, designs.meets.T, strict=True):
-            out.append(f"  require {text}  met by {int(met.sum()):,}" if designs.pool.requirements else f"  {text}")
+            out.append(
+                f"  require {text}  met by {count(int(met.sum()), 'design')}"
+                if designs.pool.requirements
+                else f"  {text}"
+            )
         return [*out, "", "those that come nearest:", *self.table(self.nearest())]
 
     def nearest(self) -> list[BestRow]:
@@ -246,8 +254,8 @@ class BestAnswer:
         """The worth of the best, in words, and the command that runs it: with other draws where its cases were
         drawn."""
         assert self.best is not None
-        if not any(each.attributes.get("design") for each in self.designs.pool.variables("coordinate")):
-            return "run it:", self.command(self.best)
+        if not self.designs.draws:
+            return "run it:", f"{self.command(self.best)} -o chosen.h5"
         said = f"it was picked out of {self.designs.count:,} by these very cases, so its numbers flatter it: "
         return f"{said}other draws confirm it or not", f"{self.command(self.best, seed=self.seed + 1)} -o confirmed.h5"
 
@@ -339,7 +347,9 @@ def _ends(found: Stretch) -> str:
 
 
 def _beyond(why: str) -> str:
-    return f"{why} is missed" if why.startswith("`") else why
+    if not why.startswith("`"):
+        return why
+    return f"{why} {'are' if why.endswith(' more') else 'is'} missed"
 
 
 def _wrapped(text: str, width: int) -> list[str]:

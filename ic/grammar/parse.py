@@ -59,7 +59,8 @@ def parse_expression(tokens: Sequence[Token], findings: Findings) -> Expression 
     with suppress(GiveUp, EndedInsideBlock, Unreadable):
         found = parser.value()
         if parser.token.kind != END:
-            parser.unexpected("the end of the line")
+            helps = {"=": "`==` compares", "&": "`and` joins conditions", "|": "`or` joins conditions"}
+            parser.unexpected("the end of the line", helps.get(parser.token.text, ()))
         return found
     return None
 

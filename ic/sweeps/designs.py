@@ -185,9 +185,9 @@ def read_sample(
         raise Problem(
             error(
                 "D224",
-                f"`{design}` takes the number of samples",
+                f"`{design}` takes the number of {'points' if design == 'saltelli' else 'samples'}",
                 call.name.place,
-                help=f"write `sample {design}(200) {{ ... }}`",
+                help=f"write `sample {design}({256 if design in ('sobol', 'saltelli') else 200}) {{ ... }}`",
             )
         )
     most = MOST_SWEPT if design == "random" else MOST_LISTED

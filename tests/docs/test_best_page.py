@@ -32,6 +32,6 @@ def test_the_chosen_gains_give_the_same_numbers_by_themselves(tmp_path: Path) ->
     command = re.search(r"So `(met run crane\.ic gains --set .*?)` runs", PAGE, re.DOTALL)
     assert deck is not None and command is not None
     (tmp_path / "crane.ic").write_text(deck[1])
-    met(tmp_path, *shlex.split(command[1])[1:], "-q", "--no-picture", "-o", "chosen.h5", status=0)
+    met(tmp_path, *shlex.split(command[1])[1:], "-q", "--no-picture", status=0)
     said = met(tmp_path, "show", "chosen.h5", "--no-plots", status=0)
     assert "3 cases" in said and "require settle < 5 s  met by 3 of 3 (100 %)" in said
