@@ -45,7 +45,7 @@ def best(
     from batch.queries.best import Designs
     from batch.queries.groups import groups_named
     from batch.queries.pool import pools
-    from batch.terminal.best import BestAnswer
+    from batch.terminal.best import BestAnswer, context
     from met.diagnostic import Problem, error
 
     with ArchiveFile(archive) as file:
@@ -65,8 +65,7 @@ def best(
         if len(front) == 1:
             raise click.UsageError("--front is of two: name each, `--front settle --front over`")
         goals, traded = ([designs.goal(text) for text in texts] for texts in (by, front))
-        seed = int(pool.groups[0].at("seed", [0])[0])
-        answer = BestAnswer(designs, goals, traded, deck=file.deck.strip("<>"), name=pool.name, seed=seed)
+        answer = BestAnswer(designs, goals, traded, **context(file, pool))
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
         if form == "json":
             say(json.dumps(answer.as_data(), indent=1))

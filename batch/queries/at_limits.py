@@ -100,7 +100,7 @@ def _judged_at_a_limit(group: ArchiveGroup, experiment: Experiment | None) -> Di
 def _passed(group: ArchiveGroup, experiment: Experiment | None) -> Diagnostic | None:
     """Limits of joints that cases pass and no requirement judges: the one that most do, and the others by name."""
     shares = {_of(variable): variable.name for variable in group.role("limit")}
-    judged = {group.variables[each.metric].attributes.get("of") for each in group_requirements(group)}
+    judged = {str(group.variables[each.metric].attributes.get("of")) for each in group_requirements(group)}
     passed = []
     for variable in group.role("excess"):
         excess, joint = np.nan_to_num(group.values(variable.name)), _of(variable).rpartition(".")[0]

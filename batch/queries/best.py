@@ -211,7 +211,8 @@ class Designs:
                 at[number] = level
             part = there[tuple(at)]
             if part.ndim == 0:  # choices alone: none is next to another
-                steps[int(part)] = int(good[tuple(at)])
+                if part >= 0:
+                    steps[int(part)] = int(good[tuple(at)])
                 continue
             near = distance_transform_cdt(np.pad(good[tuple(at)], 1), metric="chessboard")
             inner = near[(slice(1, -1),) * part.ndim]
@@ -223,6 +224,8 @@ class Designs:
         """The design in each cell of the grid of all axes' levels, -1 where there is none; None: they are no grid."""
         sizes = [len(axis.values) for axis in self.axes]
         cells = int(np.prod([float(size) for size in sizes]))
+        if any(np.isnan(column.values[self.first]).any() for axis in self.axes for column in axis.columns):
+            return None  # a sum of sweeps, which choose other parameters
         if cells > MOST_CELLS or self.count <= FULL * cells:
             return None
         out = np.full(sizes, -1)

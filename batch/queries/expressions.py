@@ -49,6 +49,7 @@ class CaseExpressions:
         }
         options = {name: each.words for name, each in choices.items()}
         truths = Truths(self._find, self._graph, words, options)
+        truths.numeric = False  # an archive has the words of a choice alone
         truths.take(self._columns, self.pool.count)
         with _shown(condition):
             return truths.of(read_expression(condition), np.ones(self.pool.count, bool))

@@ -9,16 +9,22 @@ from typing import Any
 
 import numpy as np
 
+from batch.archive.read import ArchiveFile
 from batch.archive.stored import Stored
 from batch.queries.best import ENDS, Designs, Goal, Stretch
-from batch.queries.pool import CaseColumn
+from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import number_text, pretty_unit
 from batch.queries.summary import finite
+from ic.meaning.expressions.command_line import ON_COMMAND_LINE
 from ic.printing.columns import columns, count
+from met.diagnostic import Problem
 from met.frozen import frozen
 from met.outputs import quoted
 from met.unit_parser import parse_unit
 from met.units import text as unit_text
+
+MACRO = "macro "
+"""Beginning of the path of a choice among values of a macro."""
 
 RUNNERS_UP = 3
 """Designs that are shown behind the best."""
@@ -41,15 +47,26 @@ class BestRow:
 class BestAnswer:
     """The answer on the designs of one run or sweep.
 
-    deck   of the archive;  name: of the sweep where the deck has several;  seed: the campaign's
-    front  goals that are traded off against each other
+    deck     of the archive;  name: of the sweep;  seed: the campaign's
+    defines  what `-D` defined for it, `NAME=VALUE`;  remarks: what else is to be known of it
+    front    goals that are traded off against each other
     """
 
     def __init__(
-        self, designs: Designs, goals: Sequence[Goal], front: Sequence[Goal], *, deck: str, name: str, seed: int
+        self,
+        designs: Designs,
+        goals: Sequence[Goal],
+        front: Sequence[Goal],
+        *,
+        deck: str,
+        name: str,
+        seed: int,
+        defines: Sequence[str] = (),
+        remarks: Sequence[str] = (),
     ) -> None:
         self.designs, self.goals, self.front = designs, tuple(goals), tuple(front)
         self.deck, self.name, self.seed = deck, name, seed
+        self.defines, self.remarks = tuple(defines), tuple(remarks)
         self.order = designs.order(goals)
         required = [
             goal
@@ -127,7 +144,7 @@ class BestAnswer:
         if not designs.against and len(designs.axes) > 1:
             last = quoted(designs.axes[-1].columns[0].label)
             out.append(f"all that varies is taken for chosen; `--over {last}` of `met best` holds designs against it")
-        return out
+        return [*out, *self.remarks]
 
     @property
     def why(self) -> str:
@@ -147,7 +164,8 @@ class BestAnswer:
             where += f" ({', '.join(map(_range, designs.against))})"
         steps = "" if designs.steps is None else f", {count(int(designs.steps[best]), 'cell')} from the border"
         room = float(designs.room[best])
-        room_said = f", {100.0 * room:.3g} % of a limit from the nearest one" if math.isfinite(room) else ""
+        alike = math.isfinite(room) and bool((designs.shares == 1.0).all())
+        room_said = f", {100.0 * room:.3g} % of a limit from the nearest one" if alike else ""
         so = f"So {'does' if good == 1 else 'do'} {good:,} of {designs.count:,} designs."
         return f"{what}{where}{steps}{room_said}. {so}"
 
@@ -233,6 +251,8 @@ class BestAnswer:
         out = []
         for axis in self.designs.axes:
             for column in axis.columns:
+                if np.isnan(column.values[place]):
+                    continue  # of a sum of sweeps, of which another part chooses it
                 if column.role == "choice":
                     out.append((column.label, column.words[int(column.values[place])]))
                 else:
@@ -245,10 +265,12 @@ class BestAnswer:
 
     def command(self, design: int, *, seed: int | None = None) -> str:
         """The command that runs a design's cases again, with other draws where there is a seed."""
-        name = f" {quoted(self.name)}"
-        settings = "".join(f" --set {quoted(f'{path}={value}')}" for path, value in self.settings(design))
-        other = f" --set seed={seed}" if seed is not None else ""
-        return f"met run {quoted(self.deck)}{name}{settings}{other}"
+        words = [f"-D {quoted(each)}" for each in self.defines]
+        for path, value in self.settings(design):
+            option = "-D" if path.startswith(MACRO) else "--set"
+            words.append(f"{option} {quoted(f'{path.removeprefix(MACRO)}={value}')}")
+        words += [f"--set seed={seed}"] if seed is not None else []
+        return " ".join([f"met run {quoted(self.deck)} {quoted(self.name)}", *words])
 
     def confirmation(self) -> tuple[str, str]:
         """The worth of the best, in words, and the command that runs it: with other draws where its cases were
@@ -319,6 +341,8 @@ def _least(goal: Goal) -> str:
 
 def _value(column: CaseColumn, place: int) -> str:
     value = float(column.values[place])
+    if math.isnan(value):
+        return ""
     return column.words[int(value)] if column.role == "choice" else number_text(value)
 
 
@@ -354,3 +378,23 @@ def _beyond(why: str) -> str:
 
 def _wrapped(text: str, width: int) -> list[str]:
     return textwrap.wrap(text, max(40, width), initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
+
+
+def context(archive: ArchiveFile, pool: Pool) -> dict[str, Any]:
+    """The arguments of `BestAnswer` that say how a campaign was run: deck, name, seed, `-D`, and remarks."""
+    defines = str(archive.provenance.get("defines") or "").split()
+    remarks = []
+    if any(group.attributes.get("step_errors") for group in pool.groups):
+        remarks.append("requirements on errors by the step are not looked at here: `met show --evidence`")
+    try:
+        plan = archive.plan(as_written=True)
+        own = [each for each in plan.experiments if each.name in {group.name for group in pool.groups}]
+        given = any(q.origin.note == ON_COMMAND_LINE for each in own for q in each.parameters.values())
+    except Problem:  # such as: a model of the plan's is not installed here
+        given = False
+    if given:
+        remarks.append("this archive was made with `--set`: what that set is not in the command")
+    seed = int(pool.groups[0].at("seed", [0])[0])
+    return {
+        "deck": archive.deck.strip("<>"), "name": pool.name, "seed": seed, "defines": defines, "remarks": remarks,
+    }  # fmt: skip

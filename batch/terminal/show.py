@@ -147,17 +147,20 @@ def _about(
         most = None if all_cases else cases.SHOWN_CASES
         if some.everything:
             return [*out, "", cases.title(group, by=by), *cases.table(group, most, by=by)]
-        among = _positions(group, some)
+        among = _positions(archive, group, some)
         out += ["", some.words(len(among), group.count)]
         if len(among):
             out += [cases.title(group, by=by), *cases.table(group, most, by=by, among=among)]
     return out
 
 
-def _positions(group: ArchiveGroup, some: CaseSelection) -> np.ndarray:
-    """Positions in a group of the cases that are asked for."""
-    pool = Pool(group.name, [group])
-    return pool.position_of[some.places(pool)]
+def _positions(archive: ArchiveFile, group: ArchiveGroup, some: CaseSelection) -> np.ndarray:
+    """Positions in a group of the cases that are asked for, among those of all structures of its sweep."""
+    name = group.sweep or group.name
+    pool = Pool(name, [each for each in archive.groups if (each.sweep or each.name) == name])
+    places = some.places(pool)
+    mine = next(number for number, each in enumerate(pool.groups) if each.name == group.name)
+    return pool.position_of[places[pool.group_of[places] == mine]]
 
 
 def as_json(
@@ -184,7 +187,7 @@ def as_json(
     ordering.check([group for group, _ in shown], by)
     for group, position in shown:
         if position is None:
-            among = None if some.everything else _positions(group, some)
+            among = None if some.everything else _positions(archive, group, some)
             most = None if all_cases else cases.SHOWN_CASES
             said: dict[str, Any] = {
                 "case_table": cases.rows_json(group, most, by=by, among=among),

@@ -112,9 +112,10 @@ class Settings:
 
 
 def _without(axis: SweepAxis, paths: Collection[str]) -> SweepAxis:
-    """The axis without the columns of these paths; of rows that were written and are equal then, the first."""
+    """The axis without the columns of these paths; of rows that were written and are equal then, the first, and so of
+    Saltelli's, of which some differ in one column alone."""
     columns = [column for column in axis.columns if column.path not in paths]
-    if len(columns) == len(axis.columns) or axis.design or not columns:
+    if len(columns) == len(axis.columns) or axis.design not in ("", "saltelli") or not columns:
         return replace(axis, columns=tuple(columns))
     rows = zip(*(_keys(column) for column in columns), strict=True)
     first = {row: number for number, row in reversed(list(enumerate(rows)))}

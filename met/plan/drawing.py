@@ -64,6 +64,16 @@ def drawn_values(
     return np.clip(found, low, high)
 
 
+def is_sound(distribution: str, arguments: tuple[float, ...]) -> bool:
+    """True if a distribution can have these arguments: a deviation above 0, ends that rise, logarithms that exist."""
+    if distribution in ("normal", "truncated") and arguments[1] <= 0.0:
+        return False
+    if distribution == "normal":
+        return True
+    low, high = arguments[-2:]
+    return low < high and (distribution != "loguniform" or low > 0.0)
+
+
 class DrawnColumn(ComputedColumn):
     """Independent draws of one parameter. unit: in which they are rounded, as text; "": none. The rest as above."""
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from met.plan import columns, drawing
-from met.plan.columns import CaseValues, ComputedColumn
+from met.plan.columns import MOST_SWEPT, CaseValues, ComputedColumn
 from met.plan.swept import RowBits, SweptRows
 
 Keep = Callable[[np.ndarray], Any]
@@ -44,8 +44,8 @@ class ArrayKeeper:
 
 
 MOST_AXES = 10_000
-MOST_ROWS = 1_000_000_000
-"""Rows of a table that is read, at most: a few minutes of checking, and ten sweeps of the longest kind."""
+MOST_ROWS = 10 * MOST_SWEPT
+"""Rows of a product that is read, at most, of which a sweep keeps fewer; a column has as many as a sweep."""
 
 
 def encoded(column: CaseValues, keep: Keep) -> Any:
@@ -103,7 +103,11 @@ class RecipeReader:
         if "positions" in data:
             rows, among = self._rows(data["positions"]), data["among"]
             product = math.prod(rows.sizes)
-            return columns.PositionColumn(rows, among and self._bits(among["bits"], product, _whole(among["count"])))
+            if among is None:
+                return columns.PositionColumn(rows, None)
+            if not isinstance(among, Mapping) or among["count"] != product:
+                raise ValueError("rows are among others than there are")
+            return columns.PositionColumn(rows, self._bits(among["bits"], product, product))
         if "shifted" in data:
             dtype = np.int64 if data["whole"] is True else np.float64
             return columns.ShiftedColumn(self._values(data["shifted"]), _whole(data["by"]), dtype)
@@ -113,7 +117,10 @@ class RecipeReader:
         arguments, name = tuple(map(_number, data["arguments"])), _word(data["distribution"])
         if name not in drawing.QUANTILES or len(arguments) != drawing.ARGUMENTS[name]:
             raise ValueError("there is no such distribution")
-        count, seed, sample = _whole(data["count"]), _whole(data["seed"], most=2**53), _whole(data["sample"])
+        if not all(map(math.isfinite, arguments)) or not drawing.is_sound(name, arguments):
+            raise ValueError("there is no such distribution")
+        count, seed = _whole(data["count"], most=MOST_SWEPT), _whole(data["seed"], most=2**53)
+        sample = _whole(data["sample"])
         return drawing.DrawnColumn(count, seed, _word(data["path"]), sample, name, arguments, _word(data["unit"]))
 
     def _values(self, data: Any) -> CaseValues:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from batch.archive.read import ArchiveFile
 from batch.queries.best import DesignAxis, Designs
 from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import number_text
 from batch.report.contents.parts import DesignAnswer, DesignMap, TextTable
-from batch.terminal.best import BestAnswer
+from batch.terminal.best import BestAnswer, context
 from met.diagnostic import Problem
 
 MOST_CELLS = 10_000
 """Cells of a map, at most: more would be smaller than a dot."""
 
 
-def design_answer(pool: Pool, deck: str) -> DesignAnswer | None:
+def design_answer(archive: ArchiveFile, pool: Pool) -> DesignAnswer | None:
     """The answer for a sweep; None where nothing is chosen in it, or nothing required."""
     if pool.count < 2 or not pool.requirements:
         return None
@@ -23,7 +24,7 @@ def design_answer(pool: Pool, deck: str) -> DesignAnswer | None:
         designs = Designs(pool)
     except Problem:  # it chooses nothing
         return None
-    answer = BestAnswer(designs, (), (), deck=deck, name=pool.name, seed=int(pool.groups[0].at("seed", [0])[0]))
+    answer = BestAnswer(designs, (), (), **context(archive, pool))
     if answer.best is None:
         table = _table(answer.cells(answer.nearest()), answer.right)
         return DesignAnswer(

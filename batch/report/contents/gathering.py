@@ -64,9 +64,7 @@ def gather(
     befores = [None if against is None else against.of(pool) for pool in found]
     sections = tuple(
         replace(
-            _section(
-                name, pool, pool.name if several else "", experiments, trouble, share, progress, before, archive.deck
-            ),
+            _section(name, pool, pool.name if several else "", experiments, trouble, share, progress, before, archive),
             changes=() if against is None else comparison.run_changes(against.found, before),
         )
         for pool, before in zip(found, befores, strict=True)
@@ -108,7 +106,7 @@ def _section(
     values: int,
     progress: Callable[[int], None] | None,
     before: EarlierCases | None,
-    deck: str,
+    file: ArchiveFile,
 ) -> ReportSection:
     own = {group.name: experiments[group.name] for group in pool.groups if group.name in experiments}
     beds: Stability | None = None
@@ -128,7 +126,7 @@ def _section(
         metrics=metric_rows(pool, before, errors),
         structures=structures(pool, before),
         evidence=evidence_part(pool, archive, several=bool(only)),
-        designs=design_answer(pool, deck.strip("<>")),
+        designs=design_answer(file, pool),
         worst=worst(pool, archive, only, before),
         overview=overview(pool, before),
         signals=drawn,

@@ -43,8 +43,11 @@ class Truths:
 
     find     gives names their values: numbers, or inputs of `graph` that stand for a column
     words    of what is a word in each row: one for all rows, or one a row; options: all the words that there are
+    numeric  whether a word that is a number may be meant as one: then it is no word
     Where a side of a comparison has no value, it does not hold.
     """
+
+    numeric = True
 
     def __init__(
         self,
@@ -82,7 +85,7 @@ class Truths:
         for side, other in ((expression.left, expression.right), (expression.right, expression.left)):
             if isinstance(side, Name) and side.text in self.words:
                 text = self.words[side.text]
-                if any(each[:1].isdigit() or each[:1] in "-." for each in np.unique(text).tolist()):
+                if self.numeric and any(each[:1].isdigit() or each[:1] in "-." for each in np.unique(text).tolist()):
                     return None
                 if expression.operator not in ("==", "!="):
                     message = f"`{side.text}` is a word, which is not less or more than another"

@@ -280,6 +280,53 @@ error[E396]: nothing says which design of `grid` is better
     assert "  it reaches the end in both of its cases (links.lower.mass 15 .. 30 kg)" in said
 
 
+def test_parts_of_a_sum_choose_what_is_theirs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    parts = """
+sweep some of arm { vary gearbox.kp = linspace(0.010, 0.034, 4) V*s/rad; }
+sweep more of arm { vary gearbox.ki = linspace(0.06, 0.26, 4) V/rad; }
+sweep sum = some + more;
+"""
+    (tmp_path / "arm.ic").write_text(DECK.replace("REQUIRED", "require past < 40 %;") + parts, encoding="utf-8")
+    out = tmp_path / "sum.h5"
+    main(["run", str(tmp_path / "arm.ic"), "sum", "-o", str(out), "-q", "--histories", "none"])
+    capsys.readouterr()
+    assert main(["best", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "of 8 designs." in said and "nan" not in said and "border" not in said
+    assert main(["report", str(out), "-o", str(tmp_path / "a.html"), "-q"]) == 0
+
+
+def test_a_command_repeats_macros_and_says_what_it_lacks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    macro = "#ifndef LIMIT\n#define LIMIT 40\n#endif\nrun arm"
+    deck = DECK.replace("REQUIRED", "require past < LIMIT %;").replace("run arm", macro, 1)
+    deck += "sweep limits of arm { vary macro LIMIT = [30, 40]; vary gearbox.ki = [0.1, 0.125] V/rad; }\n"
+    (tmp_path / "arm.ic").write_text(deck, encoding="utf-8")
+    for words, wanted in (
+        (["grid", "-D", "LIMIT=60"], "-D LIMIT=60 --set"),
+        (["grid", "--set", "links.upper.mass=41 kg"], "this archive was made with `--set`"),
+    ):
+        out = tmp_path / "a.h5"
+        command = ["run", str(tmp_path / "arm.ic"), *words, "-o", str(out), "-q", "--histories", "none", "--fresh"]
+        assert main(command) in (0, 1)
+        capsys.readouterr()
+        assert main(["best", str(out)]) == 0
+        assert wanted in capsys.readouterr().out
+
+
+def test_choices_alone_of_which_one_is_excluded() -> None:
+    pool = made({"a": np.array([0.0, 0.0, 1.0]), "b": np.array([0.0, 1.0, 0.0])}, np.array([True, True, True]))
+    for column in pool.columns:
+        object.__setattr__(column, "role", "choice")
+    designs = Designs(pool)
+    assert designs.steps is not None and designs.steps.tolist() == [1, 1, 1]
+
+
+def test_some_of_what_is_drawn_is_not_chosen() -> None:
+    values = {"a": np.arange(4.0), "b": np.array([3.0, 1.0, 2.0, 0.0])}
+    with pytest.raises(Problem, match="`a` is drawn, and each of its values comes with one of `b`"):
+        Designs(made(values, np.ones(4, bool), drawn=("a", "b")), choose=["a"])
+
+
 def test_a_single_run_has_no_designs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     archive = ran(tmp_path, "arm")
     capsys.readouterr()

@@ -88,7 +88,7 @@ class TestTheDesignToUse:
             answer = BestAnswer(Designs(pools(file.groups)[0]), (), (), deck="two_link.ic", name="gains", seed=7)
             assert found is not None and answer.best is not None
             assert found.headline.lower() == answer.headline.lower() and found.why.lower() == answer.why.lower()
-            assert found.command.startswith("met run two_link.ic gains --set 'gearbox.kp=")
+            assert found.command.startswith("met run two_link.ic gains -D FAST=1 --set 'gearbox.kp=")
 
     def test_has_a_map_where_two_are_chosen(self, here: Path, engine: None) -> None:
         one = archives.grid([0.01, 0.02, 0.03, 0.04, 0.05], [20.0, 21.0, 22.0, 23.0])
@@ -428,7 +428,7 @@ class TestStability:
 def test_a_plan_that_cannot_be_read_here_leaves_the_rest(sweep: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from met.diagnostic import Problem, error
 
-    def refuse(self: ArchiveFile) -> None:
+    def refuse(self: ArchiveFile, *, as_written: bool = False) -> None:
         raise Problem(error("E999", "no model `mine` here"))
 
     monkeypatch.setattr(ArchiveFile, "plan", refuse)
