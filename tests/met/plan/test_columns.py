@@ -11,7 +11,7 @@ import pytest
 
 import ic
 from met.diagnostic import Problem
-from met.plan import Plan, columns, drawing, keys
+from met.plan import Plan, columns, drawing, keys, recipes
 from met.plan import file as plan_file
 from met.plan.swept import RowBits, SweptRows
 from met.unit_parser import parse_unit
@@ -165,3 +165,26 @@ def test_a_plan_whose_table_cannot_be_computed_is_damaged(was: str, now: str, tm
     with pytest.raises(Problem) as caught:
         plan_file.read(tmp_path / "p.json")
     assert [each.code for each in caught.value.diagnostics] == ["E302"]
+
+
+DRAWN = {"seed": 1, "path": "a", "sample": 1, "count": 9, "distribution": "uniform", "arguments": [0, 1], "unit": "kg"}
+ROWS = {"sizes": [8], "chosen": [None], "kept": None}
+
+
+@pytest.mark.parametrize("data", [
+    DRAWN | {"distribution": "loguniform", "arguments": [0, 2]},
+    DRAWN | {"distribution": "loguniform", "arguments": [-1, 2]},
+    DRAWN | {"distribution": "truncated", "arguments": [1, 0, 2, 1]},
+    DRAWN | {"distribution": "normal", "arguments": [1, 0]},
+    DRAWN | {"arguments": [2, 1]},
+    DRAWN | {"arguments": [0, float("inf")]},
+    DRAWN | {"count": 10**9},
+    {"positions": ROWS, "among": 0},
+    {"positions": ROWS, "among": []},
+    {"positions": ROWS, "among": {"bits": {"file": "x"}, "count": 16}},
+])  # fmt: skip
+def test_a_forged_column_is_refused(data: dict[str, object]) -> None:
+    reader = recipes.RecipeReader(lambda where: np.zeros(1, np.uint8))
+    with pytest.raises((ValueError, LookupError, TypeError)):
+        reader.column(data)
+    assert len(reader.column(DRAWN)) == 9
