@@ -230,6 +230,8 @@ class _Truths(Truths):
         try:
             return scope.names.find(name)
         except Problem as problem:
+            if not any(each.at is not None and each.at.place == name.place for each in problem.diagnostics):
+                raise  # it has one, which is wrong
             later = "a metric" if name.text in {use.name for use in self.structure.metrics} else ""
             later = later or ("a channel" if name.text in channels(self.structure, [name.text]) else "")
             if later:

@@ -99,6 +99,20 @@ def test_a_metric_has_no_value_before_a_case_has_run(tmp_path: Path) -> None:
     assert one.startswith("D065 [top] `top` is a metric, which has no value before a case has run")
 
 
+MOST = (
+    "sweep it of hold {\n    vary links.bar.mass = [1, 2] kg;\n"
+    "    exclude when links.bar.mass > most;\n    exclude when most > 3 kg;\n}\n"
+)
+
+
+@pytest.mark.parametrize(("value", "message"), [
+    ("2 kg +", "D020 [;] expected a value, found `;` | the value is missing"),
+    ("gone * 2 kg", "D065 [gone] no value `gone` | define it: `let gone = ...;`"),
+])  # fmt: skip
+def test_of_a_name_with_a_wrong_value_its_value_is_told_and_once(tmp_path: Path, value: str, message: str) -> None:
+    assert said(tmp_path, f"let most = {value};\n", MOST) == [message]
+
+
 @pytest.mark.parametrize(
     "condition",
     [
