@@ -11,6 +11,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from textwrap import indent
 
 from tests.docs.mended_servo import met
 
@@ -33,7 +34,8 @@ def follow(folder: Path) -> Iterator[tuple[str, list[str], str]]:
     found = re.search(r"<!-- pick\.ic -->\n```c\n(.*?)```", PAGE, re.DOTALL)
     mended = re.search(r"<!-- the command of joint2 -->\n```c\n(.*?)```", PAGE, re.DOTALL)
     assert found is not None and mended is not None
-    deck, after = found[1], re.sub(r" {12}command = .*\n", lambda _: mended[1], found[1])
+    deck, new = found[1], indent(mended[1], " " * 8)
+    after = re.sub(r" {8}joint2 \{\n.*?\n {8}\}\n", lambda _: new, deck, count=1, flags=re.DOTALL)
     assert deck != after
     (folder / "pick.ic").write_text(deck, encoding="utf-8")
     for command, shown in commands():
