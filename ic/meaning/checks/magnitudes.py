@@ -291,7 +291,8 @@ def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[Weigh
     ends = np.cumsum([4 + len(body.sizes) for body in bodies]).tolist()
 
     def warn(rows: np.ndarray) -> None:
-        arm = np.sqrt((rows[:, ends[-1] :].reshape(len(rows), -1, 3) ** 2).sum(axis=2)).sum(axis=1)
+        with np.errstate(over="ignore"):  # an arm of 1e200 m is endless, which is what is said of it
+            arm = np.sqrt((rows[:, ends[-1] :].reshape(len(rows), -1, 3) ** 2).sum(axis=2)).sum(axis=1)
         found = []
         for body, first, last in zip(bodies, [0, *ends], ends, strict=False):
             mass, largest, sizes = rows[:, first], rows[:, first + 1 : first + 4].max(axis=1), rows[:, first + 4 : last]
