@@ -193,6 +193,7 @@ NOT_TRACED = {
     ("environment", "pushed_links"),
     ("environment", "content"),
     ("environment", "alone"),
+    ("environment", "holds"),
     ("guide", "idle"),
     ("command", "jumps"),
     ("command", "content"),
