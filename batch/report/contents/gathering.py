@@ -69,7 +69,7 @@ def gather(
         )
         for pool, before in zip(found, befores, strict=True)
     )
-    verdicts = [verdict(pool, named=len(found) > 1) for pool in found]
+    verdicts = [verdict(pool, experiments, named=len(found) > 1) for pool in found]
     if against is not None:
         verdicts.append(comparison.verdict(against, list(zip(found, befores, strict=True))))
     return Report(

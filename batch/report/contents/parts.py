@@ -47,7 +47,11 @@ class OutcomeCount:
 @frozen
 class RequirementCounts:
     """A requirement: by how many of the cases it is met and missed, of how many that is not known, and the value that
-    is furthest beyond the limit, or nearest to it, with its case."""
+    is furthest beyond the limit, or nearest to it, with its case.
+
+    verdict  of one over a share of cases: its worst of all design points, such as "not shown"; "" of one that every
+             case is to meet
+    """
 
     text: str
     met: int
@@ -56,6 +60,7 @@ class RequirementCounts:
     of: int
     furthest: str = ""
     case: int | None = None
+    verdict: str = ""
 
 
 @frozen
@@ -81,6 +86,16 @@ class RequirementFlow:
 
 
 @frozen
+class ReportWarning:
+    """What makes an answer doubtful: what was seen, what to do about it, and the line of the deck that it is about."""
+
+    code: str
+    message: str
+    help: tuple[str, ...]
+    spot: Spot | None = None
+
+
+@frozen
 class Verdict:
     """An answer: yes or no, in one sentence, and what it rests on.
 
@@ -99,6 +114,7 @@ class Verdict:
     demands: tuple[RequirementCounts, ...] = ()
     failing: tuple[FailureRow, ...] = ()
     notes: tuple[str, ...] = ()
+    warnings: tuple[ReportWarning, ...] = ()
     word: str = ""
     figure: tuple[int, int, int] | None = None
     flows: tuple[RequirementFlow, ...] = ()

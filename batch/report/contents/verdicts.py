@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 
 from batch.queries.at_limits import limit_summaries, reached_texts
+from batch.queries.evidence import evidence
 from batch.queries.failures import failures, ranges
 from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
 from batch.queries.signals import deck_unit
@@ -12,34 +16,59 @@ from batch.queries.step_errors.figures import Verification, figures
 from batch.queries.step_errors.limits import StepErrorVerdict, verdicts
 from batch.queries.step_errors.words import NONE, error_text
 from batch.queries.summary import spread, summary_of
+from batch.queries.warnings import campaign_warnings
 from batch.report.contents.against import EarlierCases
-from batch.report.contents.parts import FailureRow, MetricRow, OutcomeCount, RequirementCounts, Verdict
+from batch.report.contents.parameters import spot
+from batch.report.contents.parts import (
+    FailureRow,
+    MetricRow,
+    OutcomeCount,
+    ReportWarning,
+    RequirementCounts,
+    Verdict,
+)
 from ic.printing.columns import count as counted
+from met.plan import Experiment
 from met.run import DONE
 
 BARS = 36
 """Stretches of a histogram."""
 
+WORSE = ("", "met", "demonstrated", "not shown", "missed", "refuted")
+"""Verdicts on a requirement over a share of cases, each worse than those before it."""
+
 FEWEST = 8
 """Values that have a shape worth drawing."""
 
 
-def verdict(pool: Pool, *, named: bool) -> Verdict:
-    """The verdict on a run or sweep: yes if all cases reached their end and met all that is required. named: True to
-    say of which run or sweep."""
+def verdict(pool: Pool, experiments: Mapping[str, Experiment], *, named: bool) -> Verdict:
+    """The verdict on a run or sweep: yes if all cases reached their end and met all that is required.
+
+    experiments  of the plan, by name, for places in the deck;  named: True to say of which run or sweep
+    """
     ended = np.bincount(pool.ended, minlength=len(ENDED))
     parts = tuple(OutcomeCount(word, int(n)) for word, n in zip(ENDED, ended, strict=True) if n)
     good = int(ended[ENDED.index("met")] + ended[ENDED.index("done")])
     errors = [each for group in pool.groups for each in verdicts(group, figures(group))]
+    shares: dict[str, list[str]] = {}
+    for row in (row for group in pool.groups for row in evidence(group)):
+        shares.setdefault(row.requirement.text, []).append(row.verdict)
     return Verdict(
         kind="requirements",
         about=pool.name if named else "",
         ok=all(summary_of(group).ok for group in pool.groups),
         headline=_headline(pool, good),
         parts=parts,
-        demands=tuple(_demand(pool, place, text) for place, text in enumerate(pool.requirements)),
+        demands=tuple(
+            replace(_demand(pool, place, text), verdict=max(shares.get(text, [""]), key=WORSE.index))
+            for place, text in enumerate(pool.requirements)
+        ),
         failing=_failing(pool),
         notes=(*_notes(pool), *map(_of_step_error, errors)),
+        warnings=tuple(
+            ReportWarning(each.code, each.message, each.help, spot(None if each.at is None else each.at.place))
+            for each in campaign_warnings(pool.groups, experiments)
+        ),
     )
 
 

@@ -11,6 +11,7 @@ from batch.report.contents.parts import (
     FailureRow,
     MetricRow,
     ReportSection,
+    ReportWarning,
     RequirementCounts,
     RequirementFlow,
     Spot,
@@ -24,7 +25,8 @@ Anchors = Mapping[str, tuple[int, int]]
 
 WORDS = {"met": "meet all", "missed": "miss a requirement", "unknown": "not known", "done": "reached their end"}
 
-STRONG = {"requirements": ("Requirements met", "Requirements not met")}
+ALL_MET = ("Requirements met", "Requirements not met")
+ALL_SHOWN = ("Requirements demonstrated", "Requirements not demonstrated")
 NOTHING_ASKED = ("All ran to the end", "Not all ran to the end")
 
 
@@ -62,11 +64,11 @@ def spot_link(spot: Spot | None, anchors: Anchors) -> Html | None:
 # The verdict
 
 
-def verdict(found: Verdict) -> Html:
-    """The answer, large; beside it what it rests on."""
+def verdict(found: Verdict, anchors: Anchors) -> Html:
+    """The answer, large; beside it what it rests on, and what makes it doubtful."""
     if found.kind == "comparison":
         return _comparison(found)
-    yes, no = STRONG.get(found.kind, STRONG["requirements"]) if found.demands else NOTHING_ASKED
+    yes, no = _words(found)
     answer = el(
         "div",
         el("p", found.about, cls="about") if found.about else None,
@@ -78,8 +80,35 @@ def verdict(found: Verdict) -> Html:
     evidence = [_parts(found) if found.cases > 1 else None, _demands(found)]
     if found.failing:
         evidence.append(_failing(found.failing, found.cases))
+    evidence += [_warning(each, anchors) for each in found.warnings]
     evidence += [el("p", note, cls="note") for note in found.notes]
     return el("div", answer, el("div", evidence, cls="evidence"), cls=f"verdict {'yes' if found.ok else 'no'}")
+
+
+def _words(found: Verdict) -> tuple[str, str]:
+    """The answer in two words, where it is yes and where it is no."""
+    if not found.demands:
+        return NOTHING_ASKED
+    of_all = {"demonstrated", "not shown", "refuted"}  # the cases that may be drawn
+    return ALL_SHOWN if any(each.verdict in of_all for each in found.demands) else ALL_MET
+
+
+def _warning(each: ReportWarning, anchors: Anchors) -> Html:
+    """What makes the answer doubtful, its line of the deck, and what to do."""
+    place = spot_link(each.spot, anchors)
+    return el(
+        "div",
+        el(
+            "p",
+            el("strong", f"Warning {each.code}"),
+            [", ", place] if place is not None else None,
+            ": ",
+            each.message,
+            ".",
+        ),
+        [el("p", help, cls="under") for help in each.help],
+        cls="note warning",
+    )
 
 
 def mark(ok: bool) -> Html:
@@ -178,15 +207,17 @@ def _demands(found: Verdict) -> Html | None:
     single = found.cases == 1
     missed = not single and any(each.missed for each in found.demands)
     unknown = not single and any(each.unknown for each in found.demands)
+    shares = not single and any(each.verdict for each in found.demands)
     heads = [
         "requirement",
         *(["outcome"] if single else ["met by", "yield"]),
+        *(["verdict"] if shares else []),
         *(["missed"] if missed else []),
         *(["not known"] if unknown else []),
         "value" if single else "worst value",
     ]
-    right = [False, not single, *[True] * (len(heads) - 2)]
-    rows = [el("tr", _demand(each, single, missed, unknown)) for each in found.demands]
+    right = [head not in ("requirement", "outcome", "verdict") for head in heads]
+    rows = [el("tr", _demand(each, single, shares, missed, unknown)) for each in found.demands]
     head = el(
         "tr",
         [el("th", name, scope="col", cls="right" if flush else None) for name, flush in zip(heads, right, strict=True)],
@@ -194,7 +225,7 @@ def _demands(found: Verdict) -> Html | None:
     return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "Requirements")
 
 
-def _demand(each: RequirementCounts, single: bool, missed: bool, unknown: bool) -> list[Html | None]:
+def _demand(each: RequirementCounts, single: bool, shares: bool, missed: bool, unknown: bool) -> list[Html | None]:
     name = el("th", el("code", breaking(each.text)), scope="row")
     if single:
         word = "met" if each.met else "missed" if each.missed else "not known"
@@ -210,12 +241,21 @@ def _demand(each: RequirementCounts, single: bool, missed: bool, unknown: bool) 
         name,
         el("td", f"{each.met:,} of {each.of:,}", cls="right"),
         el("td", share(each.met, each.of), cls="right strong"),
+        _share_verdict(each.verdict) if shares else None,
         el("td", f"{each.missed:,}" if each.missed else "–", cls="right bad" if each.missed else "right")
         if missed
         else None,
         el("td", f"{each.unknown:,}" if each.unknown else "–", cls="right") if unknown else None,
         el("td", far, cls="right"),
     ]
+
+
+def _share_verdict(word: str) -> Html:
+    """The verdict on a requirement over a share of cases; nothing for one that every case is to meet."""
+    if not word:
+        return el("td", "–")
+    ok = word in ("met", "demonstrated")
+    return el("td", mark(ok), word, cls="good" if ok else "bad")
 
 
 def case_link(case: int) -> Html:

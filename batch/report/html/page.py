@@ -104,7 +104,7 @@ def _links(number: int, section: ReportSection, report: Report) -> list[tuple[st
 
 def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
     several = len(report.sections) > 1
-    answers = [blocks.verdict(each) for each in report.verdicts]
+    answers = [blocks.verdict(each, anchors) for each in report.verdicts]
     out: list[Child] = [el("section", el("h2", "Verdict", cls="quiet"), answers, id="verdict")]
     if report.changes is not None:
         out.append(el("section", el("h2", "What changed"), changes.origins(report.changes), id="changed"))

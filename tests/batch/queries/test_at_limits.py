@@ -14,6 +14,8 @@ import ic
 from batch.archive.read import ArchiveFile
 from batch.queries.summary import summarise
 from batch.queries.warnings import campaign_warnings
+from batch.report.contents.gathering import gather
+from batch.report.html.page import page
 from batch.terminal.show import show
 from met import run as engine
 from met.cli import main
@@ -82,6 +84,24 @@ def test_of_a_campaign_there_is_one_warning_with_the_count_and_the_worst_case(tm
     [at_limit] = [each for each in summary.limits if each.limit == "hinge.servo.tau_max"]
     assert (at_limit.cases, at_limit.row) == (2, 0)
     assert at_limit.largest == pytest.approx(0.25, abs=0.0006)  # until 0.501 s, the least steep part of the table
+
+
+def test_a_report_says_it_beside_the_verdict_with_its_line_and_what_to_do(tmp_path: Path) -> None:
+    path, _ = made(tmp_path, "it")
+    with ArchiveFile(path) as file:
+        report = gather(file)
+    [[said]] = [verdict.warnings for verdict in report.verdicts]
+    assert (said.code, said.help) == (
+        "D344",
+        ("raise `hinge.servo.tau_max`, or ask for a motion that does not come to it",),
+    )
+    assert said.spot is not None and said.spot.line == 15
+    html = page(report)
+    beside = html[html.index('id="verdict"') : html.index("What was run</h2>")]
+    assert "Warning D344" in beside and "was reached.</p>" in beside and 'href="#f0-15"' in beside
+    path, _ = made(tmp_path, "allowed")
+    with ArchiveFile(path) as file:
+        assert gather(file).verdicts[0].warnings == ()
 
 
 def test_what_a_run_allows_is_not_warned_of(tmp_path: Path) -> None:

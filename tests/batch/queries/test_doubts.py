@@ -67,7 +67,7 @@ def test_of_a_case_alone_it_is_said_where_it_is_so(archive: Path, capsys: pytest
 
 def test_reports_have_it_among_the_notes(archive: Path) -> None:
     [group] = ArchiveFile(archive).groups
-    [note] = [each for each in verdict(Pool("some", [group]), named=False).notes if "Warning" in each]
+    [note] = [each for each in verdict(Pool("some", [group]), {}, named=False).notes if "Warning" in each]
     assert note.startswith("Warning of #1, #3: t = 0.8 s: joint slide: it moves faster than 1e+06 m/s")
 
 
