@@ -87,7 +87,7 @@ class RequirementFlow:
 
 @frozen
 class ReportWarning:
-    """What makes an answer doubtful: what was seen, what to do about it, and the line of the deck that it is about."""
+    """A warning that makes an answer doubtful: its message, its remedies, and the line of the deck that it is about."""
 
     code: str
     message: str

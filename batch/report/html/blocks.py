@@ -94,7 +94,7 @@ def _words(found: Verdict) -> tuple[str, str]:
 
 
 def _warning(each: ReportWarning, anchors: Anchors) -> Html:
-    """What makes the answer doubtful, its line of the deck, and what to do."""
+    """A warning beside the verdict: what was seen, the line of the deck that it is about, and the remedies."""
     place = spot_link(each.spot, anchors)
     return el(
         "div",
