@@ -159,8 +159,9 @@ class _File:
 
     def _text(self, kind: str, number: int, table: dict[str, Any], key: str) -> str:
         found = table.get(key)
-        if not isinstance(found, str):
-            raise self.wrong(f"`{key}` of {kind} number {number + 1} is no text", f'`{key} = "..."`', kind, number, key)
+        if not isinstance(found, str) or not found.isprintable():
+            message = f"`{key}` of {kind} number {number + 1} is no text in a line"
+            raise self.wrong(message, f'`{key} = "..."`', kind, number, key)
         return found
 
     def _figure(self, number: int, table: dict[str, Any], key: str) -> float:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
 
 from batch.beds.filter_range import FilterRange, filter_range
 from batch.beds.sizing import BedFigures, Candidate, MotorFigures, PartVerdict, gather, judge_part
@@ -77,11 +79,18 @@ def joint_of(experiment: Experiment, name: str | None, texts: Mapping[str, str] 
 
 
 def bed_size(
-    experiment: Experiment, joint: str, margin: float, named: Mapping[str, MotorPart], listed: PartsList
+    experiment: Experiment,
+    joint: str,
+    margin: float,
+    named: Mapping[str, MotorPart],
+    listed: PartsList,
+    rows: np.ndarray | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> BedSize:
-    """The sizes of a bed over all cases. Raises Problem.
+    """The sizes of a bed over all cases, or those of some rows of the case table. Raises Problem.
 
-    named  parts by `drive` and `load`; none: all that are listed
+    named     parts by `drive` and `load`; none: all that are listed
+    progress  called with the number of cases done so far
     """
     use = servo_of(experiment, joint)
     assert use is not None
@@ -89,13 +98,13 @@ def bed_size(
     candidates = _candidates(named, listed)
     benches = {} if named else {name: _bench(each, listed) for name, each in listed.benches.items()}
     everyone = [*candidates, *(each for two in benches.values() for each in two)]
-    figures = gather(shaft_work(experiment, joint), everyone)
+    figures = gather(shaft_work(experiment, joint, rows, progress), everyone)
     if figures is None:
         message = f"no case of `{experiment.name}` came to its first instant: there is nothing to size a bed by"
         raise Problem(error("E443", message, help="`met run` says why its cases fail"))
     bedded = on_bed(experiment, joint, delay=exchanges.late(False))
     lightest, heaviest = figures.ratio
-    rows = sorted({row_at(experiment.cases.table, one.case) or 0 for one in figures.ratio})
+    ends = sorted({row_at(experiment.cases.table, one.case) or 0 for one in figures.ratio})
     return BedSize(
         experiment=experiment,
         bedded=bedded,
@@ -103,7 +112,7 @@ def bed_size(
         margin=margin,
         figures=figures,
         exchanges=exchanges,
-        filter=filter_range(bedded, joint, rows, (lightest.value, heaviest.value), margin),
+        filter=filter_range(bedded, joint, ends, (lightest.value, heaviest.value), margin),
         verdicts=tuple(judge_part(each, margin) for each in candidates),
         benches={name: (judge_part(a, margin), judge_part(b, margin)) for name, (a, b) in benches.items()},
         notes=tuple(_notes(experiment, joint, figures, candidates)),

@@ -8,14 +8,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
+from batch.archive.read import ArchiveFile
 from batch.beds.bed_size import BedSize, bed_size, joint_of
 from batch.beds.chosen_bed import on_beds
 from batch.beds.size_table import size_lines
 from batch.beds.sizing import Extreme, MotorFigures, PartVerdict
 from batch.campaigns.choosing import experiments_named
 from batch.campaigns.plans import read_plan
+from batch.queries.groups import groups_named
+from batch.terminal.progress import Bar
 from hw.motor_parts import parts_list
 from met.diagnostic import Problem, error
+from met.host.sources import names_archive
 from met.messages import visible
 from met.plan import Experiment, Plan
 
@@ -41,15 +47,35 @@ def size_and_tell(
     listed = parts_list(parts)
     named = {role: listed.motor(name) for role, name in (("drive", drive), ("load", load)) if name is not None}
     silent = quiet or form == "json"
-    plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=silent)
+    rows: dict[str, np.ndarray] = {}
+    if names_archive(source):
+        plan, rows = _of_archive(source, names)
+    else:
+        plan = read_plan(source, names, defines=defines, include_dirs=include_dirs, settings=settings, quiet=silent)
     asked = experiments_named(plan, names or None) if joint is not None else _on_beds(plan, names)
     texts = {each.name: each.text for each in plan.sources}
-    found = [bed_size(each, joint_of(each, joint, texts), margin, named, listed) for each in asked]
+    joints = [joint_of(each, joint, texts) for each in asked]
+    bar, found = None if silent else Bar(), []
+    for each, of in zip(asked, joints, strict=True):
+        wanted = rows.get(each.name)
+        if bar is not None:
+            bar.begin(each.name, each.cases.count if wanted is None else len(wanted))
+        found.append(bed_size(each, of, margin, named, listed, wanted, None if bar is None else bar.advance))
+        if bar is not None:
+            bar.end()
     if form == "json":
         visible.say(json.dumps([as_data(each) for each in found], indent=1))
     else:
         say("\n\n".join("\n".join(size_lines(each, named=bool(named), curves=verbose)) for each in found))
     return not named or all(verdict.fits for each in found for verdict in each.verdicts)
+
+
+def _of_archive(source: str, names: Sequence[str]) -> tuple[Plan, dict[str, np.ndarray]]:
+    """The plan in an archive, with the runs that it holds, and the rows of each that it has cases of."""
+    with ArchiveFile(source) as file:
+        plan, groups = file.plan(), groups_named(file, names)
+        cases = {each.name: each.cases.table for each in plan.experiments}
+        return plan, {each.name: np.searchsorted(cases[each.name], each.values("case")) for each in groups}
 
 
 def _on_beds(plan: Plan, names: Sequence[str]) -> Sequence[Experiment]:

@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 from textwrap import wrap
 
 from batch.beds.bed_size import BedSize
-from batch.beds.sizing import UNITS, Check, Extreme, MotorFigures, PartVerdict
+from batch.beds.sizing import UNITS, Extreme, MotorFigures, PartCheck, PartVerdict
 from batch.terminal.margin import in_words
 from ic.printing.columns import columns, count
+from met.analysis.margin import remedy
 
 WORDS = {
     "torque_rms": "torque, continuous",
@@ -30,7 +31,7 @@ ROLES = ("drive", "load")
 
 def size_lines(size: BedSize, *, named: bool, curves: bool = False) -> Iterator[str]:
     """The sizes in lines. named: whether the parts were named;  curves: with the torque-speed curves."""
-    figures, several = size.figures, size.figures.cases > 1
+    figures, several = size.figures, size.experiment.varies
     duration = size.experiment.structure.schedule.duration
     yield (
         f"{size.experiment.name}: a bed for joint `{size.joint}`, {count(figures.cases, 'case')} of {duration:g} s, "
@@ -84,7 +85,7 @@ def _rest(size: BedSize, several: bool) -> Iterator[Sequence[str]]:
     yield "", f"at least {bare} baud, with all sensors {all_of_them}"
     bed = "the deck's bed" if size.in_deck else f"a bed by itself, delay = {own.delay:g}"
     yield "loop", f"{in_words(own)};"
-    yield "", bed
+    yield "", bed if own.stable else f"{bed}: NOT STABLE, {remedy(own)} may help"
     yield "filter", _filter(size)
 
 
@@ -98,7 +99,7 @@ def _filter(size: BedSize) -> str:
         return f"{here}stable {margin} at all of {ends}"
     if not good:
         return f"{here}stable {margin} at none of {ends}"
-    words = f"{_digits(good[0])} to {_digits(good[-1])} Hz"
+    words = " to ".join(dict.fromkeys(_digits(end) for end in (good[0], good[-1]))) + " Hz"
     whole = good == tuple(tried[tried.index(good[0]) : tried.index(good[-1]) + 1])
     return f"{here}stable {margin} at {words}{'' if whole else ', not all of them'}, of {ends} that were tried"
 
@@ -157,7 +158,7 @@ def _share(verdict: PartVerdict) -> float:
     return 0.0 if verdict.binds is None else verdict.binds.share
 
 
-def _check(check: Check) -> str:
+def _check(check: PartCheck) -> str:
     """`torque, peak: 0.3 of 1.1 N*m, 27 %`."""
     return f"{check.what}: {_digits(check.asked)} of {_with(check.has, check.unit)}, {100.0 * check.share:.0f} %"
 

@@ -298,7 +298,7 @@ CHECKS = (
 
 
 @frozen
-class Check:
+class PartCheck:
     """One figure of a part against what is asked, margin included, SI. at: where it is asked"""
 
     what: str
@@ -319,11 +319,11 @@ class PartVerdict:
 
     role: str
     part: MotorPart
-    checks: tuple[Check, ...]
+    checks: tuple[PartCheck, ...]
     missing: tuple[str, ...]
 
     @property
-    def binds(self) -> Check | None:
+    def binds(self) -> PartCheck | None:
         """The check with the least room."""
         return max(self.checks, key=lambda each: each.share, default=None)
 
@@ -341,7 +341,7 @@ def judge_part(candidate: Candidate, margin: float) -> PartVerdict:
     for what, name, own in CHECKS:
         has = part.figure(own)
         if has is not None and name in asked:
-            checks.append(Check(what, UNITS[name], margin * asked[name].value, has, asked[name]))
+            checks.append(PartCheck(what, UNITS[name], margin * asked[name].value, has, asked[name]))
     made = {each.what for each in checks}
     missing = [name for name in ("torque, continuous", "rate") if name not in made]
     if not made & {"torque, peak", "current, peak", "voltage"}:

@@ -193,7 +193,7 @@ def identify(word: str, source: str, names: tuple[str, ...], **options: Any) -> 
 
 
 @bed.command(short_help="Say what the two motors of a bed must do, and which can.")
-@click.argument("source", metavar="DECK|PLAN.json")
+@click.argument("source", metavar="DECK|PLAN.json|ARCHIVE.h5")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @click.option("--joint", metavar="JOINT", help="That is to be on the bed [the one that is on one in the deck].")
 @click.option(
@@ -214,6 +214,7 @@ def size(source: str, names: tuple[str, ...], **options: Any) -> int:
     """Run all cases of a deck's only run or sweep, of the one marked `default`, or of these NAMEs, and say what a bed
     for one of its joints must do: torque, rate, power, current and voltage of both motors, what they return, the
     inertia that the load stands for, line and filter. Then which motors can: those of --drive and --load, or all known.
+    Of an archive, the cases that it has are run again.
 
     Nothing is written. -v adds torque-speed curves. Exit status: 0 the motors that were named fit; 1 one does not, or
     it is not known; 2 the input is wrong.

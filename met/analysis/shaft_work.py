@@ -14,7 +14,7 @@ another inertia, the load motor gives tau_l + (J - J_b) w' for the same motion.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from types import SimpleNamespace
 from typing import Any
@@ -116,15 +116,25 @@ def not_for_a_bed(experiment: Experiment, use: ServoUse) -> tuple[str, str] | No
     return None
 
 
-def shaft_work(experiment: Experiment, joint: str) -> Iterator[ShaftWork]:
-    """The work of a joint's motor and of its load in all cases, a block of cases at a time. Raises Problem."""
+def shaft_work(
+    experiment: Experiment,
+    joint: str,
+    rows: np.ndarray | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Iterator[ShaftWork]:
+    """The work of a joint's motor and of its load, a block of cases at a time. Raises Problem.
+
+    rows  of the case table, rising; all of them by default.  progress: called with the number of cases done so far
+    """
     on_bed = substitution_of(experiment, joint) is not None
     prepared = prepare(_recording(experiment, joint, OF_BED if on_bed else OF_JOINT))
     each = max(1, prepared.experiment.structure.history_bytes)
     size = max(FEWEST_CASES, BLOCK_BYTES // each)
-    for first in range(0, experiment.cases.count, size):
-        rows = np.arange(first, min(first + size, experiment.cases.count))
-        yield _block(experiment, joint, run(prepared, rows), rows, on_bed=on_bed)
+    wanted = np.arange(experiment.cases.count) if rows is None else rows
+    for first in range(0, len(wanted), size):
+        block = wanted[first : first + size]
+        told = None if progress is None else lambda done, before=first: progress(before + done)
+        yield _block(experiment, joint, run(prepared, block, progress=told), block, on_bed=on_bed)
 
 
 def _recording(experiment: Experiment, joint: str, names: Sequence[str]) -> Experiment:

@@ -15,8 +15,8 @@ import pytest
 from batch.beds.filter_range import filter_range
 from batch.beds.sizing import Candidate, MotorFigures, PartVerdict, corners, gather, hottest, judge_part
 from hw.motor_parts import MotorPart
+from met import cli
 from met.analysis.shaft_work import ShaftWork
-from met.plan import Experiment
 from tests.met.analysis.test_shaft_work import PUSHED, compiled, work
 
 DECK = (
@@ -26,6 +26,17 @@ run held like push { duration = 0.1 s;  substitute swing { bed = emulated(kt_loa
 sweep heavier of push { vary links.disk.inertia.zz = [0.3, 0.6, 0.15] kg*m^2; }
 """
 )
+ON_BED = """#include <servos/rigid_gearbox.ic>
+arm one {{
+    link beam {{ mass = {mass} kg;  com = [1, 0, 0] m;  inertia = [1e-3, 1e-3, 1e-3] kg*m^2; }}
+    joint swing revolute {{ parent = base;  child = beam;  axis = z; }}
+}}
+servo gearbox like rigid_gearbox {{ command = rate(0.03 rad/s); }}
+run bench {{
+    arm = one;  servos {{ swing = gearbox; }}  rates {{ dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }}
+    duration = 0.2 s;  record = [q];  substitute swing {{ law = {law}; }}
+}}
+"""
 Bed = Callable[..., tuple[int, str, str]]
 
 # of the pushed disk: N = 50, J_m = 1e-4, I = 0.3, tau = 2 N m at the joint for 2 s
@@ -177,6 +188,27 @@ def test_what_a_data_sheet_leaves_out_is_no_fit(met_bed: Bed, here: Path) -> Non
     assert "load bare: not known, for its source does not give: torque, peak, inertia of its rotor\n" in out
 
 
+def test_of_an_archive_the_cases_that_it_has_are_sized(
+    met_bed: Bed, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["run", "deck.ic", "heavier", "--case", "#1", "-q", "--no-picture", "-o", "one.h5"]) == 0
+    status, out, err = met_bed("size", "one.h5", "--joint", "swing", "--format", "json")
+    assert (status, err) == (0, "")
+    [found] = json.loads(out)
+    assert (found["cases"], found["load"]["figures"]["torque_peak"]["case"]) == (1, 1)
+    assert [one["value"] for one in found["r"]] == pytest.approx([2.4, 2.4], rel=1e-12)
+
+
+def test_a_loop_that_is_not_stable_is_said_to_be_so(met_bed: Bed, here: Path) -> None:
+    """At 1 kHz with a filter of 50 Hz and no delay `measured_acceleration` is stable up to r = 5.35."""
+    (here / "deck.ic").write_text(ON_BED.format(mass=25 * 157.26062, law="measured_acceleration"), encoding="utf-8")
+    _, out, err = met_bed("size", "deck.ic", "--load", "maxon-353297")
+    assert "warning[D321]" in err
+    assert "  loop              swing: r = 25, stable to 5.35 with measured_acceleration at 1000 Hz;\n" in out
+    assert "the deck's bed: NOT STABLE, a lighter arm, a faster servo or another law may help\n" in out
+    assert "stable with a margin of 1.5 of r at none of 10 to 500 Hz\n" in out
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -243,25 +275,10 @@ def test_a_run_that_fails_at_once_has_nothing_to_size(
     )
 
 
-def _at(r: float, law: str, folder: Path) -> Experiment:
-    deck = f"""#include <servos/rigid_gearbox.ic>
-arm one {{
-    link beam {{ mass = {r * 157.26062} kg;  com = [1, 0, 0] m;  inertia = [1e-3, 1e-3, 1e-3] kg*m^2; }}
-    joint swing revolute {{ parent = base;  child = beam;  axis = z; }}
-}}
-servo gearbox like rigid_gearbox {{ command = rate(0.03 rad/s); }}
-run bench {{
-    arm = one;  servos {{ swing = gearbox; }}  rates {{ dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }}
-    duration = 1 s;  record = [q];  substitute swing {{ law = {law}; }}
-}}
-"""
-    return compiled(folder, deck, "bench")
-
-
 def test_the_range_of_filters_ends_where_the_law_is_unstable(tmp_path: Path) -> None:
     """`measured_acceleration` at 1 kHz is stable up to r = 13.6, 5.35, 2.95 and 1.91 with filters of 20, 50, 100 and
     200 Hz (docs/substitution.md). With r = 2 and a margin of 1.5 that is 3: up to a little below 100 Hz."""
-    at_two = _at(2.0, "measured_acceleration", tmp_path)
+    at_two = compiled(tmp_path, ON_BED.format(mass=2 * 157.26062, law="measured_acceleration"), "bench")
     found = filter_range(at_two, "swing", [0], (2.0, 2.0), 1.5)
     assert found.f_cut == 50.0
     assert found.good == tuple(f_cut for f_cut, _ in found.tried if f_cut < 98.0)
