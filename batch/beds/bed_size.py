@@ -144,6 +144,8 @@ def _notes(experiment: Experiment, joint: str, figures: BedFigures, candidates: 
             times = schedule.dynamics // use.divisor
             yield f"the servo ticks {times} times a step of the dynamics, and one of them alone is seen"
     yield "a part's rotor is on the shaft with it; a coupling and a brake are not"
+    if any(each.role == "drive" for each in candidates):
+        yield "a drive of other constants moves the joint otherwise: write its own into the servo, and ask again"
     if any(each.part.figure("resistance") for each in candidates):
         yield "voltages of parts are of resistance and back-EMF, without inductance and what heat does to both"
     if figures.at_most:

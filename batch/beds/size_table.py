@@ -75,7 +75,8 @@ def _rest(size: BedSize, several: bool) -> Iterator[Sequence[str]]:
         f"({_place(heavy, several)})",
     )
     yield "", f"r = {_digits(least.value)} to {_digits(most.value)} of the joint's rotor, {_span(figures.rotor)}"
-    yield "shaft", f"{_span(figures.shaft)} with both rotors, as the deck has it"
+    whose = "the deck's bed, both rotors" if size.in_deck else "the joint's rotor alone: a load's adds to it"
+    yield "shaft", f"{_span(figures.shaft)}, {whose}"
     peak, energy = figures.both["returned_peak"], figures.both["returned_energy"]
     yield "returned", "on a supply each, what is said above, into its brake resistor or capacitors;"
     of_both = f"{_with(peak.value, 'W')}{_in(peak, several)}" if peak.value else "0 W"

@@ -104,18 +104,16 @@ def hottest(torque: np.ndarray, time: np.ndarray, constant: float) -> np.ndarray
     Heat goes with the square of the torque, and the winding follows it as a low-pass of order 1 with its thermal time
     constant (s). The case is run again and again, so it begins as warm as it ends.
     """
+    from scipy.signal import lfilter
+
     if len(time) < 2:
         return np.abs(torque).max(1)
-    step = float(time[1] - time[0])
-    kept = math.exp(-step / constant)
-    squares = np.nan_to_num(torque[:, :-1] ** 2)
-    warm, course = np.zeros(len(torque)), []
-    for k in range(squares.shape[1]):
-        warm = kept * warm + (1.0 - kept) * squares[:, k]
-        course.append(warm)
-    left = kept ** np.arange(1, len(course) + 1)
-    begin = warm / (1.0 - left[-1])
-    found: np.ndarray = np.sqrt((np.array(course) + left[:, None] * begin).max(0))
+    step, squares = float(time[1] - time[0]), np.nan_to_num(torque[:, :-1] ** 2)
+    share = -math.expm1(-step / constant)
+    course = lfilter([share], [1.0, share - 1.0], squares, axis=1)
+    after = step * np.arange(1, squares.shape[1] + 1) / constant
+    begin = course[:, -1] / -math.expm1(-after[-1])
+    found: np.ndarray = np.sqrt((course + begin[:, None] * np.exp(-after)).max(1))
     return found
 
 

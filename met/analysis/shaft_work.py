@@ -28,10 +28,8 @@ from met.plan.channel import recordable
 from met.run import prepare, run
 from met.servos.motor import Motor
 
-BLOCK_BYTES = 64 << 20
-"""Size of the histories that are held at once."""
-FEWEST_CASES = 8
-"""Cases of a block at least: so many fill the lanes of a machine."""
+BLOCK_BYTES = 128 << 20
+"""Size of the histories that are held at once, where one case's are not larger."""
 
 OF_JOINT = ("qdd", "servo.motor_rate", "servo.motor_torque", "servo.voltage", "tau_load", "J_eff")
 OF_BED = ("qdd", "bed.shaft_rate", "bed.drive_voltage", "law.torque", "J_eff")
@@ -129,7 +127,7 @@ def shaft_work(
     on_bed = substitution_of(experiment, joint) is not None
     prepared = prepare(_recording(experiment, joint, OF_BED if on_bed else OF_JOINT))
     each = max(1, prepared.experiment.structure.history_bytes)
-    size = max(FEWEST_CASES, BLOCK_BYTES // each)
+    size = max(1, BLOCK_BYTES // each)
     wanted = np.arange(experiment.cases.count) if rows is None else rows
     for first in range(0, len(wanted), size):
         block = wanted[first : first + size]

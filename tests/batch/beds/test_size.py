@@ -344,7 +344,7 @@ PRINTED = """heavier: a bed for joint `swing`, 3 cases of 2 s, 2001 instants eac
 
   arm at the shaft  6e-05 kg*m^2 (#2, 0 s) to 0.00024 kg*m^2 (#1, 0 s)
                     r = 0.6 to 2.4 of the joint's rotor, 0.0001 kg*m^2
-  shaft             0.0001 kg*m^2 with both rotors, as the deck has it
+  shaft             0.0001 kg*m^2, the joint's rotor alone: a load's adds to it
   returned          on a supply each, what is said above, into its brake resistor or capacitors;
                     on one supply at most 0 W, and 0 J in a case, less what windings take
   line              1000 exchanges a second, for a servo of 1000 Hz:
@@ -364,4 +364,5 @@ PRINTED = """heavier: a bed for joint `swing`, 3 cases of 2 s, 2001 instants eac
   all of it is simulated: no real bed has been driven with this version
   friction, noise and converters of a bed are not in the figures: in the deck this joint is on none
   a part's rotor is on the shaft with it; a coupling and a brake are not
+  a drive of other constants moves the joint otherwise: write its own into the servo, and ask again
 """
