@@ -161,6 +161,26 @@ def test_a_motor_fits_up_to_the_figure_that_binds(pushed: ShaftWork, figure: str
         assert verdict.binds.share == pytest.approx(share, rel=1e-4)
 
 
+def test_of_a_case_that_failed_counts_what_it_had_until_then(pushed: ShaftWork) -> None:
+    """Half of the way: half of the rate, a quarter of the energy; and a case that never began counts for nothing."""
+    names = ("rate", "acceleration", "drive", "voltage", "load", "arm")
+    half = {name: np.where(pushed.time <= 1.0, getattr(pushed, name), np.nan) for name in names}
+    none = {name: np.full_like(getattr(pushed, name), np.nan) for name in names}
+    whole = {name: np.concatenate([none[name], half[name]]) for name in names}
+    of_cases = {name: np.tile(getattr(pushed, name), 2) for name in ("rotor", "shaft", "kt", "strongest", "limited")}
+    cases = {"case": np.array([4, 7]), "failed": np.array([True, True])}
+    found = gather([replace(pushed, **whole, **of_cases, **cases)])
+    assert found is not None
+    assert (found.failed, found.cases) == (2, 2)
+    assert found.drive.found["rate"].value == pytest.approx(W / 2.0, rel=3e-5)
+    assert found.drive.found["rate"].case == 7
+    assert found.drive.found["torque_rms"].value == pytest.approx(0.04, rel=1e-5)
+    assert found.drive.found["power_mean"].value == pytest.approx(0.04 * W / 4.0, rel=3e-5)
+    energy = 0.5 * 0.3 * (W / 2.0 / 50.0) ** 2
+    assert found.load.found["returned_energy"].value == pytest.approx(energy, rel=3e-5)
+    assert gather([replace(pushed, **none, failed=np.array([True]))]) is None
+
+
 def test_a_winding_that_warms_fast_is_held_against_the_hottest_of_a_case(pushed: ShaftWork) -> None:
     torque = np.where(pushed.time < 0.5, 0.4, 0.0)[None, :]
     found = judged(replace(pushed, drive=torque), "drive", thermal_time=0.1)
@@ -259,6 +279,34 @@ run both like nominal { duration = 0.2 s;  substitute shoulder { }  substitute e
         " = help: one at a time: `--joint shoulder` or `--joint elbow`\n"
     )
     assert sized(met_bed, "both", "--joint", "elbow")["joint"] == "elbow"
+
+
+def test_a_joint_that_would_not_tick_with_those_on_beds_is_told(met_bed: Bed, here: Path) -> None:
+    deck = """#include <two_link.ic>
+run both like nominal { substitute shoulder { }  servos { elbow = gearbox { rate = 50 Hz; } } }
+run bare like nominal { servos { remove elbow; } }
+"""
+    (here / "deck.ic").write_text(deck, encoding="utf-8")
+    status, _, err = met_bed("size", "deck.ic", "both", "--joint", "elbow")
+    assert status == 2
+    assert (
+        "error[E440]: the servo of joint `elbow` ticks at 50 Hz, and that of `shoulder`, which is on a bed, at 100 Hz\n"
+        in err
+    )
+    status, _, err = met_bed("size", "deck.ic", "bare", "--joint", "elbow")
+    assert status == 2
+    assert "error[E440]: joint `elbow` of `bare` has no servo\n = help: joints that have a servo: shoulder\n" in err
+
+
+def test_a_drive_at_its_largest_torque_is_noted(met_bed: Bed, here: Path) -> None:
+    text = PUSHED.replace("tau_max = 10 N*m", "tau_max = 0.03 N*m")
+    (here / "deck.ic").write_text(text, encoding="utf-8")
+    found = sized(met_bed, "--joint", "swing")
+    assert (found["at_largest_torque"], found["drive"]["figures"]["torque_peak"]["value"]) == (1, 0.03)
+    assert any(
+        note.startswith("the drive motor was at the largest torque of the deck's motor in 1 of 1")
+        for note in found["notes"]
+    )
 
 
 def test_a_run_that_fails_at_once_has_nothing_to_size(
