@@ -24,7 +24,7 @@ PAGES = {
               "editors"],
     "Campaigns and results": ["cluster", "best", "verification", "evidence", "sensitivity", "plots", "report", "diff",
                               "export", "notebooks"],
-    "A motor on a bed": ["bed", "protocol", "../hw/firmware/README"],
+    "A motor on a bed": ["bed", "bench", "protocol", "../hw/firmware/README"],
     "From Python": ["api"],
     "What it computes": ["physics", "paper", "engine"],
     "Inside": ["architecture", "glossary", "../CONTRIBUTING", "../SECURITY", "../CHANGELOG"],

@@ -192,6 +192,39 @@ def identify(word: str, source: str, names: tuple[str, ...], **options: Any) -> 
     return YES
 
 
+@bed.command(short_help="Say what the two motors of a bed must do, and which can.")
+@click.argument("source", metavar="DECK|PLAN.json|ARCHIVE.h5")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@click.option("--joint", metavar="JOINT", help="That is to be on the bed [the one that is on one in the deck].")
+@click.option(
+    "--margin",
+    type=click.FloatRange(1.0, 100.0),
+    metavar="FACTOR",
+    default=1.5,
+    show_default=True,
+    help="Order so many times what is asked.",
+)
+@click.option("--drive", metavar="PART", help="A motor to be held against it, in the joint's motor's place.")
+@click.option("--load", metavar="PART", help="A motor to be held against it, as the load.")
+@click.option("--parts", metavar="FILE.toml", help="Motors of your own, besides those that come with MET.")
+@deck_options
+@format_option
+@loudness_options
+def size(source: str, names: tuple[str, ...], **options: Any) -> int:
+    """Run all cases of a deck's only run or sweep, of the one marked `default`, or of these NAMEs, and say what a bed
+    for one of its joints must do: torque, rate, power, current and voltage of both motors, what they return, the
+    inertia that the load stands for, line and filter. Then which motors can: those of --drive and --load, or all known.
+    Of an archive, the cases that it has are run again.
+
+    Nothing is written. -v adds torque-speed curves. Exit status: 0 the motors that were named fit; 1 one does not, or
+    it is not known; 2 the input is wrong.
+    """
+    from batch.beds.size import size_and_tell
+
+    check_options(source, names, False, options["defines"], options["include_dirs"], options["settings"])
+    return YES if size_and_tell(source, names, **options) else NO
+
+
 @bed.command(short_help="Run a deck whose joints' motors are on beds.")
 @click.argument("source", metavar="DECK|PLAN.json")
 @click.argument("names", nargs=-1, metavar="[NAME]...")

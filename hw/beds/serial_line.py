@@ -65,13 +65,12 @@ class SerialBed(WireBed):
     def connect(self) -> About:
         about = super().connect()
         waits = Capability.LOCK_STEP not in about.capabilities and urlsplit(self._name).scheme not in ("socket", "unix")
-        bits = _BITS * exchanged(about.capabilities)
-        share = bits / self.baud / self.period
+        share = needed(about.capabilities, self.baud) / self.period
         if waits and share > LONGEST_SHARE:
             self.close()
             message = f"{self._name} at {self.baud} baud: an exchange takes {share:.0%} of its period of "
             message += f"{self.period * 1e3:.4g} ms, and {LONGEST_SHARE:.0%} is the most"
-            least = math.ceil(bits / LONGEST_SHARE / self.period)
+            least = least_baud(about.capabilities, self.period)
             raise Problem(error("E405", message, help=f"at least {least} baud, or a lower rate of the servo"))
         return about
 
@@ -105,6 +104,11 @@ def exchanged(capabilities: Capability) -> int:
 def needed(capabilities: Capability, baud: int) -> float:
     """The time that the bytes of an exchange take on a serial line, s."""
     return _BITS * exchanged(capabilities) / baud
+
+
+def least_baud(capabilities: Capability, period: float) -> int:
+    """The least rate of a serial line for an exchange each period (s), bits a second."""
+    return math.ceil(_BITS * exchanged(capabilities) / LONGEST_SHARE / period)
 
 
 class SerialLine:

@@ -1,0 +1,56 @@
+"""Cut-offs of a bed's filter under which its loop is stable, with the arm that a run's cases show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from met.analysis.margin import Margin, margins
+from met.frozen import frozen
+from met.plan import Experiment, Origin, Quantity
+
+TRIED = 9
+"""Cut-offs that are tried, a constant share apart, from a hundredth of the servo's rate to half of it."""
+
+
+@frozen
+class FilterRange:
+    """The loop with the filter that the bed has, and with others.
+
+    own      the tightest margin with the bed's filter, held against the arms of the run;  f_cut: the filter's, Hz
+    tried    cut-offs, Hz, and whether the loop is stable there with the margin that was asked
+    """
+
+    own: Margin
+    f_cut: float
+    tried: tuple[tuple[float, bool], ...]
+
+    @property
+    def good(self) -> tuple[float, ...]:
+        return tuple(f_cut for f_cut, stable in self.tried if stable)
+
+
+def filter_range(
+    experiment: Experiment, joint: str, rows: Sequence[int], ratio: tuple[float, float], margin: float
+) -> FilterRange:
+    """The filters of a joint's bed. rows: cases that are looked at;  ratio: least and largest r over a run. Where other
+    joints are on beds too, r is that of all their motions at the start instead."""
+    alone = len(experiment.structure.substitutions) == 1
+    path = f"{joint}.bed.f_cut"
+
+    def tightest(one: Experiment) -> Margin:
+        found = [each for case in margins(one, rows) for each in case if each.joint == joint]
+        if alone:
+            found = [replace(each, least=ratio[0], together=ratio[1]) for each in found]
+        return min(found, key=lambda each: each.room)
+
+    own = tightest(experiment)
+    value = experiment.parameters[path].value
+    tried = []
+    for f_cut in np.geomspace(0.01 * own.rate_hz, 0.5 * own.rate_hz, TRIED).tolist():
+        parameters = {**experiment.parameters, path: Quantity(f_cut, "Hz", Origin("default"))}
+        one = tightest(replace(experiment, parameters=parameters))
+        tried.append((f_cut, one.stable and one.room >= margin))
+    return FilterRange(own, float(value) if isinstance(value, float | int) else float("nan"), tuple(tried))

@@ -1,0 +1,199 @@
+"""Motors to buy for a bed, from files in TOML: `hw/motor_parts.toml`, and users' own of the same form.
+
+A file is data of others: bounded, and each figure is a number with a unit of its kind, above zero.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import field
+from pathlib import Path
+from typing import Any
+
+from met import units
+from met.diagnostic import Place, Problem, did_you_mean, error
+from met.frozen import frozen
+from met.host.files import read_regular
+from met.unit_parser import parse_unit
+
+SHIPPED = Path(__file__).with_suffix(".toml")
+MOST_BYTES = 1 << 20
+MOST_MOTORS = 1000
+
+FIGURES: Mapping[str, str] = {
+    "torque_rated": "N*m",
+    "torque_peak": "N*m",
+    "rate_max": "rad/s",
+    "kt": "N*m/A",
+    "resistance": "ohm",
+    "inductance": "H",
+    "voltage": "V",
+    "inertia": "kg*m^2",
+    "current_rated": "A",
+    "current_peak": "A",
+    "thermal_time": "s",
+}
+"""Figures of a motor, and the SI unit of each."""
+
+_WORDS = ("name", "maker", "model", "source", "note")
+_BENCH = ("name", "drive", "load")
+_QUANTITY = re.compile(r"\s*([\d.]+(?:[eE][+-]?\d+)?)\s*(\S.*?)\s*")
+
+
+@frozen
+class MotorPart:
+    """A motor that can be bought. figures: those of `FIGURES` that its source gives, SI;  file: that it is from"""
+
+    name: str
+    source: str
+    maker: str = ""
+    model: str = ""
+    note: str = ""
+    figures: Mapping[str, float] = field(default_factory=dict)
+    file: str = ""
+
+    def figure(self, name: str) -> float | None:
+        """One of `FIGURES`, SI; None where the source does not give it."""
+        return self.figures.get(name)
+
+
+@frozen
+class Bench:
+    """Two motors that go together, by their names."""
+
+    name: str
+    drive: str
+    load: str
+
+
+@frozen
+class PartsList:
+    """The motors and benches of some files, by name."""
+
+    motors: Mapping[str, MotorPart]
+    benches: Mapping[str, Bench]
+
+    def motor(self, name: str) -> MotorPart:
+        """The motor of a name. Raises Problem E442."""
+        if name in self.motors:
+            return self.motors[name]
+        helps = [*did_you_mean(name, self.motors), f"motors: {', '.join(self.motors)}"]
+        raise Problem(error("E442", f"no motor `{name}` in the files of parts", help=helps))
+
+
+def parts_list(more: str | os.PathLike[str] | None = None) -> PartsList:
+    """The motors that are shipped, and those of a file of one's own, which go before. Raises Problem E441, OSError."""
+    found = [_File(SHIPPED).parts(), *([] if more is None else [_File(more).parts()])]
+    own_first = [*reversed(found)]
+    motors = {name: each for one in found for name, each in one.motors.items()}
+    names = dict.fromkeys(name for one in own_first for name in one.motors)
+    benches = {name: each for one in found for name, each in one.benches.items()}
+    return PartsList({name: motors[name] for name in names}, benches)
+
+
+class _File:
+    """One file of parts, and the places in it."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.name = os.fspath(path)
+        data = read_regular(path, MOST_BYTES)
+        try:
+            self.text = data.decode()
+        except UnicodeDecodeError as reason:
+            raise Problem(error("E441", f"{self.name} is no text in UTF-8", help="a file of parts is TOML")) from reason
+        try:
+            self.tables = tomllib.loads(self.text)
+        except (tomllib.TOMLDecodeError, RecursionError) as reason:
+            line = re.search(r"at line (\d+), column (\d+)", str(reason))
+            message = re.sub(r" \(at .*\)$", "", str(reason))
+            at = None if line is None else Place(self.name, int(line[1]), int(line[2]), 1)
+            wrong = error("E441", f"{self.name} is no TOML: {message}", at, help="`met doc E441` shows a file of parts")
+            raise Problem(wrong, {self.name: self.text}) from reason
+
+    def parts(self) -> PartsList:
+        for key in self.tables:
+            if key not in ("motor", "bench"):
+                raise self.wrong(f"no `{key}` belongs here", "motors are `[[motor]]`, benches `[[bench]]`", key=key)
+        motors: dict[str, MotorPart] = {}
+        for number, table in enumerate(self._several("motor")):
+            motor = self._motor(number, table)
+            if motor.name in motors:
+                raise self.wrong(f"motor `{motor.name}` is there twice", "give each a name of its own", "motor", number)
+            motors[motor.name] = motor
+        benches: dict[str, Bench] = {}
+        for number, table in enumerate(self._several("bench")):
+            found = {key: self._text("bench", number, table, key) for key in _BENCH}
+            self._only(_BENCH, "bench", number, table)
+            for role in _BENCH[1:]:
+                if found[role] not in motors:
+                    message = f"bench `{found['name']}`: there is no motor `{found[role]}` in this file"
+                    raise self.wrong(message, f"its motors: {', '.join(motors)}", "bench", number, role)
+            benches[found["name"]] = Bench(**found)
+        return PartsList(motors, benches)
+
+    def _several(self, kind: str) -> list[dict[str, Any]]:
+        found = self.tables.get(kind, [])
+        if not isinstance(found, list) or not all(isinstance(each, dict) for each in found):
+            raise self.wrong(f"`{kind}` is no list of tables", f"write `[[{kind}]]` above each", key=kind)
+        if len(found) > MOST_MOTORS:
+            raise self.wrong(f"it has {len(found)} tables `[[{kind}]]`", f"{MOST_MOTORS} are the most", kind)
+        return found
+
+    def _motor(self, number: int, table: dict[str, Any]) -> MotorPart:
+        self._only((*_WORDS, *FIGURES), "motor", number, table)
+        words = {key: self._text("motor", number, table, key) for key in _WORDS if key in table}
+        for key, why in (("name", "`--drive` and `--load` call it so"), ("source", "say where its figures are from")):
+            if not words.get(key):
+                raise self.wrong(f"motor number {number + 1} has no `{key}`", why, "motor", number)
+        figures = {key: self._figure(number, table, key) for key in FIGURES if key in table}
+        return MotorPart(**words, figures=figures, file=self.name)
+
+    def _only(self, known: tuple[str, ...], kind: str, number: int, table: dict[str, Any]) -> None:
+        for key in table:
+            if key not in known:
+                helps = (*did_you_mean(key, known), f"a {kind} has {', '.join(known)}")
+                raise self.wrong(f"a {kind} has no `{key}`", helps, kind, number, key)
+
+    def _text(self, kind: str, number: int, table: dict[str, Any], key: str) -> str:
+        found = table.get(key)
+        if not isinstance(found, str) or not found.isprintable():
+            message = f"`{key}` of {kind} number {number + 1} is no text in a line"
+            raise self.wrong(message, f'`{key} = "..."`', kind, number, key)
+        return found
+
+    def _figure(self, number: int, table: dict[str, Any], key: str) -> float:
+        """A quantity above zero, SI."""
+        unit, value = FIGURES[key], table[key]
+        match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
+        try:
+            if match is None:
+                raise ValueError
+            of = parse_unit(match[2])
+            found = of.to_si(float(match[1]), match[1])
+            if not units.same(of.dimension, parse_unit(unit).dimension) or not 0.0 < found < float("inf"):
+                raise ValueError
+        except ValueError:
+            message = f"`{key}` is no quantity above zero in {unit}: {value!r}"
+            raise self.wrong(message, f'write `{key} = "1.5 {unit}"`', "motor", number, key) from None
+        return found
+
+    def wrong(
+        self, message: str, help: str | tuple[str, ...], kind: str = "", number: int = 0, key: str = ""
+    ) -> Problem:
+        """The error about a table's line, or that of a key of it."""
+        return Problem(error("E441", message, self._place(kind, number, key), help=help), {self.name: self.text})
+
+    def _place(self, kind: str, number: int, key: str) -> Place:
+        lines, at = self.text.split("\n"), 0
+        heads = [line for line, text in enumerate(lines) if kind and re.match(rf"\s*\[\[\s*{kind}\s*\]\]", text)]
+        if number < len(heads):
+            at = heads[number]
+        if key:
+            named = re.compile(rf"\s*\[*\s*{re.escape(key)}\b")
+            at = next((line for line in range(at, len(lines)) if named.match(lines[line])), at)
+        text = lines[at]
+        column = len(text) - len(text.lstrip()) + 1
+        return Place(self.name, at + 1, column, max(1, len(text.rstrip()) - column + 1))
