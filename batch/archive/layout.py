@@ -122,6 +122,18 @@ class Variable:
         """The engine's name of it."""
         return self.source or self.name
 
+    @property
+    def written_attributes(self) -> dict[str, Any]:
+        """The attributes that it has in an archive, in their order, but for a code key."""
+        units = {"units": self.unit} if self.unit else {}
+        return {**units, "long_name": self.long_name, "role": self.role, **self.attributes}
+
+    def code_key(self, results: Mapping[str, str]) -> dict[str, str]:
+        """The attribute with the key of what a metric or signal computes, among `met.run.Prepared.result_keys`."""
+        kind = {"metric": "metrics", "signal": "record"}.get(self.role)
+        key = results.get(f"{kind}.{self.key}")
+        return {} if key is None else {"code_key": key}
+
 
 @frozen
 class Layout:
