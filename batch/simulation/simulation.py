@@ -22,6 +22,8 @@ from met.plan import Cases, Experiment
 if TYPE_CHECKING:
     import xarray
 
+    from batch.simulation.stepping import SteppedProgram, SteppedRun
+
 
 @dataclass
 class Program:
@@ -70,6 +72,7 @@ class Simulation:
             settings=tuple(settings),
         )
         self._programs: dict[tuple[tuple[str, ...], bool], Program] = {}
+        self._stepped: dict[object, SteppedProgram] = {}
         self._units: dict[str, str | None] = {}
 
     def __repr__(self) -> str:
@@ -112,6 +115,38 @@ class Simulation:
         rows = np.arange(count * repeat)
         history, outputs = engine.compute(prepared, rows, threads=threads, record=bool(signals))
         return program.datasets.dataset(prepared.experiment, engine.results(prepared, rows, history, outputs), signals)
+
+    def start(
+        self,
+        values: Mapping[str, Any] | None = None,
+        *,
+        commands: str | Sequence[str] | Mapping[str, str],
+        record: Sequence[str] | None = None,
+        repeat: int = 0,
+    ) -> SteppedRun:
+        """Begin one case that is stepped by commands from outside, in place of the deck's (`SteppedRun.step`).
+
+        values    as `run` takes them, one each
+        commands  joints whose commands are given, or by joint the kind of its command: "rate", "position", "torque" or
+                  "acceleration"; of a joint without, the kind that it has in the deck
+        record    channels that are seen besides q and qd: `shoulder.servo.sensor.qd`, `links.lower.position`; None:
+                  what the run records
+        repeat    number of the noise: another number is another noise
+        """
+        from batch.simulation.stepping import SteppedRun, program
+
+        table, count = columns(self._in_si(values or {}), product=False)
+        if count > 1:
+            raise Problem(error("E430", f"one case is stepped, and these values make {count}", help="give one each"))
+        asked = tuple(commands.items()) if isinstance(commands, Mapping) else commands
+        key = tuple(table), asked if isinstance(asked, str) else tuple(asked), record and tuple(record), repeat > 0
+        if key not in self._stepped:
+            first = {path: (float(column[0]), self._units[path] or "1") for path, column in table.items()}
+            self._stepped[key] = program(self._given, first, commands=commands, record=record, repeated=repeat > 0)
+        found = self._stepped[key]
+        zeros = {path: np.zeros(1) for path in found.paths}
+        found.varied.check({**table, **zeros}, 1)
+        return SteppedRun(found, {**table, **zeros}, repeat)
 
     def _in_si(self, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
         found = {}

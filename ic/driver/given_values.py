@@ -73,11 +73,14 @@ class GivenRun:
         found = next(explanations_of(self.compiled, path), None)
         return None if found is None else found.unit if not isinstance(found.value, str) else ""
 
-    def vary(self, values: Mapping[str, tuple[float | str, str]], *, repeat: int = 1) -> VariedRun:
+    def vary(
+        self, values: Mapping[str, tuple[float | str, str]], *, repeat: int = 1, words: Mapping[str, str] | None = None
+    ) -> VariedRun:
         """The run as a sweep over these paths, of which the one case has these values in these units.
 
         values  numbers, or words as a deck has them
         repeat  1: nothing is repeated
+        words   what decides the program, by path, in place of what the deck writes
 
         Raises Problem with what is wrong, as of the entry of a sweep; E434 where a path decides the program.
         """
@@ -90,6 +93,7 @@ class GivenRun:
             f"vary {path} = [{value if isinstance(value, str) else repr(value)}]{f' {unit}' if unit != '1' else ''};"
             for path, (value, unit) in values.items()
         ]
+        lines = [*(f"vary {path} = [{word}];" for path, word in (words or {}).items()), *lines]
         lines += [f"repeat {repeat};"] if repeat > 1 else []
         text = "\n".join([f"sweep {name} of {self.name} {{", *(f"    {line}" for line in lines), "}", ""])
         deck = replace(
@@ -101,12 +105,14 @@ class GivenRun:
         if compiled.plan is None:
             raise Problem(_errors(compiled), compiled.sources)
         (experiment,) = compiled.plan.experiments
-        if experiment.cases.choices:
-            path = experiment.cases.choices[0].path
+        chosen = [choice.path for choice in experiment.cases.choices if choice.path not in (words or {})]
+        if chosen:
+            path = chosen[0]
             message = f"`{path}` decides the program, and is no number that a case brings"
             raise Problem(error("E434", message, help=f'`batch.Simulation(..., set={{"{path}": "..."}})` sets it'))
         (scope,) = compiled.scopes
-        return VariedRun(replace(experiment, name=self.name), scope.checks.of_other_cases(), compiled.sources)
+        experiment = replace(experiment, name=self.name, sweep="", cases=replace(experiment.cases, choices=()))
+        return VariedRun(experiment, scope.checks.of_other_cases(), compiled.sources)
 
 
 def given_run(
