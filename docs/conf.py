@@ -25,7 +25,7 @@ PAGES = {
     "Campaigns and results": ["cluster", "best", "verification", "evidence", "sensitivity", "plots", "report", "diff",
                               "export", "notebooks"],
     "A motor on a bed": ["bed", "protocol", "../hw/firmware/README"],
-    "From Python": ["api"],
+    "From Python": ["python", "api"],
     "What it computes": ["physics", "paper", "engine"],
     "Inside": ["architecture", "glossary", "../CONTRIBUTING", "../SECURITY", "../CHANGELOG"],
 }  # fmt: skip

@@ -30,6 +30,7 @@ import math
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import field, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -143,8 +144,15 @@ class Layout:
     variables: tuple[Variable, ...]
     attributes: Mapping[str, Any]
 
+    @cached_property
+    def _by_role(self) -> dict[str, tuple[Variable, ...]]:
+        found: dict[str, list[Variable]] = {}
+        for variable in self.variables:
+            found.setdefault(variable.role, []).append(variable)
+        return {role: tuple(those) for role, those in found.items()}
+
     def role(self, role: Role) -> tuple[Variable, ...]:
-        return tuple(variable for variable in self.variables if variable.role == role)
+        return self._by_role.get(role, ())
 
     def shape(self, variable: Variable) -> tuple[int, ...]:
         return tuple(self.sizes[dim] for dim in variable.dims)

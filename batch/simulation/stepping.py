@@ -24,7 +24,7 @@ from met.judging import judge
 from met.plan import REPEAT, Recorded, ServoUse, Structure
 from met.plan.channel import COMMAND_UNIT, joint_unit, recordable
 from met.program import plausible
-from met.program.build import METRIC
+from met.program.build import METRIC, UNHELD
 from met.program.step import FAILURE
 from met.program.system import PARAMETER
 
@@ -114,7 +114,7 @@ class SteppedRun:
         self._given = [block.inputs[names.index(path)] for path in program.paths]
         self._held = [block.state[cells.index(PARAMETER + path)] for path in program.paths if PARAMETER + path in cells]
         outputs = self._prepared.program.outputs
-        alarms = [name for name in (FAILURE[0], plausible.FAILED_TICK) if name in outputs]
+        alarms = [name for name in (FAILURE[0], plausible.FAILED_TICK, UNHELD) if name in outputs]
         self._alarms = [block.outputs[outputs.index(name)] for name in alarms]
         self._memory = np.empty_like(block.state)
         self._base_hz = experiment.structure.schedule.base_hz
@@ -132,9 +132,7 @@ class SteppedRun:
         """
         if self.done:
             raise self._over()
-        values = (commands,) if isinstance(commands, float | int) else commands
-        if len(values) != len(self._given) or not all(map(math.isfinite, values)):
-            raise self._no_commands(values)
+        values = self._checked(commands)
         for value, given in zip(values, self._given, strict=True):
             given[:] = value
         for value, held in zip(values, self._held, strict=True):
@@ -152,12 +150,12 @@ class SteppedRun:
     @property
     def cause(self) -> str:
         """Why the case has failed, as an archive's variable `cause` says it; empty where it has not."""
+        if not self.failed:
+            return ""
         names = self._prepared.program.outputs
         outputs = self._block.outputs[: len(names), :1].T.copy()
         judge(names, outputs)
         by_name = {name: outputs[:, column] for column, name in enumerate(names)}
-        if by_name[FAILURE[0]][0] == 0.0:
-            return ""
         given = self._block.inputs[:, :1].T
         return causes_of(self._prepared.experiment, given, by_name)[0]
 
@@ -180,13 +178,21 @@ class SteppedRun:
             self.done = True
         return Observation(tick / self._base_hz, row[0, 0], self._program.columns)
 
+    def _checked(self, commands: Any) -> Any:
+        """The commands in a row, one for each joint. Raises Problem E436."""
+        try:
+            values = commands if hasattr(commands, "__len__") else (commands,)
+            good = len(values) == len(self._given) and all(map(math.isfinite, values))
+        except TypeError:
+            good = False
+        if not good:
+            message = f"commands are a finite number for each of {', '.join(self.joints)}, and not {commands!r}"
+            raise Problem(error("E436", message, help="in SI, in this order: `state.step([0.1, 0.2])`"))
+        return values
+
     def _over(self) -> Problem:
         why = f"the case has failed: {self.cause}" if self.failed else f"the run ends at {self.seen.time:g} s"
         return Problem(error("E437", why, help="begin another: `sim.start(...)`; `state.done` says when"))
-
-    def _no_commands(self, values: Any) -> Problem:
-        message = f"commands are a finite number for each of {', '.join(self.joints)}, and not {values!r}"
-        return Problem(error("E436", message, help="in SI, in this order: `state.step([0.1, 0.2])`"))
 
 
 def program(

@@ -131,7 +131,20 @@ class TestBeginningsAndEnds:
         (found,) = caught.value.diagnostics
         assert (found.code, found.message) == ("E437", "the run ends at 2 s")
 
-    @pytest.mark.parametrize("commands", [[0.1], [0.1, 0.2, 0.3], [0.1, float("nan")], 0.1, np.array([np.inf, 0.0])])
+    @pytest.mark.parametrize(
+        "commands",
+        [
+            [0.1],
+            [0.1, 0.2, 0.3],
+            [0.1, float("nan")],
+            0.1,
+            np.float32(1),
+            np.array([np.inf, 0.0]),
+            "ab",
+            ["0", "1"],
+            None,
+        ],
+    )
     def test_commands_are_one_finite_number_each(self, arm: batch.Simulation, commands: object) -> None:
         state = arm.start(commands=BOTH)
         with pytest.raises(Problem) as caught:
