@@ -30,9 +30,9 @@ PAGES = {
     "Inside": ["architecture", "glossary", "../CONTRIBUTING", "../SECURITY", "../CHANGELOG"],
 }  # fmt: skip
 MODULES = [
-    "ic", "batch", "met.diagnostic", "met.parameter", "met.trace", "met.servos.servo", "met.environments.environment",
-    "met.sensors.sensor", "met.metrics.metric", "met.integrators.integrator", "met.guides.guide",
-    "met.substitution.law", "met.substitution.bed",
+    "ic", "batch", "batch.simulation.simulation", "batch.simulation.stepping", "met.diagnostic", "met.parameter",
+    "met.trace", "met.servos.servo", "met.environments.environment", "met.sensors.sensor", "met.metrics.metric",
+    "met.integrators.integrator", "met.guides.guide", "met.substitution.law", "met.substitution.bed",
 ]  # fmt: skip
 """Public modules, which docs/api.md shows: what a script calls, then what a model of one's own imports."""
 

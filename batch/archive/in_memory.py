@@ -81,12 +81,9 @@ class DatasetMaker:
                 values = np.asarray(fixed[each.name])
                 coordinates[each.name] = (each.dims, values.astype(str) if each.kind == "str" else values, attributes)
             else:
-                shape = tuple(layout.sizes[dim] for dim in each.dims)
-                laid[each.name] = (
-                    each.dims,
-                    np.empty(shape, "U1" if each.kind == "str" else KINDS[each.kind]),
-                    attributes,
-                )
+                kind = "U1" if each.kind == "str" else KINDS[each.kind]
+                nothing = np.broadcast_to(np.zeros((), kind), [layout.sizes[dim] for dim in each.dims])
+                laid[each.name] = each.dims, nothing, attributes
         named = str(layout.attributes["coordinates"]).split()
         attributes = {
             "schema": archive_layout.SCHEMA,

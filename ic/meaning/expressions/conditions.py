@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -99,9 +100,10 @@ class Checks:
 
     def errors(self, cases: Mapping[str, CaseValues], count: int) -> tuple[Diagnostic, ...]:
         """The errors that so many cases with these values make, whatever was asked before."""
-        self.complaints, self._failed = Complaints(), set()
-        self.run(cases, count)
-        return self.complaints.errors
+        asked = copy.copy(self)
+        asked.complaints, asked._failed = Complaints(), set()
+        asked.run(cases, count)
+        return asked.complaints.errors
 
     def _formulas(self) -> Formulas:
         """The values of all checks that wait, one after the other."""

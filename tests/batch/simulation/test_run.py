@@ -42,6 +42,28 @@ class TestLikeAnArchive:
         xarray.testing.assert_identical(data, kept)
         assert dict(data.met.grid("settle").sizes) == {"gearbox.kp": 3, "load": 2}
 
+    @pytest.mark.slow
+    @pytest.mark.parametrize("deck", ["panda.ic", "free_flyer.ic", "stanford_arm.ic", "ets_vii.ic", "station_arm.ic"])
+    def test_any_parameters_of_any_deck_give_what_an_archive_holds(self, deck: str, tmp_path: Path) -> None:
+        sim = batch.Simulation(deck, set={"duration": "0.4 s"})
+        name, known = sim.experiment.name, sim.experiment.parameters
+        rng = np.random.default_rng(len(deck))
+        paths = [path for path, each in known.items() if isinstance(each.value, float) and each.value and "." in path]
+        for _ in range(40):
+            chosen = rng.choice(paths, 3, replace=False).tolist()
+            values = {path: [known[path].value, 1.001 * float(cast(float, known[path].value))] for path in chosen}
+            units = {path: "" if (unit := known[path].unit) == "1" else f" {unit}" for path in chosen}
+            lines = [f"vary {path} = [{one!r}, {two!r}]{units[path]};" for path, (one, two) in values.items()]
+            text = f"#include <{deck}>\nsweep own_sweep of {name} {{ {' '.join(lines)} }}"
+            checked = ic.check(text=text, select=["own_sweep"], set={"duration": "0.4 s"})
+            if checked.plan is not None:  # else some of them change nothing, or cannot vary
+                break
+        assert checked.plan is not None
+        with batch.run(checked.plan, output=tmp_path / "a.h5", verify="none").open() as opened:
+            wanted = opened.load()
+        wanted.attrs |= {"experiment": name, "deck": f"<{deck}>"}
+        xarray.testing.assert_identical(sim.run(values, product=True, histories=True), wanted)
+
     def test_noise_is_that_of_the_decks_seed_and_repeats(self, tmp_path: Path) -> None:
         data = batch.Simulation(text=NOISY, run="noisy").run({"gearbox.kp": [0.01, 0.02]}, repeat=3, histories=True)
         xarray.testing.assert_identical(data, of_archive(NOISY, "repeated", "noisy", tmp_path))
