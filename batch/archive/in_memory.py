@@ -22,6 +22,9 @@ from met.run import Prepared, Run
 if TYPE_CHECKING:
     import xarray
 
+DIGITS = 2 * keys.DIGEST_BYTES
+"""Letters of a case_id."""
+
 KEPT_LAYOUTS = 4
 """Numbers of cases whose layouts are kept, those that were used last."""
 
@@ -109,5 +112,9 @@ def _as_opened(attributes: Mapping[str, Any]) -> dict[str, Any]:
 def _plain(values: Any, count: int) -> np.ndarray:
     """Values as an opened archive has them: strings as arrays of letters; one value of all cases, as often as that."""
     if isinstance(values, list):
-        return np.array(values) if any(values) else np.zeros(count, "U1")
+        if not any(values):
+            return np.zeros(count, "U1")
+        if len(values[0]) == DIGITS == min(map(len, values)) == max(map(len, values)):  # ten times as fast
+            return np.frombuffer("".join(values).encode("utf-32-le"), f"<U{DIGITS}").copy()
+        return np.array(values)
     return np.full(count, values) if np.ndim(values) == 0 else values

@@ -121,7 +121,7 @@ class Simulation:
         values: Mapping[str, Any] | None = None,
         *,
         commands: str | Sequence[str] | Mapping[str, str],
-        record: Sequence[str] | None = None,
+        record: str | Sequence[str] | None = None,
         repeat: int = 0,
     ) -> SteppedRun:
         """Begin one case that is stepped by commands from outside, in place of the deck's (`SteppedRun.step`).
@@ -138,11 +138,12 @@ class Simulation:
         table, count = columns(self._in_si(values or {}), product=False)
         if count > 1:
             raise Problem(error("E430", f"one case is stepped, and these values make {count}", help="give one each"))
-        asked = tuple(commands.items()) if isinstance(commands, Mapping) else commands
-        key = tuple(table), asked if isinstance(asked, str) else tuple(asked), record and tuple(record), repeat > 0
+        kinds = dict(commands) if isinstance(commands, Mapping) else dict.fromkeys(_listed(commands), "")
+        seen = None if record is None else _listed(record)
+        key = tuple(table), tuple(kinds.items()), seen, repeat > 0
         if key not in self._stepped:
             first = {path: (float(column[0]), self._units[path] or "1") for path, column in table.items()}
-            self._stepped[key] = program(self._given, first, commands=commands, record=record, repeated=repeat > 0)
+            self._stepped[key] = program(self._given, first, kinds=kinds, record=seen, repeated=repeat > 0)
         found = self._stepped[key]
         zeros = {path: np.zeros(1) for path in found.paths}
         found.varied.check({**table, **zeros}, 1)
@@ -176,18 +177,25 @@ class Simulation:
         if histories is False:
             return ()
         known = [recorded.name for recorded in self.experiment.structure.record]
-        names = tuple(known)
-        if histories is not True:
-            names = (histories,) if isinstance(histories, str) else tuple(histories)
+        names = tuple(known) if histories is True else _listed(histories)
         for name in names:
             if name not in known:
-                helps = [*did_you_mean(name, known), known_words("the run records", known)]
+                helps = [
+                    *did_you_mean(name, known),
+                    known_words("the run records", known),
+                    "the deck's `record` says what",
+                ]
                 raise Problem(error("E432", f"`{self._given.name}` records no `{name}`", help=helps))
         needed = self.experiment.structure.history_bytes * cases
         if names and needed > memory():
             message = f"histories of {cases:,} cases take {size_text(needed)} of memory"
             raise Problem(error("E432", message, help="run fewer at once, or `batch.run` the sweep into an archive"))
         return names
+
+
+def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
+    """Names, of which one may stand by itself."""
+    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def _cases(template: Cases, table: Mapping[str, np.ndarray], count: int, repeat: int) -> Cases:

@@ -199,17 +199,17 @@ def program(
     given: GivenRun,
     first: Mapping[str, tuple[float, str]],
     *,
-    commands: str | Sequence[str] | Mapping[str, str],
+    kinds: Mapping[str, str],
     record: Sequence[str] | None,
     repeated: bool,
 ) -> SteppedProgram:
-    """The program of a run that is stepped. first: values that it is compiled with, by path, and their units.
+    """The program of a run that is stepped.
+
+    first  values that it is compiled with, by path, and their units
+    kinds  of commands, by the joints that are commanded from outside; "" for the deck's
 
     Raises Problem, E435 for a joint that cannot be commanded from outside.
     """
-    kinds = dict.fromkeys([commands] if isinstance(commands, str) else commands, "")
-    if isinstance(commands, Mapping):
-        kinds |= commands
     uses = {use.joint: use for use in given.experiment.structure.servos}
     for joint in kinds:
         if joint not in uses:
@@ -222,7 +222,10 @@ def program(
             )
         )
     structure = given.experiment.structure
-    taken = {joint: _command(uses[joint], kind, structure) for joint, kind in kinds.items()}
+    taken = {
+        joint: _command(uses[joint], kind, structure, is_set=given.sets(f"{joint}.servo.command"))
+        for joint, kind in kinds.items()
+    }
     values = {f"{joint}.servo.command.value": (0.0, command.unit) for joint, command in taken.items()}
     words = {f"{joint}.servo.command": command.word for joint, command in taken.items() if command.word}
     varied = given.vary({**first, **values}, repeat=2 if repeated else 1, words=words)
@@ -249,8 +252,11 @@ class OutsideCommand:
     word: str
 
 
-def _command(use: ServoUse, kind: str, structure: Structure) -> OutsideCommand:
-    """The command of a joint, of a kind; "" for that of the deck. Raises Problem E435."""
+def _command(use: ServoUse, kind: str, structure: Structure, *, is_set: bool) -> OutsideCommand:
+    """The command of a joint, of a kind; "" for that of the deck. Raises Problem E435.
+
+    is_set  whether it is what the settings make it: then it is written anew
+    """
     command = use.command
     kind = kind or (command.kind if command is not None else "")
     if kind not in COMMAND_UNIT:
@@ -262,14 +268,12 @@ def _command(use: ServoUse, kind: str, structure: Structure) -> OutsideCommand:
         raise Problem(error("E435", message, help=f'give it a rate: `set={{"{use.joint}.servo.rate": "1 kHz"}}`'))
     (joint,) = (each for each in structure.moving if each.name == use.joint)
     unit = joint_unit(COMMAND_UNIT[kind], joint)
-    told = command is not None and (command.kind, command.model, command.guide) == (kind, "constant", "")
+    told = not is_set and command is not None and (command.kind, command.model, command.guide) == (kind, "constant", "")
     return OutsideCommand(unit, "" if told else f"{kind}(0 {unit})")
 
 
 def _seen(structure: Structure, record: Sequence[str] | None) -> tuple[Recorded, ...]:
     """What is seen at each step: q, qd, and these channels; None: and what the deck records. Raises Problem E432."""
-    if isinstance(record, str):
-        record = [record]
     known = recordable(structure, record or ())
     found = {name: each for name in ALWAYS_SEEN for each in known[name]}
     found = {each.name: each for each in found.values()}

@@ -6,7 +6,7 @@ the same program runs any others, whose values are checked by `VariedRun.errors`
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -73,6 +73,10 @@ class GivenRun:
         found = next(explanations_of(self.compiled, path), None)
         return None if found is None else found.unit if not isinstance(found.value, str) else ""
 
+    def sets(self, path: str) -> bool:
+        """True where the settings have just this path."""
+        return any(_path(each) == path for each in self.settings)
+
     def vary(
         self, values: Mapping[str, tuple[float | str, str]], *, repeat: int = 1, words: Mapping[str, str] | None = None
     ) -> VariedRun:
@@ -82,18 +86,21 @@ class GivenRun:
         repeat  1: nothing is repeated
         words   what decides the program, by path, in place of what the deck writes
 
+        What is set of the same paths counts for nothing then.
         Raises Problem with what is wrong, as of the entry of a sweep; E434 where a path decides the program.
         """
         if not values and repeat == 1:
             return VariedRun(self.experiment, None, self.compiled.sources)
+        words = {**self._set_around(values), **(words or {})}  # a `--set` of what is varied within would be refused
+        settings = [each for each in self.settings if _path(each) not in (*words, *values)]
         name = f"{self.name}_given"
-        while any(isinstance(word, str) and word == name for word in _words(self.deck)):
+        while name in _names(self.deck):
             name += "_"
         lines = [
             f"vary {path} = [{value if isinstance(value, str) else repr(value)}]{f' {unit}' if unit != '1' else ''};"
             for path, (value, unit) in values.items()
         ]
-        lines = [*(f"vary {path} = [{word}];" for path, word in (words or {}).items()), *lines]
+        lines = [*(f"vary {path} = [{word}];" for path, word in words.items()), *lines]
         lines += [f"repeat {repeat};"] if repeat > 1 else []
         text = "\n".join([f"sweep {name} of {self.name} {{", *(f"    {line}" for line in lines), "}", ""])
         deck = replace(
@@ -101,18 +108,27 @@ class GivenRun:
             entries=(*self.deck.entries, *_entries(text)),
             sources=(*self.deck.sources, SourceFile(GIVEN, text, "")),
         )
-        compiled = compile_deck(deck, select=name, defines=self.defines, settings=self.settings)
+        compiled = compile_deck(deck, select=name, defines=self.defines, settings=settings)
         if compiled.plan is None:
             raise Problem(_errors(compiled), compiled.sources)
         (experiment,) = compiled.plan.experiments
-        chosen = [choice.path for choice in experiment.cases.choices if choice.path not in (words or {})]
+        chosen = [choice.path for choice in experiment.cases.choices if choice.path not in words]
         if chosen:
             path = chosen[0]
             message = f"`{path}` decides the program, and is no number that a case brings"
             raise Problem(error("E434", message, help=f'`batch.Simulation(..., set={{"{path}": "..."}})` sets it'))
+        assert [coordinate.path for coordinate in experiment.cases.coordinates] == list(values)
         (scope,) = compiled.scopes
         experiment = replace(experiment, name=self.name, sweep="", cases=replace(experiment.cases, choices=()))
         return VariedRun(experiment, scope.checks.of_other_cases(), compiled.sources)
+
+    def _set_around(self, values: Iterable[str]) -> dict[str, str]:
+        """The settings of what these paths are parts of, by path: a command, of which the value is given."""
+        return {
+            _path(each): each.partition("=")[2]
+            for each in self.settings
+            if any(path.startswith(f"{_path(each)}.") for path in values)
+        }
 
 
 def given_run(
@@ -174,12 +190,17 @@ def _run_of(sweep: Definition) -> str:
     return sweep.group.of.text if sweep.group.of is not None else ""
 
 
+def _path(setting: str) -> str:
+    return setting.partition("=")[0].strip()
+
+
 def _errors(compiled: Compiled) -> list[Diagnostic]:
     return [each for each in compiled.diagnostics if each.severity == "error"]
 
 
-def _words(deck: Deck) -> list[str]:
-    return [word.text for entry in deck.entries for word in (*getattr(entry, "words", ()), *getattr(entry, "path", ()))]
+def _names(deck: Deck) -> set[str]:
+    """All that a definition of the deck may be called."""
+    return {word.text for entry in deck.entries for word in (*getattr(entry, "words", ()), *getattr(entry, "path", ()))}
 
 
 def _entries(text: str) -> tuple[Entry, ...]:

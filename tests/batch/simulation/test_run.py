@@ -248,7 +248,7 @@ class TestValues:
         assert (found.code, str(caught.value)) == (
             "E432",
             "E432: `reach` records no `qdd`\n  did you mean `qd`?\n"
-            "  the run records: q, qd, tau, shoulder.servo.voltage",
+            "  the run records: q, qd, tau, shoulder.servo.voltage\n  the deck's `record` says what",
         )
 
     def test_histories_that_memory_has_no_room_for_are_refused(
@@ -296,6 +296,18 @@ class TestWhichRun:
         for given in ({}, {"path": "two_link.ic", "text": "x"}):
             with pytest.raises(TypeError, match="a deck is given by its path or by its text"):
                 batch.Simulation(**given)  # type: ignore[arg-type]
+
+    def test_what_is_given_comes_before_what_is_set(self) -> None:
+        sim = batch.Simulation(text=ARM, run="reach", set={"gearbox.kp": "0.03 V*s/rad", "load": "5 kg"})
+        data = sim.run({"gearbox.kp": [0.01, 0.02], "load": 25})
+        plain = batch.Simulation(text=ARM, run="reach").run({"gearbox.kp": [0.01, 0.02], "load": 25})
+        xarray.testing.assert_identical(data, plain)
+        assert sim.run({"load": 25})["settle"].item() not in plain["settle"].values
+
+    def test_a_part_of_what_is_set_may_be_given(self) -> None:
+        sim = batch.Simulation("two_link.ic", set={"shoulder.servo.command": "rate(step(to = 10 mrad/s, at = 0.1 s))"})
+        data = sim.run({"shoulder.servo.command.to": [0.02, 0.03]}, histories="qd")
+        assert data["qd"].isel(time=-1, joint=0).values.round(6).tolist() == [0.02, 0.03]
 
     def test_what_decides_the_program_is_set_once(self) -> None:
         sim = batch.Simulation("two_link.ic", set={"integrator": "rk4", "duration": "1 s"})

@@ -56,6 +56,34 @@ class TestSameAsARun:
         np.testing.assert_array_equal(seen[0].q, data.q.values[0, 0])
         assert state.metrics == {name: data[name].item() for name in ("settle", "volts")}
 
+    @pytest.mark.slow
+    @pytest.mark.parametrize(
+        ("deck", "run"),
+        [
+            ("ets_vii.ic", None),
+            ("puma_560.ic", None),
+            ("station_arm.ic", None),
+            ("free_flyer.ic", None),
+            ("two_link.ic", "hybrid"),
+        ],
+    )
+    def test_any_deck_with_guides_sensors_beds_and_bases_of_any_kind(self, deck: str, run: str | None) -> None:
+        servos = batch.Simulation(deck, run=run).experiment.structure.servos
+        kinds = {use.joint: use.command.kind for use in servos if use.command is not None}
+        texts = {"position": "position(0.1 rad)", "rate": "rate(0.02 rad/s)"}
+        sim = batch.Simulation(deck, run=run, set={f"{joint}.servo.command": texts[kinds[joint]] for joint in kinds})
+        values = {joint: 0.02 if kind == "rate" else 0.1 for joint, kind in kinds.items()}
+        state = sim.start(commands=list(kinds), record=[])
+        data = sim.run({f"{joint}.servo.command.value": value for joint, value in values.items()}, histories="q")
+        rows = {round(time, 9): row for row, time in enumerate(data.time.values.tolist())}
+        compared = 0
+        while not state.done and compared < 40:
+            seen = state.step(list(values.values()))
+            if (row := rows.get(round(seen.time, 9))) is not None:
+                np.testing.assert_array_equal(seen.q, data.q.values[0, row])
+                compared += 1
+        assert compared == 40 and not state.failed
+
     def test_commands_that_change_give_the_bits_of_a_table(self) -> None:
         sim = batch.Simulation(text=TABLES, run="swing")
         state = sim.start(commands="shoulder")
@@ -196,6 +224,10 @@ class TestWhatIsRefused:
                 sim.start(**asked)  # type: ignore[arg-type]
             found = caught.value.diagnostics[0]
             assert (found.code, found.message) == (code, said)
+
+    def test_a_continuous_law_takes_commands_once_it_has_a_rate(self) -> None:
+        sim = batch.Simulation(text=TABLES, run="smooth", set={"shoulder.servo.rate": "100 Hz"})
+        assert sim.start(commands="shoulder").step(0.01).time == 0.04
 
     def test_what_is_not_seen(self, arm: batch.Simulation) -> None:
         with pytest.raises(Problem) as caught:
