@@ -161,7 +161,7 @@ class Prepared:
 
 
 _OF_PROGRAM = ("program", "recording", "kernel", "code_key", "result_keys", "limits", "extremes")
-"""What of a `Prepared` is the same whatever values its cases have."""
+"""The parts of a `Prepared` that are the same whatever values its cases have."""
 
 
 KEY_VERSION = 2

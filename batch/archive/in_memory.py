@@ -30,7 +30,7 @@ KEPT_LAYOUTS = 4
 
 
 @frozen
-class LaidOut:
+class DatasetLayout:
     """A Dataset without values. moving: its variables that have other ones in each run."""
 
     layout: Layout
@@ -41,8 +41,8 @@ class LaidOut:
 class DatasetMaker:
     """Makes Datasets of runs of one program.
 
-    deck     its name, as an archive's attribute has it
-    prepared the program, with any cases
+    deck      its name, as an archive's attribute has it
+    prepared  the program, with any cases
     """
 
     def __init__(self, deck: str, prepared: Prepared) -> None:
@@ -67,7 +67,7 @@ class DatasetMaker:
             variables[name].data = _plain(values[name], count)
         return made
 
-    def _lay_out(self, count: int, signals: frozenset[str]) -> LaidOut:
+    def _lay_out(self, count: int, signals: frozenset[str]) -> DatasetLayout:
         import xarray
 
         prepared, experiment = self._prepared, self._prepared.experiment
@@ -97,7 +97,7 @@ class DatasetMaker:
             "code_key": prepared.code_key,
         }
         template = xarray.Dataset(laid, coordinates, attributes).set_coords([name for name in named if name in laid])
-        return LaidOut(layout, template, tuple(laid))
+        return DatasetLayout(layout, template, tuple(laid))
 
 
 def _as_opened(attributes: Mapping[str, Any]) -> dict[str, Any]:

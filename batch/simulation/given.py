@@ -12,7 +12,7 @@ from met.diagnostic import Problem, error
 
 
 def values_in_si(given: Any, path: str, unit: str) -> np.ndarray:
-    """What is given for a path, as an array without dimensions for one value and with one for many, in its SI unit.
+    """The values given for a path in its SI unit: an array without dimensions for one, with one dimension for many.
 
     given  a number, which is in SI; a text with a unit, "25 kg"; what has `magnitude` and `units`, as pint's quantities
            do, or an xarray.DataArray with the attribute `units`; or a list or array of these

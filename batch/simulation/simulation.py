@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class Program:
+class SimulationProgram:
     """The program of a run whose inputs are some paths, and what makes Datasets of what it gives."""
 
     varied: VariedRun
@@ -71,7 +71,7 @@ class Simulation:
             defines=tuple(defines),
             settings=tuple(settings),
         )
-        self._programs: dict[tuple[tuple[str, ...], bool], Program] = {}
+        self._programs: dict[tuple[tuple[str, ...], bool], SimulationProgram] = {}
         self._stepped: dict[object, SteppedProgram] = {}
         self._units: dict[str, str | None] = {}
 
@@ -162,14 +162,14 @@ class Simulation:
             found[path] = values_in_si(value, path, unit or "1")
         return found
 
-    def _program(self, first: Mapping[str, float], repeated: bool) -> Program:
+    def _program(self, first: Mapping[str, float], repeated: bool) -> SimulationProgram:
         """The program whose inputs are these paths, compiled with these values where it is the first time."""
         key = tuple(first), repeated
         if key not in self._programs:
             values = {path: (value, self._units[path] or "1") for path, value in first.items()}
             varied = self._given.vary(values, repeat=2 if repeated else 1)
             prepared = engine.prepare(varied.experiment)
-            self._programs[key] = Program(varied, prepared, DatasetMaker(self._given.deck.file, prepared))
+            self._programs[key] = SimulationProgram(varied, prepared, DatasetMaker(self._given.deck.file, prepared))
         return self._programs[key]
 
     def _signals(self, histories: bool | str | Sequence[str], cases: int) -> tuple[str, ...]:

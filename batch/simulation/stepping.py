@@ -53,7 +53,7 @@ class SteppedProgram:
 
 
 class Observation:
-    """What is seen at an instant: `time` (s), positions `q` and rates `qd` of all joints, and by name what else is
+    """The sight of an instant: `time` (s), positions `q` and rates `qd` of all joints, and by name what else is
     recorded, `seen["tau"]`, in SI. It is of its own: later steps leave it as it is."""
 
     __slots__ = ("_columns", "row", "time")
@@ -144,7 +144,7 @@ class SteppedRun:
 
     @property
     def failed(self) -> bool:
-        """Whether the case has failed; `cause` says why."""
+        """True where the case has failed; `cause` says why."""
         return any(alarm[0] != 0.0 for alarm in self._alarms)
 
     @property
@@ -273,7 +273,7 @@ def _command(use: ServoUse, kind: str, structure: Structure, *, is_set: bool) ->
 
 
 def _seen(structure: Structure, record: Sequence[str] | None) -> tuple[Recorded, ...]:
-    """What is seen at each step: q, qd, and these channels; None: and what the deck records. Raises Problem E432."""
+    """The signals seen at each step: q, qd, and these channels; None: what the deck records. Raises Problem E432."""
     known = recordable(structure, record or ())
     found = {name: each for name in ALWAYS_SEEN for each in known[name]}
     found = {each.name: each for each in found.values()}
