@@ -1,9 +1,11 @@
 """Campaigns: many cases, run into archives that xarray opens as they are.
 
-import ic, batch
-archive = batch.run(ic.compile("two_link.ic"))          # -> two_link.h5
+import batch
+archive = batch.run("two_link.ic")                      # -> two_link.h5
 data = archive.open()                                   # an xarray.Dataset, or a DataTree of several
 data = batch.open("two_link.h5")                        # the same, later
+sim = batch.Simulation("two_link.ic")                   # no files: values of parameters to an xarray.Dataset
+data = sim.run({"gearbox.kp": [0.01, 0.02, 0.03]})
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from batch.campaigns.verification.when import Verify
     from batch.differences.result import Diff
     from batch.queries.summary import Summary
+    from batch.simulation.simulation import Simulation as Simulation
     from met.plan import Plan
 
 
@@ -40,6 +43,15 @@ class Archive:
     def open(self) -> Any:
         """Its contents as xarray has them (`batch.open`)."""
         return open(self.path)
+
+
+def __getattr__(name: str) -> Any:
+    """Import `Simulation` when it is first used."""
+    if name != "Simulation":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from batch.simulation.simulation import Simulation
+
+    return Simulation
 
 
 def run(
@@ -62,11 +74,11 @@ def run(
 ) -> Archive:
     """Run a plan's cases into an archive: what is missing of it, where an earlier run was interrupted.
 
-    plan          what `ic.compile` gives, or a plan file (`met plan DECK -o p.json`)
+    plan          a deck's path; what `ic.compile` gives; or a plan file (`met plan DECK -o p.json`)
     output        the archive; None: in the current folder, called as `met run` calls it: the deck's name, and those of
                   the runs and sweeps that were asked for (`two_link.gains.h5`). FILE.mcap, FILE.csv or FILE.parquet:
                   FILE.h5, and an export of it: a table of a sweep has its metrics, or the histories that are asked for
-    experiments   names of runs and sweeps; None: all of the plan's
+    experiments   names of runs and sweeps; None: all of the plan's, of a deck as `met run` takes it
     cases         rows of the case table, `"#7"`, or the beginnings of case_ids; None: all
     histories     whose signals are kept, one word or several: "default" (all while the archive stays below 1 GiB, else
                   none), "all", "none", "every:N", "failed", "worst:N", "worst:N:METRIC", or cases as above
@@ -91,7 +103,7 @@ def run(
     archive, target = from_run.archive_and_export(output)
     chosen = executor or choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
     campaign = prepare(
-        _plan(plan),
+        _plan(plan, experiments),
         output=archive,
         experiments=experiments,
         cases=cases,
@@ -128,16 +140,18 @@ def diff(
     return compared(Path(a), Path(b), read(texts), distributions=distributions)
 
 
-def _plan(given: object) -> Plan:
-    """A plan, or the one in a plan file; TypeError for what is neither, such as a deck's name."""
+def _plan(given: object, experiments: Sequence[str] | None) -> Plan:
+    """A plan; the one in a plan file; or a deck compiled, its runs and sweeps of these names. TypeError for others."""
     from met.plan import Plan
 
     if isinstance(given, Plan):
         return given
     if not isinstance(given, str | os.PathLike):
-        raise TypeError(f"batch.run takes a plan, as ic.compile gives it, and not {type(given).__name__}")
+        raise TypeError(f"batch.run takes a deck's path or a plan, and not {type(given).__name__}")
     if Path(given).suffix != ".json":
-        raise TypeError(f"batch.run takes a plan, and {os.fspath(given)!r} is none: batch.run(ic.compile({given!r}))")
+        import ic
+
+        return ic.compile(given, select=experiments)
     from met.plan import file as plan_file
 
     return plan_file.read(given)

@@ -25,14 +25,14 @@ PAGES = {
     "Campaigns and results": ["cluster", "best", "verification", "evidence", "sensitivity", "plots", "report", "diff",
                               "export", "notebooks"],
     "A motor on a bed": ["bed", "bench", "protocol", "../hw/firmware/README"],
-    "From Python": ["api"],
+    "From Python": ["python", "api"],
     "What it computes": ["physics", "paper", "engine"],
     "Inside": ["architecture", "glossary", "../CONTRIBUTING", "../SECURITY", "../CHANGELOG"],
 }  # fmt: skip
 MODULES = [
-    "ic", "batch", "met.diagnostic", "met.parameter", "met.trace", "met.servos.servo", "met.environments.environment",
-    "met.sensors.sensor", "met.metrics.metric", "met.integrators.integrator", "met.guides.guide",
-    "met.substitution.law", "met.substitution.bed",
+    "ic", "batch", "batch.simulation.simulation", "batch.simulation.stepping", "met.diagnostic", "met.parameter",
+    "met.trace", "met.servos.servo", "met.environments.environment", "met.sensors.sensor", "met.metrics.metric",
+    "met.integrators.integrator", "met.guides.guide", "met.substitution.law", "met.substitution.bed",
 ]  # fmt: skip
 """Public modules, which docs/api.md shows: what a script calls, then what a model of one's own imports."""
 

@@ -1,6 +1,7 @@
 """The deck compiler: deck text -> tokens -> syntax -> model -> plan.
 
     plan = ic.compile("two_link.ic")
+    plan = ic.compile(text="#include <two_link.ic> ...")
 
 Importing this package loads nothing of it: each function imports what it needs when it is called.
 """
@@ -19,25 +20,37 @@ __all__ = ["check", "compile"]
 
 
 def check(
-    path: str | PathLike[str],
+    path: str | PathLike[str] | None = None,
     *,
+    text: str | None = None,
     include_dirs: Iterable[str | PathLike[str]] = (),
     defines: Iterable[str] = (),
     set: Mapping[str, object] | Iterable[str] = (),
     select: Sequence[str] | Literal["all"] | None = "all",
 ) -> Compiled:
-    """The plan of all runs and sweeps or None, all diagnostics, every file's text. A mistake raises nothing."""
+    """The plan of all runs and sweeps or None, all diagnostics, every file's text. A mistake raises nothing.
+
+    Parameters as of `compile`.
+    """
     from ic.driver.compile import check as lowered
 
+    if (path is None) == (text is None):
+        raise TypeError("a deck is given by its path or by its text")
     settings = [f"{path}={value}" for path, value in set.items()] if isinstance(set, Mapping) else set
     return lowered(
-        path, include_dirs=tuple(include_dirs), defines=tuple(defines), select=select, settings=tuple(settings)
+        path or "",
+        include_dirs=tuple(include_dirs),
+        defines=tuple(defines),
+        select=select,
+        settings=tuple(settings),
+        text=text,
     )
 
 
 def compile(
-    path: str | PathLike[str],
+    path: str | PathLike[str] | None = None,
     *,
+    text: str | None = None,
     include_dirs: Iterable[str | PathLike[str]] = (),
     defines: Iterable[str] = (),
     set: Mapping[str, object] | Iterable[str] = (),
@@ -45,6 +58,7 @@ def compile(
 ) -> Plan:
     """The run plan of a deck.
 
+    text    of a deck in no file; what it includes is looked for as if it stood in the current folder
     set     values in place of the deck's, as the deck would write them: `{"gearbox.kp": "0.02 V*s/rad"}`, or
             texts, `["gearbox.kp=0.02 V*s/rad"]`
     select  names of runs and sweeps, "all", or None: the only one, else the one marked `default`
@@ -52,7 +66,7 @@ def compile(
     """
     from met.diagnostic import Problem
 
-    compiled = check(path, include_dirs=include_dirs, defines=defines, set=set, select=select)
+    compiled = check(path, text=text, include_dirs=include_dirs, defines=defines, set=set, select=select)
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)
     return compiled.plan

@@ -27,16 +27,18 @@ def read(
     *,
     library: Path = LIBRARY,
     despite_errors: bool = False,
+    text: str | None = None,
 ) -> Deck:
     """The deck at `path`, or the standard library's of that name where there is no such file.
 
     include_dirs  further directories for `#include`, and for other files that the deck names
     defines       macros, `NAME` or `NAME=VALUE`
+    text          of the deck, where it is in no file: then `path` counts for nothing
     despite_errors  also where errors are found, as long as what is not wrong could be read: `Deck.unreadable`
 
     Raises Problem with every error and warning found, in the order of the text, and the text of every file read.
     """
-    seen = preprocess(path, include_dirs, defines, library=library)
+    seen = preprocess(path, include_dirs, defines, library=library, text=text)
     findings = Findings()
     entries: tuple[Entry, ...] = ()
     unreadable: tuple[UnreadableStretch, ...] = ()
@@ -58,6 +60,7 @@ def read(
         os.fspath(path),
         tuple(defines),
         unreadable,
+        text,
     )
 
 
@@ -65,7 +68,7 @@ def read_again(deck: Deck, defines: Sequence[str], *, library: Path = LIBRARY) -
     """A deck as it is with further macros, `NAME=VALUE`, in place of those of their names on the command line."""
     names = {each.partition("=")[0] for each in defines}
     kept = [each for each in deck.defines if each.partition("=")[0] not in names]
-    return read(deck.path, deck.include_dirs, (*kept, *defines), library=library)
+    return read(deck.path, deck.include_dirs, (*kept, *defines), library=library, text=deck.text)
 
 
 def in_order(diagnostics: Iterable[Diagnostic], sources: Sequence[SourceFile]) -> tuple[Diagnostic, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -15,8 +16,8 @@ from met.causes import causes_of, doubt_of
 from met.frozen import frozen
 from met.judging import judge
 from met.passing import Memories, run_past
-from met.plan import REPEAT, Experiment, keys
-from met.plan.limits import extremes, limits
+from met.plan import REPEAT, Cases, Experiment, keys
+from met.plan.limits import LimitUse, extremes, limits
 from met.plan.outputs import GRAPPLE_FIGURES, grappled_payloads
 from met.program import cell_names, plausible
 from met.program.build import COORDINATE, METRIC, build
@@ -142,6 +143,26 @@ class Prepared:
         """True where the key is this work's, in this version of keys or the one before."""
         return key == self.work_key or key == self.old_code_key
 
+    @cached_property
+    def limits(self) -> tuple[LimitUse, ...]:
+        """The limits that can be reached in a case."""
+        return limits(self.experiment.structure, self.experiment.parameters)
+
+    @cached_property
+    def extremes(self) -> tuple[str, ...]:
+        """The required metrics that say at which limit they fell."""
+        return tuple(extremes(self.experiment))
+
+    def with_cases(self, cases: Cases) -> Prepared:
+        """The same program for other values of the same coordinates; what is compiled is shared."""
+        made = replace(self, experiment=replace(self.experiment, cases=cases))
+        made.__dict__.update({name: getattr(self, name) for name in _OF_PROGRAM})
+        return made
+
+
+_OF_PROGRAM = ("program", "recording", "kernel", "code_key", "result_keys", "limits", "extremes")
+"""The parts of a `Prepared` that are the same whatever values its cases have."""
+
 
 KEY_VERSION = 2
 """The version that code keys begin with: it says what they are made of. Keys of before have none."""
@@ -253,7 +274,7 @@ def results(
     """
     experiment, program = prepared.experiment, prepared.program
     schedule = experiment.structure.schedule
-    steps, watched = schedule.ticks // schedule.dynamics, limits(experiment.structure, experiment.parameters)
+    steps, watched = schedule.ticks // schedule.dynamics, prepared.limits
     out = {name: outputs[:, column] for column, name in enumerate(program.outputs)}
     failed = out["failure"] != 0.0
     n_valid = np.where(failed, np.ceil(out["failure.tick"] / schedule.record), schedule.rows).astype(np.int64)
@@ -302,8 +323,7 @@ def results(
         at_limit={use.path: np.where(failed, math.nan, out[cell_names.AT_LIMIT(use.path)] / steps) for use in watched},
         excess={use.path: np.where(failed, math.nan, out[cell_names.EXCESS(use.path)]) for use in watched if use.bound},
         extreme_at={
-            name: np.where(failed, 0, out[cell_names.EXTREME_AT(name)]).astype(np.int64)
-            for name in extremes(experiment)
+            name: np.where(failed, 0, out[cell_names.EXTREME_AT(name)]).astype(np.int64) for name in prepared.extremes
         },
         grapples=_grapples(experiment, out, failed),
         warning=warnings,

@@ -30,6 +30,7 @@ import math
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import field, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -122,6 +123,18 @@ class Variable:
         """The engine's name of it."""
         return self.source or self.name
 
+    @property
+    def written_attributes(self) -> dict[str, Any]:
+        """The attributes that it has in an archive, in their order, but for a code key."""
+        units = {"units": self.unit} if self.unit else {}
+        return {**units, "long_name": self.long_name, "role": self.role, **self.attributes}
+
+    def code_key(self, results: Mapping[str, str]) -> dict[str, str]:
+        """The attribute with the key of what a metric or signal computes, among `met.run.Prepared.result_keys`."""
+        kind = {"metric": "metrics", "signal": "record"}.get(self.role)
+        key = results.get(f"{kind}.{self.key}")
+        return {} if key is None else {"code_key": key}
+
 
 @frozen
 class Layout:
@@ -131,8 +144,15 @@ class Layout:
     variables: tuple[Variable, ...]
     attributes: Mapping[str, Any]
 
+    @cached_property
+    def _by_role(self) -> dict[str, tuple[Variable, ...]]:
+        found: dict[str, list[Variable]] = {}
+        for variable in self.variables:
+            found.setdefault(variable.role, []).append(variable)
+        return {role: tuple(those) for role, those in found.items()}
+
     def role(self, role: Role) -> tuple[Variable, ...]:
-        return tuple(variable for variable in self.variables if variable.role == role)
+        return self._by_role.get(role, ())
 
     def shape(self, variable: Variable) -> tuple[int, ...]:
         return tuple(self.sizes[dim] for dim in variable.dims)

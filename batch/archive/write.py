@@ -18,12 +18,13 @@ import numpy as np
 from batch.archive import layout as archive_layout
 from batch.archive import verified
 from batch.archive.hdf5 import LIBVER, h5py
-from batch.archive.layout import AT_LIMIT, EXCESS, EXTREME_AT, GRAPPLE, Layout, Variable
+from batch.archive.layout import Layout, Variable
 from batch.archive.provenance import Revision, version
 from batch.archive.sink import Sink
+from batch.archive.values import KINDS, values_of_cases, values_of_dimensions
 from met import backends
 from met.frozen import frozen
-from met.plan import Experiment, Plan, keys, recipes
+from met.plan import Experiment, Plan, recipes
 from met.plan import file as plan_file
 from met.plan.columns import CaseValues
 from met.plan.swept import blocks
@@ -31,8 +32,6 @@ from met.plan.uses import packages
 
 if TYPE_CHECKING:
     from met.run import Run
-
-KINDS = {"float64": np.float64, "float32": np.float32, "int64": np.int64, "int8": np.int8, "str": object}
 
 
 @frozen
@@ -95,7 +94,8 @@ class ArchiveWriter:
     def put_cases(self, number: int, first: int, run: Run) -> None:
         """Write the variables along `case` for the cases of an experiment from its `first` one on."""
         group = self.groups[number]
-        values = _values(group, run)
+        values = values_of_cases(group.part.experiment, group.layout, run)
+        values |= {name: np.array(texts, dtype=object) for name, texts in values.items() if isinstance(texts, list)}
         for variable in group.layout.variables:
             if variable.dims[0] == "case":
                 group.node[variable.name][first : first + len(run.case)] = values[variable.name]
@@ -161,10 +161,8 @@ class ArchiveWriter:
             node.attrs[name] = value
         made = {variable.name: _make(node, layout, variable) for variable in layout.variables}
         for variable in layout.variables:
-            kind = {"metric": "metrics", "signal": "record"}.get(variable.role)
-            key = part.results.get(f"{kind}.{variable.key}")
-            if key is not None:
-                made[variable.name].attrs["code_key"] = key
+            for name, key in variable.code_key(part.results).items():
+                made[variable.name].attrs[name] = key
         for variable in layout.role("dimension"):
             made[variable.name].make_scale(variable.name)
         for variable in layout.variables:
@@ -236,53 +234,12 @@ def _table_sum(experiment: Experiment) -> str:
     return summed.hexdigest()
 
 
-def _values(group: OpenGroup, run: Run) -> dict[str, Any]:
-    """Everything that is one value a case, of some cases, by the variable's name."""
-    experiment, rows = group.part.experiment, run.case
-    names = keys.case_keys(experiment, rows)
-    values: dict[str, Any] = {
-        "case": experiment.cases.table[rows],
-        "case_key": names,
-        "case_id": keys.case_ids(experiment, rows, names),
-        "seed": keys.case_seeds(experiment, rows),
-        "repeat": 0 if experiment.cases.repeats is None else experiment.cases.repeats[rows],
-        "status": run.status,
-        "cause": run.cause,
-        "warning": run.warning,
-        "n_valid": run.n_valid,
-        "bed_limited": run.limited,
-        **{f"friction_{name}": count for name, count in run.events.items()},
-        **{variable.name: run.coordinates[variable.key] for variable in group.layout.role("coordinate")},
-        **{variable.name: run.metrics[variable.key] for variable in group.layout.role("metric")},
-        **{AT_LIMIT + path: share for path, share in run.at_limit.items()},
-        **{EXCESS + path: most for path, most in run.excess.items()},
-        **{EXTREME_AT + metric: number for metric, number in run.extreme_at.items()},
-        **{GRAPPLE + of: figure for of, figure in run.grapples.items()},
-    }
-    for role in ("limit", "excess", "extreme", "grapple"):  # by the name that is free
-        values |= {variable.name: values[variable.key] for variable in group.layout.role(role)}
-    for choice, variable in zip(experiment.cases.choices, group.layout.role("choice"), strict=True):
-        values[variable.name] = [choice.value] * len(rows)
-    for name in ("case_id", "case_key", "cause", "warning"):
-        values[name] = np.array(values[name], dtype=object)
-    met = np.empty((len(rows), len(experiment.requirements)), np.int8)
-    for index, requirement in enumerate(experiment.requirements):
-        unknown = (run.status != 0) | np.isnan(run.metrics[requirement.metric])
-        met[:, index] = np.where(unknown, -1, run.met[requirement.text])
-    values["met"] = met
-    return values
-
-
 def _write_rest(group: OpenGroup) -> None:
     """Write the dimensions, and the variables that identify a case along recorded_case."""
     part, layout = group.part, group.layout
-    schedule = part.experiment.structure.schedule
     values: dict[str, Any] = {variable.name: group.gathered[variable.source] for variable in layout.role("recorded")}
-    values["requirement"] = np.array([r.text for r in part.experiment.requirements], dtype=object)
+    values |= values_of_dimensions(part.experiment)
     values["recorded_case"] = part.experiment.cases.table[part.rows[part.kept]]
-    values["time"] = np.arange(schedule.rows) * schedule.record / schedule.base_hz
-    for dimensions in (archive_layout.joint_dimensions, archive_layout.component_dimensions):
-        values |= {dim: np.array(names, dtype=object) for names, dim in dimensions(part.experiment).items()}
     for variable in layout.variables:
         if variable.role != "signal" and variable.dims[0] != "case":
             group.node[variable.name][...] = values[variable.name]
@@ -300,10 +257,7 @@ def _make(group: Any, layout: Layout, variable: Variable) -> Any:
         options = {"chunks": chunks, "dcpl": early, "fill_time": "never", "fletcher32": True}
     dtype = module.string_dtype("utf-8") if variable.kind == "str" else np.dtype(variable.kind).newbyteorder("<")
     dataset = group.create_dataset(variable.name, layout.shape(variable), dtype=dtype, track_order=True, **options)
-    attributes = {"long_name": variable.long_name, "role": variable.role, **variable.attributes}
-    if variable.unit:
-        attributes = {"units": variable.unit, **attributes}
-    for name, value in attributes.items():
+    for name, value in variable.written_attributes.items():
         dataset.attrs[name] = value
     return dataset
 

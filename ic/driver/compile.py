@@ -52,10 +52,11 @@ def check(
     defines: Sequence[str],
     select: Select,
     settings: Sequence[str] = (),
+    text: str | None = None,
 ) -> Compiled:
-    """The deck at `path`, compiled."""
+    """The deck at `path`, or of this text, compiled."""
     try:
-        deck = read(Path(path), [Path(each) for each in include_dirs], defines, despite_errors=True)
+        deck = read(Path(path), [Path(each) for each in include_dirs], defines, despite_errors=True, text=text)
     except Problem as problem:
         return Compiled(None, problem.diagnostics, problem.sources)
     return compile_deck(deck, select=select, defines=defines, settings=settings)

@@ -238,7 +238,7 @@ class Deck:
     """A whole deck after the preprocessor: its entries in order, the files they came from, and warnings so far.
 
     include_dirs: further directories in which files that the deck names are looked for.
-    path, defines: what it was read from and with, to read it again.
+    path, text, defines: what it was read from and with, to read it again; text: None where it was in a file.
     unreadable: what could not be read; where there are some, `warnings` holds errors too.
     """
 
@@ -250,3 +250,4 @@ class Deck:
     path: str = ""
     defines: tuple[str, ...] = ()
     unreadable: tuple[UnreadableStretch, ...] = ()
+    text: str | None = None

@@ -26,6 +26,9 @@ MOST_LISTED = 2_000  # names that a "did you mean" compares with
 MOST_SEEN = 20_000  # files and folders looked at for them
 MOST_NAMED = 8  # files named in a message
 
+DECK_IN_MEMORY = "deck"
+"""The name in messages and archives of a deck that is given as text."""
+
 HDF5 = b"\x89HDF\r\n\x1a\n"
 """The bytes that an HDF5 file begins with."""
 
@@ -100,6 +103,12 @@ class Files:
             return given
         return next((found for d in self.path if os.path.isfile((found := d.join(name)).path)), given)
 
+    def given(self, text: str) -> FoundFile:
+        """A deck that is given as text: its includes are looked for as if it stood in the current folder."""
+        file = FoundFile(DECK_IN_MEMORY, DECK_IN_MEMORY)
+        self._keep(file, text.encode("utf-8", "surrogatepass"), "deck", MOST_BYTES)
+        return file
+
     def where(self, includer: FoundFile, angled: bool) -> list[Directory]:
         """The directories in which an include is looked for, in order."""
         return self.path if angled else [includer.directory, *self.path]
@@ -143,13 +152,19 @@ class Files:
         if file.name in self._refused:
             raise self._refused[file.name]
         if file.name not in self.read_so_far:
-            data = _read_bytes(file, kind, most)
-            text, complaint = decode(data, file.name, kind)
-            self.read_so_far[file.name] = SourceFile(file.name, text, hashlib.sha256(data).hexdigest())
-            if complaint is not None:
-                self._refused[file.name] = Problem(complaint)
+            self._keep(file, _read_bytes(file, kind, most), kind, most)
+            if file.name in self._refused:
                 raise self._refused[file.name]
         return self.read_so_far[file.name].text
+
+    def _keep(self, file: FoundFile, data: bytes, kind: str, most: int) -> None:
+        """Keep a file's bytes as text, and what is wrong with them. Raises Problem D018."""
+        if len(data) > most:
+            raise Problem(_too_large(file, kind, f"{len(data) / 2**20:.1f} MiB", most))
+        text, complaint = decode(data, file.name, kind)
+        self.read_so_far[file.name] = SourceFile(file.name, text, hashlib.sha256(data).hexdigest())
+        if complaint is not None:
+            self._refused[file.name] = Problem(complaint)
 
 
 def library_defines(kind: str, name: str, library: Path = LIBRARY) -> str | None:

@@ -66,8 +66,10 @@ def preprocess(
     defines: Sequence[str] = (),
     *,
     library: Path = LIBRARY,
+    text: str | None = None,
 ) -> Tokens:
-    """Reads a deck and all that it includes. `defines` are as after `-D`: `NAME` or `NAME=VALUE`."""
+    """Reads a deck and all that it includes. `defines` are as after `-D`: `NAME` or `NAME=VALUE`. text: of the deck,
+    where it is in no file."""
     files = Files(include_dirs, library)
     findings = Findings()
     run = _Preprocessor(files, findings)
@@ -75,7 +77,7 @@ def preprocess(
     try:
         with without_collection():
             run.define_from_command_line(defines)
-            run.read_deck(files.deck(path))
+            run.read_deck(files.deck(path) if text is None else files.given(text))
             run.warn_of_names()
     except GiveUp:
         whole = False

@@ -63,18 +63,27 @@ def case_keys(experiment: Experiment, rows: Sequence[int] | np.ndarray | None = 
 
 
 def case_ids(
-    experiment: Experiment, rows: Sequence[int] | np.ndarray | None = None, keys: Sequence[str] | None = None
+    experiment: Experiment,
+    rows: Sequence[int] | np.ndarray | None = None,
+    keys: Sequence[str] | None = None,
+    head: bytes | None = None,
 ) -> list[str]:
-    """case_id of every case, or of some rows of the case table, in their order. keys: their case_keys, where known."""
-    parameters = {path: _value(quantity.value) for path, quantity in experiment.parameters.items()}
-    formulas = experiment.formulas
-    own = [experiment.cases.seeds] if experiment.cases.seeds != "common" else []
-    head = _bytes(
-        ["case_id", parameters, experiment.cases.seed, formulas.inputs, formulas.nodes, formulas.outputs, *own]
-    )
+    """case_id of every case, or of some rows of the case table, in their order. keys: their case_keys, where known;
+    head: `id_head` of the experiment, where known."""
+    head = id_head(experiment) if head is None else head
     keys = case_keys(experiment, rows) if keys is None else keys
     packed = np.frombuffer("".join(keys).encode("ascii"), dtype=np.uint8).reshape(len(keys), 2 * DIGEST_BYTES)
     return _row_digests(head, packed)
+
+
+def id_head(experiment: Experiment) -> bytes:
+    """The part of case_ids that all cases share: parameters, formulas and seed, whatever values the cases have."""
+    parameters = {path: _value(quantity.value) for path, quantity in experiment.parameters.items()}
+    formulas = experiment.formulas
+    own = [experiment.cases.seeds] if experiment.cases.seeds != "common" else []
+    return _bytes(
+        ["case_id", parameters, experiment.cases.seed, formulas.inputs, formulas.nodes, formulas.outputs, *own]
+    )
 
 
 def id_numbers(experiment: Experiment) -> np.ndarray:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from functools import cached_property
 from typing import Protocol
 
 from met.frozen import frozen
@@ -134,7 +135,7 @@ class Program:
     state_outputs: tuple[str, ...] | None = None
     counters: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def record_divisor(self) -> int:
         """Ticks a row; 1 where nothing is recorded. All `RecordPhase`s of a program have one divisor."""
         divisors = {

@@ -18,6 +18,7 @@ from benchmarks import (
     hybrid,
     ladder,
     report,
+    simulations,
     stepping,
     whole_process,
 )  # fmt: skip
@@ -27,7 +28,19 @@ from benchmarks.machine import machine, told
 RATIOS = SimpleNamespace(
     TITLE="ratios of throughput over many cases, each on one core and in the same turns", BENCHMARKS=evaluation.RATIOS
 )
-SUBJECTS = (RATIOS, evaluation, stepping, ladder, hybrid, bed, compiling, whole_process, campaigns, differences)
+SUBJECTS = (
+    RATIOS,
+    evaluation,
+    stepping,
+    ladder,
+    hybrid,
+    bed,
+    compiling,
+    whole_process,
+    campaigns,
+    simulations,
+    differences,
+)
 """In the order of the report: ratios first, since they change least with machine and load."""
 
 TURNS, QUICK = 15, 3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -9,8 +10,8 @@ import numpy as np
 
 from ic.grammar.syntax import Unit
 from ic.meaning.expressions.quantity import Value
-from ic.text.complaints import Complaints
-from met.diagnostic import Label, Place
+from ic.text.complaints import PROVISIONAL, Complaints
+from met.diagnostic import Diagnostic, Label, Place
 from met.frozen import frozen
 from met.plan.columns import AxisColumn, CaseValues, ends
 from met.plan.swept import blocks
@@ -36,6 +37,8 @@ MOST_BAD = 1000
 def in_pieces(test: Test, values: np.ndarray) -> tuple[np.ndarray, list[str]]:
     """Apply a test that looks at each row by itself piece by piece, in little memory: a million cases would take 300 MB
     where a test needs matrices."""
+    if len(values) <= PIECE:
+        return test(values)
     bad, causes = np.zeros(len(values), bool), list[str]()
     for first in range(0, len(values), PIECE):
         bad[first : first + PIECE], why = test(values[first : first + PIECE])
@@ -85,6 +88,30 @@ class Checks:
         self._waiting: list[Check] = []
         self._failed: set[str] = set()
         self._rows: np.ndarray | None = None  # the cases that a test is looking at, where that is not all of them
+        self._tested: Formulas | None = None  # of the values of all checks that wait, once no more come
+
+    def of_other_cases(self) -> Checks:
+        """The same checks for cases of another table, of which nothing has failed yet; but for those that warn, or
+        that only the whole arm decides."""
+        found = Checks(Complaints(), self.graph, self.varied)
+        found._waiting = [check for check in self._waiting if not check.warns and check.code not in PROVISIONAL]
+        found._tested = found._formulas()
+        return found
+
+    def errors(self, cases: Mapping[str, CaseValues], count: int) -> tuple[Diagnostic, ...]:
+        """The errors that so many cases with these values make, whatever was asked before."""
+        if count <= WHOLE:
+            columns = {path: np.asarray(values) for path, values in cases.items()}
+            if not any(check.test(table)[0].any() for check, table in self._tables(columns, count)):
+                return ()
+        asked = copy.copy(self)
+        asked.complaints, asked._failed = Complaints(), set()
+        asked.run(cases, count)
+        return asked.complaints.errors
+
+    def _formulas(self) -> Formulas:
+        """The values of all checks that wait, one after the other."""
+        return self._tested or Formulas.of(self.graph, [x for check in self._waiting for x in check.values])
 
     def fail(self, path: str) -> None:
         self._failed.add(path)
@@ -160,11 +187,12 @@ class Checks:
 
     def _tables(self, values: Mapping[str, np.ndarray], count: int) -> Iterator[tuple[Check, np.ndarray]]:
         """Every check that waited, with what it tests of so many cases, [n, k]."""
-        formulas = Formulas.of(self.graph, [x for check in self._waiting for x in check.values])
-        columns = iter(formulas.replay(values))
+        columns = iter(self._formulas().replay(values))
         for check in self._waiting:
-            parts = [np.broadcast_to(np.asarray(next(columns), dtype=float), count) for _ in check.values]
-            yield check, np.stack(parts, -1)
+            table = np.empty((count, len(check.values)))
+            for number in range(len(check.values)):
+                table[:, number] = next(columns)
+            yield check, table
 
     def _run_in_pieces(self, cases: Mapping[str, CaseValues], count: int) -> None:
         """The same of a long table: each check is tested on all of it, and asked for its reason, or what it warns of,

@@ -8,6 +8,7 @@ not on lanes, threads, chunk, neighbours or, given fused multiply-add, on the ma
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import threading
 import warnings
@@ -308,7 +309,7 @@ def _threads(asked: int | None) -> int:
 
 def _aligned(shape: tuple[int, ...]) -> np.ndarray:
     """Zeros, aligned to a cache line and to the widest register."""
-    size = int(np.prod(shape)) * 8
+    size = math.prod(shape) * 8
     raw = np.zeros(size + 64, dtype=np.uint8)
     offset = -raw.ctypes.data % 64
     return raw[offset : offset + size].view(np.float64).reshape(shape)

@@ -200,14 +200,17 @@ class TestHowItEnds:
         plan_file.write(ic.compile("two_link.ic", select=["gains"]), here / "p.json")
         assert batch.run("p.json", cases=["#3"]).path == Path("two_link.gains.case3.h5")
 
+    def test_a_deck_is_run_from_its_path(self, here: Path) -> None:
+        assert batch.run("two_link.ic", cases=[0]).path == Path("two_link.h5")
+        assert batch.run(Path("two_link.ic"), experiments=["gains"], cases=[3]).path == Path("two_link.gains.case3.h5")
+
     def test_what_is_no_plan_is_named(self, here: Path) -> None:
-        with pytest.raises(TypeError) as caught:
+        with pytest.raises(Problem) as caught:
             batch.run("gantry.ic")
-        said = "batch.run takes a plan, and 'gantry.ic' is none: batch.run(ic.compile('gantry.ic'))"
-        assert str(caught.value) == said
-        with pytest.raises(TypeError) as caught:
+        assert caught.value.diagnostics[0].message == "cannot read `gantry.ic`: No such file or directory"
+        with pytest.raises(TypeError) as refused:
             batch.run(7)  # type: ignore[arg-type]
-        assert str(caught.value) == "batch.run takes a plan, as ic.compile gives it, and not int"
+        assert str(refused.value) == "batch.run takes a deck's path or a plan, and not int"
 
     def test_a_case_that_is_run_again_does_not_take_its_sweeps_place(self, here: Path) -> None:
         def output(*cases: str | int) -> str:

@@ -1,0 +1,65 @@
+"""The values of an archive's variables from what the engine gives, by the variable's name: for a file, or in memory."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from batch.archive import layout as archive_layout
+from batch.archive.layout import AT_LIMIT, EXCESS, EXTREME_AT, GRAPPLE, Layout
+from met.plan import Experiment, keys
+
+if TYPE_CHECKING:
+    from met.run import Run
+
+KINDS = {"float64": np.float64, "float32": np.float32, "int64": np.int64, "int8": np.int8, "str": object}
+"""The type that an array of each kind of variable has."""
+
+
+def values_of_cases(experiment: Experiment, layout: Layout, run: Run, id_head: bytes | None = None) -> dict[str, Any]:
+    """Everything that is one value a case, of the cases of a run; strings in lists.
+
+    id_head  as `keys.case_ids` takes it
+    """
+    rows = run.case
+    names = keys.case_keys(experiment, rows)
+    values: dict[str, Any] = {
+        "case": experiment.cases.table[rows],
+        "case_key": names,
+        "case_id": keys.case_ids(experiment, rows, names, id_head),
+        "seed": keys.case_seeds(experiment, rows),
+        "repeat": 0 if experiment.cases.repeats is None else experiment.cases.repeats[rows],
+        "status": run.status,
+        "cause": run.cause,
+        "warning": run.warning,
+        "n_valid": run.n_valid,
+        "bed_limited": run.limited,
+        **{f"friction_{name}": count for name, count in run.events.items()},
+        **{variable.name: run.coordinates[variable.key] for variable in layout.role("coordinate")},
+        **{variable.name: run.metrics[variable.key] for variable in layout.role("metric")},
+        **{AT_LIMIT + path: share for path, share in run.at_limit.items()},
+        **{EXCESS + path: most for path, most in run.excess.items()},
+        **{EXTREME_AT + metric: number for metric, number in run.extreme_at.items()},
+        **{GRAPPLE + of: figure for of, figure in run.grapples.items()},
+    }
+    for role in ("limit", "excess", "extreme", "grapple"):  # by the name that is free
+        values |= {variable.name: values[variable.key] for variable in layout.role(role)}
+    for choice, variable in zip(experiment.cases.choices, layout.role("choice"), strict=True):
+        values[variable.name] = [choice.value] * len(rows)
+    met = np.empty((len(rows), len(experiment.requirements)), np.int8)
+    for index, requirement in enumerate(experiment.requirements):
+        unknown = (run.status != 0) | np.isnan(run.metrics[requirement.metric])
+        met[:, index] = np.where(unknown, -1, run.met[requirement.text])
+    values["met"] = met
+    return values
+
+
+def values_of_dimensions(experiment: Experiment) -> dict[str, Any]:
+    """The values of dimensions that do not depend on which cases are run."""
+    schedule = experiment.structure.schedule
+    values: dict[str, Any] = {"requirement": np.array([r.text for r in experiment.requirements], dtype=object)}
+    values["time"] = np.arange(schedule.rows) * schedule.record / schedule.base_hz
+    for dimensions in (archive_layout.joint_dimensions, archive_layout.component_dimensions):
+        values |= {dim: np.array(names, dtype=object) for names, dim in dimensions(experiment).items()}
+    return values

@@ -1,0 +1,215 @@
+"""`Simulation`: a run of a deck, called from Python with values for its parameters; nothing is written."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from batch.archive.in_memory import DatasetMaker
+from batch.simulation.given import columns, values_in_si
+from ic.driver.given_values import VariedRun, given_run
+from ic.printing.columns import size as size_text
+from ic.text.complaints import known_words
+from met import run as engine
+from met.diagnostic import Problem, did_you_mean, error
+from met.host.files import memory
+from met.plan import Cases, Experiment
+
+if TYPE_CHECKING:
+    import xarray
+
+    from batch.simulation.stepping import SteppedProgram, SteppedRun
+
+
+@dataclass
+class SimulationProgram:
+    """The program of a run whose inputs are some paths, and what makes Datasets of what it gives."""
+
+    varied: VariedRun
+    prepared: engine.Prepared
+    datasets: DatasetMaker
+
+
+class Simulation:
+    """A run of a deck as a function: values of its parameters to results, in memory.
+
+    sim = batch.Simulation("arm.ic")
+    data = sim.run({"gearbox.kp": [0.01, 0.02, 0.03], "load": "25 kg"})      # an xarray.Dataset of three cases
+
+    path     of the deck; or none, and its text
+    run      the run's name; None: the deck's only one, else the one that it marks `default`
+    defines, include_dirs, set  as `ic.compile` has them: `set={"integrator": "rk4"}` for what decides the program
+
+    The deck is compiled here, and again when a set of paths is first given: these become inputs of a program, which is
+    kept as long as the simulation is. Machine code is kept in the cache of all of MET, no other file is written.
+
+    Raises met.diagnostic.Problem, here and in all it does, for what a user can mend.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        text: str | None = None,
+        run: str | None = None,
+        defines: Iterable[str] = (),
+        include_dirs: Iterable[str | os.PathLike[str]] = (),
+        set: Mapping[str, object] | Iterable[str] = (),
+    ) -> None:
+        if (path is None) == (text is None):
+            raise TypeError("a deck is given by its path or by its text")
+        settings = [f"{path}={value}" for path, value in set.items()] if isinstance(set, Mapping) else set
+        self._given = given_run(
+            path or "",
+            run,
+            text=text,
+            include_dirs=tuple(include_dirs),
+            defines=tuple(defines),
+            settings=tuple(settings),
+        )
+        self._programs: dict[tuple[tuple[str, ...], bool], SimulationProgram] = {}
+        self._stepped: dict[object, SteppedProgram] = {}
+        self._units: dict[str, str | None] = {}
+
+    def __repr__(self) -> str:
+        return f"Simulation of `{self._given.name}` in {self._given.deck.file}"
+
+    @property
+    def experiment(self) -> Experiment:
+        """The run as the deck has it: its parameters, in SI, with where each was written."""
+        return self._given.experiment
+
+    def run(
+        self,
+        values: Mapping[str, Any] | None = None,
+        *,
+        product: bool = False,
+        repeat: int = 1,
+        histories: bool | str | Sequence[str] = False,
+        threads: int | None = None,
+    ) -> xarray.Dataset:
+        """Run a case for each value, and return what an archive of the same sweep would hold, as `batch.open` gives it.
+
+        values     by path, as `--set` and `vary` take them: `gearbox.kp`, `elbow.servo.kp`, `links.lower.mass`, a
+                   `let`. A number is in SI; a text has its unit, "25 kg"; so has anything with `magnitude` and `units`.
+                   One value is for all cases, a list or array has one for each; several lists go in step
+        product    True: each value of one list with each of the others, the last fastest, as axes of a sweep
+        repeat     each case so often, with noise of its own, as in a sweep
+        histories  signals that are kept: False for none, True for all that the run records, or their names
+        threads    None: as many as there are cores
+        """
+        given = self._in_si(values or {})
+        table, count = columns(given, product=product)
+        if repeat != 1 and not (isinstance(repeat, int) and repeat > 1):
+            raise Problem(error("E431", f"`repeat` is a whole number, at least 1, and not {repeat!r}"))
+        program = self._program({path: float(column[0]) for path, column in table.items()}, repeat > 1)
+        program.varied.check(table, count)
+        if repeat > 1:
+            table = {path: np.repeat(column, repeat) for path, column in table.items()}
+        prepared = program.prepared.with_cases(_cases(program.varied.experiment.cases, table, count, repeat))
+        signals = self._signals(histories, count * repeat)
+        rows = np.arange(count * repeat)
+        history, outputs = engine.compute(prepared, rows, threads=threads, record=bool(signals))
+        return program.datasets.dataset(prepared.experiment, engine.results(prepared, rows, history, outputs), signals)
+
+    def start(
+        self,
+        values: Mapping[str, Any] | None = None,
+        *,
+        commands: str | Sequence[str] | Mapping[str, str],
+        record: str | Sequence[str] | None = None,
+        repeat: int = 0,
+    ) -> SteppedRun:
+        """Begin one case that is stepped by commands from outside, in place of the deck's (`SteppedRun.step`).
+
+        values    as `run` takes them, one each
+        commands  joints whose commands are given, or by joint the kind of its command: "rate", "position", "torque" or
+                  "acceleration"; of a joint without, the kind that it has in the deck
+        record    channels that are seen besides q and qd: `shoulder.servo.sensor.qd`, `links.lower.position`; None:
+                  what the run records
+        repeat    number of the noise: another number is another noise
+        """
+        from batch.simulation.stepping import SteppedRun, program
+
+        table, count = columns(self._in_si(values or {}), product=False)
+        if count > 1:
+            raise Problem(error("E430", f"one case is stepped, and these values make {count}", help="give one each"))
+        kinds = dict(commands) if isinstance(commands, Mapping) else dict.fromkeys(_listed(commands), "")
+        seen = None if record is None else _listed(record)
+        key = tuple(table), tuple(kinds.items()), seen, repeat > 0
+        if key not in self._stepped:
+            first = {path: (float(column[0]), self._units[path] or "1") for path, column in table.items()}
+            self._stepped[key] = program(self._given, first, kinds=kinds, record=seen, repeated=repeat > 0)
+        found = self._stepped[key]
+        zeros = {path: np.zeros(1) for path in found.paths}
+        found.varied.check({**table, **zeros}, 1)
+        return SteppedRun(found, {**table, **zeros}, repeat)
+
+    def _in_si(self, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        found = {}
+        for path, value in values.items():
+            if path not in self._units:
+                self._units[path] = self._given.unit(path)
+            unit = self._units[path]
+            if unit is None:  # then this says what is wrong with the path
+                self._given.vary({path: (value if isinstance(value, str) and value.isidentifier() else 0.0, "1")})
+            elif unit == "" or isinstance(value, bool | np.bool_):
+                raise _no_number(path, value, unit)
+            found[path] = values_in_si(value, path, unit or "1")
+        return found
+
+    def _program(self, first: Mapping[str, float], repeated: bool) -> SimulationProgram:
+        """The program whose inputs are these paths, compiled with these values where it is the first time."""
+        key = tuple(first), repeated
+        if key not in self._programs:
+            values = {path: (value, self._units[path] or "1") for path, value in first.items()}
+            varied = self._given.vary(values, repeat=2 if repeated else 1)
+            prepared = engine.prepare(varied.experiment)
+            self._programs[key] = SimulationProgram(varied, prepared, DatasetMaker(self._given.deck.file, prepared))
+        return self._programs[key]
+
+    def _signals(self, histories: bool | str | Sequence[str], cases: int) -> tuple[str, ...]:
+        """The names of the signals that are kept. Raises Problem E432 for what is not recorded, or does not fit."""
+        if histories is False:
+            return ()
+        known = [recorded.name for recorded in self.experiment.structure.record]
+        names = tuple(known) if histories is True else _listed(histories)
+        for name in names:
+            if name not in known:
+                helps = [
+                    *did_you_mean(name, known),
+                    known_words("the run records", known),
+                    "the deck's `record` says what",
+                ]
+                raise Problem(error("E432", f"`{self._given.name}` records no `{name}`", help=helps))
+        needed = self.experiment.structure.history_bytes * cases
+        if names and needed > memory():
+            message = f"histories of {cases:,} cases take {size_text(needed)} of memory"
+            raise Problem(error("E432", message, help="run fewer at once, or `batch.run` the sweep into an archive"))
+        return names
+
+
+def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
+    """Names, of which one may stand by itself."""
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
+def _cases(template: Cases, table: Mapping[str, np.ndarray], count: int, repeat: int) -> Cases:
+    """The cases of a table, as a plan has them."""
+    made = [replace(coordinate, values=table[coordinate.path]) for coordinate in template.coordinates]
+    repeats = np.tile(np.arange(repeat), count) if repeat > 1 else None
+    return replace(template, count=count * repeat, coordinates=tuple(made), repeats=repeats)
+
+
+def _no_number(path: str, value: Any, unit: str) -> Problem:
+    if unit == "":
+        message, helps = (
+            f"`{path}` is a word, not a number",
+            f'`batch.Simulation(..., set={{"{path}": {str(value)!r}}})`',
+        )
+        return Problem(error("E434", message, help=f"what decides the program is set once: {helps}"))
+    return Problem(error("E431", f"`{path}` = {value!r}: it is a number"))

@@ -1,0 +1,213 @@
+"""A run whose parameters get their values from outside, for many cases at once: as if a sweep of the deck varied them.
+
+`GivenRun` is of one run; `vary` compiles it as a sweep over some paths. The experiment that comes of it has one case;
+the same program runs any others, whose values are checked by `VariedRun.errors` as those of a sweep are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+
+from ic.driver.compile import Compiled, compile_deck
+from ic.driver.explain import explanations_of
+from ic.grammar.parse import parse
+from ic.grammar.syntax import Deck, Entry
+from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.expressions.conditions import Checks
+from ic.read import read
+from ic.text.complaints import Complaints, known_words
+from ic.text.lexer import END, SPACE, Text, Token, logical_lines
+from ic.text.source import SourceFile
+from met.diagnostic import Diagnostic, Problem, did_you_mean, error
+from met.frozen import frozen
+from met.plan import Experiment
+from met.plan.columns import CaseValues
+
+GIVEN = "(given)"
+"""The name of the text, in messages, that varies what is given."""
+
+
+@frozen
+class VariedRun:
+    """A run as a sweep of one case.
+
+    checks   those of values, for cases of any others; None where no path is given
+    sources  texts that messages show
+    """
+
+    experiment: Experiment
+    checks: Checks | None
+    sources: Mapping[str, str]
+
+    def check(self, columns: Mapping[str, CaseValues], count: int) -> None:
+        """Raise Problem where one of so many cases has a value that its parameter cannot have. columns: SI, by path."""
+        found = () if self.checks is None else self.checks.errors(columns, count)
+        if found:
+            raise Problem(found, self.sources)
+
+
+@frozen
+class GivenRun:
+    """A run of a deck, compiled once as the deck has it, and again for each set of paths that are given.
+
+    settings  `PATH=VALUE`, as of `--set`
+    """
+
+    deck: Deck
+    name: str
+    defines: tuple[str, ...]
+    settings: tuple[str, ...]
+    compiled: Compiled
+
+    @property
+    def experiment(self) -> Experiment:
+        """The run as the deck has it."""
+        assert self.compiled.plan is not None
+        return self.compiled.plan.experiments[0]
+
+    def unit(self, path: str) -> str | None:
+        """The SI unit of what a path sets, `gearbox.kp` or a `let`; None where it sets nothing, "" for a word."""
+        found = next(explanations_of(self.compiled, path), None)
+        return None if found is None else found.unit if not isinstance(found.value, str) else ""
+
+    def sets(self, path: str) -> bool:
+        """True where the settings have just this path."""
+        return any(_path(each) == path for each in self.settings)
+
+    def vary(
+        self, values: Mapping[str, tuple[float | str, str]], *, repeat: int = 1, words: Mapping[str, str] | None = None
+    ) -> VariedRun:
+        """The run as a sweep over these paths, of which the one case has these values in these units.
+
+        values  numbers, or words as a deck has them
+        repeat  1: nothing is repeated
+        words   what decides the program, by path, in place of what the deck writes
+
+        What is set of the same paths counts for nothing then.
+        Raises Problem with what is wrong, as of the entry of a sweep; E434 where a path decides the program.
+        """
+        if not values and repeat == 1:
+            return VariedRun(self.experiment, None, self.compiled.sources)
+        words = {**self._set_around(values), **(words or {})}  # a `--set` of what is varied within would be refused
+        settings = [each for each in self.settings if _path(each) not in (*words, *values)]
+        name = f"{self.name}_given"
+        while name in _names(self.deck):
+            name += "_"
+        lines = [
+            f"vary {path} = [{value if isinstance(value, str) else repr(value)}]{f' {unit}' if unit != '1' else ''};"
+            for path, (value, unit) in values.items()
+        ]
+        lines = [*(f"vary {path} = [{word}];" for path, word in words.items()), *lines]
+        lines += [f"repeat {repeat};"] if repeat > 1 else []
+        text = "\n".join([f"sweep {name} of {self.name} {{", *(f"    {line}" for line in lines), "}", ""])
+        deck = replace(
+            self.deck,
+            entries=(*self.deck.entries, *_entries(text)),
+            sources=(*self.deck.sources, SourceFile(GIVEN, text, "")),
+        )
+        compiled = compile_deck(deck, select=name, defines=self.defines, settings=settings)
+        if compiled.plan is None:
+            raise Problem(_errors(compiled), compiled.sources)
+        (experiment,) = compiled.plan.experiments
+        chosen = [choice.path for choice in experiment.cases.choices if choice.path not in words]
+        if chosen:
+            path = chosen[0]
+            message = f"`{path}` decides the program, and is no number that a case brings"
+            raise Problem(error("E434", message, help=f'`batch.Simulation(..., set={{"{path}": "..."}})` sets it'))
+        assert [coordinate.path for coordinate in experiment.cases.coordinates] == list(values)
+        (scope,) = compiled.scopes
+        experiment = replace(experiment, name=self.name, sweep="", cases=replace(experiment.cases, choices=()))
+        return VariedRun(experiment, scope.checks.of_other_cases(), compiled.sources)
+
+    def _set_around(self, values: Iterable[str]) -> dict[str, str]:
+        """The settings of what these paths are parts of, by path: a command, of which the value is given."""
+        return {
+            _path(each): each.partition("=")[2]
+            for each in self.settings
+            if any(path.startswith(f"{_path(each)}.") for path in values)
+        }
+
+
+def given_run(
+    path: str | PathLike[str],
+    run: str | None = None,
+    *,
+    text: str | None = None,
+    include_dirs: Sequence[str | PathLike[str]] = (),
+    defines: Sequence[str] = (),
+    settings: Sequence[str] = (),
+) -> GivenRun:
+    """A run of a deck. run: None for the deck's only one, else the one that it marks `default`. Raises Problem."""
+    deck = read(Path(path), [Path(each) for each in include_dirs], tuple(defines), text=text)
+    definitions = Definitions(deck, Complaints(deck.warnings))
+    return _given(deck, _name_of(definitions, run, deck), tuple(defines), tuple(settings))
+
+
+def _given(deck: Deck, name: str, defines: tuple[str, ...], settings: tuple[str, ...]) -> GivenRun:
+    compiled = compile_deck(deck, select=name, defines=defines, settings=settings)
+    if compiled.plan is None:
+        raise Problem(_errors(compiled), compiled.sources)
+    return GivenRun(deck, name, defines, settings, compiled)
+
+
+def _name_of(definitions: Definitions, run: str | None, deck: Deck) -> str:
+    """The name of the run that is asked for. Raises Problem E433 where it is a sweep, or none can be told."""
+    runs, sweeps = definitions.of_kind("run"), definitions.of_kind("sweep")
+    sources = {source.name: source.text for source in deck.sources}
+    if run is None:
+        own = {name: each for name, each in runs.items() if definitions.writes(each)} or dict(runs)
+        if len(own) == 1:
+            return next(iter(own))
+        ours = [each for each in (*runs.values(), *sweeps.values()) if each.name in own or definitions.writes(each)]
+        default = next((each for each in ours if each.default), None)
+        if default is None or default.name not in own:
+            why = f"it marks a sweep, `{default.name}`, `default`" if default else "none is marked `default`"
+            message = f"this deck has {len(own)} runs, and {why}" if own else "this deck has no run"
+            helps = [f'name one: `run="{next(iter(own))}"`', known_words("there are", own)] if own else "write one"
+            raise Problem(error("E433", message, help=helps), sources)
+        return default.name
+    if run in sweeps:
+        of = _run_of(sweeps[run])
+        message = f"`{run}` is a sweep, and a simulation is of one run, whose values are given"
+        raise Problem(
+            error("E433", message, sweeps[run].place, help=f'`run="{of}"` is the run that it varies' if of else ()),
+            sources,
+        )
+    if run not in runs:
+        raise Problem(
+            error(
+                "E433", f"no run `{run}` in this deck", help=[*did_you_mean(run, runs), known_words("there are", runs)]
+            ),
+            sources,
+        )
+    return run
+
+
+def _run_of(sweep: Definition) -> str:
+    return sweep.group.of.text if sweep.group.of is not None else ""
+
+
+def _path(setting: str) -> str:
+    return setting.partition("=")[0].strip()
+
+
+def _errors(compiled: Compiled) -> list[Diagnostic]:
+    return [each for each in compiled.diagnostics if each.severity == "error"]
+
+
+def _names(deck: Deck) -> set[str]:
+    """All that a definition of the deck may be called."""
+    return {word.text for entry in deck.entries for word in (*getattr(entry, "words", ()), *getattr(entry, "path", ()))}
+
+
+def _entries(text: str) -> tuple[Entry, ...]:
+    """The entries of a text that needs no preprocessor. Raises Problem."""
+    source = Text(GIVEN, text)
+    tokens = [token for line in logical_lines(source) for token in line if token.kind != SPACE]
+    entries, found = parse([*tokens, Token(END, "", source, len(text.rstrip()), 1)])
+    if found:
+        raise Problem(found, {GIVEN: text})
+    return entries
