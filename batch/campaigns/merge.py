@@ -1,17 +1,25 @@
-"""The shards of a campaign into its archive: in order, a bounded number of cases at a time, each shard proved again."""
+"""The shards of a campaign into its archive: in order, a bounded number of cases at a time, each shard proved again.
+
+One thread writes, for HDF5 has no more; others read and prove the shards and make what is written of them, some stretches
+ahead of it. What is written, and in which pieces, does not depend on them.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from batch.campaigns import shard
 from batch.campaigns.folder import Folder
 from batch.campaigns.outcomes import CaseOutcomes
-from batch.campaigns.tasks import CampaignSection
+from batch.campaigns.tasks import CampaignSection, Task
 from met import run as engine
 from met.diagnostic import Problem, error
 from met.plan.columns import places_among
@@ -22,6 +30,12 @@ if TYPE_CHECKING:
 
 BLOCK = 1 << 16
 """Cases that are written at a time, however they were run: where HDF5 puts strings depends on it."""
+
+
+AHEAD = 2
+"""Shards that are read, and blocks that are made, while one is written."""
+
+T = TypeVar("T")
 
 
 class Missing(Exception):
@@ -35,11 +49,14 @@ def merge(
     values: CampaignSection,
     histories: CampaignSection | None,
     progress: Callable[[int], None] = lambda _: None,
+    *,
+    threads: int | None = None,
 ) -> CaseOutcomes:
     """Write one experiment; what became of its cases. Raises Missing.
 
     values     all of its cases;  histories: those that were run again for them
     progress   told how many cases are written
+    threads    that read shards and make what is written; None: one a processor
     """
     kept = histories.rows if histories is not None else np.empty(0, np.int64)
     places = places_among(values.rows, np.asarray(kept))
@@ -50,7 +67,8 @@ def merge(
     ended: dict[int, tuple[int, str]] = {}
     first = held = 0
 
-    def put(cases: int) -> None:
+    def block(cases: int) -> Callable[[], tuple[int, Run, Mapping[str, Any]]]:
+        """Take so many cases off those that wait; what makes of them what is written."""
         nonlocal waiting, fates, first, held
         outputs = np.concatenate(waiting)
         mine = {case: fate for case, fate in fates.items() if case < cases}
@@ -58,23 +76,35 @@ def merge(
         here = places[again] - first
         before.append(outputs[here])
         ended.update({int(k): mine[int(case)] for k, case in zip(again, here, strict=True) if int(case) in mine})
-        run = _results(values, first, outputs[:cases], None, mine)
-        writer.put_cases(number, first, run)
-        outcomes.add_run(run)
         fates = {case - cases: fate for case, fate in fates.items() if case >= cases}
-        waiting, first, held = [outputs[cases:]], first + cases, held - cases
-        progress(first)
+        at, waiting, first, held = first, [outputs[cases:]], first + cases, held - cases
 
-    for at, found in shards_in_order(folder, values):
-        if found.history is not None:
-            writer.put_signals(number, at, _results(values, at, found.outputs.copy(), found.history, dict(found.fates)))
-        fates |= {at - first + case: fate for case, fate in found.fates.items()}
-        waiting.append(found.outputs.copy() if found.history is not None else found.outputs)  # not the shard with it
-        held += len(found.outputs)
-        while held >= BLOCK:
-            put(BLOCK)
-    if held:
-        put(held)
+        def made() -> tuple[int, Run, Mapping[str, Any]]:
+            run = _results(values, at, outputs[:cases], None, mine)
+            return at, run, writer.case_values(number, run)
+
+        return made
+
+    def blocks_of_cases(pool: ThreadPoolExecutor) -> Iterator[Callable[[], tuple[int, Run, Mapping[str, Any]]]]:
+        nonlocal fates, held
+        for at, found in shards_in_order(folder, values, pool):
+            if found.history is not None:
+                run = _results(values, at, found.outputs.copy(), found.history, dict(found.fates))
+                writer.put_signals(number, at, run)
+            fates |= {at - first + case: fate for case, fate in found.fates.items()}
+            # not the shard with it
+            waiting.append(found.outputs.copy() if found.history is not None else found.outputs)
+            held += len(found.outputs)
+            while held >= BLOCK:
+                yield block(BLOCK)
+        if held:
+            yield block(held)
+
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        for at, run, made in ahead(pool, blocks_of_cases(pool), AHEAD):
+            writer.put_cases(number, at, made)
+            outcomes.add_run(run)
+            progress(at + len(run.case))
     if histories is not None:
         again = np.concatenate(before)
         first_kept = 0
@@ -118,22 +148,45 @@ def results(folder: Folder, section: CampaignSection, most: Mapping[str, int] | 
     return outcomes
 
 
-def shards_in_order(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, shard.Shard]]:
-    """The shards of a section in order, less what was had before, each with the place of its first case."""
-    at = 0
-    for task in folder.named_tasks(section.number):
-        if task.last <= at:
-            continue
-        if task.first > at:
-            break
+def shards_in_order(
+    folder: Folder, section: CampaignSection, pool: ThreadPoolExecutor | None = None
+) -> Iterator[tuple[int, shard.Shard]]:
+    """The shards of a section in order, less what was had before, each with the place of its first case. pool: reads
+    some ahead, where they have no histories, which would take much memory. Raises Missing."""
+
+    def read(task: Task, at: int) -> tuple[int, shard.Shard]:
         try:
-            found = folder.read(section, task)
+            return at, _without(folder.read(section, task), at - task.first)
         except (shard.UnsoundShard, OSError) as reason:
             raise Missing(f"shard {task.name} {reason}") from reason
-        yield at, _without(found, at - task.first)
-        at = task.last
+
+    tasks, at = [], 0
+    for task in folder.named_tasks(section.number):
+        if task.last > at >= task.first:
+            tasks.append(partial(read, task, at))
+            at = task.last
+    yield from ahead(None if section.recorded else pool, tasks, AHEAD)
     if at < len(section.rows):
         raise Missing(f"no shard holds case {at:,} of {section.name}")
+
+
+def ahead(pool: ThreadPoolExecutor | None, calls: Iterable[Callable[[], T]], most: int) -> Iterator[T]:
+    """What these calls return, in order, made by a pool of threads, so many at most beyond the one that is waited for;
+    without a pool, each when it is asked for."""
+    waiting: deque[Future[T]] = deque()
+    try:
+        for call in calls:
+            if pool is None:
+                yield call()
+                continue
+            waiting.append(pool.submit(call))
+            if len(waiting) > most:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        for each in waiting:
+            each.cancel()
 
 
 def _without(found: shard.Shard, first: int) -> shard.Shard:

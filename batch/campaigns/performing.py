@@ -323,6 +323,7 @@ class _CampaignWork:
                     section,
                     histories.get(number),
                     lambda cases: self.reporter.advance(cases, 0),
+                    threads=self._threads,
                 )
                 self.counted[section.name] = outcomes.counted(len(parts[number].kept))
                 writer.look_back(number)
