@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from batch.archive import layout as archive_layout
-from batch.archive import verified
+from batch.archive import summarised, verified
 from batch.archive.hdf5 import LIBVER, h5py
 from batch.archive.layout import AT_LIMIT, EXCESS, EXTREME_AT, GRAPPLE, Layout, Variable
 from batch.archive.provenance import Revision, version
@@ -25,7 +25,7 @@ from met import backends
 from met.frozen import frozen
 from met.plan import Experiment, Plan, keys, recipes
 from met.plan import file as plan_file
-from met.plan.columns import CaseValues
+from met.plan.columns import LISTED_ROWS, CaseValues
 from met.plan.swept import blocks
 from met.plan.uses import packages
 
@@ -44,6 +44,7 @@ class ArchivePart:
     results  keys of what metrics and signals compute beyond the state (`met.run.Prepared.result_keys`)
     until_shown  the most cases of a design point, of which the rows are those up to the one that decided what is
                  required; 0 where the rows were chosen otherwise
+    summed       whether there is a summary of cases besides; then the plan keeps what long tables are computed from
     """
 
     experiment: Experiment
@@ -53,6 +54,7 @@ class ArchivePart:
     code: str = ""
     results: Mapping[str, str] = field(default_factory=dict)
     until_shown: int = 0
+    summed: bool = False
 
 
 @frozen
@@ -125,6 +127,11 @@ class ArchiveWriter:
         verified.write(self.groups[number].node, found)
         self._sink.check()
 
+    def put_summary(self, number: int, found: summarised.CaseSummary) -> None:
+        """Write what came of all cases of an experiment, in a group of its own."""
+        summarised.write(self.groups[number].node, found)
+        self._sink.check()
+
     def finish(self) -> None:
         """Write what is left, and see the file safely on the disk under its temporary name, still locked."""
         for group in self.groups:
@@ -193,13 +200,14 @@ class ArchiveWriter:
         group.attrs["git_dirty"] = changed
         group.attrs["defines"] = " ".join(self.plan.defines)
 
+        summed = any(each.part.summed for each in self.groups)
         tables: dict[str, tuple[Experiment, str]] = {}
         arrays: dict[str, np.ndarray] = {}
         keepers: dict[str, recipes.ArrayKeeper] = {}
 
         def refer(experiment: Experiment, index: int) -> Any:
             name = f"cases.{experiment.name}"
-            if experiment.cases.count <= plan_file.TABLE_ROWS:
+            if experiment.cases.count <= (LISTED_ROWS if summed else plan_file.TABLE_ROWS):
                 if name not in tables:
                     tables[name] = experiment, _table_sum(experiment)
                 return {"file": name, "row": index, "sha256": tables[name][1]}

@@ -24,8 +24,8 @@ DIGITS = 12
 CHUNK = 1 << 12
 """Points of a stream that are drawn together where some between the first and the last are not wanted."""
 
-KEPT_BLOCKS = 8
-"""Blocks of a column that are kept, half a megabyte each: twice the cases of the longest task."""
+KEPT_BLOCKS = 16
+"""Blocks of a column that are kept, half a megabyte each: the cases of the longest tasks that are merged together."""
 
 A_COUNT = 4
 """Numbers that the generator gives at each count."""
