@@ -248,7 +248,7 @@ def _summed(variable: Stored, kept: CaseSummary, place: int) -> SummedMetric:
     told = {name: kept.values[name][place].item() for name in SUMMED}
     return SummedMetric(
         minimum=told["least"],
-        median=np.nan,
+        median=told["least"] if told["finite"] == 1 else np.nan,
         maximum=told["most"],
         infinite=told["infinite"],
         unknown=told["unknown"],
@@ -264,7 +264,7 @@ def _summed(variable: Stored, kept: CaseSummary, place: int) -> SummedMetric:
     )
 
 
-SUMMED = ("least", "most", "infinite", "unknown", "mean", "variance", "least_case", "most_case")
+SUMMED = ("least", "most", "finite", "infinite", "unknown", "mean", "variance", "least_case", "most_case")
 """Variables of a summary that a metric's row is made of."""
 
 

@@ -164,11 +164,11 @@ def _about(
     if group.count > 1:
         most = None if all_cases else cases.SHOWN_CASES
         if some.everything:
-            return [*out, "", cases.title(group, by=by), *cases.table(group, most, by=by)]
+            return [*out, "", cases.title(group, by=by, every=all_cases), *cases.table(group, most, by=by)]
         among = _positions(archive, group, some)
         out += ["", some.words(len(among), group.count)]
         if len(among):
-            out += [cases.title(group, by=by), *cases.table(group, most, by=by, among=among)]
+            out += [cases.title(group, by=by, every=True), *cases.table(group, most, by=by, among=among)]
     return out
 
 

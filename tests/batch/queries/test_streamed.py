@@ -91,6 +91,13 @@ def test_met_show_lists_those_that_stand_out(archive: Path, many: None) -> None:
         assert "percentile(volts, 95 %)" in show_evidence(file)
 
 
+def test_all_cases_are_listed_where_they_are_asked_for(archive: Path, many: None) -> None:
+    with ArchiveFile(archive) as file:
+        said = show(file, plots=False, all_cases=True)
+    assert "cases, worst first" in said and "stand out" not in said
+    assert sum(line.lstrip().startswith("#") for line in said.splitlines()) >= 360
+
+
 def test_too_many_design_points_are_held(archive: Path, many: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tallies, "MOST_POINTS", 3)
     monkeypatch.setattr(streamed, "MOST_POINTS", 3)
