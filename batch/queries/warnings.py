@@ -39,7 +39,6 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
 
     experiment  of the plan, for places
     """
-    about = (step_errors, at_limits, grapples, undecided)
-    if summed_up(group) is not None:  # told by counts; rows beside a summary are few, and say nothing of all cases
-        about = about[:1]
+    # told by counts; rows beside a summary are few, and say nothing of all cases
+    about = (step_errors,) if summed_up(group) is not None else (step_errors, at_limits, grapples, undecided)
     return [warning for each in about for warning in each.warnings(group, experiment)]
