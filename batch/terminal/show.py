@@ -118,10 +118,12 @@ def show_evidence(archive: ArchiveFile, experiments: Sequence[str] = (), *, widt
     """The table of evidence of each run and sweep, or of these: what is required, and what the cases show of it."""
     out = _Lines()
     out += [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
-    for pool in pools(groups_named(archive, tuple(experiments))):
-        cases = sum(group.run for group in pool.groups)
-        title = f"{pool.name}: {cases:,} case{'s' * (cases != 1)}"
-        out += ["", title, *evidence_table_lines(_evidence(archive, pool.groups), width)]
+    named = groups_named(archive, tuple(experiments))
+    for name in dict.fromkeys(group.sweep or group.name for group in named):
+        groups = [group for group in named if (group.sweep or group.name) == name]
+        cases = sum(group.run for group in groups)
+        title = f"{name}: {cases:,} case{'s' * (cases != 1)}"
+        out += ["", title, *evidence_table_lines(_evidence(archive, groups), width)]
     return "\n".join(out.lines).rstrip() + "\n"
 
 

@@ -5,15 +5,17 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import batch
 import ic
-from batch.archive.read import ArchiveFile
+from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries import streamed, tallies
 from batch.queries.evidence_table import requirement_evidence
 from batch.queries.summary import SummedMetric, summarise
 from batch.terminal.show import show, show_evidence
+from met.plan import swept
 
 DECK = """
 #include <two_link.ic>
@@ -89,6 +91,26 @@ def test_met_show_lists_those_that_stand_out(archive: Path, many: None) -> None:
         assert "gearbox.kt = values from " in said
         assert "180 of 360 cases reached their end, 180 failed" in said
         assert "percentile(volts, 95 %)" in show_evidence(file)
+
+
+def test_no_column_of_them_is_read_whole(archive: Path, many: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    values, stretch = ArchiveGroup.values, ArchiveGroup.stretch
+
+    def some(group: ArchiveGroup, name: str) -> np.ndarray:
+        assert group.variables[name].dims[0] != "case", name
+        return values(group, name)
+
+    def short(group: ArchiveGroup, name: str, first: int, last: int) -> np.ndarray:
+        assert last - first <= 64, name
+        return stretch(group, name, first, last)
+
+    monkeypatch.setattr(swept, "BLOCK", 64)
+    monkeypatch.setattr(ArchiveGroup, "values", some)
+    monkeypatch.setattr(ArchiveGroup, "stretch", short)
+    with ArchiveFile(archive) as file:
+        assert "of 360 cases those that stand out:" in show(file, plots=False)
+        assert "percentile(volts, 95 %)" in show_evidence(file)
+        assert summarise(file)[0].failed == 180
 
 
 def test_all_cases_are_listed_where_they_are_asked_for(archive: Path, many: None) -> None:
