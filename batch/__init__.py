@@ -69,6 +69,7 @@ def run(
     max_failures: int | None = None,
     fresh: bool = False,
     verify: Verify = "auto",
+    rows: str = "all",
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Archive:
@@ -91,6 +92,8 @@ def run(
     fresh         start over, rather than run what is missing
     verify        which cases are run again with shorter steps, so that metrics have errors: "none", "some", "all", or
                   "auto": some where that is cheap
+    rows          cases that have a row in the archive: "all"; or a "summary", with the few that it names; or
+                  "worst:N:METRIC", the worst besides
     executor      who runs it, in place of threads, processes and dask (batch/executors)
 
     Raises met.diagnostic.Problem for what a user can mend.
@@ -110,6 +113,7 @@ def run(
         histories=histories,
         float32=float32,
         verify=verify,
+        rows=rows,
     )
     if target is not None:
         from_run.check(campaign, target, histories=histories != "default")

@@ -22,9 +22,6 @@ from met.run import Prepared, Run
 if TYPE_CHECKING:
     import xarray
 
-DIGITS = 2 * keys.DIGEST_BYTES
-"""Letters of a case_id."""
-
 KEPT_LAYOUTS = 4
 """Numbers of cases whose layouts are kept, those that were used last."""
 
@@ -114,7 +111,7 @@ def _plain(values: Any, count: int) -> np.ndarray:
     if isinstance(values, list):
         if not any(values):
             return np.zeros(count, "U1")
-        if len(values[0]) == DIGITS == min(map(len, values)) == max(map(len, values)):  # ten times as fast
-            return np.frombuffer("".join(values).encode("utf-32-le"), f"<U{DIGITS}").copy()
         return np.array(values)
+    if getattr(values, "dtype", np.dtype(float)).kind == "S":
+        return np.asarray(values.astype(str))
     return np.full(count, values) if np.ndim(values) == 0 else values

@@ -6,6 +6,7 @@ import errno
 import hashlib
 import shlex
 from binascii import unhexlify
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
@@ -15,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive import plain, sound, step_errors, verified
+from batch.archive import plain, sound, step_errors, summarised, verified
 from batch.archive.hdf5 import SIGNATURE, h5py
 from batch.archive.layout import SCHEMA, VERSION
 from batch.archive.rows import row_of
@@ -25,6 +26,7 @@ from met.distinct import distinct
 from met.host.files import open_regular
 from met.plan import Plan
 from met.plan.columns import are_among
+from met.plan.swept import blocks
 
 
 @contextmanager
@@ -50,6 +52,9 @@ class ArchiveGroup:
             sound.check(self)
             self.verified = verified.read(node, self)
             self.step_errors = step_errors.read(self)
+            self.summary = summarised.read(node, self)
+        self.summed: summarised.CaseSummary | None = None
+        """What all cases came to, once somebody has gone through their rows for it (batch/queries/streamed.py)."""
         self.name: str = self.attributes["experiment"]
         self.sweep: str = str(self.attributes.get("sweep", ""))
         self.allowed: tuple[str, ...] = tuple(filter(None, str(self.attributes.get("allowed", "")).split("\n")))
@@ -163,6 +168,11 @@ class ArchiveGroup:
         return int(self._node["case"].shape[0])
 
     @property
+    def run(self) -> int:
+        """The number of cases that were run: those of a summary, or all that have a row."""
+        return self.count if self.summary is None else self.summary.cases
+
+    @property
     def recorded(self) -> int:
         """The number of cases whose histories are kept."""
         return int(self._node["recorded_case"].shape[0]) if "recorded_case" in self._node else 0
@@ -175,6 +185,11 @@ class ArchiveGroup:
             unit = str(variable.attributes.get("deck_unit", variable.unit))
             out[variable.path] = (float(self.values(variable.name)[position]) / scale, unit)
         return out
+
+    def position_of(self, case: int) -> int:
+        """The position here of a case by its position in the case table; it is here."""
+        with reading(self.path):
+            return bisect_left(range(self.count), case, key=lambda place: int(self._node["case"][place]))
 
     def find_case(self, wanted: str) -> int:
         """Position in this group of a case: `#7`, its row in the case table, or the beginning of its case_id."""
@@ -265,6 +280,18 @@ class ArchiveFile:
             raise Unlike("it holds two runs of one name")
         return groups
 
+    def need_every_row(self, what: str) -> None:
+        """Refuse a question to all cases of an archive that keeps a summary of them. Raises Problem E330."""
+        for group in self.groups:
+            if group.summary is not None:
+                message = f"{what} needs a row a case, and {self.path} keeps a summary of `{group.name}`"
+                helps = (
+                    "`met run DECK --rows all` keeps a row a case",
+                    f"`met show {shlex.quote(str(self.path))}` says what the summary holds, and `--evidence` the "
+                    "table of requirements",
+                )
+                raise Problem(error("E330", message, help=helps))
+
     @property
     def provenance(self) -> dict[str, Any]:
         """Versions, git commit and whether MET's source was changed, defines."""
@@ -310,7 +337,8 @@ class ArchiveFile:
             varied = {coordinate.path for coordinate in cases.coordinates}
             if varied != {variable.path for variable in group.role("coordinate")}:
                 raise Unlike(f"the plan of `{group.name}` varies something else")
-            if not are_among(cases.table, group.values("case")).all():
+            stretches = (group.stretch("case", piece.start, piece.stop) for piece in blocks(group.count))
+            if not all(are_among(cases.table, numbers).all() for numbers in stretches):
                 raise Unlike(f"the plan of `{group.name}` has not its cases")
 
 

@@ -36,6 +36,9 @@ HEAP = b"GCOL\x01\0\0\0"
 SEARCHED = 64 << 20
 """Bytes at either end of a file in which heaps are looked for: more would take seconds of a large archive."""
 
+PIECE = 16 << 16
+"""Bytes of a dataset that are looked at together, a whole number of strings."""
+
 REFERENCE = np.dtype([("length", "<u4"), ("address", "<u8"), ("index", "<u4")])
 """A string of any length, as a dataset has it: its length, and where it is."""
 
@@ -113,9 +116,12 @@ def _stored(node: Any, packers: list[int], file: int, width: int) -> Iterator[by
     made = node.get_create_plist()
     layout = made.get_layout()
     if layout == module.h5d.CONTIGUOUS:
-        offset = node.get_offset()
-        if offset is not None:
-            yield os.pread(file, node.get_storage_size(), offset)
+        offset, size = node.get_offset(), node.get_storage_size()
+        for at in range(0, size, PIECE) if offset is not None else ():
+            piece = os.pread(file, min(PIECE, size - at), offset + at)
+            if not piece:  # the file ends before its own words say so
+                break
+            yield piece
     elif layout == module.h5d.COMPACT:  # a few values, in the file's own words about the dataset: one by one
         read = module.Dataset(node)
         for place in np.ndindex(node.shape):

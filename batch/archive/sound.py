@@ -13,6 +13,7 @@ import numpy as np
 
 from batch.archive.stored import Stored, StoredGroup, Unlike
 from met.messages.visible import line
+from met.plan.swept import blocks
 from met.run import DONE, LOST
 from met.statistics.confidence import can_be_shown
 
@@ -181,25 +182,29 @@ def _requirements(group: StoredGroup) -> None:
 
 def _values(group: StoredGroup) -> None:
     """Check that cases rise, and that statuses, times and names have values that they can have."""
-    cases, valid = group.values("case"), group.values("n_valid")
-    if not _rises(cases) or (len(cases) and not (cases[0] >= 0 and cases[-1] <= MOST_CASE)):
-        raise Unlike("its cases do not rise")
-    if not len(cases):
+    count = group.shape("case")[0]
+    if not count:
         raise Unlike("it has no case")
-    _within(group, "status", DONE, LOST)
-    if "met" in group.variables:
-        _within(group, "met", -1, 1)
     rows = None
     if "time" in group.variables:
         times = group.values("time")
         rows = len(times)
         if not rows or not (np.diff(times) > 1 / MOST).all() or not 0.0 <= times[0] <= times[-1] < MOST:
             raise Unlike("its times do not rise")
-    if valid.min() < 0 or (rows is not None and valid.max() > rows):
-        raise Unlike("variable `n_valid` is not of its times")
+    before = -1
+    for piece in blocks(count):
+        cases, valid = (group.stretch(name, piece.start, piece.stop) for name in ("case", "n_valid"))
+        if not _rises(cases) or not before < cases[0] or not cases[-1] <= MOST_CASE:
+            raise Unlike("its cases do not rise")
+        if valid.min() < 0 or (rows is not None and valid.max() > rows):
+            raise Unlike("variable `n_valid` is not of its times")
+        before = int(cases[-1])
+    _within(group, "status", DONE, LOST)
+    if "met" in group.variables:
+        _within(group, "met", -1, 1)
     if "recorded_case" in group.variables:
         recorded = group.values("recorded_case")
-        if not _rises(recorded) or not np.isin(recorded, cases).all():
+        if not _rises(recorded) or not are_cases(group, recorded).all():
             raise Unlike("its recorded cases are none of its cases")
     for variable in group.role("extreme"):
         _within(group, variable.name, 0, len(str(variable.attributes.get("flag_meanings", "")).split()) - 1)
@@ -219,7 +224,17 @@ def _rises(values: np.ndarray) -> bool:
     return bool((values[1:] > values[:-1]).all())
 
 
+def are_cases(group: StoredGroup, wanted: np.ndarray) -> np.ndarray:
+    """True for each of these positions in the case table of which the group has a case."""
+    found = np.zeros(np.shape(wanted), bool)
+    for piece in blocks(group.shape("case")[0]):
+        found |= np.isin(wanted, group.stretch("case", piece.start, piece.stop))
+    return found
+
+
 def _within(group: StoredGroup, name: str, low: int, high: int) -> None:
-    values = group.values(name)
-    if values.size and not (values.min() >= low and values.max() <= high):
-        raise Unlike(f"variable `{name}` has a value that it cannot have")
+    """Check the values of a variable along cases, a stretch at a time."""
+    for piece in blocks(group.shape(name)[0]):
+        values = group.stretch(name, piece.start, piece.stop)
+        if values.size and not (values.min() >= low and values.max() <= high):
+            raise Unlike(f"variable `{name}` has a value that it cannot have")

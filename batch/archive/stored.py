@@ -57,3 +57,6 @@ class StoredGroup(Protocol):
 
     def values(self, name: str) -> np.ndarray:
         """All of a variable; strings as an array of str."""
+
+    def stretch(self, name: str, first: int, last: int) -> np.ndarray:
+        """A variable in the cases at positions `first` to `last`, not itself."""

@@ -18,16 +18,16 @@ KINDS = {"float64": np.float64, "float32": np.float32, "int64": np.int64, "int8"
 
 
 def values_of_cases(experiment: Experiment, layout: Layout, run: Run, id_head: bytes | None = None) -> dict[str, Any]:
-    """Everything that is one value a case, of the cases of a run; strings in lists.
+    """Everything that is one value a case, of the cases of a run; keys as arrays of bytes, other strings in lists.
 
-    id_head  as `keys.case_ids` takes it
+    id_head  of the experiment, as `keys.id_head` gives it, where known
     """
     rows = run.case
-    names = keys.case_keys(experiment, rows)
+    own, names = keys.case_names(experiment, rows, id_head)
     values: dict[str, Any] = {
         "case": experiment.cases.table[rows],
-        "case_key": names,
-        "case_id": keys.case_ids(experiment, rows, names, id_head),
+        "case_key": own,
+        "case_id": names,
         "seed": keys.case_seeds(experiment, rows),
         "repeat": 0 if experiment.cases.repeats is None else experiment.cases.repeats[rows],
         "status": run.status,

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from batch.archive.hdf5 import h5py
-from batch.archive.sound import MOST
+from batch.archive.sound import MOST, are_cases
 from batch.archive.stored import StoredGroup, Unlike
 from met.frozen import frozen
 
@@ -92,7 +92,7 @@ def read(node: Any, group: StoredGroup) -> Verified | None:
         if values[name].shape != tuple(sizes[dim] for dim in dims):
             raise Unlike(f"variable `{NAME}/{name}` is not of the size of its dimensions")
     cases, metrics = values["verified_case"], tuple(map(str, values["verified_metric"].tolist()))
-    if not len(cases) or not (np.diff(cases) > 0).all() or not np.isin(cases, group.values("case")).all():
+    if not len(cases) or not (np.diff(cases) > 0).all() or not are_cases(group, cases).all():
         raise Unlike("its verified cases are none of its cases")
     there = {variable.name for variable in group.role("metric")}
     if not metrics or len(set(metrics)) != len(metrics) or not there.issuperset(metrics):

@@ -10,15 +10,17 @@ import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from batch.archive import layout as archive_layout
 from batch.campaigns import choosing
 from batch.campaigns.folder import Folder, beside
-from batch.campaigns.keep import Keep, as_list, keep, kept_before, kept_by_outcome
+from batch.campaigns.keep import Keep, KeptRows, as_list, keep, kept_before, kept_by_outcome, kept_rows
 from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.output import check_output, check_room, default_output
+from batch.campaigns.summarising import point_sizes
 from batch.campaigns.tasks import CampaignSection
 from batch.campaigns.verification.when import WORDS as VERIFY_WORDS
 from batch.campaigns.verification.when import Verify
@@ -54,6 +56,7 @@ class CampaignPart:
     single  whether histories are kept as numbers of four bytes
     wires   whether its beds are real ones, and how late these are (met.program.build.build); None: they are emulated
     stops_early  whether its cases are run only until what is required of them is decided; then `rows` are the most
+    written  the number of cases that have a row in the archive, about; None: all
     """
 
     experiment: Experiment
@@ -63,6 +66,7 @@ class CampaignPart:
     single: bool = False
     wires: Wires | None = None
     stops_early: bool = False
+    written: int | None = None
 
     def prepared(self) -> engine.Prepared:
         """The program that runs it."""
@@ -83,7 +87,8 @@ class CampaignPart:
     def bytes(self) -> int:
         """About what is in the archive of it."""
         described = archive_layout.PARAMETER_TEXT * len(self.experiment.parameters)
-        return archive_layout.layout(self.experiment, len(self.rows), self.recorded, self.single).bytes + described
+        rows = len(self.rows) if self.written is None else min(self.written, len(self.rows))
+        return archive_layout.layout(self.experiment, rows, self.recorded, self.single).bytes + described
 
     @property
     def shard_bytes(self) -> int:
@@ -96,7 +101,8 @@ class CampaignPart:
 @frozen
 class Campaign:
     """A campaign that is ready to run, all of it checked. words: the choice of histories, as `prepare` takes it;
-    verify: which cases are run with shorter steps besides (batch/campaigns/verification/when.py)."""
+    verify: which cases are run with shorter steps besides (batch/campaigns/verification/when.py); kept_rows: whose rows
+    the archive has."""
 
     plan: Plan
     parts: tuple[CampaignPart, ...]
@@ -105,6 +111,7 @@ class Campaign:
     output: Path
     notes: tuple[str, ...] = ()
     verify: Verify = "auto"
+    kept_rows: KeptRows = KeptRows()
 
     @property
     def cases(self) -> int:
@@ -150,6 +157,7 @@ def prepare(
     wires: Wires | None = None,
     verify: Verify = "auto",
     decided: Collection[str] = (),
+    rows: str = "all",
 ) -> Campaign:
     """Settle what will be run; raises Problem for anything that would stop it later, and writes nothing.
 
@@ -163,6 +171,8 @@ def prepare(
     wires        where it is run on real beds: then nothing is verified
     verify       which cases are run again with shorter steps: "none", "some", "all", or "auto": some where it is cheap
     decided      experiments, by name, whose rows in `selected` are those after which it was decided what is required
+    rows         of which cases the archive has rows: "all", or a "summary" and the rows that it names, "worst:N:METRIC"
+                 and the worst besides (batch/campaigns/keep.py)
     """
     if verify not in VERIFY_WORDS:
         raise ValueError(f"verify is one of {', '.join(VERIFY_WORDS)}, and not {verify!r}")
@@ -176,9 +186,14 @@ def prepare(
         raise Problem(error("E311", "there is no case to run", help="`met cases DECK` lists them"))
     named = [experiment for experiment, _ in selected]
     target = Path(output) if output is not None else default_output(plan, experiments, selected, all_of)
+    chosen_rows = kept_rows(rows, named)
+    if not chosen_rows.all:
+        histories = _histories_of_a_summary(rows, histories, verify)
     wanted = keep(histories, named)
     words = tuple(as_list(histories))
     parts = _parts(selected, wanted, float32, decided)
+    if not chosen_rows.all:
+        parts = tuple(_summarised(part, chosen_rows) for part in parts)
     if kept is not None:
         parts = tuple(replace(part, kept=places_among(part.rows, kept[part.experiment.name])) for part in parts)
     notes: list[str] = []
@@ -194,11 +209,37 @@ def prepare(
     parts = tuple(replace(part, wires=wires) for part in parts)
     kept_plan = replace(plan, experiments=tuple(part.experiment for part in parts), selected=())
     words = tuple("all" if word == "default" else word for word in words)
-    campaign = Campaign(kept_plan, parts, wanted, words, target, tuple(notes), "none" if wires else verify)
+    checked: Verify = "none" if wires else verify
+    campaign = Campaign(kept_plan, parts, wanted, words, target, tuple(notes), checked, chosen_rows)
     check_output(target, kept_plan)
     if not target.exists():  # one that is there may be whole, and need nothing: then `perform` sees to it
         check_room(target, campaign.bytes_missing)
     return campaign
+
+
+def _histories_of_a_summary(rows: str, histories: str | int | Sequence[str | int], verify: Verify) -> Literal["none"]:
+    """The choice of histories beside `--rows` other than `all`: none. Raises Problem E351 for any other, and where all
+    cases are to be verified, whose rows would have to be there."""
+    if as_list(histories) not in (["default"], ["none"]):
+        message = f"rows `{rows}` keep no histories"
+        remedy = "`met run ARCHIVE.h5 --case '#7'` computes a case again, with its history; `--rows all` keeps any"
+        raise Problem(error("E351", message, help=remedy))
+    if verify == "all":
+        message = f"rows `{rows}` do not go with all cases verified, of which each would need its row"
+        raise Problem(error("E351", message, help="`--verify some` verifies those that it chooses; `--rows all`"))
+    return "none"
+
+
+def _summarised(part: CampaignPart, rows: KeptRows) -> CampaignPart:
+    """A part of which the archive has a summary. Raises Problem E351 where it has too many design points, or stops by
+    its results."""
+    experiment = part.experiment
+    if part.stops_early:
+        message = f"`{experiment.name_in_deck}` stops when its requirements are decided, which takes a row a case"
+        raise Problem(error("E351", message, help="leave `--rows` away: its cases are few"))
+    points = len(point_sizes(experiment, part.rows))
+    named = 2 * len(experiment.structure.metrics) + (points + 1) * len(experiment.requirements)
+    return replace(part, written=rows.worst + named)
 
 
 def _parts(

@@ -366,6 +366,7 @@ def _checked(data: Any) -> dict[str, Any]:
         and all(isinstance(word, str) or is_count(word) for word in data["histories"])
         and isinstance(data["float32"], bool)
         and data.get("verify", "auto") in VERIFY_WORDS
+        and isinstance(data.get("rows", "all"), str)
         and all(is_count(each["number"]) for each in sections)
         and all(one["number"] < other["number"] for one, other in pairwise(sections))
     )

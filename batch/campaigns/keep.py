@@ -24,6 +24,13 @@ SINGLE = ("default", "all", "none", "every", "failed", "worst")
 WORDS = "default, all, none, every:N, failed, worst:N, worst:N:METRIC, or cases by '#7' or id"
 
 
+ROW_WORDS = ("all", "summary", "worst")
+ROWS_HELP = "rows are kept of: all, summary, worst:N, or worst:N:METRIC, N up to 100,000"
+
+MOST_WORST = 100_000
+"""Rows of the worst cases beside a summary, at most."""
+
+
 @frozen
 class Keep:
     """The choice of cases whose histories are kept.
@@ -47,6 +54,37 @@ class Keep:
     def at_most(self, cases: int) -> int:
         """The most cases that are chosen later; no failures are expected."""
         return min(cases, sum(count for count, _ in self.worst))
+
+
+@frozen
+class KeptRows:
+    """The cases of which an archive has rows: all, or those that its summary names and the `worst` by a `metric`.
+
+    word  as it was asked for, `all`, `summary` or `worst:N:METRIC`
+    """
+
+    word: str = "all"
+    worst: int = 0
+    metric: str = ""
+
+    @property
+    def all(self) -> bool:
+        return self.word == "all"
+
+
+def kept_rows(word: str, experiments: Sequence[Experiment]) -> KeptRows:
+    """Read the word of `--rows`. Raises Problem E351."""
+    name, *rest = word.split(":")
+    if word in ("all", "summary"):
+        return KeptRows(word)
+    if name == "worst" and 1 <= len(rest) <= 2 and rest[0].isdecimal() and 0 < int(rest[0]) <= MOST_WORST:
+        metric = rest[1] if len(rest) == 2 else ""
+        _check_metric(metric, experiments)
+        first = experiments[0].structure.metrics
+        return KeptRows(word, int(rest[0]), metric or (first[0].name if first else ""))
+    near = difflib.get_close_matches(name, ROW_WORDS, n=1)
+    helps = [*(f"did you mean `{each}`?" for each in near if each != name), ROWS_HELP]
+    raise Problem(error("E351", f"rows `{word}` is none of the words that say whose rows are kept", help=helps))
 
 
 def as_list(words: str | int | Sequence[str | int]) -> list[str | int]:

@@ -1,17 +1,26 @@
-"""The shards of a campaign into its archive: in order, a bounded number of cases at a time, each shard proved again."""
+"""The shards of a campaign into its archive: in order, a bounded number of cases at a time, each shard proved again.
+
+One thread writes, for HDF5 has no more; others read and prove the shards and make what is written, some stretches
+ahead of it. What is written, and in which pieces, does not depend on them.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from batch.campaigns import shard
 from batch.campaigns.folder import Folder
 from batch.campaigns.outcomes import CaseOutcomes
-from batch.campaigns.tasks import CampaignSection
+from batch.campaigns.tasks import CampaignSection, Task
 from met import run as engine
 from met.diagnostic import Problem, error
 from met.plan.columns import places_among
@@ -22,6 +31,12 @@ if TYPE_CHECKING:
 
 BLOCK = 1 << 16
 """Cases that are written at a time, however they were run: where HDF5 puts strings depends on it."""
+
+
+AHEAD = 2
+"""Shards that are read, and blocks that are made, while one is written."""
+
+T = TypeVar("T")
 
 
 class Missing(Exception):
@@ -35,46 +50,45 @@ def merge(
     values: CampaignSection,
     histories: CampaignSection | None,
     progress: Callable[[int], None] = lambda _: None,
+    *,
+    threads: int | None = None,
 ) -> CaseOutcomes:
     """Write one experiment; what became of its cases. Raises Missing.
 
     values     all of its cases;  histories: those that were run again for them
     progress   told how many cases are written
+    threads    that read shards and make what is written; None: one a processor
     """
     kept = histories.rows if histories is not None else np.empty(0, np.int64)
     places = places_among(values.rows, np.asarray(kept))
     outcomes = CaseOutcomes(values.prepared.experiment)
     before: list[np.ndarray] = []
-    waiting: list[np.ndarray] = []
-    fates: dict[int, tuple[int, str]] = {}
     ended: dict[int, tuple[int, str]] = {}
-    first = held = 0
 
-    def put(cases: int) -> None:
-        nonlocal waiting, fates, first, held
-        outputs = np.concatenate(waiting)
-        mine = {case: fate for case, fate in fates.items() if case < cases}
-        again = np.flatnonzero((places >= first) & (places < first + cases))
-        here = places[again] - first
-        before.append(outputs[here])
-        ended.update({int(k): mine[int(case)] for k, case in zip(again, here, strict=True) if int(case) in mine})
-        run = _results(values, first, outputs[:cases], None, mine)
-        writer.put_cases(number, first, run)
-        outcomes.add_run(run)
-        fates = {case - cases: fate for case, fate in fates.items() if case >= cases}
-        waiting, first, held = [outputs[cases:]], first + cases, held - cases
-        progress(first)
+    def made(first: int, outputs: np.ndarray, fates: dict[int, tuple[int, str]]) -> tuple[int, Run, Mapping[str, Any]]:
+        run = _results(values, first, outputs, None, fates)
+        return first, run, writer.case_values(number, run)
 
-    for at, found in shards_in_order(folder, values):
-        if found.history is not None:
-            writer.put_signals(number, at, _results(values, at, found.outputs.copy(), found.history, dict(found.fates)))
-        fates |= {at - first + case: fate for case, fate in found.fates.items()}
-        waiting.append(found.outputs.copy() if found.history is not None else found.outputs)  # not the shard with it
-        held += len(found.outputs)
-        while held >= BLOCK:
-            put(BLOCK)
-    if held:
-        put(held)
+    def shards(pool: ThreadPoolExecutor) -> Iterator[tuple[int, shard.Shard]]:
+        for at, found in shards_in_order(folder, values, pool):
+            if found.history is not None:
+                run = _results(values, at, found.outputs.copy(), found.history, dict(found.fates))
+                writer.put_signals(number, at, run)
+            yield at, found
+
+    def calls(pool: ThreadPoolExecutor) -> Iterator[Callable[[], tuple[int, Run, Mapping[str, Any]]]]:
+        for first, outputs, fates in in_blocks(shards(pool)):
+            again = np.flatnonzero((places >= first) & (places < first + len(outputs)))
+            here = places[again] - first
+            before.append(outputs[here])
+            ended.update({int(k): fates[int(c)] for k, c in zip(again, here, strict=True) if int(c) in fates})
+            yield partial(made, first, outputs, fates)
+
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        for first, run, found_values in ahead(pool, calls(pool), AHEAD):
+            writer.put_cases(number, first, found_values)
+            outcomes.add_run(run)
+            progress(first + len(run.case))
     if histories is not None:
         again = np.concatenate(before)
         first_kept = 0
@@ -118,22 +132,111 @@ def results(folder: Folder, section: CampaignSection, most: Mapping[str, int] | 
     return outcomes
 
 
-def shards_in_order(folder: Folder, section: CampaignSection) -> Iterator[tuple[int, shard.Shard]]:
-    """The shards of a section in order, less what was had before, each with the place of its first case."""
-    at = 0
+def shards_in_order(
+    folder: Folder, section: CampaignSection, pool: ThreadPoolExecutor | None = None
+) -> Iterator[tuple[int, shard.Shard]]:
+    """The shards of a section in order, less what was had before, each with the place of its first case. pool: reads
+    some ahead, where they have no histories, which would take much memory. Raises Missing."""
+
+    def read(task: Task, at: int) -> tuple[int, shard.Shard]:
+        try:
+            return at, _without(folder.read(section, task), at - task.first)
+        except (shard.UnsoundShard, OSError) as reason:
+            raise Missing(f"shard {task.name} {reason}") from reason
+
+    tasks, at = [], 0
     for task in folder.named_tasks(section.number):
-        if task.last <= at:
+        if task.last > at >= task.first:
+            tasks.append(partial(read, task, at))
+            at = task.last
+    yield from ahead(None if section.recorded else pool, tasks, AHEAD)
+    if at < len(section.rows):
+        raise Missing(f"no shard holds case {at:,} of {section.name}")
+
+
+def in_blocks(
+    shards: Iterable[tuple[int, shard.Shard]],
+) -> Iterator[tuple[int, np.ndarray, dict[int, tuple[int, str]]]]:
+    """Outputs and fates of cases in blocks of `BLOCK`, however the shards were cut, each with the place of its first
+    case."""
+    waiting: list[np.ndarray] = []
+    fates: dict[int, tuple[int, str]] = {}
+    first = held = 0
+    for at, found in shards:
+        fates |= {at - first + case: fate for case, fate in found.fates.items()}
+        waiting.append(found.outputs.copy() if found.history is not None else found.outputs)  # not the shard with it
+        held += len(found.outputs)
+        while held >= BLOCK:
+            outputs = np.concatenate(waiting)
+            yield first, outputs[:BLOCK], {case: fate for case, fate in fates.items() if case < BLOCK}
+            fates = {case - BLOCK: fate for case, fate in fates.items() if case >= BLOCK}
+            waiting, first, held = [outputs[BLOCK:]], first + BLOCK, held - BLOCK
+    if held:
+        yield first, np.concatenate(waiting), fates
+
+
+def runs_in_blocks(folder: Folder, section: CampaignSection, threads: int | None = None) -> Iterator[tuple[int, Run]]:
+    """The results of all cases of a section in order, in blocks of `BLOCK`, each with the place of its first case.
+    Raises Missing."""
+
+    def made(first: int, outputs: np.ndarray, fates: dict[int, tuple[int, str]]) -> tuple[int, Run]:
+        return first, _results(section, first, outputs, None, fates)
+
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        blocks = (partial(made, *block) for block in in_blocks(shards_in_order(folder, section, pool)))
+        yield from ahead(pool, blocks, AHEAD)
+
+
+def ahead(pool: ThreadPoolExecutor | None, calls: Iterable[Callable[[], T]], most: int) -> Iterator[T]:
+    """What these calls return, in order, made by a pool of threads, so many at most beyond the one that is waited for;
+    without a pool, each when it is asked for."""
+    waiting: deque[Future[T]] = deque()
+    try:
+        for call in calls:
+            if pool is None:
+                yield call()
+                continue
+            waiting.append(pool.submit(call))
+            if len(waiting) > most:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        for each in waiting:
+            each.cancel()
+
+
+def with_rows(folder: Folder, section: CampaignSection, places: np.ndarray, number: int) -> CampaignSection:
+    """A section of some of another's cases, with shards of its own under this number. places: rising. Raises
+    Missing."""
+    kept = replace(section, number=number, rows=np.asarray(section.rows[places]), memories=None)
+    for task in folder.named_tasks(number):
+        (folder.shards / task.name).unlink(missing_ok=True)
+    done = at = 0
+    for task in folder.named_tasks(section.number):
+        first, last = np.searchsorted(places, [max(task.first, at), task.last]).tolist()
+        at = max(at, task.last)  # a case counts once
+        if last <= first:
             continue
-        if task.first > at:
-            break
         try:
             found = folder.read(section, task)
         except (shard.UnsoundShard, OSError) as reason:
             raise Missing(f"shard {task.name} {reason}") from reason
-        yield at, _without(found, at - task.first)
-        at = task.last
-    if at < len(section.rows):
-        raise Missing(f"no shard holds case {at:,} of {section.name}")
+        own = Task(number, first, last)
+        part = _part(found, places[first:last] - task.first, kept.key(first, last))
+        shard.write(folder.shards / own.name, part)
+        done += last - first
+    if done < len(places):
+        raise Missing(f"{len(places) - done:,} cases of {section.name} have no shard any more")
+    return kept
+
+
+def _part(found: shard.Shard, cases: np.ndarray, key: str) -> shard.Shard:
+    """Some cases of a shard as a shard of their own; the time they took stays with the shard that they are of."""
+    history = None if found.history is None else found.history[cases]
+    to = {case: place for place, case in enumerate(cases.tolist())}
+    fates = {to[case]: fate for case, fate in found.fates.items() if case in to}
+    return shard.Shard(key, found.outputs[cases], history, 0.0, fates)
 
 
 def _without(found: shard.Shard, first: int) -> shard.Shard:

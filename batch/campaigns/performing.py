@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +25,10 @@ from batch.campaigns.keep import worst_wanted
 from batch.campaigns.outcomes import CaseOutcomes, CountedCases
 from batch.campaigns.output import busy, cannot_write, check_room, publish
 from batch.campaigns.status import Reporter, died_lines
+from batch.campaigns.summarising import Summarised, summarise
 from batch.campaigns.tasks import CampaignSection
 from batch.campaigns.until_shown import StoppingPoints, run_until_shown, without_dropped
+from batch.campaigns.verification import when
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 from met.outputs import quoted
@@ -87,8 +89,7 @@ def perform(
     say           told, as it comes, what is found of an earlier run
     more          what else stands beside the archive, asked when all cases are done
     """
-    values = resuming.as_begun(Folder(beside(campaign.output)), campaign, values_sections(campaign))
-    key = resuming.campaign_key(values)
+    values, key = resuming.as_begun(Folder(beside(campaign.output)), campaign, values_sections(campaign))
     campaign = resuming.settled(campaign, values)
     there = resuming.finished_state(campaign, key)
     if there == resuming.WHOLE and not fresh:
@@ -166,6 +167,7 @@ class _CampaignWork:
         self.notes: list[str] = []
         self.warned: dict[object, Diagnostic] = {}
         self.counted: dict[str, CountedCases] = {}
+        self.summaries: dict[int, Summarised] = {}
         self.began = time.time()
         self.reporter = Reporter(folder, campaign.cases, progress)
         self.max_failures = max_failures
@@ -206,6 +208,7 @@ class _CampaignWork:
                         driver.run(section, stretches)
                 try:
                     self._drop(stops)
+                    self._summarise()
                     histories = self._histories(driver)
                     self.reporter.state("merging")
                     self._merge(histories)
@@ -263,6 +266,27 @@ class _CampaignWork:
         for note in notes:
             self._note(note)
 
+    def _summarise(self) -> None:
+        """Go on with the few cases whose rows are kept, and a summary of all, where that is asked for."""
+        if self.campaign.kept_rows.all:
+            return
+        kept, parts = [], []
+        for part, section in zip(self.whole.parts, self.values, strict=True):
+            self.reporter.begin(f"{section.name}, summing up", len(section.rows), 0, 0, "")
+            found = summarise(
+                section,
+                merge.runs_in_blocks(self.folder, section, self._threads),
+                self.campaign.kept_rows,
+                verified=when.resolve(self.campaign.verify, section.prepared, len(section.rows)) == "some",
+                progress=lambda cases: self.reporter.advance(cases, 0),
+            )
+            self.reporter.end()
+            self.summaries[section.experiment] = found
+            number = 2 * len(self.values) + section.number
+            kept.append(merge.with_rows(self.folder, section, found.places, number))
+            parts.append(replace(part, rows=kept[-1].rows))
+        self.kept, self.whole = kept, replace(self.campaign, parts=tuple(parts))
+
     def _histories(self, driver: Driver) -> dict[int, CampaignSection]:
         """Run the second pass; its sections by experiment."""
         found = {}
@@ -309,6 +333,7 @@ class _CampaignWork:
                     program.code_key,
                     program.result_keys,
                     part.experiment.cases.until_shown * part.stops_early,
+                    values.experiment in self.summaries,
                 )
             )
         temporary = temporary_of(self.campaign.output)
@@ -323,11 +348,16 @@ class _CampaignWork:
                     section,
                     histories.get(number),
                     lambda cases: self.reporter.advance(cases, 0),
+                    threads=self._threads,
                 )
-                self.counted[section.name] = outcomes.counted(len(parts[number].kept))
                 writer.look_back(number)
-                self._verify(writer, number, section, outcomes)
-                for each in instants.step_warnings(section, outcomes, self._threads):
+                whole = section
+                if number in self.summaries:
+                    outcomes, whole = self.summaries[number].outcomes, self.values[number]
+                    writer.put_summary(number, self.summaries[number].summary)
+                self.counted[section.name] = outcomes.counted(len(parts[number].kept))
+                self._verify(writer, number, whole, outcomes)
+                for each in instants.step_warnings(whole, outcomes, self._threads):
                     self.warned.setdefault((each.code, each.at), each)
                 self.reporter.end()
             writer.finish()
@@ -357,8 +387,6 @@ class _CampaignWork:
     def _verify(self, writer: ArchiveWriter, number: int, section: CampaignSection, outcomes: CaseOutcomes) -> None:
         """Run some of an experiment's cases, which are all in the archive by now, with shorter steps, where that is
         wanted."""
-        from batch.campaigns.verification import when
-
         way = when.resolve(self.campaign.verify, section.prepared, len(section.rows))
         if way == "none":
             return
@@ -381,7 +409,7 @@ class _CampaignWork:
         return [
             {
                 "experiment": section.name,
-                "cases": len(section.rows),
+                "cases": self.summaries[number].summary.cases if number in self.summaries else len(section.rows),
                 "seconds": round(
                     sum(
                         counts[n].seconds
@@ -391,7 +419,7 @@ class _CampaignWork:
                     6,
                 ),
             }
-            for section in self.kept
+            for number, section in enumerate(self.kept)
         ]
 
     def _tell_found(self, *, first: bool) -> None:

@@ -8,11 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.campaigns import choosing
 from batch.queries.groups import cases_named, groups_named
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import Experiment, Plan
+from met.plan.columns import are_among
 from met.run import comparable
+
+MOST_IN_NAME = 4
+"""Cases that an archive of them is called after."""
 
 MOST_TOLD = 8
 """Differences that are named."""
@@ -44,6 +49,10 @@ def replay(
     everything: all of the archive, with the histories that it has. Raises Problem."""
     with ArchiveFile(archive) as file:
         rows: dict[str, set[int]] = {}
+        if failed or everything:
+            file.need_every_row("running all again, or all that failed,")
+        if any(group.summary is not None for group in file.groups):
+            return _of_summary(file, names, cases)
         for case in cases:
             for group, position in cases_named(file, names, case):
                 if position is not None:
@@ -81,8 +90,20 @@ def replay(
     if everything:
         word = "again"
     else:
-        word = "failed" if failed else "case" + "-".join(map(str, few)) if len(few) <= 4 else "cases"
+        word = "failed" if failed else "case" + "-".join(map(str, few)) if len(few) <= MOST_IN_NAME else "cases"
     return Replay(Path(archive), plan, tuple(picked_rows), word, kept if everything else None, tuple(decided))
+
+
+def _of_summary(file: ArchiveFile, names: Sequence[str], cases: Sequence[str]) -> Replay:
+    """The cases to run again of an archive that keeps a summary: any that its plan has. Raises Problem."""
+    plan, wanted = file.plan(), {group.name for group in groups_named(file, names)}
+    if not cases:
+        raise Problem(error("E357", f"which cases of {file.path} are to be run again?", help="`--case '#7'` says it"))
+    asked = [experiment for experiment in plan.experiments if experiment.name in wanted]
+    picked = tuple((each, np.asarray(rows)) for each, rows in choosing.select_rows(asked, cases))
+    few = sorted({int(each.cases.table[row]) for each, rows in picked for row in rows.tolist()})
+    word = "case" + "-".join(map(str, few)) if len(few) <= MOST_IN_NAME else "cases"
+    return Replay(file.path, plan, picked, word)
 
 
 def _row(group: ArchiveGroup, position: int) -> int:
@@ -99,7 +120,9 @@ def differences(before: str | Path, after: str | Path) -> list[str]:
         for new in new_file.groups:
             old = groups[new.name]
             places = np.searchsorted(old.values("case"), new.values("case"))
-            ran = old.at("status", places) < 2
+            there = are_among(old.values("case"), new.values("case"))  # a summary has rows of few
+            places = np.where(there, places, 0)
+            ran = (old.at("status", places) < 2) & there
             out += _signals(old, new, places, ran)
             names = ["case_id", "status", "n_valid", *(variable.name for variable in new.role("metric"))]
             for name in names:
@@ -112,6 +135,14 @@ def differences(before: str | Path, after: str | Path) -> list[str]:
                 what = f"the program of `{new.name}` is another"
                 out.insert(0, f"{what}: MET's code, or that of models, has changed since")
     return out[:MOST_TOLD] + ([f"and {len(out) - MOST_TOLD} more"] if len(out) > MOST_TOLD else [])
+
+
+def in_both(before: str | Path, after: str | Path) -> tuple[int, int]:
+    """The number of the second archive's cases that have a row in the first, and of all of its cases."""
+    with ArchiveFile(before) as old_file, ArchiveFile(after) as new_file:
+        known = {group.name: group.values("case") for group in old_file.groups}
+        found = [are_among(known[group.name], group.values("case")) for group in new_file.groups]
+    return sum(int(each.sum()) for each in found), sum(map(len, found))
 
 
 def _signals(old: ArchiveGroup, new: ArchiveGroup, places: np.ndarray, ran: np.ndarray) -> list[str]:

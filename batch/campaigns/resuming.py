@@ -43,15 +43,15 @@ def campaign_key(values: Sequence[CampaignSection]) -> str:
     return hashlib.sha256(json.dumps([[section.name, section.key()] for section in values]).encode()).hexdigest()
 
 
-def as_begun(folder: Folder, campaign: Campaign, values: list[CampaignSection]) -> list[CampaignSection]:
+def as_begun(folder: Folder, campaign: Campaign, values: list[CampaignSection]) -> tuple[list[CampaignSection], str]:
     """The sections with the keys of programs that an older MET wrote, where what stands in the folder, or beside the
-    archive, is this campaign under those keys; else as they are."""
+    archive, is this campaign under those keys; else as they are. And the campaign's key."""
     key = campaign_key(values)
     begun = _begun_key(folder, campaign)
     if begun in ("", key):
-        return values
+        return values, key
     older = [replace(section, begun=section.prepared.old_code_key) for section in values]
-    return older if campaign_key(older) == begun else values
+    return (older, begun) if campaign_key(older) == begun else (values, key)
 
 
 def settled(campaign: Campaign, values: Sequence[CampaignSection]) -> Campaign:
@@ -173,6 +173,7 @@ def describe(folder: Folder, campaign: Campaign, sections: Iterable[CampaignSect
         histories=campaign.words,
         float32=any(part.single for part in campaign.parts),
         verify=campaign.verify,
+        **({} if campaign.kept_rows.all else {"rows": campaign.kept_rows.word}),
     )
 
 
@@ -192,6 +193,7 @@ def described(folder: Folder) -> Campaign:
         histories=told["histories"],
         float32=told["float32"],
         verify=told.get("verify", "auto"),
+        rows=told.get("rows", "all"),
     )
 
 
@@ -226,9 +228,11 @@ def _asked_sum(campaign: Campaign) -> str:
     summed = hashlib.sha256(json.dumps([campaign.keep.failed, campaign.keep.worst]).encode())
     if campaign.verify != "auto":
         summed.update(f"verify {campaign.verify}".encode())
+    if not campaign.kept_rows.all:
+        summed.update(f"rows {campaign.kept_rows.word}".encode())
 
     def refer(experiment: Any, index: int) -> dict[str, Any]:
-        if not index:
+        if not index and campaign.kept_rows.all:  # else the campaign's key says it, which is of all inputs
             for _, _, values in plan_file.table_pieces(experiment):
                 summed.update(values.tobytes())
         return {"index": index}

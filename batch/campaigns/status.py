@@ -219,7 +219,7 @@ def finished_archive(archive: Path) -> dict[str, Any] | None:
     if not archive.exists():
         return None
     with ArchiveFile(archive) as file:
-        return {"archive": str(archive), "cases": sum(group.count for group in file.groups), "began": "unknown"}
+        return {"archive": str(archive), "cases": sum(group.run for group in file.groups), "began": "unknown"}
 
 
 def unfinished_in(folder: Path) -> list[str]:

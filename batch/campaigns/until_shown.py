@@ -8,15 +8,12 @@ beyond it, and these are dropped: they reach neither the archive nor a verdict.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
-
 import numpy as np
 
 from batch.campaigns import shard
 from batch.campaigns.drive import Driver, Stopped
 from batch.campaigns.folder import Folder
-from batch.campaigns.merge import Missing
+from batch.campaigns.merge import with_rows
 from batch.campaigns.tasks import GRANULE, CampaignSection, Task
 from met import run as engine
 from met.run import DONE
@@ -163,41 +160,4 @@ def run_until_shown(driver: Driver, section: CampaignSection, points: StoppingPo
 def without_dropped(folder: Folder, section: CampaignSection, points: StoppingPoints, number: int) -> CampaignSection:
     """The section less the cases that are dropped, with shards of its own under this number. Raises Missing."""
     places = points.kept()
-    if len(places) == len(section.rows):
-        return section
-    kept = replace(section, number=number, rows=section.rows[places], memories=None)
-    for task in folder.named_tasks(number):
-        (folder.shards / task.name).unlink(missing_ok=True)
-    to = np.full(len(section.rows), -1)
-    to[places] = np.arange(len(places))
-    done = 0
-    for task in folder.named_tasks(section.number):
-        wanted = np.arange(task.first, task.last)
-        wanted = wanted[to[wanted] >= 0]
-        if len(wanted):
-            try:
-                found = folder.read(section, task)
-            except (shard.UnsoundShard, OSError) as reason:
-                raise Missing(f"shard {task.name} {reason}") from reason
-            for first, last in _stretches(wanted):
-                at = Task(number, int(to[first]), int(to[last - 1]) + 1)
-                part = _part(found, first - task.first, last - task.first, kept.key(at.first, at.last))
-                shard.write(folder.shards / at.name, part)
-            done += len(wanted)
-            to[wanted] = -1  # a case counts once
-    if done < len(places):
-        raise Missing(f"{len(places) - done:,} cases of {section.name} have no shard any more")
-    return kept
-
-
-def _stretches(places: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Stretches of neighbours among rising places."""
-    for part in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1):
-        yield int(part[0]), int(part[-1]) + 1
-
-
-def _part(found: shard.Shard, first: int, last: int, key: str) -> shard.Shard:
-    """Some cases of a shard as a shard of their own; the time they took stays with the shard that they are of."""
-    history = None if found.history is None else found.history[first:last]
-    fates = {case - first: fate for case, fate in found.fates.items() if first <= case < last}
-    return shard.Shard(key, found.outputs[first:last], history, 0.0, fates)
+    return section if len(places) == len(section.rows) else with_rows(folder, section, places, number)

@@ -49,6 +49,7 @@ def best(
     from met.diagnostic import Problem, error
 
     with ArchiveFile(archive) as file:
+        file.need_every_row("choosing among designs")
         found = [each for each in pools(groups_named(file, [experiment] if experiment else [])) if each.count > 1]
         if not found:
             helps = "a sweep has several: `vary`, `sample`"

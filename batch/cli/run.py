@@ -33,6 +33,14 @@ class Seconds(click.ParamType):
 
 SECONDS = Seconds()
 
+ROWS = click.option(
+    "--rows",
+    default="all",
+    metavar="WHICH",
+    help="Cases that have a row in the archive: all, or a `summary` of them with the few rows that it names, or "
+    "worst:N:METRIC, the N worst besides. [all]",
+)
+
 VERIFY = click.option(
     "--verify",
     type=click.Choice(["auto", "none", "some", "all"]),
@@ -96,6 +104,7 @@ def measured(value: Any, si: str) -> float:
 @click.option("--max-failures", type=click.IntRange(min=0), metavar="N", help="Stop when more cases have failed.")
 @click.option("--fresh", is_flag=True, help="Start over, rather than run what is missing.")
 @VERIFY
+@ROWS
 @click.option("--no-picture", is_flag=True, help="Draw no picture beside the archive.")
 @deck_options
 @format_option
@@ -141,6 +150,7 @@ def run(source: str, names: tuple[str, ...], form: str, **options: Any) -> int:
 @click.option("--timeout", type=SECONDS, metavar="TIME", help="Give up a case that makes no progress for so long.")
 @click.option("--fresh", is_flag=True, help="Start over, rather than submit what is missing.")
 @VERIFY
+@ROWS
 @deck_options
 @format_option
 @loudness_options

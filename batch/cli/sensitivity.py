@@ -37,10 +37,13 @@ def sensitivity(
     data, texts = [], []
     with ExitStack() as files:
         file = files.enter_context(ArchiveFile(archive))
+        file.need_every_row("what a result depends on")
         groups = groups_named(file, experiments)
         pairs = {}
         if against is not None:
-            both, _, _ = match_experiments(files.enter_context(ArchiveFile(against)), file)
+            other = files.enter_context(ArchiveFile(against))
+            other.need_every_row("what a change depends on")
+            both, _, _ = match_experiments(other, file)
             pairs = {
                 here.name: (there, *(matched := match_cases(there, here), matched.a, matched.b)[1:])
                 for there, here in both

@@ -55,6 +55,8 @@ def diff(a: str | Path, b: str | Path, given: Tolerances | None = None, *, distr
     """Compare two archives. given: tolerances, besides and instead of those of b's deck. distributions: compare metrics
     as samples even where the seeds are the same. Raises Problem."""
     with ArchiveFile(a) as file_a, ArchiveFile(b) as file_b:
+        for file in (file_a, file_b):
+            file.need_every_row("a comparison of cases")
         pairs, only_a, only_b = matching.match_experiments(file_a, file_b)
         allowed = given or Tolerances()
         _check(allowed, [*file_a.groups, *file_b.groups])

@@ -90,6 +90,8 @@ def export(
     request = ExportRequest(table, tuple(signals), units, layout, force, named=bool(cases))
     writer.check_request(request, target)
     with ArchiveFile(Path(archive)) as file:
+        if table != "evidence" and not cases:
+            file.need_every_row("a table of all cases")
         check(target, file.path, writer.is_own, force=force)
         names = [f"#{case}" if isinstance(case, int) else case for case in cases]
         only = writer.tables[0] if len(writer.tables) == 1 else None

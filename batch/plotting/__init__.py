@@ -73,6 +73,9 @@ def draw(
     """Draw a picture of archives that are open, as `plot` does."""
     from batch.plotting import histories, metrics
     from batch.plotting import output as place
+
+    for each in (archive, *([against] if against is not None else [])):
+        each.need_every_row("a picture of all cases")
     from batch.plotting.against import beside
     from batch.plotting.requests import plot_request
     from batch.plotting.sheet import PictureSheet

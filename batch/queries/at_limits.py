@@ -10,6 +10,7 @@ from batch.queries.requirements import beyond, group_requirements
 from batch.queries.signals import deck_unit, number_text
 from met.diagnostic import Diagnostic, Label, Place
 from met.frozen import frozen
+from met.plan.swept import blocks
 
 if TYPE_CHECKING:
     from batch.archive.read import ArchiveGroup
@@ -36,13 +37,18 @@ class LimitSummary:
 
 def limit_summaries(group: ArchiveGroup, here: slice = slice(None)) -> tuple[LimitSummary, ...]:
     """The limits of an experiment, or of some of its cases, in the archive's order; none of an older archive."""
-    rows, found = group.values("case")[here], []
+    first, last, _ = here.indices(group.count)
+    found = []
     for variable in group.role("limit"):
-        shares = np.nan_to_num(group.values(variable.name)[here])
-        worst, cases, mostly = int(shares.argmax()), int((shares > 0.0).sum()), int((shares > 0.5).sum())
-        found.append(
-            LimitSummary(_of(variable), variable.long_name, cases, float(shares[worst]), int(rows[worst]), mostly)
-        )
+        worst, largest, cases, mostly = first, -1.0, 0, 0
+        for piece in blocks(last - first):
+            begin = first + piece.start
+            shares = np.nan_to_num(group.stretch(variable.name, begin, first + piece.stop))
+            cases, mostly = cases + int((shares > 0.0).sum()), mostly + int((shares > 0.5).sum())
+            if (most := float(shares.max())) > largest:
+                worst, largest = begin + int(shares.argmax()), most
+        row = int(group.at("case", [worst])[0])
+        found.append(LimitSummary(_of(variable), variable.long_name, cases, largest, row, mostly))
     return tuple(found)
 
 

@@ -14,8 +14,10 @@ from batch.queries.failures import STATUS
 from batch.queries.ordering import CaseOrder
 from batch.queries.pool import ENDED, Pool
 from batch.queries.signals import deck_unit, number_text, value_text
+from batch.queries.streamed import is_streamed, summed_up
 from batch.queries.summary import finite
 from met.diagnostic import Problem
+from met.distinct import distinct
 
 SHOWN_CASES = 20
 """Rows of the table unless all are asked for."""
@@ -38,14 +40,14 @@ def table(
     """
     from ic.printing.columns import columns
 
-    positions = _among(ordering.positions(group, by), among)
+    positions = _listed(group, by, among, most)
     left = 0 if most is None else max(0, len(positions) - most)
     positions = positions[: len(positions) - left]
     outcomes = requirements.outcomes(group, positions)
     cells = [["", *(f"#{row}" for row in group.at("case", positions))]]
     cells.append(["id", *(case_id[:8] for case_id in group.at("case_id", positions))])
     marks, units = _marks(group, outcomes), ["", ""]
-    if "repeat" in group.variables and group.values("repeat").any():
+    if "repeat" in group.variables and group.at("repeat", positions).any():
         cells.append(["repeat", *map(str, group.at("repeat", positions))])
         units.append("")
     for variable in (*group.role("coordinate"), *group.role("metric")):
@@ -103,8 +105,38 @@ def _among(order: np.ndarray, some: np.ndarray | None) -> np.ndarray:
     return order if some is None else order[np.isin(order, some)]
 
 
-def title(group: ArchiveGroup, most: int | None = None, *, by: CaseOrder | None = None) -> str:
-    """The title of the table, which says how it is ordered."""
+def title(group: ArchiveGroup, most: int | None = None, *, by: CaseOrder | None = None, every: bool = False) -> str:
+    """The title of the table, which says how it is ordered, and of which cases it is where not all have rows. every:
+    whether all cases are listed."""
+    if is_streamed(group) and by is None and not every:
+        return f"of {group.count:,} cases those that stand out:"
+    found = _title(group, most, by)
+    return found if group.summary is None else f"of the rows that are kept, {found}"
+
+
+def _listed(group: ArchiveGroup, by: CaseOrder | None, among: np.ndarray | None, most: int | None) -> np.ndarray:
+    """Positions of the cases of the table, in order. Of very many, unless all are asked for: those that stand out, in
+    the order of the case table."""
+    if (
+        most is not None
+        and by is None
+        and among is None
+        and is_streamed(group)
+        and (summed := summed_up(group)) is not None
+    ):
+        named = distinct(np.concatenate([summed.values[name] for name in CASES]))
+        return np.array([group.position_of(int(case)) for case in named[named >= 0][:MOST_STANDING_OUT]], np.int64)
+    return _among(ordering.positions(group, by), among)
+
+
+CASES = ("judged_worst_case", "least_case", "most_case", "cause_first")
+"""Variables of a summary that name cases."""
+
+MOST_STANDING_OUT = 100
+"""Cases that stand out among very many, of which so many are listed."""
+
+
+def _title(group: ArchiveGroup, most: int | None, by: CaseOrder | None) -> str:
     if (found := ordering.order_of_group(group, by)) is not None:
         return found.title
     outcomes = requirements.outcomes(group)
@@ -130,7 +162,7 @@ def rows_json(
     """The table of cases for programs, in SI, of these cases or of the worst among some: what a case is, how it ended,
     its metrics (null where not finite), and whether it meets each requirement."""
     if positions is None:
-        positions = _among(ordering.positions(group, by), among)[:most]
+        positions = _listed(group, by, among, most)[:most]
     positions = np.asarray(positions)
     numbers = [variable.name for variable in (*group.role("coordinate"), *group.role("metric"))]
     repeats = {"repeat": group.at("repeat", positions)} if "repeat" in group.variables else {}

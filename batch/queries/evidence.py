@@ -15,9 +15,11 @@ from typing import Any, Literal
 import numpy as np
 
 from batch.archive.read import ArchiveGroup, Stored
+from batch.archive.summarised import CaseSummary
 from batch.queries import requirements
 from batch.queries.requirements import GroupRequirement
 from batch.queries.signals import deck_unit, number_text
+from batch.queries.streamed import summed_up
 from met.frozen import frozen
 from met.statistics import confidence as fixed
 from met.statistics import sequential
@@ -87,6 +89,8 @@ def evidence_for(group: ArchiveGroup, found: Sequence[GroupRequirement]) -> list
     """The rows of these requirements: a row a design point, and one alone for what every case is to meet."""
     if not found:
         return []
+    if (summed := summed_up(group)) is not None:
+        return _of_summary(group, summed, found)
     outcomes = requirements.outcomes(group)
     points, why = _design_points(group)
     early = bool(group.attributes.get("until_shown"))
@@ -100,6 +104,34 @@ def evidence_for(group: ArchiveGroup, found: Sequence[GroupRequirement]) -> list
             out.append(
                 EvidenceRow(requirement=each, unit=unit, scale=scale, chosen=point.chosen, worst=worst, **judged)
             )
+    return out
+
+
+def _of_summary(group: ArchiveGroup, summary: CaseSummary, found: Sequence[GroupRequirement]) -> list[EvidenceRow]:
+    """The rows of requirements of all cases, of which the archive keeps what they came to."""
+    chosen = [group.variables[str(name)] for name in summary.values["chosen"]]
+    why = _why_without_confidence(group, group.role("coordinate"))
+    out = []
+    for each in found:
+        scale, unit = deck_unit(group.variables[each.metric])
+        sign = 1.0 if each.comparison.startswith("<") else -1.0
+        for row in summary.judged(each.place, whole=each.share is None):
+            values = summary.values["chosen_value"][row["point"]] if row["point"] >= 0 else ()
+            misses, spread = row["missed"] + row["unknown"], row["deviation"]
+            told: dict[str, Any] = {
+                "cases": row["cases"],
+                "missed": misses,
+                "value": row["worst"],
+                "margin": sign * (each.limit - row["worst"]),
+                "sigmas": sign * (each.limit - row["mean"]) / spread if spread > 0.0 else None,
+            }
+            if _without_confidence(each, why):
+                told |= _counted(each, row["cases"], misses, why)
+            else:
+                told |= _judged_by_counts(each, row["cases"], misses, None if np.isnan(row["bound"]) else row["bound"])
+            worst = group.position_of(row["worst_case"])
+            at = {variable.path: _shown(variable, value) for variable, value in zip(chosen, values, strict=False)}
+            out.append(EvidenceRow(requirement=each, unit=unit, scale=scale, chosen=at, worst=worst, **told))
     return out
 
 
@@ -120,16 +152,28 @@ def _design_points(group: ArchiveGroup) -> tuple[list[DesignPoint], str]:
     everything = [DesignPoint({}, np.arange(group.count))]
     coordinates = group.role("coordinate")
     drawn = [variable for variable in coordinates if variable.attributes.get("design")]
-    if not drawn and not int(group.values("repeat").max(initial=0)):
-        return everything, NOTHING_DRAWN
-    some = group.count < int(group.attributes.get("cases_in_table", group.count))
-    why = SOME_OF_THE_TABLE if some and not group.attributes.get("until_shown") else ""
+    why = _why_without_confidence(group, coordinates)
+    if why == NOTHING_DRAWN:
+        return everything, why
     chosen = [(variable, group.values(variable.name)) for variable in coordinates if variable not in drawn]
     if not chosen:
         return everything, why
     points = design_points([values for _, values in chosen], group.count)
     cases = np.split(np.argsort(points, kind="stable"), np.cumsum(np.bincount(points))[:-1])
     return [DesignPoint({v.path: _shown(v, values[here[0]]) for v, values in chosen}, here) for here in cases], why
+
+
+def _why_without_confidence(group: ArchiveGroup, coordinates: Sequence[Stored]) -> str:
+    """Why the cases of a group give no confidence; "" where they do."""
+    if (summed := summed_up(group)) is not None:
+        drawn = summed.drawn
+    else:
+        drawn = any(variable.attributes.get("design") for variable in coordinates)
+        drawn = drawn or int(group.values("repeat").max(initial=0)) > 0
+    if not drawn:
+        return NOTHING_DRAWN
+    some = group.run < int(group.attributes.get("cases_in_table", group.run))
+    return SOME_OF_THE_TABLE if some and not group.attributes.get("until_shown") else ""
 
 
 def _shown(variable: Stored, value: float) -> str:
@@ -156,23 +200,40 @@ def _judged(each: GroupRequirement, values: np.ndarray, outcomes: np.ndarray, wh
         "margin": sign * (each.limit - float(values[worst])),
         "sigmas": sign * (each.limit - float(finite.mean())) / deviation if deviation > 0.0 else None,
     }
-    if each.share is None or each.confidence is None or why:
-        share = each.share if each.share is not None and each.confidence is None else 1.0
-        verdict = "met" if cases - missed >= share * cases * (1.0 - ROUNDING) else "missed"
-        return {**found, "verdict": verdict, "why": why if each.confidence is not None else ""}
+    if _without_confidence(each, why):
+        return {**found, **_counted(each, cases, missed, why)}
     judged = _judged_early if early else _judged_once
     return {**found, **judged(each, values, outcomes != 1, unknown)}
+
+
+def _without_confidence(each: GroupRequirement, why: str) -> bool:
+    """True where the cases that were run decide it, and nothing is said of others."""
+    return each.share is None or each.confidence is None or bool(why)
+
+
+def _counted(each: GroupRequirement, cases: int, missed: int, why: str) -> dict[str, Any]:
+    """The verdict of the cases that were run. why: no confidence can be had."""
+    share = each.share if each.share is not None and each.confidence is None else 1.0
+    verdict = "met" if cases - missed >= share * cases * (1.0 - ROUNDING) else "missed"
+    return {"verdict": verdict, "why": why if each.confidence is not None else ""}
 
 
 def _judged_once(each: GroupRequirement, values: np.ndarray, missed: np.ndarray, unknown: np.ndarray) -> dict[str, Any]:
     """The verdict of cases whose number was fixed before they were looked at, and its bounds."""
     assert each.share is not None and each.confidence is not None
-    cases, misses = len(values), int(missed.sum())
+    rank = fixed.percentile_rank(len(values), each.share, each.confidence)
+    return _judged_by_counts(each, len(values), int(missed.sum()), _order_statistic(each, values, unknown, rank))
+
+
+def _judged_by_counts(each: GroupRequirement, cases: int, misses: int, bound: float | None) -> dict[str, Any]:
+    """The same, by the number of cases, how many of them miss it, and the order statistic that bounds the
+    percentile."""
+    assert each.share is not None and each.confidence is not None
     verdict = fixed.verdict(cases, misses, each.share, each.confidence)
     return {
         "lower": fixed.lower_bound(cases, misses, each.confidence),
         "upper": fixed.upper_bound(cases, misses, each.confidence),
-        "bound": _order_statistic(each, values, unknown, fixed.percentile_rank(cases, each.share, each.confidence)),
+        "bound": bound,
         "verdict": verdict,
         "more": fixed.cases_needed(each.share, each.confidence, misses) - cases if verdict == "not shown" else 0,
     }

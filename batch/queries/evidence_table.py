@@ -19,6 +19,7 @@ from batch.queries.signals import deck_unit, number_text, pretty_unit
 from batch.queries.step_errors.figures import figures
 from batch.queries.step_errors.limits import StepErrorVerdict, verdicts
 from batch.queries.step_errors.words import rounded
+from batch.queries.streamed import summed_up
 from met.frozen import frozen
 from met.outputs import quoted
 
@@ -30,7 +31,8 @@ NONE = "-"
 class RequirementEvidence:
     """A row of the table of evidence; numbers in SI, of which one `unit`, as the deck writes it, is `scale`.
 
-    run, requirement  as the deck wrote them;  at: the design point, `gearbox.ki = 0.1 V/rad`; "" where there is one
+    run, requirement  as the deck wrote them;  at: the design point, `gearbox.ki = 0.1 V/rad`, of a sum of
+                      sweeps behind its part, `loads`; "" where there is one
     metric, comparison, limit, share, confidence  of what is required
     cases             that were judged;  missed: of these, with those that failed or have no value
     share_met         of the cases that were run;  at_least, at_most: of all cases, each with the confidence
@@ -95,6 +97,8 @@ def requirement_evidence(
     out = []
     for group in groups:
         structure = [f"{choice.path} = {group.at(choice.name, [0])[0]}" for choice in group.role("choice")]
+        if group.sweep and not structure:  # a sum of sweeps
+            structure = [group.name.removeprefix(f"{group.sweep}.")]
         verified = figures(group)
         errors = {} if verified is None else {name: each.error for name, each in verified.metrics.items()}
         drawn, chosen = _designs(group)
@@ -113,6 +117,8 @@ def requirement_evidence(
 def _designs(group: ArchiveGroup) -> tuple[bool, bool]:
     """Whether anything was drawn at random in a group's cases, and whether anything was chosen."""
     designs = [bool(variable.attributes.get("design")) for variable in group.role("coordinate")]
+    if (summed := summed_up(group)) is not None:
+        return summed.drawn, not all(designs)
     repeated = "repeat" in group.variables and bool(group.values("repeat").any())
     return any(designs) or repeated, not all(designs)
 
@@ -120,7 +126,7 @@ def _designs(group: ArchiveGroup) -> tuple[bool, bool]:
 def _of_metric(
     group: ArchiveGroup, row: EvidenceRow, at: str, error: float | None, archive: str, several: bool
 ) -> RequirementEvidence:
-    required, case = row.requirement, int(group.values("case")[row.worst])
+    required, case = row.requirement, int(group.at("case", [row.worst])[0])
     variable = group.variables[required.metric]
     return RequirementEvidence(
         run=group.sweep or group.name,

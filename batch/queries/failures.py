@@ -22,12 +22,19 @@ NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d.]*(e[-+]?\d+)?")
 
 @frozen
 class FailureGroup:
-    """Cases that failed alike: how they ended, the cause of the first, whose id this is, and all their positions."""
+    """Cases that failed alike: how they ended, the cause of the first, whose id this is, and all their positions; where
+    an archive keeps a summary, the position of the first alone, and how many they are, `of`."""
 
     status: str
     cause: str
     case_id: str
     cases: tuple[int, ...]
+    of: int = 0
+
+    @property
+    def count(self) -> int:
+        """The number of the cases."""
+        return self.of or len(self.cases)
 
     @property
     def row(self) -> int:
@@ -61,12 +68,14 @@ def failure_lines(found: Sequence[FailureGroup], width: int) -> list[str]:
     for failure in found:
         word = "" if failure.status == "failed" else f"{failure.status}: "
         cause = failure.cause.removeprefix(word)
-        if len(failure.cases) == 1:
+        if failure.count == 1:
             head = f"  #{failure.row} {failure.case_id[:8]}  {word}"
             out += textwrap.wrap(cause, width, initial_indent=head, subsequent_indent=" " * len(head))
             continue
-        head = f"  {len(failure.cases):,} cases  {word}"
+        head = f"  {failure.count:,} cases  {word}"
         out += textwrap.wrap(f"{cause} (#{failure.row})", width, initial_indent=head, subsequent_indent=" " * len(head))
+        if failure.of:
+            continue
         out += textwrap.wrap(ranges(failure.cases), width, initial_indent="    ", subsequent_indent="    ")
     return out
 

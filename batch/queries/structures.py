@@ -8,6 +8,7 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.signals import deck_unit
+from batch.queries.streamed import summed_up
 from batch.queries.summary import Summary, median_text, summary_of
 
 
@@ -44,6 +45,9 @@ def _table(groups: Sequence[ArchiveGroup]) -> list[str]:
     if metrics:
         rows.append(["median of the cases:", "", *([""] if judged else []), *(units[name] for name in metrics)])
     for group in groups:
+        if summed_up(group) is not None:
+            rows.append([group.name, str(group.run), *(["-"] * judged), *("-" for _ in metrics)])
+            continue
         met = group.values("met") if "met" in group.variables else np.ones((group.count, 0), np.int8)
         whole = [str(int((met == 1).all(axis=1).sum()))] if judged else []
         scales = {variable.name: deck_unit(variable)[0] for variable in group.role("metric")}

@@ -10,13 +10,16 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.archive.stored import Stored
+from batch.archive.summarised import DOUBTFUL, CaseSummary
 from batch.queries.at_limits import LimitSummary, limit_summaries
 from batch.queries.evidence import EvidenceRow, evidence
-from batch.queries.failures import FailureGroup, failures
+from batch.queries.failures import STATUS, FailureGroup, failures
+from batch.queries.requirements import requirement_texts
 from batch.queries.signals import number_text
 from batch.queries.step_errors import figures
 from batch.queries.step_errors.figures import Verification
 from batch.queries.step_errors.limits import StepErrorVerdict, verdicts
+from batch.queries.streamed import summed_up
 from batch.queries.warnings import warnings
 from met.diagnostic import Diagnostic
 from met.frozen import frozen
@@ -46,6 +49,14 @@ class SpreadColumn:
     page_head: str
 
 
+SUMMED_COLUMNS = (
+    SpreadColumn("minimum", "min", "smallest"),
+    SpreadColumn("mean", "mean", "mean"),
+    SpreadColumn("maximum", "max", "largest"),
+    SpreadColumn("deviation", "sigma", "standard deviation"),
+)
+"""The same of a metric of which an archive keeps a summary, `SummedMetric`."""
+
 SPREAD_COLUMNS = (
     SpreadColumn("minimum", "min", "smallest"),
     SpreadColumn("median", "median", "median"),
@@ -65,6 +76,17 @@ class MetricSummary(MetricSpread):
     about: str
     deck_unit: str = ""
     deck_scale: float = 1.0
+
+
+@frozen
+class SummedMetric(MetricSummary):
+    """A metric of which an archive keeps a summary: the mean and the standard deviation of its finite values, SI, in
+    place of the median, and the positions in the case table of the smallest and the largest."""
+
+    mean: float = np.nan
+    deviation: float = np.nan
+    least_case: int = -1
+    most_case: int = -1
 
 
 @frozen
@@ -135,6 +157,8 @@ def summarise(archive: ArchiveFile) -> tuple[Summary, ...]:
 
 def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
     """The outcome of one experiment, or of its case at this position."""
+    if position is None and (summed := summed_up(group)) is not None:
+        return _of_summary(group, summed)
     here = slice(None) if position is None else slice(position, position + 1)
     status = group.values("status")[here]
     failed = np.flatnonzero(status != 0)
@@ -174,6 +198,74 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
         limits=limit_summaries(group, here),
         limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
     )
+
+
+def _of_summary(group: ArchiveGroup, kept: CaseSummary) -> Summary:
+    """The outcome of an experiment of which the archive keeps a summary."""
+    values = kept.values
+    causes: dict[bool, list[FailureGroup]] = {True: [], False: []}
+    for cause, status, cases, first in zip(
+        *(values[f"cause{name}"].tolist() for name in ("", "_status", "_cases", "_first")), strict=True
+    ):
+        word = "warning" if status == DOUBTFUL else STATUS.get(status, str(status))
+        name = str(group.at("case_id", [group.position_of(first)])[0])
+        causes[status == DOUBTFUL].append(FailureGroup(word, str(cause), name, (first,), cases))
+    shares = evidence(group)
+    texts = requirement_texts(group)
+    whole = {place: kept.judged(place, whole=True)[0] for place in range(len(texts))}
+    verified = figures.figures(group)
+    return Summary(
+        name=group.name,
+        cases=kept.cases,
+        failed=sum(each.count for each in causes[False]),
+        recorded=group.recorded,
+        failures=tuple(causes[False]),
+        metrics=tuple(
+            _summed(group.variables[str(name)], kept, place) for place, name in enumerate(values["summed_metric"])
+        ),
+        requirements=tuple(
+            RequirementSummary(
+                text,
+                met=whole[place]["cases"] - whole[place]["missed"] - whole[place]["unknown"],
+                missed=whole[place]["missed"],
+                unknown=whole[place]["unknown"],
+                no_value=whole[place]["no_value"],
+                evidence=tuple(row for row in shares if row.requirement.place == place),
+            )
+            for place, text in enumerate(texts)
+        ),
+        sweep=group.sweep,
+        verified=verified,
+        step_errors=verdicts(group, verified),
+        warnings=tuple(warnings(group)),
+        doubts=tuple(causes[True]),
+        limits=limit_summaries(group) if group.summary is None else (),
+        limited=kept.limited,
+    )
+
+
+def _summed(variable: Stored, kept: CaseSummary, place: int) -> SummedMetric:
+    told = {name: kept.values[name][place].item() for name in SUMMED}
+    return SummedMetric(
+        minimum=told["least"],
+        median=told["least"] if told["finite"] == 1 else np.nan,
+        maximum=told["most"],
+        infinite=told["infinite"],
+        unknown=told["unknown"],
+        name=variable.name,
+        unit=variable.unit,
+        about=variable.long_name,
+        deck_unit=str(variable.attributes.get("deck_unit", variable.unit)),
+        deck_scale=float(variable.attributes.get("deck_scale", 1.0)),
+        mean=told["mean"],
+        deviation=float(np.sqrt(told["variance"])),
+        least_case=told["least_case"],
+        most_case=told["most_case"],
+    )
+
+
+SUMMED = ("least", "most", "finite", "infinite", "unknown", "mean", "variance", "least_case", "most_case")
+"""Variables of a summary that a metric's row is made of."""
 
 
 def _doubts(group: ArchiveGroup, position: int | None) -> tuple[FailureGroup, ...]:

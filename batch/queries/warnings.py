@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from batch.queries import at_limits, grapples, undecided
 from batch.queries.step_errors import warning as step_errors
+from batch.queries.streamed import summed_up
 from ic.printing.columns import count as counted
 from met.diagnostic import Diagnostic
 
@@ -38,5 +39,6 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
 
     experiment  of the plan, for places
     """
-    about = (step_errors, at_limits, grapples, undecided)
+    # told by counts; rows beside a summary are few, and say nothing of all cases
+    about = (step_errors,) if summed_up(group) is not None else (step_errors, at_limits, grapples, undecided)
     return [warning for each in about for warning in each.warnings(group, experiment)]

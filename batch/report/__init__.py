@@ -49,6 +49,7 @@ def report(
     target = default(archive) if output is None else Path(output)
     with ExitStack() as stack:
         file = stack.enter_context(ArchiveFile(archive))
+        file.need_every_row("a report")
         check(target)
         other = None
         if against is not None:

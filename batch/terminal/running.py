@@ -15,12 +15,13 @@ from batch.campaigns.executor import Executor
 from batch.campaigns.performing import Performed, TooMany, perform
 from batch.campaigns.plans import read_plan
 from batch.campaigns.rehearsal import rehearse
-from batch.campaigns.replaying import Replay, differences, replay
+from batch.campaigns.replaying import Replay, differences, in_both, replay
 from batch.campaigns.verification.when import Verify
 from batch.executors.choose import choose
 from batch.executors.threads import Threads
 from batch.export import Exported
 from batch.export.from_run import archive_and_export, check, export_command, export_run
+from batch.queries.streamed import MANY
 from batch.queries.structures import structures
 from batch.queries.summary import RequirementSummary, Summary, summarise
 from batch.queries.warnings import campaign_warnings
@@ -86,6 +87,7 @@ def run_and_tell(
     max_failures: int | None = None,
     fresh: bool = False,
     verify: Verify = "auto",
+    rows: str = "all",
     no_picture: bool = False,
     defines: tuple[str, ...] = (),
     include_dirs: tuple[str, ...] = (),
@@ -106,9 +108,9 @@ def run_and_tell(
     archive, target = archive_and_export(output)
     again = replay(source, names, cases, failed, everything) if names_archive(source) else None
     if again is not None:
-        campaign = _of_archive(source, again, archive, histories, float32, verify)
+        campaign = _of_archive(source, again, archive, histories, float32, verify, rows)
     else:
-        campaign = _of_deck(request, archive, cases, histories, float32, quiet or json, verify)
+        campaign = _of_deck(request, archive, cases, histories, float32, quiet or json, verify, rows)
     if target is not None:
         check(campaign, target, histories=bool(histories))
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
@@ -119,7 +121,7 @@ def run_and_tell(
     result = _result(campaign, performed, no_picture, say)
     exported, refused = _exported(campaign, target, bool(histories), json, say)
     unlike = differences(again.archive, campaign.output) if again is not None else []
-    compared = _compared(again, unlike)
+    compared = _compared(again, unlike, campaign.output)
     missing = target is not None and exported is None
     ok = result.ok and not unlike and not missing
     if json:
@@ -136,7 +138,13 @@ def run_and_tell(
 
 
 def _of_archive(
-    source: str, again: Replay, output: Path | None, histories: str | Sequence[str], float32: bool, verify: Verify
+    source: str,
+    again: Replay,
+    output: Path | None,
+    histories: str | Sequence[str],
+    float32: bool,
+    verify: Verify,
+    rows: str,
 ) -> Campaign:
     """The campaign that runs cases of an archive again. Raises Problem E305 where it would be written over that one."""
     archive = output or again.output
@@ -147,11 +155,12 @@ def _of_archive(
         again.plan,
         output=archive,
         selected=again.selected,
-        histories=histories or ("all" if again.kept is None else "none"),
+        histories=histories or ("all" if again.kept is None and rows == "all" else "none"),
         kept=again.kept if not histories else None,
         decided=again.decided,
         float32=float32,
         verify=verify,
+        rows=rows,
     )
 
 
@@ -189,7 +198,7 @@ def _performed(
 
 def _result(campaign: Campaign, performed: Performed, no_picture: bool, say: Callable[[str], None]) -> RunResult:
     """Read what came of a campaign, and draw the picture beside its archive."""
-    if campaign.cases > MOST_READ and _is_counted(campaign, performed):
+    if campaign.kept_rows.all and campaign.cases > MOST_READ and _is_counted(campaign, performed):
         return _counted_result(campaign, performed)
     with ArchiveFile(campaign.output) as file:
         summaries = summarise(file)
@@ -198,15 +207,22 @@ def _result(campaign: Campaign, performed: Performed, no_picture: bool, say: Cal
         warned = [*performed.warned, *campaign_warnings(file.groups, experiments)]
         tables = list(structures(file))
         try:
-            picture, excuse = (None, "") if no_picture else first_picture(file)
+            if no_picture:
+                picture, excuse = None, ""
+            elif campaign.kept_rows.all and campaign.cases > MOST_READ:
+                picture, excuse = None, NOT_DRAWN.format(MOST_READ)
+            else:
+                picture, excuse = first_picture(file)
         except KeyboardInterrupt as interrupt:
             say(f"{campaign.output} is whole; its picture is missing: `met plot {quoted(campaign.output)}`")
             raise type(interrupt) from None
     return RunResult(summaries, worst, tables, picture, excuse, tuple(warned))
 
 
-MOST_READ = 10_000_000
-"""Cases of a campaign up to which its archive is read for verdict and picture: a million take 150 MB of memory."""
+MOST_READ = MANY
+"""Cases of a campaign up to which its picture is drawn: a million take 150 MB of memory."""
+
+NOT_DRAWN = "of more than {:,} cases `met show` says more and `met plot` draws: 150 MB of memory a million"
 
 
 def _is_counted(campaign: Campaign, performed: Performed) -> bool:
@@ -239,7 +255,7 @@ def _counted_result(campaign: Campaign, performed: Performed) -> RunResult:
                 sweep=experiment.sweep,
             )
         )
-    excuse = f"of more than {MOST_READ:,} cases `met show` says more and `met plot` draws: 150 MB of memory a million"
+    excuse = NOT_DRAWN.format(MOST_READ)
     return RunResult(tuple(summaries), (WorstCaseLines(),) * len(summaries), (), None, excuse, performed.warned)
 
 
@@ -306,6 +322,7 @@ def submit_and_tell(
     timeout: float | None = None,
     fresh: bool = False,
     verify: Verify = "auto",
+    rows: str = "all",
     defines: tuple[str, ...] = (),
     include_dirs: tuple[str, ...] = (),
     settings: tuple[str, ...] = (),
@@ -320,7 +337,7 @@ def submit_and_tell(
 
     say = (lambda *_: None) if quiet or json else visible.say
     request = RunRequest(source, names, everything, defines, include_dirs, settings)
-    campaign = _of_deck(request, output, cases, histories, float32, quiet or json, verify)
+    campaign = _of_deck(request, output, cases, histories, float32, quiet or json, verify, rows)
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
     done = submit(campaign, jobs=jobs, options=options, timeout=timeout, fresh=fresh, say=say)
     archive = str(campaign.output)
@@ -345,6 +362,7 @@ def _of_deck(
     float32: bool,
     quiet: bool,
     verify: Verify,
+    rows: str,
 ) -> Campaign:
     """The campaign that is asked of a deck or a plan."""
     return prepare(
@@ -355,6 +373,7 @@ def _of_deck(
         histories=histories or "default",
         float32=float32,
         verify=verify,
+        rows=rows,
     )
 
 
@@ -369,12 +388,15 @@ def _complain(problem: Problem, json: bool) -> None:
         print(render.render(problem.diagnostics, problem.sources, colour=colour), end="", file=sys.stderr)
 
 
-def _compared(again: Replay | None, unlike: Sequence[str]) -> list[str]:
+def _compared(again: Replay | None, unlike: Sequence[str], output: Path) -> list[str]:
     """Lines that compare a replay with its archive."""
     if again is None:
         return []
+    there, cases = in_both(again.archive, output)
+    if not there:
+        return [f"{again.archive} keeps a summary, without a row of {'it' if cases == 1 else 'them'} to compare with"]
     if not unlike:
-        return [f"the same bits as in {again.archive}"]
+        return [f"the same bits as in {again.archive}" + f", which has rows of {there:,}" * (there < cases)]
     return [f"not the same as in {again.archive}:", *(f"  {line}" for line in unlike)]
 
 

@@ -23,8 +23,17 @@ from batch.queries.pool import Pool, pools
 from batch.queries.selection import CaseSelection
 from batch.queries.signals import case_text, history, number_text, panels, pretty_unit
 from batch.queries.step_errors.words import NONE, about, error_text
+from batch.queries.streamed import is_streamed
 from batch.queries.structures import structures
-from batch.queries.summary import SPREAD_COLUMNS, MetricSummary, Summary, summary_of
+from batch.queries.summary import (
+    SPREAD_COLUMNS,
+    SUMMED_COLUMNS,
+    MetricSummary,
+    SpreadColumn,
+    Summary,
+    SummedMetric,
+    summary_of,
+)
 from batch.terminal import braille
 from batch.terminal.evidence import evidence_lines
 from batch.terminal.evidence_table import evidence_table_lines
@@ -33,6 +42,7 @@ from ic.printing.columns import size as size_text
 from met.distinct import distinct
 from met.messages.visible import line
 from met.outputs import quoted
+from met.plan.swept import blocks
 
 MOST_GROUPS = 4
 """So many structures of a sweep are shown in full unless they are named; of more, their table alone."""
@@ -70,6 +80,7 @@ def show(
     out = _Lines()
     out += [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
     shown = cases_named(archive, experiments, case)
+    check_asked(archive, by, some)
     ordering.check([group for group, _ in shown], by)
     if not experiments and case is None and not signals:
         out += [row for table in structures(archive) for row in ("", *table)]
@@ -97,13 +108,22 @@ def show(
     return "\n".join(out.lines).rstrip() + "\n"
 
 
+def check_asked(archive: ArchiveFile, by: CaseOrder | None, some: CaseSelection) -> None:
+    """Refuse to sort or to choose among the few cases whose rows are beside a summary. Raises Problem E330."""
+    if by is not None or not some.everything:
+        archive.need_every_row("a choice or an order of all cases")
+
+
 def show_evidence(archive: ArchiveFile, experiments: Sequence[str] = (), *, width: int = 100) -> str:
     """The table of evidence of each run and sweep, or of these: what is required, and what the cases show of it."""
     out = _Lines()
     out += [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
-    for pool in pools(groups_named(archive, tuple(experiments))):
-        title = f"{pool.name}: {pool.count:,} case{'s' * (pool.count != 1)}"
-        out += ["", title, *evidence_table_lines(_evidence(archive, pool.groups), width)]
+    named = groups_named(archive, tuple(experiments))
+    for name in dict.fromkeys(group.sweep or group.name for group in named):
+        groups = [group for group in named if (group.sweep or group.name) == name]
+        cases = sum(group.run for group in groups)
+        title = f"{name}: {cases:,} case{'s' * (cases != 1)}"
+        out += ["", title, *evidence_table_lines(_evidence(archive, groups), width)]
     return "\n".join(out.lines).rstrip() + "\n"
 
 
@@ -146,11 +166,11 @@ def _about(
     if group.count > 1:
         most = None if all_cases else cases.SHOWN_CASES
         if some.everything:
-            return [*out, "", cases.title(group, by=by), *cases.table(group, most, by=by)]
+            return [*out, "", cases.title(group, by=by, every=all_cases), *cases.table(group, most, by=by)]
         among = _positions(archive, group, some)
         out += ["", some.words(len(among), group.count)]
         if len(among):
-            out += [cases.title(group, by=by), *cases.table(group, most, by=by, among=among)]
+            out += [cases.title(group, by=by, every=True), *cases.table(group, most, by=by, among=among)]
     return out
 
 
@@ -184,6 +204,7 @@ def as_json(
 
     groups = []
     shown = cases_named(archive, experiments, case)
+    check_asked(archive, by, some)
     ordering.check([group for group, _ in shown], by)
     for group, position in shown:
         if position is None:
@@ -213,8 +234,8 @@ def as_json(
 def heading(group: ArchiveGroup, width: int) -> list[str]:
     """Lines that say what was run."""
     a = group.attributes
-    count = f"{group.count:,} case{'s' if group.count != 1 else ''}"
-    if group.count < a["cases_in_table"]:
+    count = f"{group.run:,} case{'s' if group.run != 1 else ''}"
+    if group.run < a["cases_in_table"]:
         count += f" of {'at most ' * ('until_shown' in a)}{a['cases_in_table']:,}"
     text = (
         f"{count}, {a['duration_s']:g} s, {a['integrator']} at {a['dynamics_hz']:g} Hz, recorded at "
@@ -230,14 +251,28 @@ def heading(group: ArchiveGroup, width: int) -> list[str]:
         out += textwrap.wrap(f"allowed: {each}", max(NARROWEST, width), initial_indent="  ", subsequent_indent="    ")
     for variable in group.role("choice"):
         out.append(f"  {variable.path} = {group.at(variable.name, [0])[0]}")
-    for variable in group.role("coordinate"):
+    if group.summary is not None:
+        named = f"a summary of them, and the rows of {group.count:,} that it names"
+        out += textwrap.wrap(f"{named}: any case again: {_again(group)}", max(NARROWEST, width), initial_indent="  ",
+                             subsequent_indent="    ")  # fmt: skip
+    for variable in group.role("coordinate") if group.summary is None else ():
         scale = float(variable.attributes.get("deck_scale", 1.0))
         unit = pretty_unit(str(variable.attributes.get("deck_unit", variable.unit)))
+        if is_streamed(group):
+            stretches = (group.stretch(variable.name, piece.start, piece.stop) for piece in blocks(group.count))
+            ends = np.array([(each.min(), each.max()) for each in stretches]) / scale
+            low, high = number_text(ends[:, 0].min()), number_text(ends[:, 1].max())
+            out.append(f"  {variable.name} = values from {low} to {high} {unit}".removesuffix(" 1"))
+            continue
         values = distinct(group.values(variable.name)) / scale
         few = ", ".join(number_text(value) for value in values[:6]) if len(values) <= 6 else ""
         many = f"{len(values)} values from {number_text(values[0])} to {number_text(values[-1])}"
         out.append(f"  {variable.name} = {few or many} {unit}".removesuffix(" 1"))
     return out
+
+
+def _again(group: ArchiveGroup) -> str:
+    return f"`met run {quoted(group.path)} --case '#{group.at('case', [0])[0]}'`"
 
 
 def verdict(summary: Summary, width: int) -> list[str]:
@@ -298,12 +333,13 @@ def _counts(summary: Summary) -> str:
 
 def _metric_table(summary: Summary) -> list[str]:
     single = summary.cases == 1
-    head = ("",) if single else tuple(column.head for column in SPREAD_COLUMNS)
+    columns = SUMMED_COLUMNS if isinstance(summary.metrics[0], SummedMetric) else SPREAD_COLUMNS
+    head = ("",) if single else tuple(column.head for column in columns)
     errors = summary.verified
     rows = [("", *head, *([] if errors is None else ["±"]), "", "")]
     for metric in summary.metrics:
         unit = "" if metric.deck_unit == "1" else pretty_unit(metric.deck_unit)
-        numbers = list(_metric_numbers(metric, single))
+        numbers = list(_metric_numbers(metric, single, columns))
         if errors is not None:
             error = error_text(errors.metrics.get(metric.name), metric.deck_scale)
             numbers.append(error if not single else "" if error == NONE else f"± {error}")
@@ -319,11 +355,11 @@ def _metric_table(summary: Summary) -> list[str]:
     return out
 
 
-def _metric_numbers(metric: MetricSummary, single: bool) -> tuple[str, ...]:
+def _metric_numbers(metric: MetricSummary, single: bool, columns: Sequence[SpreadColumn]) -> tuple[str, ...]:
     """The numbers of a metric's finite values, as texts; `_metric_words` says how many others there are."""
     if single:
         return ("inf" if metric.infinite else _text(metric.median, metric),)
-    return tuple(_text(getattr(metric, column.field), metric) for column in SPREAD_COLUMNS)
+    return tuple(_text(getattr(metric, column.field), metric) for column in columns)
 
 
 def _text(value: float, metric: MetricSummary) -> str:

@@ -298,7 +298,8 @@ class _SweepReader:
             column = self.varied(part.path, part.place, numbers, part.low, part.unit)
             columns.append(replace(column, drawn=part.distribution))
         if sample.warning is not None:
-            self.complaints.remark("D228", *sample.warning, help="take a power of 2")
+            message, place, helps = sample.warning
+            self.complaints.remark("D228", message, place, help=helps)
         self.axes.append(SweepAxis(tuple(columns), sample.note, sample.design, sample.until_shown))
 
     def repeats(self, statement: Statement) -> None:

@@ -35,6 +35,7 @@ from met.frozen import frozen
 from met.plan import Design
 from met.plan.columns import MOST_SWEPT, CaseValues, listed
 from met.plan.drawing import DIGITS, DrawnColumn, drawn_values, within
+from met.statistics.saltelli import FEWEST_PAIRS
 from met.trace import Scalar
 
 UNTIL_SHOWN, AT_MOST = "until_shown", "at_most"
@@ -77,14 +78,14 @@ class DrawnParameter:
 
 @frozen
 class SampleDesign:
-    """A `sample` statement as read. warning: message and place of a warning about it; until_shown: where it is written
+    """A `sample` statement as read. warning: message, place and help of one about it; until_shown: where it is written
     that no more cases are run than decide what is required, if it is: then `count` is the most."""
 
     design: Design
     count: int
     seed: int
     parts: tuple[DrawnParameter, ...]
-    warning: tuple[str, Place] | None = None
+    warning: tuple[str, Place, str] | None = None
     until_shown: Place | None = None
 
     @property
@@ -224,6 +225,13 @@ def read_sample(
         warning = (
             f"{count} points of a Sobol sequence are less even than {lower} or {2 * lower}",
             place_of(call.positional[0]),
+            "take a power of 2",
+        )
+    if design == "saltelli" and count < FEWEST_PAIRS:
+        warning = (
+            f"{count} points are too few for indices: {count * (len(parts) + 2)} cases that say nothing of them",
+            place_of(call.positional[0]),
+            f"take {FEWEST_PAIRS} or more, a power of 2; of some thousands the intervals are narrow",
         )
     return SampleDesign(design, count, seed, tuple(parts), warning, until_shown)
 
@@ -237,6 +245,9 @@ def _until_shown(call: Call, definitions: Definitions) -> Place | None:
     if not named and written and UNTIL_SHOWN in definitions.lets:
         return None
     usage = f"write `sample random({UNTIL_SHOWN}, {AT_MOST} = 50000) {{ ... }}`"
+    meant = did_you_mean(word.text, [UNTIL_SHOWN]) if isinstance(word, Name) and not written else []
+    if isinstance(word, Name) and meant and word.text not in definitions.lets:
+        raise Problem(error("D224", f"`{word.text}` is no number of samples", place_of(word), help=[*meant, usage]))
     if named & {AT_MOST} and not written:
         message = f"`{AT_MOST}` goes with `{UNTIL_SHOWN}`, and not with a number of samples"
         raise Problem(error("D224", message, call.named[0][0].place, help=[usage, "or leave it out"]))

@@ -16,13 +16,16 @@ import numpy as np
 
 from met import units
 from met.plan.columns import ComputedColumn
-from met.plan.swept import blocks
+from met.plan.swept import BLOCK, blocks
 from met.unit_parser import parse_unit
 
 DIGITS = 12
 
 CHUNK = 1 << 12
 """Points of a stream that are drawn together where some between the first and the last are not wanted."""
+
+KEPT_BLOCKS = 16
+"""Blocks of a column that are kept, half a megabyte each: the cases of the longest tasks that are merged together."""
 
 A_COUNT = 4
 """Numbers that the generator gives at each count."""
@@ -84,6 +87,7 @@ class DrawnColumn(ComputedColumn):
         self.seed, self.path, self.number = seed, path, number
         self.distribution, self.arguments, self.unit = distribution, arguments, unit
         self._measure = parse_unit(unit) if unit else None
+        self._drawn: dict[int, np.ndarray] = {}
 
     def at(self, rows: np.ndarray) -> np.ndarray:
         if not len(rows):
@@ -111,6 +115,22 @@ class DrawnColumn(ComputedColumn):
         return int(np.sort(low.rows)[first]), int(np.sort(high.rows)[last])
 
     def _between(self, first: int, last: int) -> np.ndarray:
+        """Draws `first` to `last`, not itself. Those of many are asked for again, by what names their cases, sums their
+        inputs and compares them: the last few blocks are kept."""
+        if last - first < CHUNK:
+            return self._made(first, last)
+        parts = []
+        for number in range(first // BLOCK, (last - 1) // BLOCK + 1):
+            block = self._drawn.get(number)
+            if block is None:
+                block = self._made(number * BLOCK, min((number + 1) * BLOCK, self.size))
+                self._drawn[number] = block  # of threads that draw it at once, each draws the same
+                for old in list(self._drawn)[:-KEPT_BLOCKS]:
+                    self._drawn.pop(old, None)
+            parts.append(block[max(0, first - number * BLOCK) : last - number * BLOCK])
+        return np.concatenate(parts)
+
+    def _made(self, first: int, last: int) -> np.ndarray:
         at = points(self.seed, self.path, self.number, first, last)
         return drawn_values(self.distribution, self.arguments, self._measure, at)
 

@@ -68,8 +68,7 @@ def figures(group: ArchiveGroup, position: int | None = None) -> Verification | 
     found = group.verified
     if found is None:
         return None
-    cases = group.values("case")
-    places = np.searchsorted(cases, found.cases)
+    places = np.array([group.position_of(int(case)) for case in found.cases])
     rows = range(len(places)) if position is None else np.flatnonzero(places == position).tolist()
     if not rows:
         return None

@@ -250,3 +250,18 @@ def test_words_are_signs_where_the_table_is_too_wide() -> None:
     assert any("at least 87.61 %" in line and "99.99 % with 99.5 %" in line for line in wide)
     assert any("\u2265 87.61 %" in line and "99.99 %, 99.5 %" in line for line in narrow)
     assert max(map(len, narrow)) <= 100 < max(map(len, wide))
+
+
+def test_parts_of_a_sum_of_sweeps_are_told_apart(tmp_path: Path) -> None:
+    deck = tmp_path / "sum.ic"
+    sweeps = (
+        "sweep slow_ones of spread { vary gearbox.kp = [0.015, 0.02] V*s/rad; }\n"
+        "sweep fast_ones of spread { vary gearbox.ki = [0.1, 0.12] V/rad; }\n"
+        "sweep both = slow_ones + fast_ones;\n"
+    )
+    deck.write_text(DECK.replace("KP", "0.025") + sweeps, encoding="utf-8")
+    main(["run", str(deck), "both", "-o", str(tmp_path / "sum.h5"), "--verify", "none", *COMMON])
+    rows = rows_of(tmp_path / "sum.h5")
+    assert [row.at for row in rows] == ["slow_ones", "fast_ones"] * 3
+    lines = evidence_table_lines(rows, 100)
+    assert "  1.1  slow_ones" in lines and "  1.2  fast_ones" in lines

@@ -237,3 +237,25 @@ error[D225]: a standard deviation is above 0
 def test_a_sample_varies_twice_what_is_varied_already(tmp_path: Path) -> None:
     body = f"vary drive.kp = [1, 2] V*s/rad; sample lhs(3) {{ {KP} }}"
     assert codes(tmp_path, ARM, SERVO, RUN, f"sweep it of hold {{ {body} }}", select=["it"]) == ["D040"]
+
+
+def test_a_saltelli_sample_of_too_few_points_is_warned_of_with_the_number_that_is_needed(tmp_path: Path) -> None:
+    def said(points: int) -> str:
+        sweep = f"sweep it of hold {{ sample saltelli({points}) {{ {KP} {MASS} }} }}\n"
+        return messages(check(tmp_path, ARM, SERVO, RUN, sweep, select=["it"]))
+
+    assert "warning[D228]: 32 points are too few for indices: 128 cases that say nothing of them\n" in said(
+        32
+    ) and "= help: take 64 or more, a power of 2; of some thousands the intervals are narrow\n" in said(32)
+    assert "D228" not in said(64)
+
+
+def test_a_word_like_until_shown_is_told_what_was_meant(tmp_path: Path) -> None:
+    for words in ("untilshown, at_most = 100", "until_show"):
+        compiled = check(
+            tmp_path, ARM, SERVO, RUN, f"sweep it of hold {{ sample random({words}) {{ {KP} }} }}\n", select=["it"]
+        )
+        word = words.split(",")[0]
+        text = messages(compiled)
+        assert f"error[D224]: `{word}` is no number of samples\n" in text
+        assert "= help: did you mean `until_shown`?\n" in text

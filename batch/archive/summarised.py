@@ -1,0 +1,176 @@
+"""The group `summary-of-cases` of an experiment of which the archive has the rows of few cases: what came of all.
+
+    cause               why cases failed, or are doubtful, numbers aside; a dimension. cause_status: how they ended, -1
+                        doubtful; cause_cases: how many; cause_first: the first, by position in the case table
+    summed_metric       names of the metrics' variables; a dimension. finite, infinite, unknown: cases with such a
+                        value; mean, variance of the finite ones, SI; least, most: of these, in the cases least_case and
+                        most_case
+    point               design points, in the order in which they first appear; a dimension
+    chosen              coordinates that are chosen and not drawn; a dimension. chosen_value (point, chosen), SI
+    judged              rows, one for each requirement of all cases, and of one over a share of cases one more for each
+                        design point; a dimension. judged_requirement, judged_point (-1: all cases), judged_cases; of
+                        these judged_missed, and judged_unknown with judged_no_value among those that reached their end;
+                        judged_worst_case, its value judged_worst; mean and deviation of the metric; judged_bound, the
+                        order statistic that bounds the percentile, not-a-number where there is none
+    attributes          `cases`, all of them; `limited`, those with a bed's motor at its limit; `rows`, as asked for;
+                        `drawn`, whether something was drawn at random
+
+A name with `-` is none that a deck can give. Every case that is named here has its row in the archive.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from batch.archive.hdf5 import h5py
+from batch.archive.sound import MOST, are_cases
+from batch.archive.stored import StoredGroup, Unlike
+from met.frozen import frozen
+from met.run import LOST
+
+NAME = "summary-of-cases"
+
+DOUBTFUL = -1
+"""The status of a cause that makes cases doubtful which reached their end."""
+
+COUNT, NUMBER, WORDS = "<i8", "<f8", "|O"
+
+VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "cause": (("cause",), WORDS, "why cases failed or are doubtful"),
+    "cause_status": (("cause",), COUNT, "how they ended; -1: doubtful"),
+    "cause_cases": (("cause",), COUNT, "cases of this cause"),
+    "cause_first": (("cause",), COUNT, "the first of them, by position in the case table"),
+    "summed_metric": (("summed_metric",), WORDS, "metrics"),
+    "finite": (("summed_metric",), COUNT, "cases with a finite value"),
+    "infinite": (("summed_metric",), COUNT, "cases with an infinite one"),
+    "unknown": (("summed_metric",), COUNT, "cases without a value"),
+    "mean": (("summed_metric",), NUMBER, "mean of the finite values, SI"),
+    "variance": (("summed_metric",), NUMBER, "their variance, SI squared"),
+    "least": (("summed_metric",), NUMBER, "the least of them, SI"),
+    "most": (("summed_metric",), NUMBER, "the largest of them, SI"),
+    "least_case": (("summed_metric",), COUNT, "the case of the least, by position in the case table; -1: none"),
+    "most_case": (("summed_metric",), COUNT, "the case of the largest"),
+    "point": (("point",), COUNT, "design points"),
+    "chosen": (("chosen",), WORDS, "coordinates that are chosen"),
+    "chosen_value": (("point", "chosen"), NUMBER, "their values at the design points, SI"),
+    "judged": (("judged",), COUNT, "requirements at design points"),
+    "judged_requirement": (("judged",), COUNT, "place of the requirement"),
+    "judged_point": (("judged",), COUNT, "the design point; -1: all cases"),
+    "judged_cases": (("judged",), COUNT, "cases there"),
+    "judged_missed": (("judged",), COUNT, "cases that miss it"),
+    "judged_unknown": (("judged",), COUNT, "cases that failed or have no value"),
+    "judged_no_value": (("judged",), COUNT, "of these, those that reached their end"),
+    "judged_worst_case": (("judged",), COUNT, "the case nearest to the limit or furthest beyond it"),
+    "judged_worst": (("judged",), NUMBER, "its value, SI"),
+    "judged_mean": (("judged",), NUMBER, "mean of the finite values, SI"),
+    "judged_deviation": (("judged",), NUMBER, "their standard deviation, SI"),
+    "judged_bound": (("judged",), NUMBER, "bound of the percentile, an order statistic, SI"),
+}
+"""Dimensions, type and meaning of each variable."""
+
+DIMENSIONS = ("cause", "summed_metric", "point", "chosen", "judged")
+
+COUNTS = ("finite", "infinite", "unknown", "cause_cases", "judged_cases", "judged_missed", "judged_unknown",
+          "judged_no_value")  # fmt: skip
+"""Variables that are numbers of cases."""
+
+
+@frozen
+class CaseSummary:
+    """What came of all cases of an experiment. values: by `VARIABLES`, arrays; the rest as the attributes."""
+
+    cases: int
+    limited: int
+    rows: str
+    drawn: bool
+    values: dict[str, np.ndarray]
+
+    def judged(self, requirement: int, *, whole: bool) -> list[dict[str, Any]]:
+        """The rows of a requirement, of all cases or of its design points, as plain numbers by names without
+        `judged_`."""
+        values = self.values
+        here = (values["judged_requirement"] == requirement) & ((values["judged_point"] < 0) == whole)
+        return [
+            {name.removeprefix("judged_"): values[name][row].item() for name in VARIABLES if name.startswith("judged_")}
+            for row in np.flatnonzero(here)
+        ]
+
+
+def write(parent: Any, found: CaseSummary) -> None:
+    """Write the group into an experiment's, of a file that is open."""
+    node = parent.create_group(NAME, track_order=True)
+    node.attrs["cases"], node.attrs["limited"] = found.cases, found.limited
+    node.attrs["rows"], node.attrs["drawn"] = found.rows, found.drawn
+    for name, (_, kind, words) in VARIABLES.items():
+        dtype = h5py().string_dtype("utf-8") if kind == WORDS else kind
+        dataset = node.create_dataset(name, data=found.values[name], dtype=dtype, track_order=True)
+        dataset.attrs["long_name"] = words
+    for name in DIMENSIONS:
+        node[name].make_scale(name)
+    for name, (dims, _, _) in VARIABLES.items():
+        if name not in DIMENSIONS:
+            for axis, dim in enumerate(dims):
+                node[name].dims[axis].attach_scale(node[dim])
+
+
+def read(node: Any, group: StoredGroup) -> CaseSummary | None:
+    """The summary of an experiment's group, checked; None where the archive has a row a case. Raises Unlike."""
+    inside = node.get(NAME)
+    if inside is None:
+        return None
+    if not isinstance(inside, h5py().Group):
+        raise Unlike(f"`{NAME}` is no group")
+    values = {name: _values(inside, name) for name in VARIABLES}
+    sizes = {dim: len(values[dim]) for dim in DIMENSIONS}
+    for name, (dims, _, _) in VARIABLES.items():
+        if values[name].shape != tuple(sizes[dim] for dim in dims):
+            raise Unlike(f"variable `{NAME}/{name}` is not of the size of its dimensions")
+    cases, limited, rows, drawn = (inside.attrs.get(name) for name in ("cases", "limited", "rows", "drawn"))
+    if not isinstance(cases, np.integer) or not 0 < cases < MOST:
+        raise Unlike(f"attribute `cases` of `{NAME}` is missing or of another type")
+    if not isinstance(limited, np.integer) or not 0 <= limited <= cases or not isinstance(rows, str):
+        raise Unlike(f"attribute `limited` or `rows` of `{NAME}` is missing or of another type")
+    if not isinstance(drawn, np.bool_):
+        raise Unlike(f"attribute `drawn` of `{NAME}` is missing or of another type")
+    found = CaseSummary(int(cases), int(limited), rows, bool(drawn), values)
+    _check(found, group)
+    return found
+
+
+def _check(found: CaseSummary, group: StoredGroup) -> None:
+    """Check that counts are of its cases, and that names and places are those of the group. Raises Unlike."""
+    values = found.values
+    for name in COUNTS:
+        _within(name, values[name], 0, found.cases)
+    none = values["finite"] == 0
+    for name in ("cause_first", "judged_worst_case", "least_case", "most_case"):
+        some = values[name][~none] if name in ("least_case", "most_case") else values[name]
+        if not are_cases(group, some).all():
+            raise Unlike(f"variable `{NAME}/{name}` names a case that it does not have")
+    _within("cause_status", values["cause_status"], DOUBTFUL, LOST)
+    required = group.shape("requirement")[0] if "requirement" in group.variables else 0
+    _within("judged_requirement", values["judged_requirement"], 0, required - 1)
+    _within("judged_point", values["judged_point"], -1, len(values["point"]) - 1)
+    for name, role in (("summed_metric", "metric"), ("chosen", "coordinate")):
+        if not {variable.name for variable in group.role(role)}.issuperset(values[name].tolist()):
+            raise Unlike(f"variable `{NAME}/{name}` names what it does not have")
+
+
+def _within(name: str, values: np.ndarray, low: int, high: int) -> None:
+    if values.size and not (values.min() >= low and values.max() <= high):
+        raise Unlike(f"variable `{NAME}/{name}` has a value that it cannot have")
+
+
+def _values(inside: Any, name: str) -> np.ndarray:
+    dataset = inside.get(name)
+    if not isinstance(dataset, h5py().Dataset) or str(dataset.dtype.str) != VARIABLES[name][1]:
+        raise Unlike(f"variable `{NAME}/{name}` is missing or of another type")
+    if len(dataset.shape) != len(VARIABLES[name][0]):
+        raise Unlike(f"variable `{NAME}/{name}` is not of the size of its dimensions")
+    if VARIABLES[name][1] == WORDS:
+        if h5py().check_string_dtype(dataset.dtype) is None:
+            raise Unlike(f"variable `{NAME}/{name}` is missing or of another type")
+        return np.asarray(dataset.asstr()[...], dtype=object)
+    return np.asarray(dataset[...])

@@ -1,0 +1,113 @@
+"""What came of very many cases, in place of a row of each (`met run --rows`): their summary, and which few cases have
+their rows kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from batch.archive import layout as archive_layout
+from batch.archive.summarised import CaseSummary
+from batch.campaigns.keep import KeptRows
+from batch.campaigns.outcomes import CaseOutcomes
+from batch.campaigns.tasks import CampaignSection
+from batch.campaigns.verification import choosing
+from batch.queries.tallies import MOST_POINTS, CaseBlock, CaseTallies, PointNumbers, TooManyPoints
+from met.diagnostic import Problem, error
+from met.distinct import distinct
+from met.frozen import frozen
+from met.plan import Coordinate, Experiment
+from met.plan.columns import CaseValues, span
+from met.plan.swept import blocks
+from met.run import DONE, Run
+
+
+@frozen
+class Summarised:
+    """The summary of an experiment's cases. places: of those whose rows are kept, rising; outcomes: of all cases."""
+
+    summary: CaseSummary
+    places: np.ndarray
+    outcomes: CaseOutcomes
+
+
+def point_sizes(experiment: Experiment, rows: CaseValues) -> list[int]:
+    """How many of some cases each design point has, in the order in which these first appear. Raises Problem E351 where
+    there are too many."""
+    chosen = _chosen(experiment)
+    if not chosen:
+        return [len(rows)]
+    points, sizes = PointNumbers(), np.zeros(MOST_POINTS, np.int64)
+    try:
+        for piece in blocks(len(rows)):
+            here = np.asarray(rows[piece])
+            numbers = points.of([np.asarray(each.values[here]) for each in chosen], len(here))
+            sizes += np.bincount(numbers, minlength=len(sizes))
+    except TooManyPoints:
+        message = f"a summary has {MOST_POINTS:,} design points at most, and this sweep has more"
+        raise Problem(error("E351", message, help="`--rows all` keeps a row a case; or choose fewer values")) from None
+    return sizes[: len(points.values)].tolist()
+
+
+def _chosen(experiment: Experiment) -> tuple[Coordinate, ...]:
+    """The coordinates that tell design points apart: none where nothing is drawn, or nothing is chosen."""
+    chosen = tuple(each for each in experiment.cases.coordinates if not each.design)
+    drawn = len(chosen) < len(experiment.cases.coordinates) or experiment.cases.repeats is not None
+    return chosen if drawn else ()
+
+
+def summarise(
+    section: CampaignSection,
+    runs: Iterator[tuple[int, Run]],
+    wanted: KeptRows,
+    *,
+    verified: bool,
+    progress: Callable[[int], None] = lambda _: None,
+) -> Summarised:
+    """The summary of all cases of a section. runs: their results in order, in blocks of one size, each with the place
+    of its first case; verified: whether some are run with shorter steps, and need their rows. Raises Problem E351."""
+    experiment = section.prepared.experiment
+    layout = archive_layout.layout(experiment, 1, 0)
+    named = {each.key: each.name for role in ("coordinate", "metric") for each in layout.role(role)}
+    chosen, points = _chosen(experiment), PointNumbers()
+    tallies = CaseTallies(
+        [use.name for use in experiment.structure.metrics],
+        experiment.requirements,
+        point_sizes(experiment, section.rows),
+    )
+    outcomes = CaseOutcomes(experiment, {wanted.metric: wanted.worst} if wanted.worst else None)
+    for first, run in runs:
+        outcomes.add_run(run)
+        rows = np.asarray(run.case)
+        met = np.empty((len(rows), len(experiment.requirements)), np.int8)
+        for number, each in enumerate(experiment.requirements):
+            unknown = (run.status != DONE) | np.isnan(run.metrics[each.metric])
+            met[:, number] = np.where(unknown, -1, run.met[each.text])
+        tallies.add(
+            CaseBlock(
+                first + np.arange(len(rows)),
+                run.status,
+                run.cause,
+                run.warning,
+                run.metrics,
+                met,
+                points.of([np.asarray(each.values[rows]) for each in chosen], len(rows)),
+                int(np.count_nonzero(run.limited)),
+            )
+        )
+        progress(first + len(rows))
+    kept = tallies.named()
+    kept += outcomes.worst(wanted.metric).tolist() if wanted.worst else []
+    kept += choosing.chosen(experiment, outcomes).tolist() if verified else []
+    places = distinct(np.array(kept or [0], np.int64))  # an archive has a case
+    values = tallies.values(
+        lambda place: int(experiment.cases.table[section.rows[place]]),
+        named,
+        [named[each.path] for each in chosen],
+        points,
+    )
+    repeats = experiment.cases.repeats
+    drawn = any(each.design for each in experiment.cases.coordinates) or (repeats is not None and span(repeats)[1] > 0)
+    found = CaseSummary(len(section.rows), tallies.limited, wanted.word, drawn, values)
+    return Summarised(found, places, outcomes)

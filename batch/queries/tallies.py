@@ -1,0 +1,243 @@
+"""Very many cases told by counts, moments, extremes and order statistics, as they come, a block of them at a time: for
+archives that keep a summary of them, and for those that have more rows than memory has room for.
+
+Blocks are of one size and come in order, and sums are exact: so nothing depends on who ran the cases, in which tasks.
+What is held grows with the design points, and with the cases beyond a percentile that is bounded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import field
+from typing import Any, Protocol
+
+import numpy as np
+
+from batch.archive.summarised import DOUBTFUL, VARIABLES, WORDS
+from batch.queries.failures import NUMBER
+from batch.queries.requirements import beyond
+from met.frozen import frozen
+from met.run import DONE
+from met.statistics.confidence import percentile_rank
+from met.statistics.moments import Furthest, Moments
+
+MOST_POINTS = 10_000
+"""Design points that are told apart, at most: each has rows of its own."""
+
+MOST_CAUSES = 1000
+"""Causes of failures that are told apart; those after them are counted together."""
+
+OTHERS = "other causes"
+
+
+class TooManyPoints(Exception):
+    """There are more than `MOST_POINTS` design points."""
+
+
+class PointNumbers:
+    """Design points, numbered in the order in which they first appear. values: what was chosen at each."""
+
+    def __init__(self) -> None:
+        self.values: list[tuple[float, ...]] = []
+        self._numbers: dict[tuple[float, ...], int] = {}
+
+    def of(self, chosen: Sequence[np.ndarray], cases: int) -> np.ndarray:
+        """The design point of each of so many cases. chosen: arrays of a value a case; with none there is one design
+        point. Raises TooManyPoints."""
+        if not chosen:
+            return np.full(cases, self._number(()))
+        table = np.stack([np.asarray(each, float) for each in chosen], axis=1)
+        _, first, index = np.unique(table, axis=0, return_index=True, return_inverse=True)
+        numbers = np.empty(len(first), np.int64)
+        for place in np.argsort(first).tolist():
+            numbers[place] = self._number(tuple(table[first[place]].tolist()))
+        return np.asarray(numbers[index.ravel()])
+
+    def _number(self, values: tuple[float, ...]) -> int:
+        if values not in self._numbers:
+            if len(self.values) == MOST_POINTS:
+                raise TooManyPoints
+            self._numbers[values] = len(self.values)
+            self.values.append(values)
+        return self._numbers[values]
+
+
+class RequiredOfCases(Protocol):
+    """A requirement, of a plan or of an archive: the limit in SI, the share of cases and the confidence."""
+
+    @property
+    def metric(self) -> str: ...
+    @property
+    def comparison(self) -> str: ...
+    @property
+    def limit(self) -> float: ...
+    @property
+    def share(self) -> float | None: ...
+    @property
+    def confidence(self) -> float | None: ...
+
+
+@frozen
+class CaseBlock:
+    """Some cases, in order. places: among all;  outcomes: [case, requirement] 1 met, 0 missed, -1 unknown;  points:
+    their design points;  limited: how many had the load motor of a bed at its limit."""
+
+    places: np.ndarray
+    status: np.ndarray
+    cause: Sequence[str]
+    warning: Sequence[str]
+    metrics: Mapping[str, np.ndarray]
+    outcomes: np.ndarray
+    points: np.ndarray
+    limited: int
+
+
+class Judged:
+    """A requirement's row: counts, the worst case, moments and the bound. most: of the values nearest to the limit or
+    beyond it, of which the last bounds the percentile; 0 where none does."""
+
+    def __init__(self, requirement: RequiredOfCases, most: int) -> None:
+        self.requirement = requirement
+        self.below = requirement.comparison.startswith("<")
+        self.cases = self.missed = self.unknown = self.no_value = 0
+        self.worst, self.worst_far, self.worst_value = -1, -math.inf, math.nan
+        self.moments, self.furthest = Moments(), Furthest(most)
+
+    def add(self, places: np.ndarray, values: np.ndarray, outcomes: np.ndarray, done: np.ndarray) -> None:
+        """Take cases at these places. outcomes: 1 met, 0 missed, -1 unknown; done: of those that reached their end."""
+        unknown = outcomes == -1
+        self.cases += len(places)
+        self.missed += int(np.count_nonzero(outcomes == 0))
+        self.unknown += int(np.count_nonzero(unknown))
+        self.no_value += int(np.count_nonzero(unknown & done))
+        limit = self.requirement.limit
+        far = np.where(unknown, np.inf, beyond(values, self.requirement.comparison, limit) if limit else
+                       (values if self.below else -values))  # fmt: skip
+        place = int(np.argmax(far))
+        if self.worst < 0 or far[place] > self.worst_far:
+            self.worst, self.worst_far, self.worst_value = int(places[place]), float(far[place]), float(values[place])
+        self.moments.add(values)
+        self.furthest.add(np.where(unknown, np.inf, values if self.below else -values))
+
+    def row(self, number: int, point: int) -> dict[str, Any]:
+        """By the variables of the archive, without `judged_`; the worst case by its place."""
+        bound = self.furthest.least
+        return {
+            "requirement": number, "point": point, "cases": self.cases, "missed": self.missed, "unknown": self.unknown,
+            "no_value": self.no_value, "worst_case": self.worst, "worst": self.worst_value, "mean": self.moments.mean,
+            "deviation": math.sqrt(self.moments.variance), "bound": bound if self.below else -bound,
+        }  # fmt: skip
+
+
+@frozen
+class MetricTally:
+    """Counts, moments and extremes of a metric: places and values of the least and the largest finite one."""
+
+    moments: Moments = field(default_factory=Moments)
+    counts: dict[str, int] = field(default_factory=lambda: {"infinite": 0, "unknown": 0})
+    ends: dict[str, tuple[int, float]] = field(default_factory=dict)
+
+    def add(self, places: np.ndarray, values: np.ndarray) -> None:
+        """Take the values of cases at these places."""
+        self.moments.add(values)
+        self.counts["infinite"] += int(np.count_nonzero(np.isinf(values)))
+        self.counts["unknown"] += int(np.count_nonzero(np.isnan(values)))
+        finite = np.isfinite(values)
+        if finite.any():
+            for name, sign in (("least", 1.0), ("most", -1.0)):
+                place = int(np.argmin(np.where(finite, sign * values, np.inf)))
+                if name not in self.ends or sign * values[place] < sign * self.ends[name][1]:
+                    self.ends[name] = int(places[place]), float(values[place])
+
+
+class CaseTallies:
+    """What all cases come to. metrics: by name; sizes: how many cases each design point has."""
+
+    def __init__(
+        self, metrics: Sequence[str], requirements: Sequence[RequiredOfCases], sizes: Sequence[int] | np.ndarray
+    ) -> None:
+        self._requirements = tuple(requirements)
+        self.metrics = {name: MetricTally() for name in metrics}
+        self._everywhere = [Judged(each, 0) for each in requirements]
+        self._at_points = {
+            number: [Judged(each, _most(each, int(size))) for size in sizes]
+            for number, each in enumerate(requirements)
+            if each.share is not None
+        }
+        self._causes: dict[tuple[int, str], list[Any]] = {}
+        self.limited = 0
+
+    def add(self, block: CaseBlock) -> None:
+        """Take the next cases."""
+        self.limited += block.limited
+        done = block.status == DONE
+        for name, tally in self.metrics.items():
+            tally.add(block.places, block.metrics[name])
+        order = np.argsort(block.points, kind="stable") if self._at_points else np.zeros(0, np.int64)
+        parts = np.split(order, np.flatnonzero(np.diff(block.points[order])) + 1) if len(order) else []
+        for number, each in enumerate(self._requirements):
+            values, met = block.metrics[each.metric], block.outcomes[:, number]
+            self._everywhere[number].add(block.places, values, met, done)
+            for part in parts if number in self._at_points else ():
+                here = self._at_points[number][int(block.points[part[0]])]
+                here.add(block.places[part], values[part], met[part], done[part])
+        for place in np.flatnonzero(~done | np.array([word != "" for word in block.warning])).tolist():
+            status = DOUBTFUL if done[place] else int(block.status[place])
+            text = str(block.warning[place] if done[place] else block.cause[place])
+            alike = (status, NUMBER.sub("#", text))
+            if len(self._causes) >= MOST_CAUSES and alike not in self._causes:
+                alike, text = (status, OTHERS), OTHERS
+            self._causes.setdefault(alike, [0, int(block.places[place]), text])[0] += 1
+
+    def named(self) -> list[int]:
+        """Places of the cases that stand out: extremes of metrics, worst by requirements, first of causes."""
+        found = [place for tally in self.metrics.values() for place, _ in tally.ends.values()]
+        found += [row["worst_case"] for row in self._rows()]
+        return found + [place for _, place, _ in self._causes.values()]
+
+    def _rows(self) -> list[dict[str, Any]]:
+        rows = [each.row(number, -1) for number, each in enumerate(self._everywhere)]
+        for number, some in self._at_points.items():
+            rows += [each.row(number, point) for point, each in enumerate(some)]
+        return rows
+
+    def values(
+        self, case: Callable[[int], int], names: Mapping[str, str], chosen: Sequence[str], points: PointNumbers
+    ) -> dict[str, np.ndarray]:
+        """The variables of an archive's summary. case: the position in the case table of a place; names: of the
+        metrics' variables; chosen: of those of what is chosen."""
+        tallies, rows = list(self.metrics.values()), self._rows()
+        ends = {name: [tally.ends.get(name, (-1, math.nan)) for tally in tallies] for name in ("least", "most")}
+        values: dict[str, Any] = {
+            "cause": [text for _, _, text in self._causes.values()],
+            "cause_status": [status for status, _ in self._causes],
+            "cause_cases": [count for count, _, _ in self._causes.values()],
+            "cause_first": [case(place) for _, place, _ in self._causes.values()],
+            "summed_metric": [names[name] for name in self.metrics],
+            "finite": [tally.moments.count for tally in tallies],
+            "infinite": [tally.counts["infinite"] for tally in tallies],
+            "unknown": [tally.counts["unknown"] for tally in tallies],
+            "mean": [tally.moments.mean for tally in tallies],
+            "variance": [tally.moments.variance for tally in tallies],
+            **{name: [value for _, value in found] for name, found in ends.items()},
+            **{f"{name}_case": [case(at) if at >= 0 else -1 for at, _ in found] for name, found in ends.items()},
+            "point": list(range(len(points.values))),
+            "chosen": list(chosen),
+            "chosen_value": np.array(points.values, float).reshape(len(points.values), len(chosen)),
+            "judged": list(range(len(rows))),
+            **{name: [row[name.removeprefix("judged_")] for row in rows] for name in VARIABLES if "judged_" in name},
+            "judged_worst_case": [case(row["worst_case"]) for row in rows],
+        }
+        return {
+            name: np.array(values[name], dtype=object if kind == WORDS else kind)
+            for name, (_, kind, _) in VARIABLES.items()
+        }
+
+
+def _most(requirement: RequiredOfCases, cases: int) -> int:
+    """The values nearest to the limit, or beyond it, of so many cases, of which the last bounds the percentile."""
+    if requirement.share is None or requirement.confidence is None:
+        return 0
+    rank = percentile_rank(cases, requirement.share, requirement.confidence)
+    return cases - rank + 1 if rank else 0

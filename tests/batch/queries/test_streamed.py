@@ -1,0 +1,128 @@
+"""Very many rows are gone through some at a time: what is said of them is what is said of rows that are held."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import batch
+import ic
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.queries import streamed, tallies
+from batch.queries.evidence_table import requirement_evidence
+from batch.queries.summary import SummedMetric, summarise
+from batch.terminal.show import show, show_evidence
+from met.plan import swept
+
+DECK = """
+#include <two_link.ic>
+run short like nominal {
+    duration = 2 s;
+    rates { dynamics = 50 Hz; servos = 100 Hz; record = 5 Hz; }
+    record = [];
+    require quick: settle < 1.9 s in 90 % of cases with 90 % confidence;
+    require percentile(volts, 95 %) < 5.2 V with 90 % confidence;
+    require volts < 5 V;
+    allow D341 because "what does not settle is part of it";
+}
+sweep many of short {
+    vary gearbox.kp = [0.01, 0.03] V*s/rad;
+    vary initial.shoulder.qd = [0, 1e120] rad/s;  // the last is too much for its square
+    sample random(90) { gearbox.kt = normal(0.1, 0.003) N*m/A; }
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("streamed")
+    (folder / "d.ic").write_text(DECK, encoding="utf-8")
+    return batch.run(ic.compile(folder / "d.ic", select=["many"]), output=folder / "d.h5", verify="some").path
+
+
+@pytest.fixture
+def many(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(streamed, "MANY", 100)
+
+
+def test_evidence_is_that_of_rows_that_are_held(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with ArchiveFile(archive) as file:
+        held = requirement_evidence(file.groups, "d.h5")
+    monkeypatch.setattr(streamed, "MANY", 100)
+    with ArchiveFile(archive) as file:
+        found = requirement_evidence(file.groups, "d.h5")
+        assert file.groups[0].summed is not None and file.groups[0].summary is None
+    assert len(held) == len(found) == 2 + 4 * 2
+    for one, other in zip(held, found, strict=True):
+        sigmas = None if one.sigmas is None else pytest.approx(one.sigmas, rel=1e-9)
+        assert other.sigmas == sigmas
+        assert dataclasses.replace(one, sigmas=None) == dataclasses.replace(other, sigmas=None)
+
+
+def test_the_outcome_is_that_of_rows_that_are_held(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with ArchiveFile(archive) as file:
+        (held,) = summarise(file)
+    monkeypatch.setattr(streamed, "MANY", 100)
+    with ArchiveFile(archive) as file:
+        (found,) = summarise(file)
+    assert (held.cases, held.failed, held.ok, held.limits) == (found.cases, found.failed, found.ok, found.limits)
+    assert held.failed == 180
+    for one, other in zip(held.metrics, found.metrics, strict=True):
+        assert isinstance(other, SummedMetric)
+        for name in ("minimum", "maximum", "infinite", "unknown", "name", "deck_unit"):
+            assert repr(getattr(one, name)) == repr(getattr(other, name))  # some have no finite value
+    for one, other in zip(held.requirements, found.requirements, strict=True):
+        assert (one.met, one.missed, one.unknown, one.no_value) == (
+            other.met,
+            other.missed,
+            other.unknown,
+            other.no_value,
+        )
+
+
+def test_met_show_lists_those_that_stand_out(archive: Path, many: None) -> None:
+    with ArchiveFile(archive) as file:
+        said = show(file, plots=False)
+        assert "median" not in said and "sigma" in said
+        assert "of 360 cases those that stand out:" in said
+        assert "gearbox.kt = values from " in said
+        assert "180 of 360 cases reached their end, 180 failed" in said
+        assert "percentile(volts, 95 %)" in show_evidence(file)
+
+
+def test_no_column_of_them_is_read_whole(archive: Path, many: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    values, stretch = ArchiveGroup.values, ArchiveGroup.stretch
+
+    def some(group: ArchiveGroup, name: str) -> np.ndarray:
+        assert group.variables[name].dims[0] != "case", name
+        return values(group, name)
+
+    def short(group: ArchiveGroup, name: str, first: int, last: int) -> np.ndarray:
+        assert last - first <= 64, name
+        return stretch(group, name, first, last)
+
+    monkeypatch.setattr(swept, "BLOCK", 64)
+    monkeypatch.setattr(ArchiveGroup, "values", some)
+    monkeypatch.setattr(ArchiveGroup, "stretch", short)
+    with ArchiveFile(archive) as file:
+        assert "of 360 cases those that stand out:" in show(file, plots=False)
+        assert "percentile(volts, 95 %)" in show_evidence(file)
+        assert summarise(file)[0].failed == 180
+
+
+def test_all_cases_are_listed_where_they_are_asked_for(archive: Path, many: None) -> None:
+    with ArchiveFile(archive) as file:
+        said = show(file, plots=False, all_cases=True)
+    assert "cases, worst first" in said and "stand out" not in said
+    assert sum(line.lstrip().startswith("#") for line in said.splitlines()) >= 360
+
+
+def test_too_many_design_points_are_held(archive: Path, many: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tallies, "MOST_POINTS", 3)
+    monkeypatch.setattr(streamed, "MOST_POINTS", 3)
+    with ArchiveFile(archive) as file:
+        assert streamed.summed_up(file.groups[0]) is None
+        assert "180 of 360 cases reached their end" in show(file, plots=False)
