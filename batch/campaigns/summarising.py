@@ -52,9 +52,13 @@ def point_sizes(experiment: Experiment, rows: CaseValues) -> list[int]:
 
 def _chosen(experiment: Experiment) -> tuple[Coordinate, ...]:
     """The coordinates that tell design points apart: none where nothing is drawn, or nothing is chosen."""
-    chosen = tuple(each for each in experiment.cases.coordinates if not each.design)
-    drawn = len(chosen) < len(experiment.cases.coordinates) or experiment.cases.repeats is not None
-    return chosen if drawn else ()
+    return tuple(each for each in experiment.cases.coordinates if not each.design) if _drawn(experiment) else ()
+
+
+def _drawn(experiment: Experiment) -> bool:
+    """True where something is drawn at random: parameters of a sample, or noise of repeats."""
+    repeats = experiment.cases.repeats
+    return any(each.design for each in experiment.cases.coordinates) or (repeats is not None and span(repeats)[1] > 0)
 
 
 def summarise(
@@ -107,7 +111,5 @@ def summarise(
         [named[each.path] for each in chosen],
         points,
     )
-    repeats = experiment.cases.repeats
-    drawn = any(each.design for each in experiment.cases.coordinates) or (repeats is not None and span(repeats)[1] > 0)
-    found = CaseSummary(len(section.rows), tallies.limited, wanted.word, drawn, values)
+    found = CaseSummary(len(section.rows), tallies.limited, wanted.word, _drawn(experiment), values)
     return Summarised(found, places, outcomes)

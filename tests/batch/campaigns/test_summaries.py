@@ -51,27 +51,33 @@ sweep ways of short {
     sample random(60) { gearbox.kt = normal(0.1, 0.003) N*m/A; }
 }
 """
-SWEEPS = ("many", "wild", "listed", "noisy", "ways")
+SWEEPS = (
+    "many",
+    "wild",
+    *(pytest.param(name, marks=pytest.mark.slow) for name in ("listed", "noisy", "ways")),
+)
 
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the deck, and of each sweep an archive with a row a case and one with a summary."""
+    """A folder with the deck, and what `archives` makes."""
     folder = tmp_path_factory.mktemp("summaries")
     (folder / "d.ic").write_text(DECK, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        for name in SWEEPS:
-            plan = ic.compile("d.ic", select=[name])
-            batch.run(plan, output=f"{name}.rows.h5", histories="none", verify="some")
-            batch.run(plan, output=f"{name}.summary.h5", rows="summary", verify="some")
     return folder
 
 
 @pytest.fixture
 def here(place: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(place)
+    archives("many")
     return place
+
+
+def archives(name: str) -> None:
+    """Make NAME.rows.h5 of a sweep, with a row a case, and NAME.summary.h5, once."""
+    if not Path(f"{name}.summary.h5").exists():
+        batch.run(plan_of(name), output=f"{name}.rows.h5", histories="none", verify="some")
+        batch.run(plan_of(name), output=f"{name}.summary.h5", rows="summary", verify="some")
 
 
 def plan_of(name: str) -> Plan:
@@ -89,6 +95,7 @@ def judged(file: ArchiveFile) -> list[tuple[EvidenceRow, int]]:
 
 @pytest.mark.parametrize("name", SWEEPS)
 def test_its_evidence_is_that_of_all_rows(here: Path, name: str) -> None:
+    archives(name)
     with ArchiveFile(f"{name}.rows.h5") as rows, ArchiveFile(f"{name}.summary.h5") as summary:
         whole, summed = judged(rows), judged(summary)
     assert len(whole) == len(summed) >= 6
@@ -104,6 +111,7 @@ def test_its_evidence_is_that_of_all_rows(here: Path, name: str) -> None:
 
 @pytest.mark.parametrize("name", SWEEPS)
 def test_its_outcome_is_that_of_all_rows(here: Path, name: str) -> None:
+    archives(name)
     with ArchiveFile(f"{name}.rows.h5") as rows, ArchiveFile(f"{name}.summary.h5") as summary:
         for one, other, group in zip(summarise(rows), summarise(summary), rows.groups, strict=True):
             assert (one.cases, one.failed, one.ok) == (other.cases, other.failed, other.ok)
@@ -136,12 +144,13 @@ def test_verified_cases_are_those_of_all_rows(here: Path) -> None:
 
 def test_cases_fail_in_these(here: Path) -> None:
     """Else nothing is shown of causes."""
+    archives("wild")
     with ArchiveFile("wild.rows.h5") as file:
         (found,) = summarise(file)
     assert 0 < found.failed < found.cases
 
 
-@pytest.mark.parametrize("more", [{"threads": 1}, {"processes": 2}])
+@pytest.mark.parametrize("more", [{"threads": 1}, pytest.param({"processes": 2}, marks=pytest.mark.slow)])
 def test_its_bytes_are_the_same_whoever_ran_it(
     here: Path, more: dict[str, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -183,12 +192,12 @@ def test_cases_in_several_blocks_give_the_same_but_for_rounding(here: Path, monk
                 np.testing.assert_array_equal(a.values[name], b.values[name], err_msg=name)
 
 
-@pytest.mark.parametrize(("metric", "sign"), [("volts", 1.0), ("settle", 1.0)])
-def test_worst_keeps_the_rows_of_the_worst(here: Path, metric: str, sign: float) -> None:
+@pytest.mark.parametrize("metric", ["volts", pytest.param("settle", marks=pytest.mark.slow)])
+def test_worst_keeps_the_rows_of_the_worst(here: Path, metric: str) -> None:
     batch.run(plan_of("many"), output=f"{metric}.h5", rows=f"worst:12:{metric}", verify="none")
     with ArchiveFile("many.rows.h5") as rows, ArchiveFile(f"{metric}.h5") as some:
         all_rows, kept = rows.groups[0], some.groups[0]
-        worst = np.argsort(-sign * all_rows.values(metric), kind="stable")[:12]
+        worst = np.argsort(-all_rows.values(metric), kind="stable")[:12]
         assert set(worst.tolist()) <= set(kept.values("case").tolist())
         assert kept.count < 60 and kept.run == 600
         places = kept.values("case")
@@ -215,6 +224,7 @@ def test_any_other_case_is_computed_from_its_plan(here: Path) -> None:
 
 
 def test_met_show_says_that_it_is_a_summary(here: Path) -> None:
+    archives("wild")
     said = met("show", "wild.summary.h5", "--no-plots").text
     assert "wild  120 cases, 4 s" in said
     assert "a summary of them, and the rows of " in said
