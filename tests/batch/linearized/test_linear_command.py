@@ -1,0 +1,52 @@
+"""`met linear` prints poles, modes and margins; its exit status says whether opened loops are stable."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from batch.cli.linear import linear
+from tests.batch.linearized.test_linear_data import DECK
+from tests.docs.mended_servo import met
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "deck.ic").write_text(DECK)
+    return tmp_path
+
+
+def test_what_is_printed_is_whole(folder: Path) -> None:
+    said = met(folder, "linear", "deck.ic", "--at", "0.5 s", "--open", "hinge.servo.voltage", status=0)
+    lines = said.splitlines()
+    assert lines[0] == "hold: linear at t = 0.5 s, a period of 2 ms, 3 states"
+    assert lines[2] == "poles of the program"
+    assert lines[3].split() == ["z", "Hz", "damping", "by", "e", "in", "who", "takes", "part"]
+    assert lines[4].split() == ["1.000000", "0", "-", "stays", "hinge", "100", "%", "(q)"]
+    assert lines[8] == "loop of hinge.servo.voltage"
+    assert [line.split()[0] for line in lines[9:]] == ["gain", "phase", "delay", "disk"]
+
+
+def test_programs_get_the_same_as_numbers(folder: Path) -> None:
+    told = json.loads(
+        met(folder, "linear", "deck.ic", "--at", "0.5", "--open", "hinge.servo.voltage", "--format", "json", status=0)
+    )  # fmt: skip
+    assert told["states"] == ["hinge.q", "hinge.qd", "hinge.servo.integral"] and told["period"] == 0.002
+    (loop,) = told["loops"]
+    assert loop["stable"] and loop["gain_up"] > 1.0 and 0.0 < loop["phase"] < 3.2
+    assert len(told["poles"]) == 3
+
+
+def test_an_opened_loop_that_is_unstable_is_exit_status_1(folder: Path) -> None:
+    text = DECK.replace("command = rate", "kp = 3 V*s/rad;  v_max = 1e6 V;  tau_max = 1e6 N*m;  command = rate")
+    (folder / "deck.ic").write_text(text)
+    said = met(folder, "linear", "deck.ic", "--open", "hinge.servo.voltage", status=1)
+    assert said.endswith("loop of hinge.servo.voltage\n  unstable as it is: a pole above grows\n")
+
+
+def test_a_word_that_is_no_instant_is_refused(folder: Path) -> None:
+    said = CliRunner().invoke(linear, [str(folder / "deck.ic"), "--at", "2 kg"])
+    assert said.exit_code == 2 and "`2 kg` is no instant: write `2 s` or `250 ms`" in said.output
