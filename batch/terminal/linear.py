@@ -45,10 +45,10 @@ _HEAD = ("Hz", "damping", "by e in", "who takes part")
 def _row(found: Linearized, pole: Pole) -> tuple[str, ...]:
     if math.isinf(pole.hz):
         return "-", "-", "at once", _parts(found, pole)
-    way = " grows" if pole.s.real > 0.0 and pole.seconds < 1e7 * found.seconds else ""
-    stays = pole.seconds > 1e7 * found.seconds
+    stays = pole.seconds > 1e6 * found.seconds
+    way = " grows" if pole.s.real > 0.0 and not stays else ""
     return (
-        f"{0.0 if stays and pole.hz * found.seconds < 1e-7 else pole.hz:.4g}",
+        f"{0.0 if stays and pole.hz * found.seconds < 1e-6 else pole.hz:.4g}",
         "-" if stays else f"{pole.damping:.3f}",
         "stays" if stays else _time(pole.seconds) + way,
         _parts(found, pole),
@@ -62,8 +62,13 @@ def _parts(found: Linearized, pole: Pole) -> str:
         if share < LEAST_SHARE and told:
             break
         state = next(name for name, _ in pole.shares if found.joints[name] == joint)
-        told.append(f"{joint} {100.0 * share:.0f} % ({state.removeprefix(joint + '.').removeprefix('servo.')})")
+        told.append(f"{joint} {100.0 * share:.0f} % ({_of_joint(state, joint)})")
     return ", ".join(told)
+
+
+def _of_joint(state: str, joint: str) -> str:
+    """A state's name without its joint's."""
+    return state.removeprefix(joint).lstrip(".:").removeprefix("servo.")
 
 
 def _table(head: Sequence[tuple[str, ...]], rows: Sequence[tuple[str, ...]]) -> Iterator[str]:

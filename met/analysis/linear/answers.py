@@ -10,7 +10,7 @@ import numpy as np
 
 from met.analysis.linear.injected import InputSignal, entries
 from met.analysis.linear.jacobian import PeriodMap, at_instant, period_map
-from met.analysis.linear.margins import LoopMargins, ScalarLoop, gain_limits, margins
+from met.analysis.linear.margins import STABLE, LoopMargins, ScalarLoop, gain_limits, margins
 from met.analysis.linear.period import PeriodProgram
 from met.analysis.linear.plant import PlantModel, plant
 from met.diagnostic import Problem, error
@@ -20,8 +20,14 @@ from met.plan import Experiment, Recorded
 from met.plan.channel import recordable
 from met.program.system import System
 
+MOST_TICKS = 5000
+"""Ticks of the base rate in a period, at most: each takes some 10 ms."""
+
 SETTLED = 1e-12
 """Size of a pole, of a period, up to which nothing is left of it after one."""
+
+GROWS = 0.01
+"""Growth over the length of a run up to which an arm is not called unstable: as it moves, its poles move too."""
 
 TINY = 1e-14
 """Share of the largest number of a column at which a state takes no part in another."""
@@ -142,7 +148,7 @@ def linear(
     opened   outputs of laws, at which loops are opened: each by itself, and all of them at once
 
     Raises Problem D370 where an event is in the period, D371 where the run has failed before, D372 where `at` is not
-    in the run, D373 where a name is none of these.
+    in the run, D373 where a name is none of these, D374 where the period is too long.
     """
     structure = experiment.structure
     if not 0.0 <= at <= structure.schedule.duration:
@@ -150,6 +156,8 @@ def linear(
     every = entries(System(experiment))
     named = _named(every, tuple(dict.fromkeys((*inputs, *opened))), opened)
     program = PeriodProgram(experiment, named, _records(experiment, outputs))
+    if program.ticks > MOST_TICKS:
+        raise _too_long(program)
     tick = math.floor(at * structure.schedule.base_hz * (1.0 + 1e-12)) // program.ticks * program.ticks
     flow = at_instant(program, case, tick)
     found = period_map(program, flow)
@@ -182,18 +190,24 @@ class _Lifted:
     program: PeriodProgram
     found: PeriodMap
 
+    @property
+    def drift(self) -> float:
+        """Growth of a period that is none."""
+        return max(STABLE, GROWS * self.found.seconds / self.program.schedule.duration)
+
     def opened(self, paths: tuple[str, ...]) -> OpenLoop:
         """Opened at these signals: what stands there is given, and what comes back is asked for."""
         ticks = [k for k, each in enumerate(self.found.ticks) if self.program.inputs[each.entry].path in paths]
         Wx, inverse, B = self.Wx[ticks], np.linalg.inv(self.Wu[np.ix_(ticks, ticks)]), self.B[:, ticks]
         A, b, c, d = self.A - B @ inverse @ Wx, B @ inverse, inverse @ Wx, np.eye(len(ticks)) - inverse
-        one = ScalarLoop(A, b[:, 0], c[0], float(d[0, 0]), self.found.seconds) if len(ticks) == 1 else None
+        drift = self.drift
+        one = ScalarLoop(A, b[:, 0], c[0], float(d[0, 0]), self.found.seconds, drift) if len(ticks) == 1 else None
         own = None if one is None else margins(one)
         if one is not None and own is not None:
             gains: tuple[float | None, float | None] = own.gain_down, own.gain_up
         else:
-            gains = gain_limits(A, b, c, d)
-        stable = bool(np.max(np.abs(np.linalg.eigvals(self.A)), initial=0.0) <= 1.0 + 1e-7)
+            gains = gain_limits(A, b, c, d, drift)
+        stable = bool(np.max(np.abs(np.linalg.eigvals(self.A)), initial=0.0) <= 1.0 + drift)
         return OpenLoop(paths, len(ticks), one, own, gains, stable)
 
 
@@ -264,6 +278,19 @@ def _unknown(what: str, name: str, known: Mapping[str, object]) -> Problem:
     elif not known:
         helps.append("no servo here has a computer that ticks: a law that is continuous is a part of the arm")
     return Problem(error("D373", f"there is no {what} `{name}`", help=tuple(helps)))
+
+
+def _too_long(program: PeriodProgram) -> Problem:
+    experiment = program.experiment
+    return Problem(
+        error(
+            "D374",
+            f"the computers of `{experiment.name}` all tick together only every {program.seconds:.6g} s, "
+            f"{program.ticks:,} ticks",
+            experiment.place,
+            help=f"choose rates of which one divides the other: {MOST_TICKS:,} ticks of the base rate are looked at",
+        )
+    )
 
 
 def _outside(experiment: Experiment, at: float) -> Problem:

@@ -12,22 +12,39 @@ from met.analysis.linear.period import PeriodProgram
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.program import cell_names
-from met.trace.nodes import Node
+from met.trace.nodes import Node, live
 from met.trace.program import Every, Unless0
 from met.trace.recording import Branch, RecordedControl, RecordSection
-from met.trace.tangents import HEAD, values
+from met.trace.tangents import HEAD, Kink, TangentSection, values
 
 HANDS_OVER = {"grappling": "grappled", "releasing": "released"}
 """Loops in which payloads change hands, by the cell that they go by, in words."""
 
 
+MOST_CELLS = 3
+"""Cells that are named of what is compared; of more the phase is."""
+
+
 @frozen
 class Edge:
-    """A kink that the memory stands on: the section's number in the order of the period, its nodes, and where it is."""
+    """A kink that the memory stands on.
+
+    run    the section's number in the order of the period;  nodes: of the kink;  phase: the section's name
+    tick   of the base rate;  cells: those that move what is compared
+    """
 
     run: int
     nodes: tuple[int, ...]
     phase: str
+    tick: int
+    cells: tuple[str, ...]
+
+    @property
+    def subject(self) -> str:
+        """What is just there, in words."""
+        if 0 < len(self.cells) <= MOST_CELLS:
+            return _listed(list(self.cells))
+        return f"a number of `{self.phase}`"
 
 
 class Flow:
@@ -81,7 +98,7 @@ class Flow:
             for kink in section.kinks:
                 a, b = kink.sides
                 if of(a) == of(b) and np.any(of(kink.move) != 0.0):
-                    self.edges.append(Edge(self._runs, kink.nodes, section.name))
+                    self.edges.append(Edge(self._runs, kink.nodes, section.name, self.tick, self._moved(section, kink)))
         for cell, value in cells:
             self.cells[cell] = value
             self.tangents.pop(cell, None)
@@ -90,6 +107,11 @@ class Flow:
             self.rows.update({column: float(of(ref)) for column, ref in section.records})
             self.row_tangents.update({column: of(ref) for column, ref in section.record_tangents})
         self._runs += 1
+
+    def _moved(self, section: TangentSection, kink: Kink) -> tuple[str, ...]:
+        """The cells that move what a kink compares."""
+        nodes = (section.nodes[i] for i in live(section.nodes, kink.sides))
+        return tuple(node[1] for node in nodes if node[0] == "cell" and node[1] in self.tangents)
 
     def _leaf(self, node: Node) -> Any:
         kind, *rest = node
@@ -148,10 +170,10 @@ class Flow:
         uses = self.program.builder.limits.uses
         return {use.path: self.cells.get(cell_names.AT_LIMIT(use.path), 0.0) for use in uses}
 
-    def event(self, what: str) -> Problem:
-        """The refusal of a derivative across an event, where the memory stands."""
+    def event(self, what: str, tick: int | None = None) -> Problem:
+        """The refusal of a derivative across an event, at a tick, or where the memory stands."""
         experiment = self.program.experiment
-        time = self.tick / self.program.schedule.base_hz
+        time = (self.tick if tick is None else tick) / self.program.schedule.base_hz
         return Problem(
             error(
                 "D370",

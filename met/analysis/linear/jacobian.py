@@ -229,8 +229,8 @@ def _refuse_kinks(found: _Carried, carried: Any) -> None:
         return
     for edge in found.edges:
         if found.differs(carried(_all([edge]))):
-            raise found.flow.event(f"a number of `{edge.phase}` is just where it begins to go another way")
-    raise found.flow.event("several numbers are just where they begin to go another way")
+            raise found.flow.event(f"{edge.subject} is just where something begins to act", edge.tick)
+    raise found.flow.event("several numbers are just where something begins to act", found.edges[0].tick)
 
 
 def _all(edges: Sequence[Edge]) -> dict[int, frozenset[int]]:

@@ -21,7 +21,8 @@ ON_CIRCLE = 1e-4
 """Distance from the unit circle at which a root of a pencil is looked at: double roots are no nearer."""
 
 STABLE = 1e-7
-"""ln of the growth of a period up to which a loop is not called unstable: what drifts is not."""
+"""Growth of a period up to which a loop is not called unstable, at least: a drift in place and rate has poles so near
+to 1."""
 
 
 @frozen
@@ -29,6 +30,7 @@ class ScalarLoop:
     """A loop that is open at one place, one tick a period.
 
     A, B, C, D  [state, state], [state], [state], and a number;  period  s
+    drift       growth of a period up to which it is not called unstable
     """
 
     A: np.ndarray
@@ -36,6 +38,7 @@ class ScalarLoop:
     C: np.ndarray
     D: float
     period: float
+    drift: float = STABLE
 
     def at(self, z: complex) -> complex:
         """L = -P at z."""
@@ -53,7 +56,7 @@ class ScalarLoop:
         """True where it is unstable, closed with this times its gain."""
         if gain * self.D == 1.0:
             return True
-        return bool(np.max(np.abs(np.linalg.eigvals(self.closed(gain))), initial=0.0) > 1.0 + STABLE)
+        return bool(np.max(np.abs(np.linalg.eigvals(self.closed(gain))), initial=0.0) > 1.0 + self.drift)
 
 
 @frozen
@@ -205,10 +208,12 @@ FARTHEST, STRIDE = 1e4, 1.05
 """Times the gain up to which a limit of several ticks or loops is looked for, and from one tried to the next."""
 
 
-def gain_limits(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> tuple[float | None, float | None]:
+def gain_limits(
+    A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, drift: float = STABLE
+) -> tuple[float | None, float | None]:
     """Times the gain of all loops at once at which they become unstable, the nearest below and above 1, to 1e-12; None:
     at none that was looked at, or they are unstable as they are. C x + D u comes back, of u that stands at the open
-    places."""
+    places; drift: as `ScalarLoop` has it."""
 
     def size(gain: float) -> float:
         """The largest of the closed loop's poles."""
@@ -218,12 +223,12 @@ def gain_limits(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> t
             return math.inf
         return float(np.max(np.abs(np.linalg.eigvals(closed)), initial=0.0))
 
-    drifts = size(1.0)
-    if drifts > 1.0 + STABLE:
+    own = size(1.0)
+    if own > 1.0 + drift:
         return None, None
 
     def grows(gain: float) -> bool:
-        return size(gain) > max(1.0, drifts) + 1e-2 * STABLE
+        return size(gain) > max(1.0, own) + 1e-2 * STABLE
 
     found: list[float | None] = []
     for stride in (1.0 / STRIDE, STRIDE):

@@ -9,6 +9,7 @@ arm or with an input.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -105,7 +106,7 @@ class PeriodProgram:
                 self._look(body, tick, read, written, ever)
         own = [*self.positions, *self.rates, *self.builder.step.states]
         more = (read & ever & self.moving) - {*own, *self._orientations}
-        return (*own, *sorted(more))
+        return (*(name for name in own if name in read or name in self.turns), *sorted(more))
 
     def _look(
         self, body: Iterable[RecordedControl], tick: int, read: set[str], written: set[str], ever: set[str]
@@ -127,12 +128,11 @@ class PeriodProgram:
 
     def joint_of(self, state: str) -> str:
         """The joint that a state belongs to, or the body, or the computer on its own; in words."""
-        name = state.rpartition(":")[2] if state.startswith(("carry:", "before:", "first:", "guide:")) else state
-        return name.partition(":" if name.partition(":")[0] in _names(self.bodies) else ".")[0]
-
-
-def _names(of: Iterable[bodies.FreeBody]) -> frozenset[str]:
-    return frozenset(each.name for each in of)
+        for body in self.bodies:
+            if state.startswith(f"{body.name}:"):
+                return body.name
+        name = state.partition(":")[2] if state.startswith(("carry:", "before:", "first:", "guide:")) else state
+        return re.split("[:.]", name)[0]
 
 
 def _is_converter(section: CodeSection, position: int) -> bool:

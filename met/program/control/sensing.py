@@ -18,7 +18,7 @@ from met.trace.noise import Stream, normal
 from met.trace.program import Tape
 
 READING = "sensors"
-"""Name of the part of a tick in which a sensor reads (`met.trace.program.Tape.part`)."""
+"""Name of the part of a tick in which a sensor reads, or a bed's converters work (`met.trace.program.Tape.part`)."""
 
 
 def measured(actuator: Actuator, p: NamedValues, q: Real, qd: Real, states: NamedValues) -> tuple[Real, Real]:

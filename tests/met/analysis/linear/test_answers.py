@@ -106,6 +106,35 @@ def test_a_run_that_has_failed_is_refused(tmp_path: Path) -> None:
     assert told.help == ("`met run` says when and why; ask at an instant before that, `--at`",)
 
 
+def test_rates_that_hardly_ever_meet_are_refused(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    made = swing(tmp_path)
+    (use,) = made.structure.servos
+    rare = replace(made, structure=replace(made.structure, servos=(replace(use, divisor=7001),)))
+    with pytest.raises(Problem) as refused:
+        linear(rare)
+    (told,) = refused.value.diagnostics
+    assert told.code == "D374"
+    assert told.message == "the computers of `hold` all tick together only every 7.001 s, 7,001 ticks"
+    assert told.help == ("choose rates of which one divides the other: 5,000 ticks of the base rate are looked at",)
+
+
+def test_a_motor_on_a_bed_is_linearised_with_its_bed_and_observer(tmp_path: Path) -> None:
+    """The shaft's rate is that of the bed, and what the loop does is nearly what the joint's own motor does."""
+    from tests.met.analysis.linear.oracles import DECKS
+
+    text = (DECKS / "two_link.ic").read_text().replace("emulated(faults = typical)", "emulated")
+    (tmp_path / "deck.ic").write_text(text)
+    import ic
+
+    plan = ic.compile(tmp_path / "deck.ic", select=["nominal", "hybrid"])
+    own, bed = (linear(each, at=10.0, outputs=["shoulder.qd"]) for each in plan.experiments)
+    assert {"shoulder.bed.shaft_rate", "shoulder:observer.w"} <= set(bed.states)
+    slow = [sorted(abs(pole.z) for pole in each.poles if 0.9 < abs(pole.z) < 0.999) for each in (own, bed)]
+    np.testing.assert_allclose(*slow, rtol=5e-4)
+
+
 def test_a_law_that_is_continuous_is_part_of_the_arm(tmp_path: Path) -> None:
     made = swing(tmp_path, MORE="rate = continuous;")
     with pytest.raises(Problem) as refused:
