@@ -31,6 +31,9 @@ class Instant(click.ParamType):
 @click.option("--at", type=Instant(), default="0", metavar="TIME", help="The instant of the run, `2 s`. [0 s]")
 @click.option("--case", metavar="ID", help="The case of a sweep: the beginning of its id, or '#7'. [#0]")
 @click.option(
+    "--all-cases", is_flag=True, help="All cases of a sweep, a row each: margins of opened loops, else damping."
+)
+@click.option(
     "--input", "inputs", multiple=True, metavar="SIGNAL", help="A column of B: `pan.servo.command`; may be repeated."
 )
 @click.option(
@@ -60,8 +63,13 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
     from batch.linearized import files, picture
     from batch.plotting import output as places
     from batch.terminal.linear import as_data, linear_lines
-    from met.analysis.linear.answers import linear
+    from batch.terminal.linear_cases import answered, case_lines
+    from met.analysis.linear.answers import Linearized, LinearQuestion
 
+    if options["all_cases"]:
+        for option, key in (("--case", "case"), ("-o", "output"), ("--picture", "picture")):
+            if options[key] is not None:
+                raise click.UsageError(f"{option} is of one case, and --all-cases of all")
     names = (name,) if name is not None else ()
     given = {key: options[key] for key in ("defines", "include_dirs", "settings")}
     check_options(source, names, **given)
@@ -77,14 +85,18 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
         case = int(rows[0])
     else:
         experiment, case = asked[0], 0
-    found = linear(
-        experiment,
-        case=case,
-        at=options["at"],
-        inputs=options["inputs"],
-        outputs=options["outputs"],
-        opened=options["opened"],
-    )
+    signals = (tuple(options[key]) for key in ("inputs", "outputs", "opened"))
+    question = LinearQuestion(experiment, options["at"], *signals)
+    if options["all_cases"]:
+        every = answered(question)
+        data = [
+            as_data(each) if isinstance(each, Linearized) else {"case": n, "why_not": each}
+            for n, each in enumerate(every)
+        ]
+        say(json.dumps(data, indent=1) if form == "json" else "\n".join(case_lines(question, every)))
+        loops = [loop for each in every if isinstance(each, Linearized) for loop in each.loops]
+        return YES if all(loop.stable for loop in loops) else NO
+    found = question.of(case)
     if output is not None:
         files.write(found, output)
     if drawn is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -132,6 +133,61 @@ class Linearized:
         return tuple(sorted(found.items(), key=lambda each: -each[1]))
 
 
+@frozen
+class LinearQuestion:
+    """What is asked of the cases of an experiment, at the last begin of a period up to `at`, s.
+
+    inputs   channels of servos that tick: commands, outputs of laws
+    outputs  channels, or what records several (`q`, `links.tip.position`)
+    opened   outputs of laws, at which loops are opened: each by itself, and all of them at once
+    """
+
+    experiment: Experiment
+    at: float = 0.0
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+    opened: tuple[str, ...] = ()
+
+    @cached_property
+    def program(self) -> PeriodProgram:
+        """The program, once for all cases. Raises Problem D372 where `at` is not in the run, D373 where a name is none
+        of these, D374 where the period is too long."""
+        experiment = self.experiment
+        if not 0.0 <= self.at <= experiment.structure.schedule.duration:
+            raise _outside(experiment, self.at)
+        every = entries(System(experiment))
+        named = _named(every, tuple(dict.fromkeys((*self.inputs, *self.opened))), self.opened)
+        program = PeriodProgram(experiment, named, _records(experiment, self.outputs))
+        if program.ticks > MOST_TICKS:
+            raise _too_long(program)
+        return program
+
+    def of(self, case: int) -> Linearized:
+        """The answers about a row of the case table. Raises Problem D370 where an event is in the period, D371 where
+        the run has failed before, and as `program` does."""
+        program, inputs = self.program, self.inputs
+        tick = math.floor(self.at * program.schedule.base_hz * (1.0 + 1e-12)) // program.ticks * program.ticks
+        flow = at_instant(program, case, tick)
+        found = period_map(program, flow)
+        kept = _kept(program, found)
+        states = tuple(found.states[place] for place in kept)
+        A, C, Wx, B = found.A[np.ix_(kept, kept)], found.C[:, kept], found.Wx[:, kept], found.B[kept]
+        paths = [program.inputs[each.entry].path for each in found.ticks]
+
+        def summed(columns: np.ndarray) -> np.ndarray:
+            own = [columns[:, [k for k, each in enumerate(paths) if each == path]].sum(1) for path in inputs]
+            return np.array(own).T.reshape(len(columns), len(inputs))
+
+        lifted = _Lifted(A, B, Wx, found.Wu, program, found)
+        several = [(path,) for path in self.opened] + ([self.opened] if len(self.opened) > 1 else [])
+        return Linearized(
+            self.experiment.name, case, tick / program.schedule.base_hz, found.seconds, states, inputs,
+            found.outputs, A, summed(B), C, summed(found.D), plant(program, flow, states),
+            tuple(lifted.opened(each) for each in several), found.held, found.at_limit,
+            {name: program.joint_of(name) for name in program.states},
+        )  # fmt: skip
+
+
 def linear(
     experiment: Experiment,
     *,
@@ -141,42 +197,8 @@ def linear(
     outputs: Sequence[str] = (),
     opened: Sequence[str] = (),
 ) -> Linearized:
-    """Linearises a case at the last begin of a period up to `at`, s.
-
-    inputs   channels of servos that tick: commands, outputs of laws
-    outputs  channels, or what records several (`q`, `links.tip.position`)
-    opened   outputs of laws, at which loops are opened: each by itself, and all of them at once
-
-    Raises Problem D370 where an event is in the period, D371 where the run has failed before, D372 where `at` is not
-    in the run, D373 where a name is none of these, D374 where the period is too long.
-    """
-    structure = experiment.structure
-    if not 0.0 <= at <= structure.schedule.duration:
-        raise _outside(experiment, at)
-    every = entries(System(experiment))
-    named = _named(every, tuple(dict.fromkeys((*inputs, *opened))), opened)
-    program = PeriodProgram(experiment, named, _records(experiment, outputs))
-    if program.ticks > MOST_TICKS:
-        raise _too_long(program)
-    tick = math.floor(at * structure.schedule.base_hz * (1.0 + 1e-12)) // program.ticks * program.ticks
-    flow = at_instant(program, case, tick)
-    found = period_map(program, flow)
-    kept = _kept(program, found)
-    states = tuple(found.states[place] for place in kept)
-    A, C, Wx, B = found.A[np.ix_(kept, kept)], found.C[:, kept], found.Wx[:, kept], found.B[kept]
-    of_input = [[k for k, each in enumerate(found.ticks) if program.inputs[each.entry].path == path] for path in inputs]
-
-    def summed(columns: np.ndarray) -> np.ndarray:
-        return np.array([columns[:, places].sum(1) for places in of_input]).T.reshape(len(columns), len(inputs))
-
-    lifted = _Lifted(A, B, Wx, found.Wu, program, found)
-    several = [(path,) for path in opened] + ([tuple(opened)] if len(opened) > 1 else [])
-    return Linearized(
-        experiment.name, case, tick / structure.schedule.base_hz, found.seconds, states, tuple(inputs),
-        found.outputs, A, summed(B), C, summed(found.D), plant(program, flow, states),
-        tuple(lifted.opened(paths) for paths in several), found.held, found.at_limit,
-        {name: program.joint_of(name) for name in program.states},
-    )  # fmt: skip
+    """The answers about one case (`LinearQuestion`). Raises Problem D370 to D374."""
+    return LinearQuestion(experiment, at, tuple(inputs), tuple(outputs), tuple(opened)).of(case)
 
 
 @frozen

@@ -50,3 +50,46 @@ def test_an_opened_loop_that_is_unstable_is_exit_status_1(folder: Path) -> None:
 def test_a_word_that_is_no_instant_is_refused(folder: Path) -> None:
     said = CliRunner().invoke(linear, [str(folder / "deck.ic"), "--at", "2 kg"])
     assert said.exit_code == 2 and "`2 kg` is no instant: write `2 s` or `250 ms`" in said.output
+
+
+OPEN = ("--open", "hinge.servo.voltage")
+
+
+def swept(folder: Path) -> str:
+    text = DECK.replace(
+        "command = rate", "kp = 0.02 V*s/rad;  f_c = 0 N*m;  v_max = 1e6 V;  tau_max = 1e6 N*m;  command = rate"
+    )
+    (folder / "deck.ic").write_text(text + "sweep gains of hold { vary drive.kp = [0.02, 0.5, 2.5] V*s/rad; }\n")
+    return "deck.ic"
+
+
+def test_all_cases_of_a_sweep_have_a_row_each_and_the_tightest_is_named(folder: Path) -> None:
+    said = met(folder, "linear", swept(folder), "gains", "--all-cases", *OPEN, status=1)
+    lines = said.splitlines()
+    assert lines[0] == "gains: linear at t = 0 s, 3 cases" and lines[2] == "loop of hinge.servo.voltage"
+    assert lines[3].split() == ["case", "drive.kp", "(V*s/rad)", "gain", "phase", "delay", "disk"]
+    assert [line.split()[:2] for line in lines[4:7]] == [["#0", "0.02"], ["#1", "0.5"], ["#2", "2.5"]]
+    assert lines[6].split()[-1] == "unstable" and lines[7] == "  unstable in 1 of 3 cases: #2"
+    gain = float(lines[5].split()[2])
+    assert lines[8].startswith(f"  tightest: gain {gain:.4g} times in #1, phase ")
+
+
+def test_a_case_of_it_says_the_same(folder: Path) -> None:
+    every = json.loads(
+        met(folder, "linear", swept(folder), "gains", "--all-cases", *OPEN, "--format", "json", status=1)
+    )  # fmt: skip
+    one = json.loads(met(folder, "linear", "deck.ic", "gains", "--case", "#1", *OPEN, "--format", "json", status=0))
+    assert every[1] == one
+
+
+def test_a_case_without_an_answer_says_why_in_its_row(folder: Path) -> None:
+    text = DECK.replace("hinge.qd = 0.1 rad/s", "hinge.q = 0 rad")
+    (folder / "deck.ic").write_text(text + "sweep loads of hold { vary links.bar.mass = [1, 2] kg; }\n")
+    said = met(folder, "linear", "deck.ic", "loads", "--all-cases", *OPEN, status=0)
+    assert said.count("`hinge` breaks away, t = 0 s") == 2
+    assert said.endswith("  2 cases of 2 without an answer: an event is on the way, or the run failed\n")
+
+
+def test_a_file_is_of_one_case(folder: Path) -> None:
+    said = CliRunner().invoke(linear, [str(folder / "deck.ic"), "--all-cases", "-o", "a.npz"])
+    assert said.exit_code == 2 and "-o is of one case, and --all-cases of all" in said.output
