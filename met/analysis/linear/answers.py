@@ -166,7 +166,7 @@ class LinearQuestion:
         """The answers about a row of the case table. Raises Problem D370 where an event is in the period, D371 where
         the run has failed before, and as `program` does."""
         program, inputs = self.program, self.inputs
-        tick = math.floor(self.at * program.schedule.base_hz * (1.0 + 1e-12)) // program.ticks * program.ticks
+        tick = program.begin(self.at)
         flow = at_instant(program, case, tick)
         found = period_map(program, flow)
         kept = _kept(program, found)
@@ -235,9 +235,10 @@ class _Lifted:
 
 def _kept(program: PeriodProgram, found: PeriodMap) -> np.ndarray:
     """Places of the states of the arm, and of those through which it, or an input, acts on it or on an output."""
-    n, arm = len(found.states), {*program.positions, *program.rates, *program.builder.step.states}
+    n, step = len(found.states), program.builder.step
+    arm = {*program.positions, *program.rates, *step.states, *program.of_beds}
     links = np.abs(found.A) > TINY * np.max(np.abs(found.A), axis=0, initial=0.0)
-    own = np.array([name in arm for name in found.states])
+    own = np.array([name in arm for name in found.states], dtype=bool)
     reached = _closed(links, own | np.any(found.B != 0.0, axis=1))
     acts = _closed(links.T, own | np.any(found.C != 0.0, axis=0) | np.any(found.Wx != 0.0, axis=0))
     return np.flatnonzero(own | (reached & acts)) if n else np.zeros(0, int)

@@ -33,6 +33,8 @@ class PeriodProgram:
 
     inputs   what something is added to at each of its ticks
     outputs  variables that are recorded at the period's begin
+
+    `positions`, `rates` and `turns` are the arm's cells of these kinds, `of_beds` the memory of emulated beds.
     """
 
     def __init__(
@@ -56,7 +58,10 @@ class PeriodProgram:
         self.turns = tuple(f"{name}.q" for name in self.builder.step.coordinates if name in turned)
         self._orientations = tuple(cell for body in self.bodies for cell in body.orientation)
         plain = tuple(name for name in self.positions if name not in self.turns)
-        self._arm = (*plain, *self.rates, *self.builder.step.states, *self._orientations)
+        self.of_beds = tuple(
+            f"{a.use.joint}.bed.{each.name}" for a, bed, _ in self.system.mounted for each in bed.memory
+        )
+        self._arm = (*plain, *self.rates, *self.builder.step.states, *self._orientations, *self.of_beds)
 
     @cached_property
     def prepared(self) -> engine.Prepared:
@@ -70,6 +75,12 @@ class PeriodProgram:
         divisors += [use.divisor for use in guiding.ticking(self.system)]
         divisors += [actuator.use.divisor for actuator in self.system.working if actuator.ticks]
         return math.lcm(self.schedule.dynamics, *divisors)
+
+    def begin(self, time: float) -> int:
+        """The tick of the last begin of a period up to a time, s. Tick 0 is none where a bed is not under way yet."""
+        found = math.floor(time * self.schedule.base_hz * (1.0 + 1e-12)) // self.ticks * self.ticks
+        waits = any(isinstance(step, Branch) and isinstance(step.condition, Unless0) for step in self.rest)
+        return self.ticks if waits and found == 0 else found
 
     @property
     def seconds(self) -> float:
