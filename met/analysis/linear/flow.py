@@ -166,8 +166,9 @@ class Flow:
         return [name for name, mode in self.modes().items() if mode != 0.0 and self._rate(name) == 0.0]
 
     def limits(self) -> dict[str, float]:
-        """Steps that began at each limit so far, by its path."""
-        uses = self.program.builder.limits.uses
+        """Steps that began at each limit so far, by its path: of motors and of what acts on the arm. Limits of a joint
+        do nothing, and a command comes to its own by time alone."""
+        uses = [use for use in self.program.builder.limits.uses if use.channels or use.owner]
         return {use.path: self.cells.get(cell_names.AT_LIMIT(use.path), 0.0) for use in uses}
 
     def event(self, what: str, tick: int | None = None) -> Problem:

@@ -75,12 +75,15 @@ def at_instant(program: PeriodProgram, case: int, tick: int) -> Flow:
     if outputs[0, prepared.program.outputs.index("failure")] != 0.0:
         raise failed(program.experiment, tick)
     cells = dict(zip(prepared.recording.cells, memory[0, 0].tolist(), strict=True))
+    if lost := program.remembered - cells.keys():
+        raise ValueError(f"the run keeps no {sorted(lost)}, which a period begins with")
     flow = Flow(program, inputs, cells, tick - 1)
     flow.finish()
     return flow
 
 
 def failed(experiment: Experiment, tick: int) -> Problem:
+    """The refusal of an instant that a run does not come to."""
     time = tick / experiment.structure.schedule.base_hz
     return Problem(
         error(

@@ -119,6 +119,16 @@ class PeriodProgram:
         more = (read & ever & self.moving) - {*own, *self._orientations}
         return (*(name for name in own if name in read or name in self.turns), *sorted(more))
 
+    @cached_property
+    def remembered(self) -> frozenset[str]:
+        """The cells that go on from tick to tick: what the end of a step and a period read before they write it."""
+        read, written, ever = set[str](), set[str](), set[str]()
+        self._look(self.finish, self.ticks, read, written, ever)
+        for k in range(1, self.ticks + 1):
+            self._look(self.rest, self.ticks + k - 1, read, written, ever)
+            self._look(self.finish, self.ticks + k, read, written, ever)
+        return frozenset(read & ever)
+
     def _look(
         self, body: Iterable[RecordedControl], tick: int, read: set[str], written: set[str], ever: set[str]
     ) -> None:
