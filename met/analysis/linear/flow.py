@@ -43,7 +43,7 @@ class Edge:
     def subject(self) -> str:
         """What is just there, in words."""
         if 0 < len(self.cells) <= MOST_CELLS:
-            return _listed(list(self.cells))
+            return listed(list(self.cells))
         return f"a number of `{self.phase}`"
 
 
@@ -145,7 +145,7 @@ class Flow:
             self._follow(step.body)
             if self.tangents and condition.cell == "crossing":
                 names = [name for name, mode in before.items() if mode != 0.0 and self._rate(name) == 0.0]
-                raise self.event(f"{_listed(names)} comes to rest")
+                raise self.event(f"{listed(names)} {'come' if len(names) > 1 else 'comes'} to rest")
             if self.tangents and condition.cell in HANDS_OVER:
                 raise self.event(f"a payload is {HANDS_OVER[condition.cell]}")
 
@@ -189,7 +189,8 @@ class Flow:
         )
 
 
-def _listed(names: list[str]) -> str:
+def listed(names: list[str]) -> str:
+    """Names as a message has them."""
     return ", ".join(f"`{name}`" for name in names) or "what slides"
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from met import run as engine
-from met.analysis.linear.flow import Edge, Flow, added
+from met.analysis.linear.flow import Edge, Flow, added, listed
 from met.analysis.linear.period import PeriodProgram
 from met.diagnostic import Problem, error
 from met.frozen import frozen
@@ -102,7 +102,7 @@ def period_map(program: PeriodProgram, flow: Flow) -> PeriodMap:
     flow.ticks()
     held = tuple(name for name, mode in flow.modes().items() if mode == 0.0)
     if going := flow.breaking_away():
-        raise flow.event(f"{', '.join(f'`{name}`' for name in going)} breaks away")
+        raise flow.event(f"{listed(going)} {'breaks' if len(going) == 1 else 'break'} away")
     stuck = {f"{name}.{part}" for name in held for part in ("q", "qd")} | set(held)
     states = tuple(name for name in program.states if name not in stuck)
     ticks = tuple(

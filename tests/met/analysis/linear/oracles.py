@@ -13,9 +13,10 @@ import numpy as np
 import ic
 from met.analysis.linear.flow import Flow
 from met.analysis.linear.jacobian import PeriodMap, at_instant
-from met.analysis.linear.period import PeriodProgram
+from met.analysis.linear.period import PeriodProgram, _is_converter
 from met.backends.reference.interpret import InterpretedBlock
 from met.plan import Experiment
+from met.trace.derivative import STEPS
 from met.trace.nodes import OPERANDS, TRUTHS
 from met.trace.primitives import PLAIN
 from met.trace.program import Every, Unless0
@@ -92,7 +93,7 @@ def by_differences(program: PeriodProgram, start: Flow, found: PeriodMap) -> np.
 def _moves(program: PeriodProgram, start: Flow, states: Sequence[str]) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Values of cells with each state moved forward, then each backward, then none; and by how much."""
     n = len(states)
-    first = np.array([0.0 if name in program.turns else start.cells[name] for name in states])
+    first = np.array([0.0 if name in program.turns else start.cells.get(name, 0.0) for name in states])
     sizes = 1e-5 * np.maximum(np.abs(first), 1e-2)
     moved = np.repeat(first[:, None], 2 * n + 1, axis=1)
     moved[range(n), range(n)] += sizes
@@ -164,7 +165,7 @@ def by_complex_step(program: PeriodProgram, start: Flow, found: PeriodMap) -> np
     for state in found.states:
         cells: dict[str, complex] = {name: complex(value) for name, value in start.cells.items()}
         if state not in program.turns:
-            cells[state] += 1j * TINY
+            cells[state] = cells.get(state, 0j) + 1j * TINY
         for body in program.bodies:
             theta = [1j * TINY * (state == f"{name}.q") for name in body.coordinates[3:]]
             if any(theta):
@@ -232,6 +233,8 @@ def _run(
                     value = (not value) if nodes[ref >> 1][0] in TRUTHS else -value
                 operands.append(value)
             found[i] = COMPLEX[op](*operands, *rest[count:])
+            if op in STEPS and _is_converter(section, i):  # the straight line through its steps
+                found[i] += 1j * complex(operands[0]).imag
     stores = [(cell, found[ref >> 1] * (-1.0 if ref & 1 else 1.0)) for cell, ref in section.stores]
     cells.update({cell: complex(value) for cell, value in stores})
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from met import models
 from met.analysis.linear.injected import entries
 from met.analysis.linear.jacobian import PeriodMap, at_instant, period_map
 from met.analysis.linear.period import PeriodProgram
@@ -23,6 +24,7 @@ from tests.met.analysis.linear.oracles import (
     shipped,
     shipped_experiment,
 )
+from tests.met.small_models import EVERY, smallest
 
 
 def mapped(made: Experiment, time: float = 0.0, inputs: bool = False) -> PeriodMap:
@@ -32,7 +34,7 @@ def mapped(made: Experiment, time: float = 0.0, inputs: bool = False) -> PeriodM
 
 
 @pytest.mark.parametrize(
-    "count", [2, pytest.param(100, marks=pytest.mark.slow, id="of 100 states")]
+    "count", [2, pytest.param(110, marks=pytest.mark.slow, id="of 110 states")]
 )  # fmt: skip
 @pytest.mark.parametrize(("deck", "name"), shipped())
 def test_it_is_that_of_shipped_decks(deck: str, name: str, count: int) -> None:
@@ -52,6 +54,24 @@ def test_it_is_that_of_shipped_decks(deck: str, name: str, count: int) -> None:
         if number < 10:
             assert near(found.A, by_complex_step(program, start, found)) < 1e-13
     assert compared >= 0.5 * count
+
+
+@pytest.mark.parametrize("times", [(0.06,), pytest.param((0.0, 0.12), marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("kind", "name"), [each for each in EVERY if each[0] != "metric"])
+def test_it_is_that_of_every_model(kind: models.Kind, name: str, times: tuple[float, ...], tmp_path: Path) -> None:
+    """Of two joints whose servos tick twice a step, by complex steps to 1e-12; and a converter is its straight line."""
+    made = experiment(tmp_path, smallest(kind, name).put(tmp_path).deck(), select=["cases"])
+    program = PeriodProgram(made)
+    for time in times:
+        start = at_instant(program, 3, program.begin(time))
+        try:
+            found = period_map(program, start.copy())
+        except Problem as refused:  # at rest many a joint just breaks away
+            assert time == 0.0 and "away" in refused.diagnostics[0].message
+            continue
+        assert near(found.A, by_complex_step(program, start, found)) < 1e-12
+        if name not in ("tachometer", "encoder"):
+            assert near(found.A, by_differences(program, start, found)) < 1e-6
 
 
 SWING = """\
