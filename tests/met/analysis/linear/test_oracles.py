@@ -138,6 +138,20 @@ def test_multirate_poles_are_those_of_the_monodromy_matrix_of_a_simulated_period
         assert np.min(np.abs(own - pole)) < 1e-6
 
 
+def test_the_gain_limit_of_a_law_that_ticks_twice_a_period_is_where_a_pole_leaves_the_unit_circle(
+    tmp_path: Path,
+) -> None:
+    words = {"SLOW": "50 Hz", "FAST": "200 Hz", "STEP": "100 Hz", "SENSOR": ""}
+    deck = MULTIRATE.replace("rate = FAST", "rate = FAST;  kp = GAIN*0.02 V*s/rad;  ki = GAIN*0.125 V/rad")
+    for word, text in words.items():
+        deck = deck.replace(word, text)
+    (opened,) = linear(experiment(tmp_path, deck.replace("GAIN", "1")), opened=["b.servo.voltage"]).loops
+    assert opened.ticks == 4 and opened.loop is None and opened.gains[1] is not None
+    for share, grows in ((0.9999, False), (1.0001, True)):
+        found = linear(experiment(tmp_path, deck.replace("GAIN", repr(share * opened.gains[1]))))
+        assert (max(abs(pole.z) for pole in found.poles) > 1.0 + 1e-8) == grows
+
+
 def monodromy(made: Experiment, program: PeriodProgram, tick: int) -> np.ndarray:
     """Differences of the kernel's memory a period after a tick, by its memory at its end."""
     prepared = engine.prepare(made)
