@@ -28,12 +28,16 @@ def draw(found: Linearized, output: Path) -> None:
     the answers to steps. Raises Problem E397 where there is neither, E305, E326."""
     import matplotlib
 
-    loops = [loop for loop in found.loops if loop.loop is not None]
+    loops = [loop for loop in found.loops if loop.loop is not None and loop.returns]
     steps = bool(found.inputs and found.outputs)
     if not loops and not steps:
         helps = ("`--open SIGNAL` opens a loop", "`--input SIGNAL --output SIGNAL` asks for a step")
         raise Problem(
-            error("E397", "there is nothing to draw: no loop of one rate, and no input with an output", help=helps)
+            error(
+                "E397",
+                "there is nothing to draw: no loop of one rate that closes, and no input with an output",
+                help=helps,
+            )
         )
     style: Any = STYLE
     with matplotlib.rc_context(style):

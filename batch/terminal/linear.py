@@ -73,6 +73,9 @@ def _of_joint(state: str, joint: str) -> str:
 
 def _table(head: Sequence[tuple[str, ...]], rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
     width = len(head[0])
+    if not rows:
+        yield "  none: nothing moves"
+        return
     yield from columns([*head, *rows[:MOST_POLES]], right=range(width - 1))
     if len(rows) > MOST_POLES:
         yield f"  and {len(rows) - MOST_POLES} more, faster: `--format json` has them all"
@@ -83,6 +86,9 @@ def _loop_lines(loop: OpenLoop, period: float) -> Iterator[str]:
     yield f"loops of {', '.join(loop.paths)}, all at once" if several else f"loop of {loop.paths[0]}"
     if not loop.stable:
         yield "  unstable as it is: a pole above grows"
+        return
+    if not loop.returns:
+        yield "  nothing comes back here: what it would move is held, or the law is at its limit"
         return
     down, up = loop.gains
     most = "no limit found" if up is None else f"{up:.4g} times{_at(loop.margins, 'at_gain_up')}"

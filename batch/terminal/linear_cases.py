@@ -74,6 +74,8 @@ def _of_loop(place: int, found: Linearized) -> tuple[str, ...]:
     loop = found.loops[place]
     if not loop.stable:
         return ("unstable",)
+    if not loop.returns:
+        return ("nothing comes back",)
     gain = "no limit" if loop.gains[1] is None else f"{loop.gains[1]:.4g}"
     own = loop.margins
     if own is None:
@@ -90,7 +92,7 @@ def _tightest(loops: dict[int, OpenLoop]) -> Iterator[str]:
         some = ", ".join(f"#{case}" for case in unstable[:5]) + (" ..." if len(unstable) > 5 else "")
         yield f"  unstable in {len(unstable)} of {len(loops)} cases: {some}"
     gains = {case: loop.gains[1] for case, loop in loops.items() if loop.stable and loop.gains[1] is not None}
-    margins = {case: loop.margins for case, loop in loops.items() if loop.margins is not None}
+    margins = {case: loop.margins for case, loop in loops.items() if loop.margins is not None and loop.returns}
     phases = {case: each.phase for case, each in margins.items() if each.phase is not None}
     told = []
     if gains:

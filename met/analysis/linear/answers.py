@@ -83,6 +83,11 @@ class OpenLoop:
     gains: tuple[float | None, float | None]
     stable: bool
 
+    @property
+    def returns(self) -> bool:
+        """False where nothing comes back: the arm is held, or the law is at its limit."""
+        return self.loop is None or self.loop.returns
+
 
 @frozen
 class Linearized:
@@ -298,6 +303,8 @@ def _unknown(what: str, name: str, known: Mapping[str, object]) -> Problem:
     helps = [f"did you mean `{near}`?"] if near else []
     if known and len(known) <= 12:
         helps.append("there are " + ", ".join(f"`{each}`" for each in known))
+    elif what == "output":
+        helps.append("an output is any name that `record` takes")
     elif not known:
         helps.append("no servo here has a computer that ticks: a law that is continuous is a part of the arm")
     return Problem(error("D373", f"there is no {what} `{name}`", help=tuple(helps)))

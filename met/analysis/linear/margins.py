@@ -48,6 +48,15 @@ class ScalarLoop:
         """L at angular frequencies, rad/s: [frequency]."""
         return np.array([self.at(cmath.exp(1j * each * self.period)) for each in w])
 
+    @property
+    def returns(self) -> bool:
+        """False where nothing comes back of what stands at the open place: L is 0."""
+        moved, largest = self.B, abs(self.D)
+        for _ in range(len(self.A)):
+            largest = max(largest, abs(float(self.C @ moved)))
+            moved = self.A @ moved
+        return largest > 0.0
+
     def closed(self, gain: float = 1.0) -> np.ndarray:
         """A of the loop closed with this times its gain."""
         return self.A + gain / (1.0 - gain * self.D) * np.outer(self.B, self.C)
@@ -84,7 +93,7 @@ class LoopMargins:
     @property
     def disk_gain(self) -> tuple[float, float]:
         """Times its gain, from and to, that the disk allows."""
-        half = 0.5 * self.disk
+        half = min(1.0, 0.5 * self.disk)
         return (1.0 - half) / (1.0 + half), (1.0 + half) / (1.0 - half) if half < 1.0 else math.inf
 
     @property

@@ -93,3 +93,14 @@ def test_a_case_without_an_answer_says_why_in_its_row(folder: Path) -> None:
 def test_a_file_is_of_one_case(folder: Path) -> None:
     said = CliRunner().invoke(linear, [str(folder / "deck.ic"), "--all-cases", "-o", "a.npz"])
     assert said.exit_code == 2 and "-o is of one case, and --all-cases of all" in said.output
+
+
+def test_of_a_joint_that_sticks_nothing_comes_back(folder: Path) -> None:
+    text = DECK.replace("rate(0.1 rad/s)", "rate(0 rad/s)").replace("hinge.qd = 0.1 rad/s", "hinge.q = 0 rad")
+    (folder / "deck.ic").write_text(text)
+    said = met(folder, "linear", "deck.ic", *OPEN, status=0)
+    assert said.splitlines()[1] == "  hinge sticks, and is held"
+    assert said.endswith(
+        "loop of hinge.servo.voltage\n"
+        "  nothing comes back here: what it would move is held, or the law is at its limit\n"
+    )
