@@ -101,7 +101,7 @@ class PeriodProgram:
     @cached_property
     def sections(self) -> dict[int, TangentSection]:
         """The sections of start and tick with tangents, by number."""
-        return {n: with_tangents(self.recording.sections[n], self.moving, _is_converter) for n in self._used}
+        return {n: with_tangents(self.recording.sections[n], self.moving, is_converter) for n in self._used}
 
     @cached_property
     def _used(self) -> tuple[int, ...]:
@@ -156,7 +156,7 @@ class PeriodProgram:
         return re.split("[:.]", name)[0]
 
 
-def _is_converter(section: CodeSection, position: int) -> bool:
+def is_converter(section: CodeSection, position: int) -> bool:
     """True for a node in the part of a section where a sensor reads: what rounds there is a converter, or counts."""
     name = ""
     for begin, part in section.parts:

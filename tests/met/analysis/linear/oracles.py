@@ -13,7 +13,7 @@ import numpy as np
 import ic
 from met.analysis.linear.flow import Flow
 from met.analysis.linear.jacobian import PeriodMap, at_instant
-from met.analysis.linear.period import PeriodProgram, _is_converter
+from met.analysis.linear.period import PeriodProgram, is_converter
 from met.backends.reference.interpret import InterpretedBlock
 from met.plan import Experiment
 from met.trace.derivative import STEPS
@@ -74,8 +74,8 @@ def by_differences(program: PeriodProgram, start: Flow, found: PeriodMap) -> np.
     for cell, values in moves.items():
         if cell in slots:
             block.state[slots[cell]] = values
+    block._tick = start.tick
     for _ in range(program.ticks):
-        block._tick = start.tick if _ == 0 else block._tick
         with np.errstate(all="ignore"):
             block._row = np.zeros((2 * n + 1, len(program.columns)))
             block._follow(_unrecorded(program.rest))
@@ -233,7 +233,7 @@ def _run(
                     value = (not value) if nodes[ref >> 1][0] in TRUTHS else -value
                 operands.append(value)
             found[i] = COMPLEX[op](*operands, *rest[count:])
-            if op in STEPS and _is_converter(section, i):  # the straight line through its steps
+            if op in STEPS and is_converter(section, i):  # the straight line through its steps
                 found[i] += 1j * complex(operands[0]).imag
     stores = [(cell, found[ref >> 1] * (-1.0 if ref & 1 else 1.0)) for cell, ref in section.stores]
     cells.update({cell: complex(value) for cell, value in stores})
