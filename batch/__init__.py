@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from batch.campaigns.executor import Executor
     from batch.campaigns.verification.when import Verify
     from batch.differences.result import Diff
+    from batch.linearized import LinearAnswer
     from batch.queries.summary import Summary
     from batch.simulation.simulation import Simulation as Simulation
     from met.plan import Plan
@@ -142,6 +143,39 @@ def diff(
 
     texts = [tolerances] if isinstance(tolerances, str) else tolerances
     return compared(Path(a), Path(b), read(texts), distributions=distributions)
+
+
+def linear(
+    plan: Plan | str | os.PathLike[str],
+    experiment: str | None = None,
+    *,
+    case: int | str = 0,
+    at: float = 0.0,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    opened: Sequence[str] = (),
+) -> LinearAnswer:
+    """Linearise the program of a plan's run, exactly, where a case is at an instant: docs/linear.md.
+
+    experiment  name of a run or sweep; None: the plan's first
+    case        row of the case table, `"#7"`, or the beginning of a case_id
+    at          s; the answers are of the last begin of a period up to it
+    inputs      columns of B: commands of servos that tick, outputs of their laws
+    outputs     rows of C: whatever can be recorded
+    opened      outputs of laws, at which loops are opened: each alone, and all at once
+
+    Raises Problem D370 where an event is on the way, D371 where the run has failed before, D372 and D373 for an instant
+    or a name that is not there.
+    """
+    from batch.campaigns.choosing import experiments_named, select_rows
+    from batch.linearized import LinearAnswer
+    from met.analysis.linear.answers import linear as linearised
+
+    asked = experiments_named(_plan(plan, None), None if experiment is None else (experiment,))[:1]
+    ((found, rows),) = select_rows(asked, [case])
+    return LinearAnswer(
+        linearised(found, case=int(rows[0]), at=at, inputs=inputs, outputs=outputs, opened=opened)
+    )  # fmt: skip
 
 
 def _plan(given: object, experiments: Sequence[str] | None) -> Plan:

@@ -214,7 +214,7 @@ class Builder:
     def _tick(self, tape: Tape, actuator: Actuator) -> None:
         """One tick of one servo's computer, on the state at this time."""
         joint = self.joints[actuator.index]
-        setpoint = setpoints.setpoint(self.system, actuator, tape.read, tape.time)
+        setpoint = self.setpoint(tape, actuator)
         if actuator.use.command is not None:
             tape.write(f"{actuator.path}.command", setpoint.value)
         on_bed, between = self.step.beds.seen(tape, actuator), actuator in self.system.ticking_between
@@ -239,6 +239,10 @@ class Builder:
         for fitted in actuator.sensors:
             tape.write(fitted.path, sensing.true_value(seen, sensing.quantity(fitted)))
         self.compute(tape, actuator, seen)
+
+    def setpoint(self, tape: Tape, actuator: Actuator) -> Setpoint:
+        """The setpoint of a servo's joint at this tick."""
+        return setpoints.setpoint(self.system, actuator, tape.read, tape.time)
 
     def seen(
         self,

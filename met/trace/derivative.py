@@ -1,7 +1,7 @@
-"""The derivative of a recorded number by one of its inputs: forward, node by node, in the graph itself.
+"""Derivatives of recorded numbers by their inputs, or along a direction: forward, node by node, in the graph itself.
 
-It is that of the pieces: of `where` the derivative of what is chosen, so at a kink or a jump that of the side which the
-condition takes there; of `floor`, `rint`, tables and random numbers none. Of sin, cos, exp and their like it is the
+They are those of the pieces: of `where` the derivative of what is chosen, so at a kink or a jump that of the side which
+the condition takes there; of `floor`, `rint`, tables and random numbers none. Of sin, cos, exp and their like it is the
 derivative of the polynomial that stands for them, right to some units in the last place of the function's own size.
 
 For what is not recorded: record it, and `Formulas.replay` the derivative over floats or arrays.
@@ -9,9 +9,9 @@ For what is not recorded: record it, and `Formulas.replay` the derivative over f
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 
-from met.trace.nodes import OPERANDS, TRUTHS, ZERO, Nodes
+from met.trace.nodes import OPERANDS, TRUTHS, ZERO, Node, Nodes
 from met.trace.scalar import Scalar
 
 ROUNDS = 2.0**51
@@ -21,27 +21,45 @@ ROUNDS = 2.0**51
 def derivative(x: Scalar, name: str) -> Scalar:
     """d x / d `name`, an input of x's graph; its other inputs, cells, tick and time are held."""
     graph = x.graph
-    slopes: dict[int, int] = {}
-    for i in graph.live([x.ref]):
+    found = slopes(graph, graph.live([x.ref]), lambda node: graph.constant(float(node == ("input", name))))
+    return Scalar(graph, found[x.ref >> 1] ^ (x.ref & 1))
+
+
+def slopes(
+    graph: Nodes, order: Iterable[int], leaf: Callable[[Node], int], straight: Callable[[int], bool] = lambda _: False
+) -> dict[int, int]:
+    """References of the derivatives of nodes by position, made in the same graph; a truth's is 0.
+
+    order     positions of the nodes, each after its operands
+    leaf      gives the reference of a leaf's own derivative
+    straight  tells of a `floor` or `rint` by its position whether it counts as the straight line through its steps
+    """
+    found: dict[int, int] = {}
+    for i in order:
         op, *rest = graph.nodes[i]
         operands = [ref for ref in rest[: OPERANDS[op]] if graph.nodes[ref >> 1][0] not in TRUTHS]
-        moving = any(slopes[ref >> 1] & -2 != ZERO for ref in operands)
-        if op == "input":
-            slopes[i] = graph.constant(float(rest[0] == name))
-        elif moving and op in _RULES and not _rounds(graph, op, rest):
+        moving = any(found[ref >> 1] & -2 != ZERO for ref in operands)
+        if op in ("input", "cell"):
+            found[i] = leaf(graph.nodes[i])
+        elif moving and op in STEPS and straight(i):
+            found[i] = found[rest[0] >> 1] ^ (rest[0] & 1)
+        elif moving and op in _RULES and not rounds(graph, op, rest):
             numbers = [Scalar(graph, ref) for ref in rest[: OPERANDS[op]]]
-            moves = [Scalar(graph, slopes.get(ref >> 1, ZERO) ^ (ref & 1)) for ref in rest[: OPERANDS[op]]]
-            slopes[i] = _RULES[op](graph, [*rest[OPERANDS[op] :]], Scalar(graph, 2 * i), numbers, moves).ref
+            moves = [Scalar(graph, found.get(ref >> 1, ZERO) ^ (ref & 1)) for ref in rest[: OPERANDS[op]]]
+            found[i] = _RULES[op](graph, [*rest[OPERANDS[op] :]], Scalar(graph, 2 * i), numbers, moves).ref
         else:
-            slopes[i] = ZERO
-    return Scalar(graph, slopes[x.ref >> 1] ^ (x.ref & 1))
+            found[i] = ZERO
+    return found
 
 
-def _rounds(graph: Nodes, op: str, operands: list[int]) -> bool:
+def rounds(graph: Nodes, op: str, operands: Sequence[int]) -> bool:
     """True where a node is a sum that rounds to whole numbers, or halves."""
     added = {"add": operands[:2], "sub": operands[:2], "fma": operands[2:3]}.get(op, [])
     return any(abs(value) >= ROUNDS for ref in added if (value := graph.value(ref)) is not None)
 
+
+STEPS = ("floor", "rint")
+"""Operations that give whole numbers: a converter's steps."""
 
 Rule = Callable[[Nodes, list[int], Scalar, list[Scalar], list[Scalar]], Scalar]
 """(graph, what stands behind the operands, the node, its operands, their derivatives) -> its derivative."""

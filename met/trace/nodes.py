@@ -17,7 +17,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
+from itertools import islice
+from typing import Any, Self
 
 import numpy as np
 
@@ -73,6 +74,22 @@ class Nodes:
         self._made: dict[Node, int] = {}
         self._literals: dict[float, int] = {0.0: ZERO, 1.0: ONE}
         self._constants: dict[int, float] = {0: 0.0, 1: 1.0}
+
+    @classmethod
+    def of(cls, nodes: Iterable[Node]) -> Self:
+        """The graph of nodes that were made in another one, at the positions that they have there."""
+        made = cls()
+        for i, node in islice(enumerate(nodes), len(made.nodes), None):
+            made.nodes.append(node)
+            if node[0] != "const":
+                made._made.setdefault(node, 2 * i)
+            elif node[1] == node[1]:
+                made._constants[i] = node[1]
+                made._literals.setdefault(node[1], 2 * i)
+            else:
+                made._constants[i] = node[1]
+                made._made.setdefault(("nan",), 2 * i)
+        return made
 
     # Making nodes
 

@@ -17,6 +17,9 @@ from met.trace import Real
 from met.trace.noise import Stream, normal
 from met.trace.program import Tape
 
+READING = "sensors"
+"""Name of the part of a tick in which a sensor reads, or a bed's converters work (`met.trace.program.Tape.part`)."""
+
 
 def measured(actuator: Actuator, p: NamedValues, q: Real, qd: Real, states: NamedValues) -> tuple[Real, Real]:
     """Position and rate where the servo's encoder and tachometer sit, of a joint that moves so."""
@@ -116,7 +119,8 @@ def tick(
     sensed = Sensed(find, period, partial(normal, stream, number))
     p = values(system, fitted, tape.read)
     held = NamedValues(fitted.owner, {part.name: tape.read(f"{fitted.path}.{part.name}") for part in fitted.memory})
-    reading: Reading = answer(fitted.owner, fitted.sensor.read, p, held, _states(fitted, state), sensed)
+    with tape.part(READING):
+        reading: Reading = answer(fitted.owner, fitted.sensor.read, p, held, _states(fitted, state), sensed)
     returned(fitted.owner, "read", reading.held, (memory.name for memory in fitted.memory))
     for name, new in reading.held.items():
         tape.write(f"{fitted.path}.{name}", new)

@@ -18,6 +18,7 @@ from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import REPEAT, SEED
 from met.program import cell_names, cells
+from met.program.control.sensing import READING
 from met.program.system import Actuator, System
 from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.motor import Motor, torque
@@ -207,7 +208,9 @@ class Substituted:
 
     def reading(self, tape: Tape, each: Mounted) -> Real:
         """The filtered rate of an emulated bed's shaft, rad/s, as the computer reads it."""
-        return answer(self._owner(each), each.bed.read, self._bed_values(tape, each), self._bed(tape, each))
+        p, held = self._bed_values(tape, each), self._bed(tape, each)
+        with tape.part(READING):
+            return answer(self._owner(each), each.bed.read, p, held)
 
     def read(self, tape: Tape) -> None:
         """The filtered rate, the observer's correction, and the shaft's angle."""
@@ -334,7 +337,8 @@ class Substituted:
         name = each.joint
         p = self._bed_values(tape, each)
         asked = Wire(self._voltage(tape, each), given.torque / p.kt_load)
-        asked, limited = answer(self._owner(each), each.bed.taken, p, asked)
+        with tape.part(READING):
+            asked, limited = answer(self._owner(each), each.bed.taken, p, asked)
         cells.count(tape, limited, LIMITED)
         delay = self._delay(tape, each)
         late = self._queued(tape, each, delay)

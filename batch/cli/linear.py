@@ -1,0 +1,105 @@
+"""`met linear`: a face of met.analysis.linear."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from batch.cli.run import measured
+from met.cli import NO, YES, check_options, deck_options, format_option
+from met.messages.visible import say
+
+
+class Instant(click.ParamType):
+    """An instant of a run, with its unit: `2 s`, `250 ms`; a bare number is seconds."""
+
+    name = "time"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Read an instant as seconds."""
+        try:
+            return measured(value, "s")
+        except ValueError:
+            self.fail(f"`{value}` is no instant: write `2 s` or `250 ms`", param, ctx)
+
+
+@click.command(short_help="Linearise the program that runs: poles, modes, margins of loops, A B C D.")
+@click.argument("source", metavar="DECK|PLAN.json")
+@click.argument("name", metavar="[NAME]", required=False)
+@click.option("--at", type=Instant(), default="0", metavar="TIME", help="The instant of the run, `2 s`. [0 s]")
+@click.option("--case", metavar="ID", help="The case of a sweep: the beginning of its id, or '#7'. [#0]")
+@click.option(
+    "--all-cases", is_flag=True, help="All cases of a sweep, a row each: margins of opened loops, else damping."
+)
+@click.option(
+    "--input", "inputs", multiple=True, metavar="SIGNAL", help="A column of B: `pan.servo.command`; may be repeated."
+)
+@click.option(
+    "--output", "outputs", multiple=True, metavar="SIGNAL", help="Rows of C: `pan.q`, `tau`; may be repeated."
+)
+@click.option(
+    "--open",
+    "opened",
+    multiple=True,
+    metavar="SIGNAL",
+    help="Open the loop here: `pan.servo.voltage`; may be repeated.",
+)
+@click.option("-o", "--to", "output", metavar="FILE", help="Write A, B, C, D with names: .npz, .h5 or .csv.")
+@click.option("--picture", metavar="FILE", help="Draw loops (Bode, Nichols) and steps: .png, .svg or .pdf.")
+@deck_options
+@format_option
+def linear(source: str, name: str | None, form: str, **options: Any) -> int:
+    """Linearise a deck's only run or sweep, the one marked `default`, or NAME, where it is at an instant.
+
+    The derivative is exact, and of the program that runs: sampling, held values and delays are in it. What sticks is
+    held. Exit status: 0; 1 an opened loop is unstable as it is; 2 the input is wrong, or an event is on the way.
+    """
+    import json
+
+    from batch.campaigns.choosing import experiments_named, select_rows
+    from batch.campaigns.plans import read_plan
+    from batch.linearized import files, picture
+    from batch.plotting import output as places
+    from batch.terminal.linear import as_data, linear_lines
+    from batch.terminal.linear_cases import answered, case_lines
+    from met.analysis.linear.answers import Linearized, LinearQuestion
+
+    if options["all_cases"]:
+        for option, key in (("--case", "case"), ("-o", "output"), ("--picture", "picture")):
+            if options[key] is not None:
+                raise click.UsageError(f"{option} is of one case, and --all-cases of all")
+    names = (name,) if name is not None else ()
+    given = {key: options[key] for key in ("defines", "include_dirs", "settings")}
+    check_options(source, names, **given)
+    output, drawn = (None if options[key] is None else Path(options[key]) for key in ("output", "picture"))
+    if output is not None:
+        files.check(output)
+    if drawn is not None:
+        places.check(drawn)
+    plan = read_plan(source, names, **given, quiet=form == "json")
+    asked = experiments_named(plan, names or None)
+    if options["case"] is not None:
+        ((experiment, rows), *_) = select_rows(asked, [options["case"]])
+        case = int(rows[0])
+    else:
+        experiment, case = asked[0], 0
+    signals = (tuple(options[key]) for key in ("inputs", "outputs", "opened"))
+    question = LinearQuestion(experiment, options["at"], *signals)
+    if options["all_cases"]:
+        every = answered(question)
+        data = [
+            as_data(each) if isinstance(each, Linearized) else {"case": n, "why_not": each}
+            for n, each in enumerate(every)
+        ]
+        say(json.dumps(data, indent=1) if form == "json" else "\n".join(case_lines(question, every)))
+        loops = [loop for each in every if isinstance(each, Linearized) for loop in each.loops]
+        return YES if all(loop.stable for loop in loops) else NO
+    found = question.of(case)
+    if output is not None:
+        files.write(found, output)
+    if drawn is not None:
+        picture.draw(found, drawn)
+    say(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(linear_lines(found)))
+    return YES if all(loop.stable for loop in found.loops) else NO

@@ -1,0 +1,85 @@
+"""Linear answers in files: .npz, .h5 that xarray opens, or .csv, each whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from batch.linearized.data import arrays, axes
+from met.analysis.linear.answers import Linearized
+from met.diagnostic import Problem, error
+from met.host.files import whole_file
+from met.outputs import cannot_write, check_place
+
+ENDINGS = (".npz", ".h5", ".csv")
+
+
+def check(output: Path) -> None:
+    """Refuses a place at which no such file can be written. Raises Problem E305, E326."""
+    if output.suffix.lower() not in ENDINGS and not output.is_dir():
+        raise Problem(
+            error("E326", f"cannot write {output}: linear answers are .npz, .h5 or .csv files", help="`-o linear.npz`")
+        )
+    check_place(output, code="E305", inside=output / "linear.npz")
+    if output.exists() and output.stat().st_size > 0:
+        helps = "give another name with `-o`, or remove the file"
+        raise Problem(error("E305", f"{output} exists: it is not written over", help=helps))
+
+
+def write(found: Linearized, output: Path) -> None:
+    """Writes the answers. Raises Problem E305."""
+    kind = output.suffix.lower()
+    content = {".npz": _npz, ".h5": _hdf5, ".csv": _csv}[kind](found)
+    try:
+        with whole_file(output) as file:
+            file.write(content)
+    except OSError as reason:
+        raise cannot_write(output, reason, code="E305") from reason
+
+
+def _about(found: Linearized) -> dict[str, Any]:
+    return {"experiment": found.experiment, "case": found.case, "time": found.time, "period": found.seconds}
+
+
+def _npz(found: Linearized) -> bytes:
+    made = io.BytesIO()
+    several: dict[str, Any] = {name: matrix for name, (_, matrix) in arrays(found).items()}
+    several |= {
+        axis: np.array(values, dtype=str) for axis, values in axes(found).items() if not axis.startswith("from_")
+    }
+    several |= {name: np.array(value) for name, value in _about(found).items()}
+    np.savez(made, **several)
+    return made.getvalue()
+
+
+def _hdf5(found: Linearized) -> bytes:
+    import h5py
+
+    made = io.BytesIO()
+    with h5py.File(made, "w", libver=("earliest", "v110"), track_order=True) as file:
+        for axis, values in axes(found).items():
+            file.create_dataset(axis, data=np.array(values, dtype=object), dtype=h5py.string_dtype())
+            file[axis].make_scale(axis)
+        for name, (along, matrix) in arrays(found).items():
+            dataset = file.create_dataset(name, data=matrix)
+            for number, axis in enumerate(along):
+                dataset.dims[number].attach_scale(file[axis])
+        file.attrs.update(_about(found))
+    return made.getvalue()
+
+
+def _csv(found: Linearized) -> bytes:
+    text, names = io.StringIO(), axes(found)
+    out = csv.writer(text, lineterminator="\n")
+    for key, value in _about(found).items():
+        out.writerow([f"# {key}", json.dumps(value)])
+    for name, ((rows, across), matrix) in arrays(found).items():
+        out.writerow([name, *names[across]])
+        for row, values in zip(names[rows], matrix.tolist(), strict=True):
+            out.writerow([row, *(repr(value) for value in values)])
+    return text.getvalue().encode()

@@ -1,0 +1,155 @@
+"""Bode, Nichols and Nyquist pictures of opened loops, and steps from inputs to outputs."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from batch.plotting import output as places
+from batch.plotting.sheet import COLOURS, FAINT, INK, STYLE
+from met.analysis.linear.answers import Linearized, OpenLoop
+from met.diagnostic import Problem, error
+
+POINTS = 1500
+"""Frequencies of a curve."""
+
+DECADES = 5
+"""Of a Bode picture, below the highest frequency that a loop sees."""
+
+STEPS = 2000
+"""Periods of a step's picture, at most."""
+
+
+def draw(found: Linearized, output: Path) -> None:
+    """Draws what there is: of each opened loop its Bode and Nichols curves, with margins marked; of inputs and outputs
+    the answers to steps. Raises Problem E397 where there is neither, E305, E326."""
+    import matplotlib
+
+    loops = [loop for loop in found.loops if loop.loop is not None and loop.returns]
+    steps = bool(found.inputs and found.outputs)
+    if not loops and not steps:
+        helps = ("`--open SIGNAL` opens a loop", "`--input SIGNAL --output SIGNAL` asks for a step")
+        raise Problem(
+            error(
+                "E397",
+                "there is nothing to draw: no loop of one rate that closes, and no input with an output",
+                help=helps,
+            )
+        )
+    style: Any = STYLE
+    with matplotlib.rc_context(style):
+        places.save(_figure(found, loops, steps), output)
+
+
+def _figure(found: Linearized, loops: list[OpenLoop], steps: bool) -> Any:
+    from matplotlib.figure import Figure
+
+    rows = [2.0] * bool(loops) + [1.0] * (len(found.outputs) if steps else 0)
+    figure = Figure(figsize=(9.4, 2.1 * sum(rows) + 0.9), dpi=144, layout="constrained")
+    grid = figure.add_gridspec(len(rows), 1, height_ratios=rows)
+    if loops:
+        inner = grid[0].subgridspec(2, 2)
+        _bode(figure.add_subplot(inner[0, 0]), figure.add_subplot(inner[1, 0]), loops, found)
+        _nichols(figure.add_subplot(inner[:, 1]), loops, found)
+    if steps:
+        first = len(rows) - len(found.outputs)
+        for row, name in enumerate(found.outputs):
+            _step(figure.add_subplot(grid[first + row]), found, row, name, last=row == len(found.outputs) - 1)
+    figure.suptitle(
+        f"{found.experiment} at t = {found.time:.6g} s, a period of {1e3 * found.seconds:g} ms", x=0.01, ha="left"
+    )
+    return figure
+
+
+def _frequencies(found: Linearized) -> np.ndarray:
+    highest = math.pi / found.seconds
+    return np.geomspace(highest / 10.0**DECADES, highest, POINTS)
+
+
+def _bode(size: Any, phase: Any, loops: list[OpenLoop], found: Linearized) -> None:
+    w = _frequencies(found)
+    for number, loop in enumerate(loops):
+        assert loop.loop is not None
+        L, colour = loop.loop.response(w), COLOURS[number % len(COLOURS)]
+        turned = np.degrees(_turned(L))
+        size.loglog(w / (2.0 * math.pi), np.abs(L), color=colour, label=loop.paths[0])
+        phase.semilogx(w / (2.0 * math.pi), turned, color=colour)
+        if loop.margins is None:
+            continue
+        for at, axis, curve in (
+            (loop.margins.at_phase, phase, turned),
+            (loop.margins.at_gain_up, size, np.abs(L)),
+        ):
+            if at is not None:
+                axis.plot(at / (2.0 * math.pi), np.interp(at, w, curve), "o", color=colour, markersize=4)
+    size.axhline(1.0, color=FAINT, linewidth=0.8)
+    phase.axhline(-180.0, color=FAINT, linewidth=0.8)
+    size.set_ylabel("size of L")
+    phase.set_ylabel("phase, deg")
+    phase.set_xlabel("frequency, Hz")
+    phase.yaxis.set_major_locator(_every(90.0))
+    for axis in (size.xaxis, size.yaxis, phase.xaxis):
+        _plain_numbers(axis)
+    size.tick_params(labelbottom=False)
+    size.legend(fontsize="small")
+
+
+def _plain_numbers(axis: Any) -> None:
+    """Writes the numbers of a logarithmic axis without powers."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _turned(L: np.ndarray) -> np.ndarray:
+    """The phase of a curve without jumps, the turn of its low end between -360 and 0 deg."""
+    turned = np.unwrap(np.angle(L))
+    return np.asarray(turned - 2.0 * math.pi * math.ceil(turned[0] / (2.0 * math.pi)))
+
+
+def _every(step: float) -> Any:
+    from matplotlib.ticker import MultipleLocator
+
+    return MultipleLocator(step)
+
+
+def _nichols(ax: Any, loops: list[OpenLoop], found: Linearized) -> None:
+    w = _frequencies(found)
+    for number, loop in enumerate(loops):
+        assert loop.loop is not None
+        L, colour = loop.loop.response(w), COLOURS[number % len(COLOURS)]
+        ax.semilogy(np.degrees(_turned(L)), np.abs(L), color=colour)
+    ax.plot(-180.0, 1.0, "+", color=INK, markersize=9)
+    for sensitivity, style in ((2.0, "-"), (4.0, "--")):  # |S| is so large on the curve around -1
+        turn = np.linspace(0.0, 2.0 * math.pi, 400)
+        around = -1.0 + np.exp(1j * turn) / sensitivity
+        phase = np.degrees(np.angle(around))
+        ax.semilogy(np.where(phase > 0.0, phase - 360.0, phase), np.abs(around), style, color=FAINT, linewidth=0.8)
+    _plain_numbers(ax.yaxis)
+    ax.xaxis.set_major_locator(_every(90.0))
+    ax.set_xlabel("phase of L, deg")
+    ax.set_ylabel("size of L")
+    ax.set_title("Nichols; grey: |S| is 2, and 4", fontsize="small", color=FAINT)
+
+
+def _step(ax: Any, found: Linearized, row: int, name: str, *, last: bool) -> None:
+    slowest = max((pole.seconds for pole in found.poles if pole.s.real < 0.0 and pole.seconds < 1e7 * found.seconds),
+                  default=found.seconds)  # fmt: skip
+    count = int(min(STEPS, max(20.0, 6.0 * slowest / found.seconds)))
+    for number, signal in enumerate(found.inputs):
+        x, values = np.zeros(len(found.states)), []
+        for _ in range(count + 1):
+            values.append(float(found.C[row] @ x + found.D[row, number]))
+            x = found.A @ x + found.B[:, number]
+        time = found.seconds * np.arange(count + 1)
+        ax.step(time, values, where="post", color=COLOURS[number % len(COLOURS)], label=f"step of {signal}")
+    ax.set_ylabel(name)
+    ax.legend(fontsize="small")
+    if last:
+        ax.set_xlabel("time, s")
+    else:
+        ax.tick_params(labelbottom=False)

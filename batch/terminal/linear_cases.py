@@ -1,0 +1,116 @@
+"""What `met linear --all-cases` prints: a row for each case of a sweep, and of each loop the tightest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+
+from ic.printing.columns import columns, count, number
+from met.analysis.linear.answers import Linearized, LinearQuestion, OpenLoop
+from met.diagnostic import Problem
+
+MOST_ROWS = 40
+"""Cases that are listed, the first ones."""
+
+Answer = Linearized | str
+"""Of a case: its answers, or why it has none."""
+
+
+def answered(question: LinearQuestion) -> list[Answer]:
+    """The answers of all cases. Raises Problem where the question itself is wrong."""
+    question.program  # noqa: B018 - what is wrong for all cases is no case's
+    found: list[Answer] = []
+    for case in range(question.experiment.cases.count):
+        try:
+            found.append(question.of(case))
+        except Problem as refused:
+            found.append(refused.diagnostics[0].message.partition(": ")[2] or refused.diagnostics[0].message)
+    return found
+
+
+def case_lines(question: LinearQuestion, found: Sequence[Answer]) -> Iterator[str]:
+    """The rows in lines: of each opened loop a table; of none, the least damped pole of each case."""
+    name, cases = question.experiment.name, count(len(found), "case")
+    yield f"{name}: linear at t = {question.at:.6g} s, {cases}"
+    several = [(path,) for path in question.opened] + ([question.opened] if len(question.opened) > 1 else [])
+    for number_of, paths in enumerate(several):
+        yield ""
+        yield f"loop of {paths[0]}" if len(paths) == 1 else f"loops of {', '.join(paths)}, all at once"
+        head = ("gain", "phase", "delay", "disk") if len(paths) == 1 else ("gain",)
+        yield from _table(question, found, head, partial(_of_loop, number_of))
+        loops = {n: each.loops[number_of] for n, each in enumerate(found) if isinstance(each, Linearized)}
+        yield from _tightest(loops)
+    if not several:
+        yield ""
+        yield "least damped pole that swings"
+        yield from _table(question, found, ("damping", "Hz", "joint"), _swing)
+    refused = sum(isinstance(each, str) for each in found)
+    if refused:
+        yield ""
+        yield f"  {count(refused, 'case')} of {len(found)} without an answer: an event is on the way, or the run failed"
+
+
+def _table(
+    question: LinearQuestion,
+    found: Sequence[Answer],
+    head: tuple[str, ...],
+    cells: Callable[[Linearized], tuple[str, ...]],
+) -> Iterator[str]:
+    varied = question.experiment.cases.coordinates
+    heads = [f"{each.path} ({each.unit})" if each.unit not in ("", "1") else each.path for each in varied]
+    rows = [("case", *heads, *head)]
+    for case, each in enumerate(found[:MOST_ROWS]):
+        values = (number(float(one.values[case]) / one.scale) for one in varied)
+        told = cells(each) if isinstance(each, Linearized) else (each,)
+        rows.append((f"#{question.experiment.cases.table[case]}", *values, *told))
+    yield from columns(rows, right=range(1, 1 + len(varied)))
+    if len(found) > MOST_ROWS:
+        yield f"  and {len(found) - MOST_ROWS} more: `--format json` has them all"
+
+
+def _of_loop(place: int, found: Linearized) -> tuple[str, ...]:
+    """The cells of a case's loop at this place among those that are asked for."""
+    loop = found.loops[place]
+    if not loop.stable:
+        return ("unstable",)
+    if not loop.returns:
+        return ("nothing comes back",)
+    gain = "no limit" if loop.gains[1] is None else f"{loop.gains[1]:.4g}"
+    own = loop.margins
+    if own is None:
+        return (gain,)
+    phase = "no limit" if own.phase is None else f"{math.degrees(own.phase):.4g} deg"
+    delay = "no limit" if own.delay is None else f"{1e3 * own.delay:.4g} ms"
+    return gain, phase, delay, f"{own.disk:.4g}"
+
+
+def _tightest(loops: dict[int, OpenLoop]) -> Iterator[str]:
+    """The cases with the least of each margin."""
+    unstable = [case for case, loop in loops.items() if not loop.stable]
+    if unstable:
+        some = ", ".join(f"#{case}" for case in unstable[:5]) + (" ..." if len(unstable) > 5 else "")
+        yield f"  unstable in {len(unstable)} of {len(loops)} cases: {some}"
+    gains = {case: loop.gains[1] for case, loop in loops.items() if loop.stable and loop.gains[1] is not None}
+    margins = {case: loop.margins for case, loop in loops.items() if loop.margins is not None and loop.returns}
+    phases = {case: each.phase for case, each in margins.items() if each.phase is not None}
+    told = []
+    if gains:
+        case = min(gains, key=lambda one: gains[one] or math.inf)
+        told.append(f"gain {gains[case]:.4g} times in #{case}")
+    if phases:
+        case = min(phases, key=lambda one: phases[one] or math.inf)
+        told.append(f"phase {math.degrees(phases[case] or 0.0):.4g} deg in #{case}")
+    if margins:
+        case = min(margins, key=lambda one: margins[one].disk)
+        told.append(f"disk {margins[case].disk:.4g} in #{case}")
+    if told and len(loops) > 1:
+        yield f"  tightest: {', '.join(told)}"
+
+
+def _swing(found: Linearized) -> tuple[str, ...]:
+    swings = [pole for pole in found.poles if pole.z.imag > 0.0]
+    if not swings:
+        return ("none swings",)
+    worst = min(swings, key=lambda pole: pole.damping)
+    return f"{worst.damping:.3f}", f"{worst.hz:.4g}", found.by_joint(worst)[0][0]

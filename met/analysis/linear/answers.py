@@ -1,0 +1,335 @@
+"""Linear answers about one case at an instant: states, A, B, C, D, poles with who takes part, natural modes, loops."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from met.analysis.linear.injected import InputSignal, entries
+from met.analysis.linear.jacobian import PeriodMap, at_instant, period_map
+from met.analysis.linear.margins import STABLE, LoopMargins, ScalarLoop, gain_limits, margins
+from met.analysis.linear.period import PeriodProgram
+from met.analysis.linear.plant import PlantModel, plant
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.messages.alike import nearest
+from met.plan import Experiment, Recorded
+from met.plan.channel import recordable
+from met.program.system import System
+
+MOST_TICKS = 5000
+"""Ticks of the base rate in a period, at most: each takes some 10 ms."""
+
+SETTLED = 1e-12
+"""Size of a pole, of a period, up to which nothing is left of it after one."""
+
+GROWS = 0.01
+"""Growth over the length of a run up to which an arm is not called unstable: as it moves, its poles move too."""
+
+TINY = 1e-14
+"""Share of the largest number of a column at which a state takes no part in another."""
+
+
+@frozen
+class Pole:
+    """A mode of a linear map or of a plant; of a conjugate pair the one that turns forward.
+
+    z       what a period makes of it; of a plant 0
+    s       1/s: ln z over the period; of a plant its root. -inf: gone within a period
+    shares  how much each state takes part, largest first: the sum is 1
+    """
+
+    z: complex
+    s: complex
+    shares: tuple[tuple[str, float], ...]
+
+    @property
+    def hz(self) -> float:
+        """Its frequency without damping, |s|/(2 pi)."""
+        return abs(self.s) / (2.0 * math.pi) if math.isfinite(self.s.real) else math.inf
+
+    @property
+    def damping(self) -> float:
+        """Ratio of damping, -Re s/|s|: 1 of what decays without swinging, below 0 of what grows; 0 of what stays."""
+        if not math.isfinite(self.s.real):
+            return 1.0
+        return -self.s.real / abs(self.s) if self.s else 0.0
+
+    @property
+    def seconds(self) -> float:
+        """Time in which it decays, or grows, by e; infinite of what does neither."""
+        return 1.0 / abs(self.s.real) if self.s.real else math.inf
+
+
+@frozen
+class OpenLoop:
+    """A loop that is opened at a signal, or several that are opened at once.
+
+    paths    of the signals;  ticks: of it in a period
+    loop     as it is open; None where it ticks more than once in a period, or several are opened
+    margins  None where it is unstable as it is, or `loop` is None
+    gains    times all gains at which it becomes unstable, below 1 and above: None: at none
+    stable   as it is
+    """
+
+    paths: tuple[str, ...]
+    ticks: int
+    loop: ScalarLoop | None
+    margins: LoopMargins | None
+    gains: tuple[float | None, float | None]
+    stable: bool
+
+    @property
+    def returns(self) -> bool:
+        """False where nothing comes back: the arm is held, or the law is at its limit."""
+        return self.loop is None or self.loop.returns
+
+
+@frozen
+class Linearized:
+    """A case of an experiment, linearised over a period that begins at `time`, s.
+
+    seconds   of the period
+    states    by name;  inputs, outputs: channels
+    A .. D    x+ = A x + B u, y = C x + D u, from period to period, inputs added to at all ticks of one
+    plant     the arm without its computers, in continuous time
+    held      what sticks;  at_limit: paths of limits
+    joints    of each state, the joint or body or computer that it belongs to
+    """
+
+    experiment: str
+    case: int
+    time: float
+    seconds: float
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    plant: PlantModel
+    loops: tuple[OpenLoop, ...]
+    held: tuple[str, ...]
+    at_limit: tuple[str, ...]
+    joints: Mapping[str, str]
+
+    @property
+    def poles(self) -> tuple[Pole, ...]:
+        """Its modes, the slowest first."""
+        made = [_of_period(z, shares, self.seconds) for z, shares in _modes(self.A, self.states)]
+        return tuple(sorted(made, key=lambda pole: (pole.hz, -pole.damping)))
+
+    @property
+    def natural(self) -> tuple[Pole, ...]:
+        """What swings of the arm on its gears and springs while its computers hold, the slowest first."""
+        made = [Pole(0j, s, shares) for s, shares in _modes(self.plant.A, self.plant.states) if s.imag > 0.0]
+        return tuple(sorted(made, key=lambda pole: pole.hz))
+
+    def by_joint(self, pole: Pole) -> tuple[tuple[str, float], ...]:
+        """How much each joint takes part in a mode, largest first."""
+        found: dict[str, float] = {}
+        for state, share in pole.shares:
+            found[self.joints[state]] = found.get(self.joints[state], 0.0) + share
+        return tuple(sorted(found.items(), key=lambda each: -each[1]))
+
+
+@frozen
+class LinearQuestion:
+    """What is asked of the cases of an experiment, at the last begin of a period up to `at`, s.
+
+    inputs   channels of servos that tick: commands, outputs of laws
+    outputs  channels, or what records several (`q`, `links.tip.position`)
+    opened   outputs of laws, at which loops are opened: each by itself, and all of them at once
+    """
+
+    experiment: Experiment
+    at: float = 0.0
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+    opened: tuple[str, ...] = ()
+
+    @cached_property
+    def program(self) -> PeriodProgram:
+        """The program, once for all cases. Raises Problem D372 where `at` is not in the run, D373 where a name is none
+        of these, D374 where the period is too long."""
+        experiment = self.experiment
+        if not 0.0 <= self.at <= experiment.structure.schedule.duration:
+            raise _outside(experiment, self.at)
+        every = entries(System(experiment))
+        named = _named(every, tuple(dict.fromkeys((*self.inputs, *self.opened))), self.opened)
+        program = PeriodProgram(experiment, named, _records(experiment, self.outputs))
+        if program.ticks > MOST_TICKS:
+            raise _too_long(program)
+        return program
+
+    def of(self, case: int) -> Linearized:
+        """The answers about a row of the case table. Raises Problem D370 where an event is in the period, D371 where
+        the run has failed before, and as `program` does."""
+        program, inputs = self.program, self.inputs
+        tick = program.begin(self.at)
+        flow = at_instant(program, case, tick)
+        found = period_map(program, flow)
+        kept = _kept(program, found)
+        states = tuple(found.states[place] for place in kept)
+        A, C, Wx, B = found.A[np.ix_(kept, kept)], found.C[:, kept], found.Wx[:, kept], found.B[kept]
+        paths = [program.inputs[each.entry].path for each in found.ticks]
+
+        def summed(columns: np.ndarray) -> np.ndarray:
+            own = [columns[:, [k for k, each in enumerate(paths) if each == path]].sum(1) for path in inputs]
+            return np.array(own).T.reshape(len(columns), len(inputs))
+
+        lifted = _Lifted(A, B, Wx, found.Wu, program, found)
+        several = [(path,) for path in self.opened] + ([self.opened] if len(self.opened) > 1 else [])
+        return Linearized(
+            self.experiment.name, case, tick / program.schedule.base_hz, found.seconds, states, inputs,
+            found.outputs, A, summed(B), C, summed(found.D), plant(program, flow, states),
+            tuple(lifted.opened(each) for each in several), found.held, found.at_limit,
+            {name: program.joint_of(name) for name in program.states},
+        )  # fmt: skip
+
+
+def linear(
+    experiment: Experiment,
+    *,
+    case: int = 0,
+    at: float = 0.0,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    opened: Sequence[str] = (),
+) -> Linearized:
+    """The answers about one case (`LinearQuestion`). Raises Problem D370 to D374."""
+    return LinearQuestion(experiment, at, tuple(inputs), tuple(outputs), tuple(opened)).of(case)
+
+
+@frozen
+class _Lifted:
+    """A period's map with each tick of each input by itself."""
+
+    A: np.ndarray
+    B: np.ndarray
+    Wx: np.ndarray
+    Wu: np.ndarray
+    program: PeriodProgram
+    found: PeriodMap
+
+    @property
+    def drift(self) -> float:
+        """Growth of a period that is none."""
+        return max(STABLE, GROWS * self.found.seconds / self.program.schedule.duration)
+
+    def opened(self, paths: tuple[str, ...]) -> OpenLoop:
+        """Opened at these signals: what stands there is given, and what comes back is asked for."""
+        ticks = [k for k, each in enumerate(self.found.ticks) if self.program.inputs[each.entry].path in paths]
+        Wx, inverse, B = self.Wx[ticks], np.linalg.inv(self.Wu[np.ix_(ticks, ticks)]), self.B[:, ticks]
+        A, b, c, d = self.A - B @ inverse @ Wx, B @ inverse, inverse @ Wx, np.eye(len(ticks)) - inverse
+        drift = self.drift
+        one = ScalarLoop(A, b[:, 0], c[0], float(d[0, 0]), self.found.seconds, drift) if len(ticks) == 1 else None
+        own = None if one is None else margins(one)
+        if one is not None and own is not None:
+            gains: tuple[float | None, float | None] = own.gain_down, own.gain_up
+        else:
+            gains = gain_limits(A, b, c, d, drift)
+        stable = bool(np.max(np.abs(np.linalg.eigvals(self.A)), initial=0.0) <= 1.0 + drift)
+        return OpenLoop(paths, len(ticks), one, own, gains, stable)
+
+
+def _kept(program: PeriodProgram, found: PeriodMap) -> np.ndarray:
+    """Places of the states of the arm, and of those through which it, or an input, acts on it or on an output."""
+    n, step = len(found.states), program.builder.step
+    arm = {*program.positions, *program.rates, *step.states, *program.of_beds}
+    links = np.abs(found.A) > TINY * np.max(np.abs(found.A), axis=0, initial=0.0)
+    own = np.array([name in arm for name in found.states], dtype=bool)
+    reached = _closed(links, own | np.any(found.B != 0.0, axis=1))
+    acts = _closed(links.T, own | np.any(found.C != 0.0, axis=0) | np.any(found.Wx != 0.0, axis=0))
+    return np.flatnonzero(own | (reached & acts)) if n else np.zeros(0, int)
+
+
+def _closed(links: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """What can be reached from the first ones. links: [to, from]"""
+    found = first.copy()
+    while True:
+        more = found | np.any(links[:, found], axis=1)
+        if np.array_equal(more, found):
+            return found
+        found = more
+
+
+def _modes(A: np.ndarray, names: Sequence[str]) -> Iterable[tuple[complex, tuple[tuple[str, float], ...]]]:
+    """Eigenvalues, of a pair the one that turns forward, with the share of each state: |l_i r_i| of the left and the
+    right eigenvector."""
+    if not len(A):
+        return
+    roots, right = np.linalg.eig(A)
+    weights = np.abs(np.linalg.pinv(right).T * right)
+    for place, root in enumerate(roots.tolist()):
+        if root.imag < 0.0:
+            continue
+        of = weights[:, place] / max(float(weights[:, place].sum()), 1e-300)
+        order = np.argsort(-of, kind="stable").tolist()
+        yield complex(root), tuple((names[k], float(of[k])) for k in order)
+
+
+def _of_period(z: complex, shares: tuple[tuple[str, float], ...], seconds: float) -> Pole:
+    s = cmath.log(z) / seconds if abs(z) > SETTLED else complex(-math.inf, 0.0)
+    return Pole(z, s, shares)
+
+
+def _records(experiment: Experiment, outputs: Sequence[str]) -> tuple[Recorded, ...]:
+    known = recordable(experiment.structure, outputs)
+    for name in outputs:
+        if name not in known:
+            raise _unknown("output", name, known)
+    return tuple(each for name in outputs for each in known[name])
+
+
+def _named(every: Sequence[InputSignal], asked: Sequence[str], opened: Sequence[str]) -> tuple[InputSignal, ...]:
+    known = {each.path: each for each in every}
+    laws = {path: each for path, each in known.items() if each.is_output}
+    for path in asked:
+        if path in opened and path not in laws:
+            raise _unknown("place to open a loop", path, laws)
+        if path not in known:
+            raise _unknown("input", path, known)
+    return tuple(known[path] for path in asked)
+
+
+def _unknown(what: str, name: str, known: Mapping[str, object]) -> Problem:
+    near = nearest(name, known)
+    helps = [f"did you mean `{near}`?"] if near else []
+    if known and len(known) <= 12:
+        helps.append("there are " + ", ".join(f"`{each}`" for each in known))
+    elif what == "output":
+        helps.append("an output is any name that `record` takes")
+    elif not known:
+        helps.append("no servo here has a computer that ticks: a law that is continuous is a part of the arm")
+    return Problem(error("D373", f"there is no {what} `{name}`", help=tuple(helps)))
+
+
+def _too_long(program: PeriodProgram) -> Problem:
+    experiment = program.experiment
+    return Problem(
+        error(
+            "D374",
+            f"the computers of `{experiment.name}` all tick together only every {program.seconds:.6g} s, "
+            f"{program.ticks:,} ticks",
+            experiment.place,
+            help=f"choose rates of which one divides the other: {MOST_TICKS:,} ticks of the base rate are looked at",
+        )
+    )
+
+
+def _outside(experiment: Experiment, at: float) -> Problem:
+    duration = experiment.structure.schedule.duration
+    return Problem(
+        error(
+            "D372",
+            f"t = {at:.6g} s is not in the run `{experiment.name}`",
+            experiment.place,
+            help=f"it goes from 0 to {duration:.6g} s",
+        )
+    )

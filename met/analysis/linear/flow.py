@@ -1,0 +1,199 @@
+"""One case's memory carried through a period with its tangents, and the events on the way at which there are none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from met.analysis.linear.injected import ADDED
+from met.analysis.linear.period import PeriodProgram
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.program import cell_names
+from met.trace.nodes import Node, live
+from met.trace.program import Every, Unless0
+from met.trace.recording import Branch, RecordedControl, RecordSection
+from met.trace.tangents import HEAD, Kink, TangentSection, values
+
+HANDS_OVER = {"grappling": "grappled", "releasing": "released"}
+"""Loops in which payloads change hands, by the cell that they go by, in words."""
+
+
+MOST_CELLS = 3
+"""Cells that are named of what is compared; of more the phase is."""
+
+
+@frozen
+class Edge:
+    """A kink that the memory stands on.
+
+    run    the section's number in the order of the period;  nodes: of the kink;  phase: the section's name
+    tick   of the base rate;  cells: those that move what is compared
+    """
+
+    run: int
+    nodes: tuple[int, ...]
+    phase: str
+    tick: int
+    cells: tuple[str, ...]
+
+    @property
+    def subject(self) -> str:
+        """What is just there, in words."""
+        if 0 < len(self.cells) <= MOST_CELLS:
+            return listed(list(self.cells))
+        return f"a number of `{self.phase}`"
+
+
+class Flow:
+    """The memory of a case under way, cells by name: numbers, and tangents of those that move, [direction]."""
+
+    def __init__(
+        self, program: PeriodProgram, inputs: Mapping[str, float], cells: Mapping[str, float], tick: int
+    ) -> None:
+        """cells: at the end of tick `tick`."""
+        self.program, self.inputs, self.tick = program, inputs, tick
+        self.cells: dict[str, float] = dict(cells)
+        self.tangents: dict[str, np.ndarray] = {}
+        self.rows: dict[int, float] = {}
+        self.row_tangents: dict[int, np.ndarray] = {}
+        self.edges: list[Edge] = []
+        self.opposite: Mapping[int, frozenset[int]] = {}
+        self._recording, self._runs = False, 0
+
+    def copy(self) -> Flow:
+        made = Flow(self.program, self.inputs, self.cells, self.tick)
+        made.tangents = dict(self.tangents)
+        return made
+
+    def begin(self) -> None:
+        """The start of a run, up to the instant 0, at which nothing has ticked yet."""
+        self._follow(self.program.recording.start)
+
+    def finish(self) -> None:
+        """The step that ends at the next tick."""
+        self.tick += 1
+        self._follow(self.program.finish)
+
+    def ticks(self, *, recording: bool = False) -> None:
+        """All that is done at this tick once the step is finished. recording: whether its columns are kept."""
+        self._recording = recording
+        self._follow(self.program.rest)
+        self._recording = False
+
+    def tangent(self, name: str) -> Any:
+        """The tangent of a cell, [direction]; 0 of one that does not move."""
+        return self.tangents.get(name, 0.0)
+
+    def run(self, number: int) -> None:
+        """One section."""
+        section = self.program.sections[number]
+        with np.errstate(all="ignore"):
+            of = values(section, self._leaf, self.opposite.get(self._runs, frozenset()))
+        cells = [(cell, float(of(ref))) for cell, ref in section.stores]
+        tangents = [(cell, of(ref)) for cell, ref in section.tangents]
+        if self.tangents:
+            for kink in section.kinks:
+                a, b = kink.sides
+                if of(a) == of(b) and np.any(of(kink.move) != 0.0):
+                    self.edges.append(Edge(self._runs, kink.nodes, section.name, self.tick, self._moved(section, kink)))
+        for cell, value in cells:
+            self.cells[cell] = value
+            self.tangents.pop(cell, None)
+        self.tangents.update({cell: move for cell, move in tangents if np.any(move != 0.0)})
+        if self._recording:
+            self.rows.update({column: float(of(ref)) for column, ref in section.records})
+            self.row_tangents.update({column: of(ref) for column, ref in section.record_tangents})
+        self._runs += 1
+
+    def _moved(self, section: TangentSection, kink: Kink) -> tuple[str, ...]:
+        """The cells that move what a kink compares."""
+        nodes = (section.nodes[i] for i in live(section.nodes, kink.sides))
+        return tuple(node[1] for node in nodes if node[0] == "cell" and node[1] in self.tangents)
+
+    def _leaf(self, node: Node) -> Any:
+        kind, *rest = node
+        if kind == "cell":
+            name = rest[0]
+            return self.tangents.get(name[len(HEAD) :], 0.0) if name.startswith(HEAD) else self.cells.get(name, 0.0)
+        if kind == "input":
+            return self.inputs[rest[0]]
+        return float(self.tick) if kind == "tick" else self.tick / self.program.schedule.base_hz
+
+    def _follow(self, body: Iterable[RecordedControl]) -> None:
+        for step in body:
+            if not isinstance(step, Branch):
+                if not isinstance(step, RecordSection) or self._recording:
+                    self.run(step.section)
+            elif isinstance(step.condition, Every):
+                if self.tick % step.condition.divisor == 0:
+                    self._follow(step.body)
+            elif isinstance(step.condition, Unless0):
+                if self.tick > 0:
+                    self._follow(step.body)
+            else:
+                self._loop(step)
+
+    def _loop(self, step: Branch) -> None:
+        condition: Any = step.condition
+        for _ in range(condition.at_most):
+            if self.cells.get(condition.cell, 0.0) == 0.0:
+                break
+            before = self.modes()
+            self._follow(step.body)
+            if self.tangents and condition.cell == "crossing":
+                names = [name for name, mode in before.items() if mode != 0.0 and self._rate(name) == 0.0]
+                raise self.event(f"{listed(names)} {'come' if len(names) > 1 else 'comes'} to rest")
+            if self.tangents and condition.cell in HANDS_OVER:
+                raise self.event(f"a payload is {HANDS_OVER[condition.cell]}")
+
+    def modes(self) -> dict[str, float]:
+        """Modes of all that has dry friction in this case, by the name of a joint or a servo's state: 0 sticks."""
+        step = self.program.builder.step
+        found = {}
+        for each in step.sticking:
+            if each.level is not None or self.cells.get(cell_names.HAS_FRICTION(each.name), 0.0) != 0.0:
+                found[each.name] = self.cells.get(cell_names.FRICTION_MODE(each.name), 0.0)
+        return found
+
+    def _rate(self, name: str) -> float:
+        return next(self.cells[each.cell] for each in self.program.builder.step.sticking if each.name == name)
+
+    def breaking_away(self) -> list[str]:
+        """What is at rest and has dry friction, and begins to slide."""
+        return [name for name, mode in self.modes().items() if mode != 0.0 and self._rate(name) == 0.0]
+
+    def limits(self) -> dict[str, float]:
+        """Steps that began at each limit so far, by its path: of motors and of what acts on the arm. Limits of a joint
+        do nothing, and a command comes to its own by time alone."""
+        uses = [use for use in self.program.builder.limits.uses if use.channels or use.owner]
+        return {use.path: self.cells.get(cell_names.AT_LIMIT(use.path), 0.0) for use in uses}
+
+    def event(self, what: str, tick: int | None = None) -> Problem:
+        """The refusal of a derivative across an event, at a tick, or where the memory stands."""
+        experiment = self.program.experiment
+        time = (self.tick if tick is None else tick) / self.program.schedule.base_hz
+        return Problem(
+            error(
+                "D370",
+                f"`{experiment.name}` has no derivative here: {what}, t = {time:.6g} s",
+                experiment.place,
+                help=(
+                    "a linear answer is about small moves, of which none is small across an event",
+                    "ask at another instant, `--at`, from which nothing changes for a period of the computers, "
+                    f"{self.program.seconds:g} s",
+                ),
+            )
+        )
+
+
+def listed(names: list[str]) -> str:
+    """Names as a message has them."""
+    return ", ".join(f"`{name}`" for name in names) or "what slides"
+
+
+def added(path: str) -> str:
+    """The cell of what is added to an input."""
+    return ADDED + path

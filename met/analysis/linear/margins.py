@@ -1,0 +1,256 @@
+"""Margins of a sampled loop: how much gain, phase, delay, or both of gain and phase, it may get before it is unstable.
+
+A loop is P(z) = C (z I - A)^-1 B + D from what stands at an open place to what comes back to it, closed where the two
+are equal: so of a loop with negative feedback L = -P. Where |P| has a value on the unit circle, or P is real there, is
+found as eigenvalues of a pencil (S. Boyd, V. Balakrishnan and P. Kabamba, A bisection method for computing the H-inf
+norm of a transfer matrix, 1989, of discrete systems), not on a grid, so no narrow peak is missed.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from met.frozen import frozen
+
+ON_CIRCLE = 1e-4
+"""Distance from the unit circle at which a root of a pencil is looked at: double roots are no nearer."""
+
+STABLE = 1e-7
+"""Growth of a period up to which a loop is not called unstable, at least: a drift in place and rate has poles so near
+to 1."""
+
+
+@frozen
+class ScalarLoop:
+    """A loop that is open at one place, one tick a period.
+
+    A, B, C, D  [state, state], [state], [state], and a number;  period  s
+    drift       growth of a period up to which it is not called unstable
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: float
+    period: float
+    drift: float = STABLE
+
+    def at(self, z: complex) -> complex:
+        """L = -P at z."""
+        return -complex(self.C @ np.linalg.solve(z * np.eye(len(self.A)) - self.A, self.B) + self.D)
+
+    def response(self, w: np.ndarray) -> np.ndarray:
+        """L at angular frequencies, rad/s: [frequency]."""
+        return np.array([self.at(cmath.exp(1j * each * self.period)) for each in w])
+
+    @property
+    def returns(self) -> bool:
+        """False where nothing comes back of what stands at the open place: L is 0."""
+        moved, largest = self.B, abs(self.D)
+        for _ in range(len(self.A)):
+            largest = max(largest, abs(float(self.C @ moved)))
+            moved = self.A @ moved
+        return largest > 0.0
+
+    def closed(self, gain: float = 1.0) -> np.ndarray:
+        """A of the loop closed with this times its gain."""
+        return self.A + gain / (1.0 - gain * self.D) * np.outer(self.B, self.C)
+
+    def grows(self, gain: float = 1.0) -> bool:
+        """True where it is unstable, closed with this times its gain."""
+        if gain * self.D == 1.0:
+            return True
+        return bool(np.max(np.abs(np.linalg.eigvals(self.closed(gain))), initial=0.0) > 1.0 + self.drift)
+
+
+@frozen
+class LoopMargins:
+    """The margins of a loop that is stable; frequencies are angular, rad/s.
+
+    gain_up, gain_down  times its gain from which on it is unstable, above 1 and below; None: at none
+    phase    rad;  delay: s;  None where |L| is 1 nowhere
+    disk     alpha of a balanced disk: gain and phase may change at once within it (P. Seiler, A. Packard and
+             P. Gahinet, An introduction to disk margins, IEEE Control Systems 40(5), 2020)
+    at_*     the frequency of each
+    """
+
+    gain_up: float | None
+    gain_down: float | None
+    phase: float | None
+    delay: float | None
+    disk: float
+    at_gain_up: float | None
+    at_gain_down: float | None
+    at_phase: float | None
+    at_delay: float | None
+    at_disk: float
+
+    @property
+    def disk_gain(self) -> tuple[float, float]:
+        """Times its gain, from and to, that the disk allows."""
+        half = min(1.0, 0.5 * self.disk)
+        return (1.0 - half) / (1.0 + half), (1.0 + half) / (1.0 - half) if half < 1.0 else math.inf
+
+    @property
+    def disk_phase(self) -> float:
+        """Phase that the disk allows, rad."""
+        return 2.0 * math.atan(0.5 * self.disk)
+
+
+def margins(loop: ScalarLoop) -> LoopMargins | None:
+    """The margins of a loop; None where it is unstable as it is."""
+    if loop.grows():
+        return None
+    up, down = _gains(loop)
+    crossings = [(w, loop.at(cmath.exp(1j * w * loop.period))) for w in _where_size_is(loop, 1.0)]
+    # to -1, from L the way that a delay turns it; and the other way, which is that of the crossing below 0
+    of_phase = [(abs(cmath.phase(-L)), w) for w, L in crossings]
+    of_delay = [((cmath.phase(-L) % (2.0 * math.pi)) / w, w) for w, L in crossings if w > 0.0]
+    phase, at_phase = min(of_phase, default=(None, None))
+    delay, at_delay = min(of_delay, default=(None, None))
+    disk, at_disk = _disk(loop)
+    return LoopMargins(up[0], down[0], phase, delay, disk, up[1], down[1], at_phase, at_delay, at_disk)
+
+
+def _gains(loop: ScalarLoop) -> tuple[tuple[float | None, float | None], tuple[float | None, float | None]]:
+    """The gains at which the closed loop comes to the unit circle: the least above 1 and the largest below, each with
+    its frequency."""
+    found = [(-1.0 / L.real, w) for w in _where_real(loop) if (L := loop.at(cmath.exp(1j * w * loop.period))).real < 0]
+    above = min(((k, w) for k, w in found if k > 1.0), default=(None, None))
+    below = max(((k, w) for k, w in found if k < 1.0), default=(None, None))
+    return above, below
+
+
+def _roots(loop: ScalarLoop, last: Sequence[Sequence[np.ndarray | float]], by_output: bool) -> list[float]:
+    """Angular frequencies, rad/s, from 0 to the half of the sampling rate, at which the rows `last` hold of (x, xi, u):
+    x of P, and xi of P(1/z), which is driven by u, or by P's output."""
+    from scipy.linalg import eig
+
+    A, B, C, D, n = loop.A, loop.B[:, None], loop.C[None, :], np.array([[loop.D]]), len(loop.A)
+    none, one = np.zeros((n, n)), np.eye(n)
+    F = np.block([[A, none, B], [none, one, np.zeros((n, 1))], [np.atleast_2d(each) for each in last[0]]])
+    driven = [B @ C, A, B @ D] if by_output else [none, A, B]
+    E = np.block([[one, none, np.zeros((n, 1))], driven, [np.zeros((1, n)), np.zeros((1, n)), np.zeros((1, 1))]])
+    over, under = eig(F, E, right=False, homogeneous_eigvals=True)
+    with np.errstate(all="ignore"):
+        z = over / under
+    near = z[np.isfinite(z) & (np.abs(np.abs(z) - 1.0) < ON_CIRCLE)]
+    return sorted({abs(cmath.phase(each)) / loop.period for each in near.tolist()})
+
+
+def _where_real(loop: ScalarLoop) -> list[float]:
+    """Frequencies at which L is real, the two ends among them."""
+    C = loop.C[None, :]
+    found = _roots(loop, [[C, -C, np.zeros((1, 1))]], by_output=False)
+    nyquist = math.pi / loop.period
+    inner = _refined(found, lambda w: loop.at(cmath.exp(1j * w * loop.period)).imag, nyquist)
+    ends = [w for w in (0.0, nyquist) if _is_number(loop, w)]
+    return [*inner, *ends]
+
+
+def _where_size_is(loop: ScalarLoop, size: float) -> list[float]:
+    """Frequencies at which |L| has this value."""
+    C, D = loop.C[None, :], loop.D
+    last = [[D * C, C, np.array([[D * D - size * size]])]]
+    found = _roots(loop, last, by_output=True)
+    nyquist = math.pi / loop.period
+
+    def apart(w: float) -> float:
+        return abs(loop.at(cmath.exp(1j * w * loop.period))) - size
+
+    inner = _refined(found, apart, nyquist)
+    return inner + [w for w in (nyquist,) if abs(apart(w)) <= 1e-12 * size]
+
+
+def _is_number(loop: ScalarLoop, w: float) -> bool:
+    z = cmath.exp(1j * w * loop.period)
+    return bool(np.min(np.abs(np.linalg.eigvals(loop.A) - z), initial=math.inf) > 1e-9)
+
+
+def _refined(found: Sequence[float], zero: Callable[[float], float], nyquist: float) -> list[float]:
+    """Roots of a function near these, each in an interval in which the function changes its sign."""
+    from scipy.optimize import brentq
+
+    made: list[float] = []
+    for w in found:
+        for width in (1e-9, 1e-7, 1e-5, 1e-3):
+            low, high = max(w * (1.0 - width) - 1e-12 * nyquist, 1e-12 * nyquist), min(w * (1.0 + width), nyquist)
+            if low >= high:
+                continue
+            a, b = zero(low), zero(high)
+            if math.isfinite(a) and math.isfinite(b) and (a < 0.0) != (b < 0.0):
+                root = float(brentq(zero, low, high, xtol=1e-15 * nyquist, rtol=8.9e-16))
+                if not any(abs(root - other) < 1e-12 * nyquist for other in made):
+                    made.append(root)
+                break
+    return made
+
+
+def _disk(loop: ScalarLoop) -> tuple[float, float]:
+    """alpha = 1/max|S - 1/2| on the unit circle, S = 1/(1 + L), and where: levels are raised until none is above (N.
+    Bruinsma and M. Steinbuch, A fast algorithm to compute the H-inf norm of a transfer function matrix, 1990)."""
+    gain = 1.0 / (1.0 - loop.D)
+    A, B = loop.closed(), gain * loop.B
+    T = ScalarLoop(A, B, gain * loop.C, gain - 0.5, loop.period)  # S - 1/2, of P: S = 1/(1 - P)
+    nyquist = math.pi / loop.period
+    tried = [nyquist * k / 16 for k in range(1, 17)] + [
+        abs(cmath.phase(z)) / loop.period for z in np.linalg.eigvals(A).tolist() if abs(z) > 0.0
+    ]
+    size, at = max((abs(T.at(cmath.exp(1j * w * T.period))), w) for w in tried if _is_number(T, w))
+    for _ in range(60):
+        level = size * (1.0 + 1e-12)
+        crossings = sorted({1e-9 * nyquist, *_where_size_is(T, level), nyquist})
+        middles = [math.sqrt(a * b) for a, b in pairwise(crossings)]
+        best, where = max((abs(T.at(cmath.exp(1j * w * T.period))), w) for w in [*middles, *crossings])
+        if best <= level:
+            break
+        size, at = best, where
+    return 1.0 / size, at
+
+
+FARTHEST, STRIDE = 1e4, 1.05
+"""Times the gain up to which a limit of several ticks or loops is looked for, and from one tried to the next."""
+
+
+def gain_limits(
+    A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, drift: float = STABLE
+) -> tuple[float | None, float | None]:
+    """Times the gain of all loops at once at which they become unstable, the nearest below and above 1, to 1e-12; None:
+    at none that was looked at, or they are unstable as they are. C x + D u comes back, of u that stands at the open
+    places; drift: as `ScalarLoop` has it."""
+
+    def size(gain: float) -> float:
+        """The largest of the closed loop's poles."""
+        try:
+            closed = A + gain * B @ np.linalg.solve(np.eye(len(D)) - gain * D, C)
+        except np.linalg.LinAlgError:
+            return math.inf
+        return float(np.max(np.abs(np.linalg.eigvals(closed)), initial=0.0))
+
+    own = size(1.0)
+    if own > 1.0 + drift:
+        return None, None
+
+    def grows(gain: float) -> bool:
+        return size(gain) > max(1.0, own) + 1e-2 * STABLE
+
+    found: list[float | None] = []
+    for stride in (1.0 / STRIDE, STRIDE):
+        good, bad = 1.0, stride
+        while not grows(bad) and 1.0 / FARTHEST < bad < FARTHEST:
+            good, bad = bad, bad * stride
+        if not grows(bad):
+            found.append(None)
+            continue
+        while abs(bad / good - 1.0) > 1e-12:
+            middle = math.sqrt(good * bad)
+            if middle in (good, bad):
+                break
+            good, bad = (good, middle) if grows(middle) else (middle, bad)
+        found.append(math.sqrt(good * bad))
+    return found[0], found[1]

@@ -1,0 +1,166 @@
+"""The program of an experiment over one period of all its computers, with tangents: what is a state, and how it flows.
+
+A period is as long as it takes until the dynamics and all computers tick together again. It begins at an instant, when
+the step that ends there is finished and nothing has ticked yet: so what a computer computes at once of what it sees is
+no state, and what it holds is. A state is a cell that the period reads before it writes it, and that moves with the
+arm or with an input.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+from met import run as engine
+from met.analysis.linear.injected import ADDED, InjectedBuilder, InputSignal
+from met.plan import Experiment, Recorded
+from met.program.control import guiding
+from met.program.control.sensing import READING
+from met.program.motion import bodies
+from met.program.system import System
+from met.trace.program import Unless0, WhileAny
+from met.trace.recorder import record
+from met.trace.recording import Branch, CodeSection, RecordedControl, RecordSection
+from met.trace.slicing import sections_in
+from met.trace.tangents import TangentSection, moved_by, with_tangents
+
+
+class PeriodProgram:
+    """An experiment's program, recorded with tangents.
+
+    inputs   what something is added to at each of its ticks
+    outputs  variables that are recorded at the period's begin
+
+    `positions`, `rates` and `turns` are the arm's cells of these kinds, `of_beds` the memory of emulated beds.
+    """
+
+    def __init__(
+        self, experiment: Experiment, inputs: Sequence[InputSignal] = (), outputs: Sequence[Recorded] = ()
+    ) -> None:
+        structure = replace(experiment.structure, metrics=(), record=tuple(outputs))
+        self.experiment, self.inputs = experiment, tuple(inputs)
+        self.system = System(replace(experiment, structure=structure))
+        self.builder = InjectedBuilder(self.system, inputs)
+        self.schedule = structure.schedule
+        program = self.builder.program()
+        added = tuple(ADDED + each.path for each in inputs)
+        self.recording = record(replace(program, counters=(*program.counters, *added)), fuse=False)
+        finish, *rest = self.recording.tick
+        self.finish, self.rest = (finish,), tuple(rest)
+        self.columns = tuple(path for each in outputs for path in each.channels)
+        self.bodies = bodies.bodies(self.system)
+        turned = {name for body in self.bodies for name in body.coordinates[3:]}
+        self.positions = tuple(f"{name}.q" for name in self.builder.step.coordinates)
+        self.rates = tuple(f"{name}.qd" for name in self.builder.step.coordinates)
+        self.turns = tuple(f"{name}.q" for name in self.builder.step.coordinates if name in turned)
+        self._orientations = tuple(cell for body in self.bodies for cell in body.orientation)
+        plain = tuple(name for name in self.positions if name not in self.turns)
+        self.of_beds = tuple(
+            f"{a.use.joint}.bed.{each.name}" for a, bed, _ in self.system.mounted for each in bed.memory
+        )
+        self._arm = (*plain, *self.rates, *self.builder.step.states, *self._orientations, *self.of_beds)
+
+    @cached_property
+    def prepared(self) -> engine.Prepared:
+        """The experiment as it is run, without inputs and with records of its own."""
+        return engine.prepare(self.experiment)
+
+    @cached_property
+    def ticks(self) -> int:
+        """Ticks of the base rate in a period."""
+        divisors = [use.divisor for use in self.system.structure.sensors]
+        divisors += [use.divisor for use in guiding.ticking(self.system)]
+        divisors += [actuator.use.divisor for actuator in self.system.working if actuator.ticks]
+        return math.lcm(self.schedule.dynamics, *divisors)
+
+    def begin(self, time: float) -> int:
+        """The tick of the last begin of a period up to a time, s. Tick 0 is none where a bed is not under way yet."""
+        found = math.floor(time * self.schedule.base_hz * (1.0 + 1e-12)) // self.ticks * self.ticks
+        waits = any(isinstance(step, Branch) and isinstance(step.condition, Unless0) for step in self.rest)
+        return self.ticks if waits and found == 0 else found
+
+    @property
+    def seconds(self) -> float:
+        """The length of a period."""
+        return self.ticks / self.schedule.base_hz
+
+    @cached_property
+    def moving(self) -> frozenset[str]:
+        """The cells that move with the arm, or with what is added to an input."""
+        found = {*self._arm, *(ADDED + each.path for each in self.inputs)}
+        sections, last = [self.recording.sections[n] for n in self._used], 0
+        while len(found) != last:
+            last = len(found)
+            for section in sections:
+                found |= moved_by(section, found)
+        return frozenset(found)
+
+    @cached_property
+    def sections(self) -> dict[int, TangentSection]:
+        """The sections of start and tick with tangents, by number."""
+        return {n: with_tangents(self.recording.sections[n], self.moving, is_converter) for n in self._used}
+
+    @cached_property
+    def _used(self) -> tuple[int, ...]:
+        return tuple(dict.fromkeys(sections_in((*self.recording.start, *self.recording.tick))))
+
+    @cached_property
+    def states(self) -> tuple[str, ...]:
+        """The names of the states, those of the arm first: positions, rates and the rest. A body's turn has the names
+        of its coordinates, for the quaternion that is kept of it."""
+        read, written, ever = set[str](), set[str](), set[str]()
+        for k in range(1, self.ticks + 1):
+            for body, tick in ((self.rest, self.ticks + k - 1), (self.finish, self.ticks + k)):
+                self._look(body, tick, read, written, ever)
+        own = [*self.positions, *self.rates, *self.builder.step.states]
+        more = (read & ever & self.moving) - {*own, *self._orientations}
+        return (*(name for name in own if name in read or name in self.turns), *sorted(more))
+
+    @cached_property
+    def remembered(self) -> frozenset[str]:
+        """The cells that go on from tick to tick: what the end of a step and a period read before they write it."""
+        read, written, ever = set[str](), set[str](), set[str]()
+        self._look(self.finish, self.ticks, read, written, ever)
+        for k in range(1, self.ticks + 1):
+            self._look(self.rest, self.ticks + k - 1, read, written, ever)
+            self._look(self.finish, self.ticks + k, read, written, ever)
+        return frozenset(read & ever)
+
+    def _look(
+        self, body: Iterable[RecordedControl], tick: int, read: set[str], written: set[str], ever: set[str]
+    ) -> None:
+        """Adds the cells that a body of control reads before it writes them, that it writes each time, and ever."""
+        for step in body:
+            if isinstance(step, RecordSection):
+                continue
+            if not isinstance(step, Branch):
+                section = self.recording.sections[step.section]
+                stores = {cell for cell, _ in section.stores}
+                read |= {section.nodes[i][1] for i in section.order if section.nodes[i][0] == "cell"} - written
+                written |= stores
+                ever |= stores
+            elif isinstance(step.condition, WhileAny):
+                self._look(step.body, tick, read, set(written), ever)
+            elif isinstance(step.condition, Unless0) or tick % step.condition.divisor == 0:
+                self._look(step.body, tick, read, written, ever)
+
+    def joint_of(self, state: str) -> str:
+        """The joint that a state belongs to, or the body, or the computer on its own; in words."""
+        for body in self.bodies:
+            if state.startswith(f"{body.name}:"):
+                return body.name
+        name = state.partition(":")[2] if state.startswith(("carry:", "before:", "first:", "guide:")) else state
+        return re.split("[:.]", name)[0]
+
+
+def is_converter(section: CodeSection, position: int) -> bool:
+    """True for a node in the part of a section where a sensor reads: what rounds there is a converter, or counts."""
+    name = ""
+    for begin, part in section.parts:
+        if begin > position:
+            break
+        name = part
+    return name.rpartition("/")[2] == READING

@@ -1,0 +1,172 @@
+"""Sections of a recorded program with tangents: graphs that also compute how all that they leave moves with cells.
+
+A cell NAME that moves has a second one, `d:NAME`, its tangent: a number for one direction, an array for several at
+once, with which the same operations compute (forward mode, A. Griewank and A. Walther, Evaluating Derivatives, 2008,
+ch. 3). What cannot move has none, so the graph that is made is sparse, and what two tangents need is there once. At a
+comparison whose sides are equal the derivative may be another from the other side; such places are told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import cached_property
+from typing import Any
+
+from met.frozen import frozen
+from met.trace.derivative import STEPS, rounds, slopes
+from met.trace.nodes import OPERANDS, TRUTHS, ZERO, Node, Nodes, live
+from met.trace.primitives import PLAIN
+from met.trace.recording import CodeSection
+
+HEAD = "d:"
+"""Before the name of a cell: the cell of its tangent."""
+
+MOVES = frozenset({"add", "sub", "mul", "div", "fma", "sqrt", "abs", "flip", "where", "significand"})
+"""Operations whose result moves with their operands; `met.trace.derivative` has their rules."""
+
+SIGN = 63
+"""Number of the bit that is a double's sign."""
+
+
+@frozen
+class Kink:
+    """A place in a section where the derivative may be another from the other side: where two numbers are equal.
+
+    sides   references of the two;  move: of the tangent of their difference
+    nodes   positions of what goes by their order, the opposite of which is the other side
+    """
+
+    sides: tuple[int, int]
+    move: int
+    nodes: tuple[int, ...]
+
+
+@frozen
+class TangentSection:
+    """A section with tangents: `stores` and `records` as `CodeSection` has them, and their tangents by the same names.
+
+    A store whose tangent is always 0 stands in `stores` alone; its tangent's cell is to be forgotten.
+    """
+
+    name: str
+    nodes: tuple[Node, ...]
+    stores: tuple[tuple[str, int], ...]
+    tangents: tuple[tuple[str, int], ...]
+    records: tuple[tuple[int, int], ...]
+    record_tangents: tuple[tuple[int, int], ...]
+    kinks: tuple[Kink, ...]
+
+    @cached_property
+    def order(self) -> list[int]:
+        """Positions of the live nodes, in order of creation."""
+        several = (self.stores, self.tangents, self.records, self.record_tangents)
+        roots = [ref for pairs in several for _, ref in pairs]
+        roots += [ref for kink in self.kinks for ref in (*kink.sides, kink.move)]
+        return live(self.nodes, roots)
+
+
+def moved_by(section: CodeSection, moving: Collection[str]) -> frozenset[str]:
+    """The cells that a section stores numbers in that move with these cells."""
+    moves = _moving(section.nodes, section.order, moving)
+    return frozenset(cell for cell, ref in section.stores if moves[ref >> 1])
+
+
+def _moving(nodes: Iterable[Node], order: Iterable[int], moving: Collection[str]) -> bytearray:
+    nodes = list(nodes)
+    found = bytearray(len(nodes))
+    for i in order:
+        op, *rest = nodes[i]
+        if op == "cell":
+            found[i] = rest[0] in moving
+        elif op in MOVES or op in STEPS:
+            found[i] = any(found[ref >> 1] for ref in rest[: OPERANDS[op]])
+    return found
+
+
+def with_tangents(
+    section: CodeSection, moving: Collection[str], straight: Callable[[CodeSection, int], bool]
+) -> TangentSection:
+    """The section with the tangents of all that moves with these cells.
+
+    straight  tells of a `floor` or `rint` of a section, by its position, whether it counts as the straight line
+              through its steps, as that of a converter; else it has no derivative
+    """
+    graph = Nodes.of(section.nodes)
+
+    def leaf(node: Node) -> int:
+        return graph.make("cell", HEAD + node[1]) if node[0] == "cell" and node[1] in moving else ZERO
+
+    found = slopes(graph, section.order, leaf, lambda i: straight(section, i))
+
+    def tangent(ref: int) -> int:
+        return found.get(ref >> 1, ZERO) ^ (ref & 1)
+
+    def moved(pairs: Iterable[tuple[Any, int]]) -> tuple[tuple[Any, int], ...]:
+        return tuple((name, tangent(ref)) for name, ref in pairs if tangent(ref) & -2 != ZERO)
+
+    tangents, record_tangents = moved(section.stores), moved(section.records)
+    kinks = _kinks(graph, section.order, found, [ref for _, ref in (*tangents, *record_tangents)])
+    return TangentSection(
+        section.name, tuple(graph.nodes), section.stores, tangents, section.records, record_tangents, kinks
+    )
+
+
+def _kinks(graph: Nodes, order: Iterable[int], found: Mapping[int, int], roots: Iterable[int]) -> tuple[Kink, ...]:
+    """The kinks on which these tangents depend: of comparisons by size, and of signs. Two numbers that are asked for
+    being equal are none: that is how a quotient is kept from 0/0 where it has a limit."""
+    needed = frozenset(live(graph.nodes, roots))
+    kinks, of_sign = [], dict[int, list[int]]()
+    for i in sorted(needed):
+        op, *rest = graph.nodes[i]
+        if op in ("lt", "le"):
+            sides = (rest[0], rest[1])
+            a, b = (found.get(ref >> 1, ZERO) ^ (ref & 1) for ref in sides)
+            move = graph.add(a, b ^ 1)
+            if move & -2 != ZERO:
+                kinks.append(Kink(sides, move, (i,)))
+        elif op == "flip" and rest[2] == SIGN and not rounds(graph, op, rest):
+            of_sign.setdefault(rest[1] & -2, []).append(i)
+        elif op == "bit" and rest[1] == SIGN:
+            of_sign.setdefault(rest[0] & -2, []).append(i)
+    for ref, nodes in of_sign.items():
+        move = found.get(ref >> 1, ZERO)
+        if move & -2 != ZERO:
+            kinks.append(Kink((ref, ZERO), move, tuple(nodes)))
+    return tuple(kinks)
+
+
+PRODUCTS: Mapping[str, Callable[..., Any]] = {**PLAIN, "fma": lambda a, b, c: a * b + c}
+"""The operations over plain numbers, and over plain numbers and arrays of tangents, each rounded by itself."""
+
+
+def values(
+    section: TangentSection, leaf: Callable[[Node], Any], opposite: Collection[int] = ()
+) -> Callable[[int], Any]:
+    """What each reference of a section is worth: numbers are floats, tangents floats or arrays.
+
+    leaf      gives what a cell, an input, the tick and the time are
+    opposite  positions of nodes of kinks that take the other side
+    """
+    nodes = section.nodes
+    found: list[Any] = [None] * len(nodes)
+    for i in section.order:
+        node = nodes[i]
+        op, count = node[0], OPERANDS[node[0]]
+        if count == 0:
+            found[i] = node[1] if op == "const" else False if op == "false" else leaf(node)
+            continue
+        operands = []
+        for ref in node[1 : 1 + count]:
+            value = found[ref >> 1]
+            if ref & 1:
+                value = (not value) if nodes[ref >> 1][0] in TRUTHS else -value
+            operands.append(value)
+        value = PRODUCTS[op](*operands, *node[1 + count :])
+        if i in opposite:
+            value = (not value) if op in TRUTHS else -value
+        found[i] = value
+
+    def value_of(ref: int) -> Any:
+        return -found[ref >> 1] if ref & 1 else found[ref >> 1]
+
+    return value_of

@@ -1,0 +1,106 @@
+"""`met linear` prints poles, modes and margins; its exit status says whether opened loops are stable."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from batch.cli.linear import linear
+from tests.batch.linearized.test_linear_data import DECK
+from tests.docs.mended_servo import met
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "deck.ic").write_text(DECK)
+    return tmp_path
+
+
+def test_what_is_printed_is_whole(folder: Path) -> None:
+    said = met(folder, "linear", "deck.ic", "--at", "0.5 s", "--open", "hinge.servo.voltage", status=0)
+    lines = said.splitlines()
+    assert lines[0] == "hold: linear at t = 0.5 s, a period of 2 ms, 3 states"
+    assert lines[2] == "poles of the program"
+    assert lines[3].split() == ["z", "Hz", "damping", "by", "e", "in", "who", "takes", "part"]
+    assert lines[4].split() == ["1.000000", "0", "-", "stays", "hinge", "100", "%", "(q)"]
+    assert lines[8] == "loop of hinge.servo.voltage"
+    assert [line.split()[0] for line in lines[9:]] == ["gain", "phase", "delay", "disk"]
+
+
+def test_programs_get_the_same_as_numbers(folder: Path) -> None:
+    told = json.loads(
+        met(folder, "linear", "deck.ic", "--at", "0.5", "--open", "hinge.servo.voltage", "--format", "json", status=0)
+    )  # fmt: skip
+    assert told["states"] == ["hinge.q", "hinge.qd", "hinge.servo.integral"] and told["period"] == 0.002
+    (loop,) = told["loops"]
+    assert loop["stable"] and loop["gain_up"] > 1.0 and 0.0 < loop["phase"] < 3.2
+    assert len(told["poles"]) == 3
+
+
+def test_an_opened_loop_that_is_unstable_is_exit_status_1(folder: Path) -> None:
+    text = DECK.replace("command = rate", "kp = 3 V*s/rad;  v_max = 1e6 V;  tau_max = 1e6 N*m;  command = rate")
+    (folder / "deck.ic").write_text(text)
+    said = met(folder, "linear", "deck.ic", "--open", "hinge.servo.voltage", status=1)
+    assert said.endswith("loop of hinge.servo.voltage\n  unstable as it is: a pole above grows\n")
+
+
+def test_a_word_that_is_no_instant_is_refused(folder: Path) -> None:
+    said = CliRunner().invoke(linear, [str(folder / "deck.ic"), "--at", "2 kg"])
+    assert said.exit_code == 2 and "`2 kg` is no instant: write `2 s` or `250 ms`" in said.output
+
+
+OPEN = ("--open", "hinge.servo.voltage")
+
+
+def swept(folder: Path) -> str:
+    text = DECK.replace(
+        "command = rate", "kp = 0.02 V*s/rad;  f_c = 0 N*m;  v_max = 1e6 V;  tau_max = 1e6 N*m;  command = rate"
+    )
+    (folder / "deck.ic").write_text(text + "sweep gains of hold { vary drive.kp = [0.02, 0.5, 2.5] V*s/rad; }\n")
+    return "deck.ic"
+
+
+def test_all_cases_of_a_sweep_have_a_row_each_and_the_tightest_is_named(folder: Path) -> None:
+    said = met(folder, "linear", swept(folder), "gains", "--all-cases", *OPEN, status=1)
+    lines = said.splitlines()
+    assert lines[0] == "gains: linear at t = 0 s, 3 cases" and lines[2] == "loop of hinge.servo.voltage"
+    assert lines[3].split() == ["case", "drive.kp", "(V*s/rad)", "gain", "phase", "delay", "disk"]
+    assert [line.split()[:2] for line in lines[4:7]] == [["#0", "0.02"], ["#1", "0.5"], ["#2", "2.5"]]
+    assert lines[6].split()[-1] == "unstable" and lines[7] == "  unstable in 1 of 3 cases: #2"
+    gain = float(lines[5].split()[2])
+    assert lines[8].startswith(f"  tightest: gain {gain:.4g} times in #1, phase ")
+
+
+def test_a_case_of_it_says_the_same(folder: Path) -> None:
+    every = json.loads(
+        met(folder, "linear", swept(folder), "gains", "--all-cases", *OPEN, "--format", "json", status=1)
+    )  # fmt: skip
+    one = json.loads(met(folder, "linear", "deck.ic", "gains", "--case", "#1", *OPEN, "--format", "json", status=0))
+    assert every[1] == one
+
+
+def test_a_case_without_an_answer_says_why_in_its_row(folder: Path) -> None:
+    text = DECK.replace("hinge.qd = 0.1 rad/s", "hinge.q = 0 rad")
+    (folder / "deck.ic").write_text(text + "sweep loads of hold { vary links.bar.mass = [1, 2] kg; }\n")
+    said = met(folder, "linear", "deck.ic", "loads", "--all-cases", *OPEN, status=0)
+    assert said.count("`hinge` breaks away, t = 0 s") == 2
+    assert said.endswith("  2 cases of 2 without an answer: an event is on the way, or the run failed\n")
+
+
+def test_a_file_is_of_one_case(folder: Path) -> None:
+    said = CliRunner().invoke(linear, [str(folder / "deck.ic"), "--all-cases", "-o", "a.npz"])
+    assert said.exit_code == 2 and "-o is of one case, and --all-cases of all" in said.output
+
+
+def test_of_a_joint_that_sticks_nothing_comes_back(folder: Path) -> None:
+    text = DECK.replace("rate(0.1 rad/s)", "rate(0 rad/s)").replace("hinge.qd = 0.1 rad/s", "hinge.q = 0 rad")
+    (folder / "deck.ic").write_text(text)
+    said = met(folder, "linear", "deck.ic", *OPEN, status=0)
+    assert said.splitlines()[1] == "  hinge sticks, and is held"
+    assert said.endswith(
+        "loop of hinge.servo.voltage\n"
+        "  nothing comes back here: what it would move is held, or the law is at its limit\n"
+    )

@@ -1,0 +1,58 @@
+"""docs/linear.md: its deck is run, and what is printed is what the page shows."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "linear.md").read_text(encoding="utf-8")
+
+
+def said(folder: Path, command: str) -> str:
+    """What a command of the page prints, on both streams."""
+    words = [sys.executable, "-m", "met.cli", *shlex.split(command)]
+    return subprocess.run(
+        words, cwd=folder, env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "HOME": str(folder)}, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    ).stdout  # fmt: skip
+
+
+def without_size(text: str) -> str:
+    """A text without the size of an archive, in which the commit of MET stands."""
+    return re.sub(r"\(\d+ KiB\)", "(SIZE)", text)
+
+
+@pytest.mark.slow
+def test_the_page_shows_what_is_printed(tmp_path: Path) -> None:
+    deck = re.search(r"<!-- hand\.ic -->\n```c\n(.*?)```", PAGE, re.DOTALL)
+    assert deck is not None
+    (tmp_path / "hand.ic").write_text(deck[1])
+    consoles = re.findall(r"```console\n(.*?)```", PAGE, re.DOTALL)
+    assert len(consoles) == 6
+    for console in consoles:
+        lines = console.splitlines(keepends=True)
+        commands = [line.removeprefix("$ met ") for line in lines if line.startswith("$ met ")]
+        printed = [said(tmp_path, command) for command in commands]
+        shown = "".join(line for line in lines if not line.startswith("$ met "))
+        if "--picture" in commands[-1]:
+            assert (tmp_path / "hand.png").stat().st_size > 10_000
+        else:
+            assert without_size(printed[-1]) == without_size(shown)
+
+
+@pytest.mark.slow
+def test_the_lines_of_python_run(tmp_path: Path) -> None:
+    deck = re.search(r"<!-- hand\.ic -->\n```c\n(.*?)```", PAGE, re.DOTALL)
+    lines = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    assert deck is not None and lines is not None
+    (tmp_path / "hand.ic").write_text(deck[1])
+    text = lines[1].replace('"hand.ic"', repr(str(tmp_path / "hand.ic")))
+    names: dict[str, object] = {}
+    exec("\n".join(line for line in text.splitlines() if "state_space" not in line), names)
+    assert "answer" in names
