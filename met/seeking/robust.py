@@ -1,0 +1,110 @@
+"""A tuning against plants, by turns: tune against those that are active, try the best against all, add the worst.
+
+So an inner loop of a few plants decides for many (P. Apkarian, M. N. Dao, D. Noll, Parametric robust structured control
+design, IEEE Trans. Automatic Control 60 (2015) 1857). A candidate is worth what it is in the worst of its plants.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from met import searching
+from met.plan.searches import SHORTEST, Search
+
+Candidate = bytes
+"""The values of a candidate's parameters, as they are in memory."""
+
+
+class RobustTuning:
+    """See `Seeker`. Without plants the candidates themselves are the cases.
+
+    A turn ends when the optimiser does, or when half of the cases that are left are spent; the last one takes all. The
+    tuning ends when no plant is worse than the worst active one, or when no further turn has room.
+    """
+
+    def __init__(self, search: Search) -> None:
+        self._search, self._plants = search, search.plants or ((),)
+        self._left = search.at_most
+        self._points: dict[Candidate, np.ndarray] = {}
+        self._known: dict[Candidate, dict[int, float]] = {}
+        self._active, self._turn = [0], 0
+        self._batch: list[Candidate] = []
+        self._wanted: list[tuple[Candidate, int]] = []
+        self._confirmed = self._confirming = False
+        self._begin(None)
+
+    def ask(self) -> np.ndarray:
+        """See `Seeker`."""
+        while not self._confirmed:
+            self._wanted = self._next()
+            if self._wanted:
+                self._left -= len(self._wanted)
+                return np.array([[*np.frombuffer(each), *self._plants[plant]] for each, plant in self._wanted])
+            if not self._confirmed:
+                self._go_on()
+        return np.empty((0, len(self._search.parameters) + len(self._plants[0])))
+
+    def tell(self, values: np.ndarray) -> None:
+        """See `Seeker`."""
+        for (candidate, plant), value in zip(self._wanted, values.tolist(), strict=True):
+            self._known[candidate][plant] = value
+        self._go_on()
+
+    def _begin(self, start: np.ndarray | None) -> None:
+        """Begin a turn, where it has room; else the tuning is over."""
+        room = self._left - self._reserve
+        if room < SHORTEST * len(self._active):
+            self._confirmed = True
+            return
+        most = room if self._reserve == 0 else max(room // 2, SHORTEST * len(self._active))
+        dimension, seed = len(self._search.parameters), self._search.seed + self._turn
+        self._tuner = searching.tuner(dimension, seed, most // len(self._active), start)
+        self._turn += 1
+        self._confirming = False
+
+    @property
+    def _reserve(self) -> int:
+        """Cases that trying the best of a turn against all plants takes."""
+        return len(self._plants) - len(self._active)
+
+    def _next(self) -> list[tuple[Candidate, int]]:
+        """The next candidates with their plants, but those that were tried before."""
+        if not self._confirming:
+            points = self._tuner.ask()
+            self._batch = [each.tobytes() for each in self._search.values(points)]
+            for candidate, point in zip(self._batch, points, strict=True):
+                self._points.setdefault(candidate, point)
+                self._known.setdefault(candidate, {})
+            wanted = self._unknown(self._batch, self._active)
+            self._confirming = not self._batch or len(wanted) > self._left - self._reserve
+            if not self._confirming:
+                return wanted
+        wanted = self._unknown([self._best()], range(len(self._plants)))
+        self._confirmed = len(wanted) > self._left
+        return [] if self._confirmed else wanted
+
+    def _unknown(self, candidates: list[Candidate], plants: list[int] | range) -> list[tuple[Candidate, int]]:
+        once = dict.fromkeys(candidates)
+        return [(each, plant) for each in once for plant in plants if plant not in self._known[each]]
+
+    def _go_on(self) -> None:
+        """Pass on what is known of a generation; or judge the best of a turn, which was tried against all plants."""
+        if not self._confirming:
+            self._tuner.tell(np.array([self._worst(each) for each in self._batch]))
+            return
+        best = self._best()
+        plant = max(range(len(self._plants)), key=lambda each: self._known[best][each])
+        if self._known[best][plant] <= self._worst(best):
+            self._confirmed = True
+            return
+        self._active.append(plant)
+        self._begin(self._points[best])
+
+    def _best(self) -> Candidate:
+        """The candidate that is worth most against the active plants, of those that were tried against all of these."""
+        tried = [each for each, known in self._known.items() if known.keys() >= set(self._active)]
+        return min(tried, key=self._worst)
+
+    def _worst(self, candidate: Candidate) -> float:
+        """The worth of a candidate against the active plants."""
+        return max(self._known[candidate][plant] for plant in self._active)
