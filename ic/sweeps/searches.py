@@ -209,15 +209,15 @@ class _SearchReader:
         number = found.number
         plain = not isinstance(number, Scalar) and found.dimension == PURE
         if key == "margin":
-            if not plain or not 0.0 <= float(number) < 1.0:  # type: ignore[arg-type]
+            if not plain or not 0.0 <= float(number) < 1.0:
                 message = "a margin is a share of a limit, from 0 % to less than 100 %"
                 raise Problem(error("D363", message, found.place, help="write `margin = 5 %;`"))
-            self.margin = float(number)  # type: ignore[arg-type]
+            self.margin = float(number)
             return
-        if not plain or not float(number).is_integer() or not 1 <= float(number) <= MOST_SEARCHED:  # type: ignore[arg-type]
+        if not plain or not float(number).is_integer() or not 1 <= float(number) <= MOST_SEARCHED:
             message = f"`at_most` is a whole number of cases from 1 to {MOST_SEARCHED}"
             raise Problem(error("D363", message, found.place, help="write `at_most = 2000;`"))
-        self.at_most, self.at_most_place = int(number), found.place  # type: ignore[arg-type]
+        self.at_most, self.at_most_place = int(number), found.place
 
     def _goal(self, entry: Statement, word: str) -> None:
         other = next((each for each in GOALS if each in self._written), None)
@@ -267,7 +267,7 @@ class _SearchReader:
         if not units.same(high.dimension, low.dimension):
             message = f"`{name}` of {units.text(low.dimension)} and {units.text(high.dimension)}"
             raise Problem(error("D063", message, high.place, help="both must be of one dimension"))
-        ends = float(low.number), float(high.number)  # type: ignore[arg-type]
+        ends = float(low.number), float(high.number)
         if not (np.isfinite(ends).all() and ends[0] < ends[1]):
             message = f"`{name}` goes from a lower to a higher value"
             helps = "change the two about, or leave the parameter out where they are equal"

@@ -11,6 +11,9 @@ import numpy as np
 from met import searching
 from met.plan.searches import SHORTEST, Search
 
+SHARE = 4
+"""A turn takes one in so many of the cases that are left, while plants may become active."""
+
 Candidate = bytes
 """The values of a candidate's parameters, as they are in memory."""
 
@@ -18,8 +21,8 @@ Candidate = bytes
 class RobustTuning:
     """See `Seeker`. Without plants the candidates themselves are the cases.
 
-    A turn ends when the optimiser does, or when half of the cases that are left are spent; the last one takes all. The
-    tuning ends when no plant is worse than the worst active one, or when no further turn has room.
+    A turn ends when the optimiser has converged, or when its share of the cases that are left is spent. The tuning ends
+    when it has converged and no plant is worse than the worst active one, or when no further turn has room.
     """
 
     def __init__(self, search: Search) -> None:
@@ -30,7 +33,8 @@ class RobustTuning:
         self._active, self._turn = [0], 0
         self._batch: list[Candidate] = []
         self._wanted: list[tuple[Candidate, int]] = []
-        self._confirmed = self._confirming = False
+        self._confirmed = self._confirming = self._converged = False
+        self._may_ask = 0
         self._begin(None)
 
     def ask(self) -> np.ndarray:
@@ -56,9 +60,11 @@ class RobustTuning:
         if room < SHORTEST * len(self._active):
             self._confirmed = True
             return
-        most = room if self._reserve == 0 else max(room // 2, SHORTEST * len(self._active))
+        least = SHORTEST * len(self._active)
+        cases = room if self._reserve == 0 or room < 2 * least else max(room // SHARE, least)
         dimension, seed = len(self._search.parameters), self._search.seed + self._turn
-        self._tuner = searching.tuner(dimension, seed, most // len(self._active), start)
+        self._may_ask = cases // len(self._active)
+        self._tuner = searching.tuner(dimension, seed, self._may_ask, start)
         self._turn += 1
         self._confirming = False
 
@@ -71,7 +77,9 @@ class RobustTuning:
         """The next candidates with their plants, but those that were tried before."""
         if not self._confirming:
             points = self._tuner.ask()
-            self._batch = [each.tobytes() for each in self._search.values(points)]
+            before, self._batch = len(self._batch), [each.tobytes() for each in self._search.values(points)]
+            self._converged = not self._batch and self._may_ask >= before
+            self._may_ask -= len(self._batch)
             for candidate, point in zip(self._batch, points, strict=True):
                 self._points.setdefault(candidate, point)
                 self._known.setdefault(candidate, {})
@@ -94,10 +102,11 @@ class RobustTuning:
             return
         best = self._best()
         plant = max(range(len(self._plants)), key=lambda each: self._known[best][each])
-        if self._known[best][plant] <= self._worst(best):
+        if self._known[best][plant] > self._worst(best):
+            self._active.append(plant)
+        elif self._converged:
             self._confirmed = True
             return
-        self._active.append(plant)
         self._begin(self._points[best])
 
     def _best(self) -> Candidate:
