@@ -20,6 +20,7 @@ from batch.archive import verified
 from batch.archive.hdf5 import LIBVER, h5py
 from batch.archive.layout import AT_LIMIT, EXCESS, EXTREME_AT, GRAPPLE, Layout, Variable
 from batch.archive.provenance import Revision, version
+from batch.archive.searched import GENERATION
 from batch.archive.sink import Sink
 from met import backends
 from met.frozen import frozen
@@ -246,6 +247,7 @@ def _values(group: OpenGroup, run: Run) -> dict[str, Any]:
         "case_id": keys.case_ids(experiment, rows, names),
         "seed": keys.case_seeds(experiment, rows),
         "repeat": 0 if experiment.cases.repeats is None else experiment.cases.repeats[rows],
+        **({} if experiment.search is None else {GENERATION: experiment.search.generation_of(rows)}),
         "status": run.status,
         "cause": run.cause,
         "warning": run.warning,

@@ -45,7 +45,9 @@ def best(
     from batch.queries.best import Designs
     from batch.queries.groups import groups_named
     from batch.queries.pool import pools
+    from batch.queries.summary import finite
     from batch.terminal.best import BestAnswer, context
+    from batch.terminal.search import search_result
     from met.diagnostic import Problem, error
 
     with ArchiveFile(archive) as file:
@@ -57,6 +59,16 @@ def best(
             helps = f"name one: {', '.join(f'`--run {each.name}`' for each in found)}"
             raise Problem(error("E395", f"{archive} holds several sweeps", help=helps))
         pool = found[0]
+        tuned = search_result(file, pool.groups[0])
+        if tuned is not None and tuned.tunes:
+            if over or choose or by or front:
+                message = (
+                    f"`{pool.name}` is a tuning: what it chose is its answer, and its candidates had different cases"
+                )
+                helps = "`met best ARCHIVE` says it; a sweep over what is chosen has all cases of each"
+                raise Problem(error("E395", message, help=helps))
+            say(json.dumps(finite(tuned.data), indent=1) if form == "json" else "\n".join(map(line, tuned.lines)))
+            return YES if tuned.ok else NO
         designs = Designs(pool, over, choose)
         if not pool.requirements and not by:
             metrics = ", ".join(column.label for column in pool.metrics())
