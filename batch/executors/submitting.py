@@ -51,8 +51,8 @@ def submit(
     """
     if any(part.searches for part in campaign.parts):
         message = "jobs have shares that are fixed beforehand, and a search asks for cases as it goes"
-        helps = ("`met run --dask` runs it on workers, which may be jobs of SLURM: docs/cluster.md",)
-        raise Problem(error("E358", message, help=helps))
+        remedy = "`met run --dask` runs it on workers, which may be jobs of SLURM: docs/cluster.md"
+        raise Problem(error("E358", message, help=remedy))
     if campaign.open_ended:
         message = "jobs have shares that are fixed beforehand, and `until_shown` runs cases until something is shown"
         helps = (

@@ -39,14 +39,29 @@ class SearchAnswer:
     @cached_property
     def found(self) -> Answer:
         """The best of its cases."""
+        return answer(self.search, *self._given)
+
+    @cached_property
+    def _given(self) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], list[_Required]]:
+        """Coordinates of the cases, which of them reached their end, their metrics, and what is required of these."""
         group = self.group
         columns = [group.values(variable.name) for variable in group.role("coordinate")]
         metrics = {variable.path: group.values(variable.name) for variable in group.role("metric")}
         by_name = {variable.name: variable.path for variable in group.role("metric")}
         required = [_Required(each.text, by_name[each.metric], each.comparison, each.limit)
                     for each in group_requirements(group)]  # fmt: skip
-        done = group.values("status") == DONE
-        return answer(self.search, np.stack(columns, axis=1), done, metrics, required)
+        return np.stack(columns, axis=1), group.values("status") == DONE, metrics, required
+
+    def progress(self, most: int) -> list[tuple[int, int, Answer]]:
+        """The best after some of the generations, `most` of them spread over all, the last among them: the number of
+        the generation, the cases by then, the best of these."""
+        ends = np.flatnonzero(np.diff(self.group.values("generation"), append=self.generations)) + 1
+        some = np.unique(np.linspace(0, len(ends) - 1, min(len(ends), most)).astype(int))
+        table, done, metrics, required = self._given
+        return [
+            (int(number), int(end), answer(self.search, table[:end], done[:end], cut(metrics, int(end)), required))
+            for number, end in zip(some, ends[some], strict=True)
+        ]
 
     @property
     def generations(self) -> int:
@@ -80,12 +95,12 @@ class SearchAnswer:
         """True if what a tuning is held against was drawn, so that other draws confirm it or not."""
         return any(variable.attributes.get("design") for variable in self.group.role("coordinate"))
 
-    def value(self) -> str:
-        """The goal's value, in the deck's unit."""
+    def value(self, found: Answer | None = None) -> str:
+        """The goal's value in the deck's unit, of the best or of what was best before."""
         variable = next(each for each in self.group.role("metric") if each.path == self.search.metric)
         scale = float(variable.attributes.get("deck_scale", 1.0))
         unit = str(variable.attributes.get("deck_unit", variable.unit))
-        return goal_text(self.found.value, unit, scale)
+        return goal_text((found or self.found).value, unit, scale)
 
     def lines(self) -> list[str]:
         """The answer in lines, without the commands that follow from it."""
@@ -156,6 +171,11 @@ class SearchAnswer:
             "nearest": [{"requirement": room.text, "inside": room.share} for room in found.rooms],
             "at_ends": [{"path": path, "end": end} for path, end in found.ends],
         }
+
+
+def cut(metrics: dict[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
+    """The metrics of the first cases alone."""
+    return {name: values[:count] for name, values in metrics.items()}
 
 
 class _Required:

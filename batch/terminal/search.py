@@ -17,11 +17,13 @@ from met.outputs import quoted
 class SearchResult:
     """The answer of a search: as lines, for programs, and whether it is what was asked for.
 
+    commands  that follow from it, each with what it is for
     tunes  whether it is a tuning: then the requirements count in its answer alone;  name: of the search
     """
 
     name: str
     lines: tuple[str, ...]
+    commands: tuple[tuple[str, str], ...]
     data: dict[str, Any]
     ok: bool
     tunes: bool
@@ -38,7 +40,7 @@ def search_result(archive: ArchiveFile, group: ArchiveGroup) -> SearchResult | N
     data = {**answer.as_data(), "commands": [command for _, command in commands]}
     # of a search the requirements of all cases count, as of any campaign
     ok = answer.ok if tunes else bool((group.values("status") == 0).all() and (group.values("met") == 1).all())
-    return SearchResult(group.name, lines, data, ok, tunes)
+    return SearchResult(group.name, lines, tuple(commands), data, ok, tunes)
 
 
 def _shown(said: str, command: str) -> Sequence[str]:

@@ -131,10 +131,11 @@ def result_lines(
     seconds: Mapping[str, float],
     ok: bool,
     tables: Sequence[Sequence[str]],
-    answers: Sequence[SearchResult | None],
+    answers: Sequence[SearchResult | None] = (),
 ) -> list[str]:
     """The verdict, and where everything is. seconds: by experiment; tables: of sweeps of several structures; answers:
-    of searches, by summary."""
+    of searches, by summary; none where there are none."""
+    answers = answers or (None,) * len(summaries)
     out: list[str] = []
     many = {s.sweep for s in summaries if sum(s.sweep == other.sweep for other in summaries) > MOST_GROUPS} - {""}
     for summary, cases, answer in zip(summaries, worst, answers, strict=True):

@@ -260,8 +260,8 @@ class _SearchReader:
             raise Problem(error("D361", message, call.name.place, help=f"write `{name}(LOW, HIGH) UNIT`"))
         if decides_structure(self.definitions, path, List(call.positional, place_of(call)), names):
             message = f"`{path}` decides the program, so that nothing chooses it between two ends"
-            helps = f"write a {self.definition.kind} for each, of runs that differ in it"
-            raise Problem(error("D361", message, path_place(entry), help=helps))
+            remedy = f"write a {self.definition.kind} for each, of runs that differ in it"
+            raise Problem(error("D361", message, path_place(entry), help=remedy))
         low, high = (evaluate_number(in_unit(each, unit), names.find) for each in call.positional)
         check_constant(path, entry, names, self._paths)
         if not units.same(high.dimension, low.dimension):
@@ -270,8 +270,8 @@ class _SearchReader:
         ends = float(low.number), float(high.number)
         if not (np.isfinite(ends).all() and ends[0] < ends[1]):
             message = f"`{name}` goes from a lower to a higher value"
-            helps = "change the two about, or leave the parameter out where they are equal"
-            raise Problem(error("D361", message, high.place, help=helps))
+            remedy = "change the two about, or leave the parameter out where they are equal"
+            raise Problem(error("D361", message, high.place, help=remedy))
         if RANGES[name] and not ends[0] * ends[1] > 0.0:
             message = "the ends of a `logbetween` are both above or both below zero"
             raise Problem(error("D361", message, low.place, help="`between` has no such limit"))
@@ -334,9 +334,9 @@ def _against(
     also = [Label(found.place, "written here")]
     if found.parts or run is None or own is None or run.text != own.text:
         of = "is made of others" if found.parts or run is None else f"is of `{run.text}`"
-        helps = f"write a sweep of `{own.text if own is not None else 'RUN'}` with the cases that it must bear"
+        remedy = f"write a sweep of `{own.text if own is not None else 'RUN'}` with the cases that it must bear"
         raise Problem(error("D364", f"sweep `{name.text}` {of}, and not of the run that is tuned", place, also=also,
-                            help=helps))  # fmt: skip
+                            help=remedy))  # fmt: skip
     before = complaints.error_count
     sweep = read_sweep(definitions, complaints, found, graph, seed=seed)
     if complaints.error_count > before:
@@ -350,16 +350,16 @@ def _against(
         *([(found.place, "it has a seed of its own")] if sweep.seed is not None and not _draws(sweep) else []),
     ]
     for where, why in cannot[:1]:
-        helps = "a tuning is held against a list, a product or a sample of numbers: write such a sweep for it"
+        remedy = "a tuning is held against a list, a product or a sample of numbers: write such a sweep for it"
         raise Problem(error("D364", f"nothing is tuned against sweep `{name.text}`: {why}", place,
-                            also=[Label(where, "here")], help=helps))  # fmt: skip
+                            also=[Label(where, "here")], help=remedy))  # fmt: skip
     places = {each.parameter.path: each.place for each in reader.chosen}
     for column in sweep.varied:
         if column.path in places:
             message = f"`{column.path}` is chosen, and varies in `{name.text}`"
-            helps = "one parameter cannot be both: leave it out of one of the two"
+            remedy = "one parameter cannot be both: leave it out of one of the two"
             raise Problem(error("D364", message, places[column.path], also=[Label(column.place, "varies here")],
-                                help=helps))  # fmt: skip
+                                help=remedy))  # fmt: skip
         if column.path in fixed:
             message = (
                 f"`{column.path}` is set, and varies in `{name.text}`, which `{reader.definition.name}` is against"

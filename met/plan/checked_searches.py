@@ -25,8 +25,8 @@ def check_search(experiment: Experiment, search: Search, where: str) -> None:
     _check_parameters(experiment, search, f"{where}.parameters")
     _check_plants(experiment, search, f"{where}.plants")
     if search.complete:
-        for index, cases in enumerate(search.generations):
-            check_whole(cases, 1, MOST_SEARCHED, f"{where}.generations[{index}]")
+        for index, count in enumerate(search.generations):
+            check_whole(count, 1, MOST_SEARCHED, f"{where}.generations[{index}]")
         if sum(search.generations) != experiment.cases.count:
             raise Damaged(f"{where}.generations", f"they are not of the {experiment.cases.count} cases")
     if experiment.cases.count > search.at_most:
