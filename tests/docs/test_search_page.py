@@ -59,7 +59,7 @@ def test_the_tables_name_every_entry() -> None:
 def main() -> None:
     """Write what the commands print into the page."""
     with tempfile.TemporaryDirectory() as folder:
-        said = {commands: text for commands, text in printed(Path(folder))}
+        said = dict(printed(Path(folder)))
     made = BLOCK.sub(lambda block: f"```console\n{block[1]}{said[block[1]]}```", PAGE)
     FILE.write_text(made, encoding="utf-8")
     print(f"wrote {FILE}")
