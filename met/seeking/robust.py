@@ -10,9 +10,16 @@ import numpy as np
 
 from met import searching
 from met.plan.searches import SHORTEST, Search
+from met.seeking.values import MET
 
 SHARE = 4
 """A turn takes one in so many of the cases that are left, while plants may become active."""
+
+GAIN = 1e-3
+"""A turn that improves the goal by less than this share of it brings next to nothing."""
+
+INSIDE = 0.05
+"""How far inside the ends of the cube the middle of a turn is, at least: so both sides of it are there."""
 
 Candidate = bytes
 """The values of a candidate's parameters, as they are in memory."""
@@ -21,8 +28,8 @@ Candidate = bytes
 class RobustTuning:
     """See `Seeker`. Without plants the candidates themselves are the cases.
 
-    A turn ends when the optimiser has converged, or when its share of the cases that are left is spent. The tuning ends
-    when it has converged and no plant is worse than the worst active one, or when no further turn has room.
+    A turn ends when the optimiser does, or when its share of the cases that are left is spent. The tuning ends when no
+    plant is worse than the worst active one and the turn brought next to nothing, or when no further turn has room.
     """
 
     def __init__(self, search: Search) -> None:
@@ -35,6 +42,7 @@ class RobustTuning:
         self._wanted: list[tuple[Candidate, int]] = []
         self._confirmed = self._confirming = self._converged = False
         self._may_ask = 0
+        self._borne: float | None = None
         self._begin(None)
 
     def ask(self) -> np.ndarray:
@@ -55,7 +63,7 @@ class RobustTuning:
         self._go_on()
 
     def _begin(self, start: np.ndarray | None) -> None:
-        """Begin a turn, where it has room; else the tuning is over."""
+        """Begin a turn, around a good candidate where there is one, if it has room; else the tuning is over."""
         room = self._left - self._reserve
         if room < SHORTEST * len(self._active):
             self._confirmed = True
@@ -64,7 +72,7 @@ class RobustTuning:
         cases = room if self._reserve == 0 or room < 2 * least else max(room // SHARE, least)
         dimension, seed = len(self._search.parameters), self._search.seed + self._turn
         self._may_ask = cases // len(self._active)
-        self._tuner = searching.tuner(dimension, seed, self._may_ask, start)
+        self._tuner, self._middle = searching.tuner(dimension, seed, self._may_ask), start
         self._turn += 1
         self._confirming = False
 
@@ -76,7 +84,7 @@ class RobustTuning:
     def _next(self) -> list[tuple[Candidate, int]]:
         """The next candidates with their plants, but those that were tried before."""
         if not self._confirming:
-            points = self._tuner.ask()
+            points = around(self._middle, self._tuner.ask())
             before, self._batch = len(self._batch), [each.tobytes() for each in self._search.values(points)]
             self._converged = not self._batch and self._may_ask >= before
             self._may_ask -= len(self._batch)
@@ -104,9 +112,12 @@ class RobustTuning:
         plant = max(range(len(self._plants)), key=lambda each: self._known[best][each])
         if self._known[best][plant] > self._worst(best):
             self._active.append(plant)
-        elif self._converged:
-            self._confirmed = True
-            return
+        else:
+            worth, before = self._worst(best), self._borne
+            if self._converged or (before is not None and hardly_better(worth, before)):
+                self._confirmed = True
+                return
+            self._borne = worth
         self._begin(self._points[best])
 
     def _best(self) -> Candidate:
@@ -117,3 +128,22 @@ class RobustTuning:
     def _worst(self, candidate: Candidate) -> float:
         """The worth of a candidate against the active plants."""
         return max(self._known[candidate][plant] for plant in self._active)
+
+
+def around(middle: np.ndarray | None, points: np.ndarray) -> np.ndarray:
+    """Points of the cube stretched so that its middle, where a tuner begins, comes to lie at a good one; the ends stay.
+
+    middle  None: the cube's own
+    """
+    if middle is None or not len(points):
+        return points
+    at = np.clip(middle, INSIDE, 1.0 - INSIDE)
+    return np.where(points < 0.5, 2.0 * at * points, at + (1.0 - at) * (2.0 * points - 1.0))
+
+
+def hardly_better(now: float, before: float) -> bool:
+    """True if the goal of one that meets all, by its worth (`served`), is hardly better than it was before."""
+    if not (abs(now) < MET and abs(before) < MET):
+        return False
+    one, other = (worth / (1.0 - abs(worth)) for worth in (now, before))
+    return abs(one - other) <= GAIN * abs(other)

@@ -9,7 +9,8 @@ import pytest
 
 from met.plan.searches import Search, SearchedParameter
 from met.seeking import seeker
-from met.seeking.robust import RobustTuning
+from met.seeking.robust import RobustTuning, around, hardly_better
+from met.seeking.values import served
 
 Worth = Callable[[np.ndarray], np.ndarray]
 """Cases [case, coordinate], the plant's number last -> what each is worth."""
@@ -92,3 +93,18 @@ def test_candidates_lie_within_their_ends() -> None:
     cases = np.concatenate(asked(tuning(2, [0.9], 300), away))
     assert (np.abs(cases[:, :2]) <= 1.0).all()
     assert isinstance(seeker(tuning(2, [0.9], 300)), RobustTuning)
+
+
+def test_the_middle_of_a_cube_comes_to_lie_at_a_good_point_and_its_ends_stay() -> None:
+    points = np.array([[0.0, 0.5, 1.0], [0.5, 0.5, 0.5], [1.0, 0.25, 0.75]])
+    found = around(np.array([0.2, 0.9, 0.0]), points)
+    assert found[1] == pytest.approx([0.2, 0.9, 0.05])
+    assert found[0] == pytest.approx([0.0, 0.9, 1.0]) and found[2] == pytest.approx([1.0, 0.45, 0.525])
+    assert (around(None, points) == points).all()
+
+
+def test_what_is_hardly_better_is_told_by_the_goal_and_not_by_how_it_is_tamed() -> None:
+    goals = np.array([1e6, 1e6 * (1 - 2e-3), 1e6 * (1 - 5e-4)])
+    one, other, same = served(goals, False, np.ones(3, bool), [], {}, 0.0).tolist()
+    assert not hardly_better(other, one) and hardly_better(same, one)
+    assert not hardly_better(1.5, 1.5), "what misses something may be mended by more cases"
