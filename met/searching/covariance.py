@@ -65,7 +65,7 @@ class CovarianceAdaptation:
         mu = min(1 - one, 2 * (mass - 2 + 1 / mass) / ((n + 2) * (n + 2) + mass))
         most = min(1 + one / mu, 1 + 2 * negative_mass / (mass + 2), (1 - one - mu) / (n * mu))
         self._one_rate, self._mu_rate = one, mu
-        self._weights = positive / total(positive) - negative / total(negative) * most
+        self._gains, self._losses = positive / total(positive), -negative / total(negative) * most
         self._usual_length = math.sqrt(n) * (1 - 1 / (4 * n) + 1 / (21 * n * n))
 
     @property
@@ -95,15 +95,14 @@ class CovarianceAdaptation:
             self._step = min(self._step * WIDENING, WIDEST)
             return
         self._generation += 1
-        weights = shared_weights(self._weights, values)
+        gains, losses = (shared_weights(weights, values) for weights in (self._gains, self._losses))
         moves = transformed(self._factor, self._drawn)
-        chosen = np.maximum(weights, 0.0)
-        chosen = chosen[:, None] / total(chosen)
+        chosen = gains[:, None]
         move = added(chosen * moves)
         self._mean = self._mean + self._step * move
         length = self._lengthen_step_path(added(chosen * self._drawn))
         steady = self._lengthen_path(move, length)
-        self._learn(weights, moves, steady)
+        self._learn(gains, losses, moves, steady)
         change = self._step_rate / self._damping * (length / self._usual_length - 1)
         self._step = min(self._step * growth(min(change, 1.0)), WIDEST)
 
@@ -123,13 +122,13 @@ class CovarianceAdaptation:
             self._path = self._path + math.sqrt(rate * (2 - rate) * self._mass) * move
         return steady
 
-    def _learn(self, weights: np.ndarray, moves: np.ndarray, steady: bool) -> None:
+    def _learn(self, gains: np.ndarray, losses: np.ndarray, moves: np.ndarray, steady: bool) -> None:
         n, one, mu = len(self._mean), self._one_rate, self._mu_rate
         squares = added((self._drawn * self._drawn).T)
-        scaled = np.where(weights < 0.0, weights * n / np.maximum(squares, 1e-300), weights)
+        scaled = gains + losses * n / np.maximum(squares, 1e-300)
         lost = 0.0 if steady else one * self._path_rate * (2 - self._path_rate)
         self._covariance = (
-            (1 + lost - one - mu * total(weights)) * self._covariance
+            (1 + lost - one - mu * total(gains + losses)) * self._covariance
             + one * self._path[:, None] * self._path[None, :]
             + mu * added(scaled[:, None, None] * moves[:, :, None] * moves[:, None, :])
         )

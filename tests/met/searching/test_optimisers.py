@@ -46,7 +46,7 @@ def test_the_same_values_told_make_it_ask_for_the_same_points(make):
 
 @pytest.mark.parametrize(
     ("make", "digest"),
-    [(searching.hardest, "af7b5a56c9613aca"), (searching.tuner, "7a515051a08692f8")],
+    [(searching.hardest, "6a52018c16cac00c"), (searching.tuner, "21d2ab637e4f09bf")],
 )
 def test_its_points_are_the_same_on_every_machine(make, digest):
     """The values told are exact too: differences, squares and sums in order, of dyadic numbers."""
@@ -72,6 +72,15 @@ def test_where_all_is_equally_good_it_goes_on(make):
     points = np.concatenate(generations)
     assert len(points) == 500 and np.isfinite(points).all()
     assert (np.histogram(points[:, 0], bins=5, range=(0.0, 1.0))[0] > 0).all()
+
+
+@pytest.mark.parametrize("make", EVERY)
+def test_where_all_but_a_few_are_equally_good_its_points_stay_numbers(make):
+    """As of a settling time that is a whole number of samples."""
+    worse = asked(make(3, 1, 1000), lambda points: np.where(points[:, 0] > 0.9, 1.0, 0.0))
+    better = asked(make(3, 1, 1000), lambda points: np.where(points[:, 0] > 0.9, -1.0, 0.0))
+    assert np.isfinite(np.concatenate(worse + better)).all()
+    assert (np.concatenate(better[-3:])[:, 0] > 0.9).mean() > 0.25  # of random points 0.1
 
 
 @pytest.mark.parametrize("make", EVERY)
