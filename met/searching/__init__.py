@@ -1,21 +1,21 @@
-"""Optimisers that ask for a generation of points of the unit cube at a time, whoever computes what these are worth."""
+"""Optimisers for searches and tunings: points of the unit cube to try, a generation at a time.
+
+They know nothing of decks and cases. What they ask for follows from the dimension, the seed, the number of points and
+what they were told, to the bit, on every machine: so a campaign that was cut off is told its archive and goes on.
+"""
 
 from __future__ import annotations
 
-import numpy as np
-
-from met.searching.evolution import Evolution
 from met.searching.optimiser import Optimiser
+from met.searching.tuning import RestartedAdaptation
+from met.searching.worst_case import WorstCaseSearch
 
 
 def hardest(dimension: int, seed: int, at_most: int) -> Optimiser:
-    """The optimiser that finds the least value anywhere in the cube, within so many points."""
-    return Evolution(dimension, seed, at_most)
+    """A search for the least value with at most this many points; it ends early where it has found -inf."""
+    return WorstCaseSearch(dimension, seed, at_most)
 
 
-def tuner(dimension: int, seed: int, at_most: int, start: np.ndarray | None = None) -> Optimiser:
-    """The optimiser that tunes, within so many candidates. start: a good candidate, where one is known."""
-    return Evolution(dimension, seed, at_most, start)
-
-
-__all__ = ["Optimiser", "hardest", "tuner"]
+def tuner(dimension: int, seed: int, at_most: int) -> Optimiser:
+    """CMA-ES, from the middle of the cube, with this many candidates."""
+    return RestartedAdaptation(dimension, seed, at_most)

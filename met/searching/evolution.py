@@ -1,70 +1,68 @@
-"""Differential evolution, a generation at a time: rand/1/bin of Storn and Price (J. Global Optimization 11 (1997) 341).
+"""Differential evolution: a trial moves a member of a population by differences of others, and replaces it if better.
 
-Every trial point is a member of the population moved along the difference of two others; it takes the place of the
-member that it was crossed with where it is no worse.
+The mutation is current-to-pbest of Zhang and Sanderson, *JADE* (IEEE Trans. Evol. Comput. 13(5), 2009), with constants
+drawn for each trial: a search has too few generations to learn them. Values are compared and never calculated with.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-STEP, CROSSED = 0.6, 0.9
-"""Length of a step along a difference, and share of a trial's numbers that come from it."""
+from met.searching.draws import Draws
 
-MOST_MEMBERS, EACH = 40, 8
-"""Members of a population at most, and for each dimension."""
+LEADING = 0.15
+"""A trial goes towards one of this share of the population, the best."""
+
+WEIGHTS = (0.4, 1.0)
+"""Between these is what a trial takes of a difference."""
+
+COLLAPSED = 1e-2
+"""The population has collapsed where no coordinate spreads by more, in edges of the cube."""
 
 
-class Evolution:
-    """Differential evolution in the unit cube, at most so many points in all; the first is `start` where it is given.
+class DifferentialEvolution:
+    """A population in the unit cube, whose walls stop what would leave it, so that corners are reached.
 
-    It ends when its points are spent, or when all members are as good as equal.
+    points  [member, dimension];  values [member]
     """
 
-    def __init__(self, dimension: int, seed: int, at_most: int, start: np.ndarray | None = None) -> None:
-        self._random = np.random.Generator(np.random.PCG64([seed, dimension, at_most]))
-        self._dimension, self._left = dimension, at_most
-        members = max(4, min(MOST_MEMBERS, EACH * dimension, at_most))
-        rows = [self._random.permutation(members) for _ in range(dimension)]
-        cells = np.stack(rows, axis=1) + self._random.random((members, dimension))
-        self._members = cells / members
-        if start is not None:
-            self._members[0] = start
-        self._values = np.full(members, np.nan)
-        self._asked = np.empty((0, dimension))
+    def __init__(self, draws: Draws, points: np.ndarray, values: np.ndarray) -> None:
+        self._draws = draws
+        self.points, self.values = np.array(points), np.array(values)
+        self._next = 0
+        self._members, self._trials = np.zeros(0, np.int64), self.points[:0]
 
-    def ask(self) -> np.ndarray:
-        """See `Optimiser`."""
-        if np.isnan(self._values).all():
-            trials = self._members
-        elif self._converged():
-            trials = np.empty((0, self._dimension))
-        else:
-            trials = self._trials()
-        self._asked = trials[: self._left]
-        return self._asked.copy()
+    @property
+    def collapsed(self) -> bool:
+        """True where the members are so close to each other that trials find nothing new."""
+        return bool(np.ptp(self.points, axis=0).max() < COLLAPSED)
+
+    def ask(self, count: int) -> np.ndarray:
+        """Trials for the next `count` members, in turn, [count, dimension]."""
+        draws, (size, dimension) = self._draws, self.points.shape
+        members = (self._next + np.arange(count)) % size
+        self._next = (self._next + count) % size
+        ranked = np.argsort(self.values, kind="stable")
+        leading = self.points[ranked[draws.whole(min(size, max(2, round(LEADING * size))), count)]]
+        own = self.points[members]
+        other = self.points[(members + 1 + draws.whole(max(1, size - 1), count)) % size]
+        another = self.points[draws.whole(size, count)]
+        least, most = WEIGHTS
+        weight = least + (most - least) * draws.even(count, 1)
+        moved = own + weight * (leading - own) + weight * (other - another)
+        taken = draws.even(count, dimension) < draws.even(count, 1)
+        taken[np.arange(count), draws.whole(dimension, count)] = True
+        self._members, self._trials = members, np.clip(np.where(taken, moved, own), 0.0, 1.0)
+        return self._trials
 
     def tell(self, values: np.ndarray) -> None:
-        """See `Optimiser`."""
-        count = len(values)
-        self._left -= count
-        better = np.isnan(self._values[:count]) | (values <= self._values[:count])
-        self._members[:count][better] = self._asked[better]
-        self._values[:count][better] = values[better]
+        """The values of the trials that were asked last, [count]."""
+        for member, point, value in zip(self._members, self._trials, values, strict=True):
+            if value <= self.values[member]:
+                self.points[member], self.values[member] = point, value
 
-    def _converged(self) -> bool:
-        return bool(np.ptp(self._members, axis=0).max() < 1e-9)
-
-    def _trials(self) -> np.ndarray:
-        members = self._members
-        count = len(members)
-        trials = np.empty_like(members)
-        for own in range(count):
-            a, b, c = self._random.choice(count - 1, 3, replace=False)
-            a, b, c = (other + (other >= own) for other in (a, b, c))
-            moved = members[a] + STEP * (members[b] - members[c])
-            taken = self._random.random(self._dimension) < CROSSED
-            taken[self._random.integers(self._dimension)] = True
-            trials[own] = np.where(taken, moved, members[own])
-        folded = np.abs(trials) % 2.0
-        return np.where(folded > 1.0, 2.0 - folded, folded)
+    def add(self, point: np.ndarray, value: float) -> None:
+        """A point found elsewhere takes the place of the worst member, if it is better than that."""
+        worst = int(np.argmax(self.values))
+        if value < self.values[worst]:
+            self.points[worst], self.values[worst] = point, value

@@ -1,4 +1,4 @@
-"""An optimiser as whoever runs cases sees it: it asks for points of the unit cube, and is told what they are worth."""
+"""What a search or a tuning asks of an optimiser: points to try, a batch at a time."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ import numpy as np
 
 
 class Optimiser(Protocol):
-    """Asks for points, a generation at a time, and is told the value of each before it asks again.
+    """Chooses points of the unit cube, a generation at a time, by the values of those before: the least is looked for.
 
-    Two that are made alike and told alike ask alike, to the bit.
+    Which it asks for follows from how it was made and from what it was told, to the bit, on every machine.
     """
 
     def ask(self) -> np.ndarray:
-        """Points of the unit cube, [candidate, dimension]; none, [0, dimension], when it has ended."""
+        """The points of the next generation, [candidate, dimension]; empty, [0, dimension]: it has ended."""
+        ...
 
     def tell(self, values: np.ndarray) -> None:
-        """Take the values of the points that were asked for last, [candidate], to be minimised; they may be
-        infinite."""
+        """The values of the points that were asked last, [candidate]: +inf and -inf may be among them, NaN is not."""
+        ...

@@ -18,6 +18,9 @@ SHARE = 4
 GAIN = 1e-3
 """A turn that improves the goal by less than this share of it brings next to nothing."""
 
+IDLE = 2
+"""A tuning ends after so many turns that bring next to nothing; the second has twice as many cases."""
+
 INSIDE = 0.05
 """How far inside the ends of the cube the middle of a turn is, at least: so both sides of it are there."""
 
@@ -29,7 +32,7 @@ class RobustTuning:
     """See `Seeker`. Without plants the candidates themselves are the cases.
 
     A turn ends when the optimiser does, or when its share of the cases that are left is spent. The tuning ends when no
-    plant is worse than the worst active one and the turn brought next to nothing, or when no further turn has room.
+    plant is worse than the worst active one and two turns brought next to nothing, or when no further turn has room.
     """
 
     def __init__(self, search: Search) -> None:
@@ -43,6 +46,7 @@ class RobustTuning:
         self._confirmed = self._confirming = self._converged = False
         self._may_ask = 0
         self._borne: float | None = None
+        self._idle = 0
         self._begin(None)
 
     def ask(self) -> np.ndarray:
@@ -69,7 +73,7 @@ class RobustTuning:
             self._confirmed = True
             return
         least = SHORTEST * len(self._active)
-        cases = room if self._reserve == 0 or room < 2 * least else max(room // SHARE, least)
+        cases = room if self._reserve == 0 or room < 2 * least else max(room // (SHARE >> self._idle), least)
         dimension, seed = len(self._search.parameters), self._search.seed + self._turn
         self._may_ask = cases // len(self._active)
         self._tuner, self._middle = searching.tuner(dimension, seed, self._may_ask), start
@@ -114,7 +118,8 @@ class RobustTuning:
             self._active.append(plant)
         else:
             worth, before = self._worst(best), self._borne
-            if self._converged or (before is not None and hardly_better(worth, before)):
+            self._idle = self._idle + 1 if before is not None and hardly_better(worth, before) else 0
+            if self._converged or self._idle == IDLE:
                 self._confirmed = True
                 return
             self._borne = worth
