@@ -44,7 +44,7 @@ from met.diagnostic import Problem, error
 from met.host.files import is_count, new_file, read_json, read_regular, whole_file
 from met.plan import Plan
 from met.plan import file as plan_file
-from met.plan.columns import CaseValues, all_rows
+from met.plan.columns import MOST_SWEPT, CaseValues, all_rows
 from met.program.step import TOO_FAST
 from met.version import VERSION
 
@@ -271,13 +271,16 @@ class Folder:
 
     # What is done
 
-    def named_tasks(self, number: int) -> list[Task]:
-        """The tasks of a section that have a file, sound or not, by their first cases."""
-        found = []
+    def named_tasks(self, number: int, stretch: tuple[int, int] | None = None) -> list[Task]:
+        """The tasks of a section that have a file, sound or not, by their first cases; of those within a stretch of
+        cases alone where one is given."""
+        found, (first, last) = [], stretch or (0, MOST_SWEPT)
         for path in self._shard_files():
             parts = SHARD.fullmatch(path.name)
             task = Task(*map(int, parts.groups())) if parts else None
-            if task is not None and task.section == number and path.name == task.name and path == self._path(task):
+            if task is None or task.section != number or (stretch and not first <= task.first < task.last <= last):
+                continue
+            if path.name == task.name and path == self._path(task):
                 found.append(task)
         return sorted(found, key=lambda task: (task.first, -task.last))
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from batch.campaigns.tasks import CampaignSection
-from met.host.files import read_regular, whole_file
+from met.host.files import read_regular
 from met.plan import Experiment
 from met.plan.columns import all_rows
 from met.plan.file import array_bytes
@@ -29,9 +29,12 @@ def points_path(folder: Path, number: int) -> Path:
 
 
 def write_points(folder: Path, number: int, table: np.ndarray) -> None:
-    """Keep the cases of a search that were asked for so far, [case, coordinate], SI."""
-    with whole_file(points_path(folder, number)) as file:
-        file.write(array_bytes(np.asarray(table, "<f8")))
+    """Keep the cases of a search that were asked for so far, [case, coordinate], SI. They follow again from the shards,
+    so nobody waits until they are on the disk."""
+    path = points_path(folder, number)
+    temporary = path.with_name(f".{path.name}.tmp")
+    temporary.write_bytes(array_bytes(np.asarray(table, "<f8")))
+    temporary.replace(path)
 
 
 def read_points(path: Path, experiment: Experiment) -> np.ndarray:

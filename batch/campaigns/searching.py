@@ -148,9 +148,7 @@ def _held(
     tell  whether what is found counts as done before, and what is no shard is told of
     """
     count, found = driver.counts[section.number], list[tuple[Task, shard.Shard]]()
-    for task in driver.folder.named_tasks(section.number):
-        if not (first <= task.first and task.last <= last):
-            continue
+    for task in driver.folder.named_tasks(section.number, (first, last)):
         try:
             found.append((task, driver.folder.read(section, task)))
         except (shard.UnsoundShard, OSError) as reason:
