@@ -4,7 +4,7 @@
     search_goal        `maximise NAME` or `minimise NAME`, the name of a metric's variable
     search_at_most     cases in all;  search_seed: of what is tried
     search_against     the sweep that a tuning is held against;  search_plants: how many cases that has
-    search_margin      by which share of its limit a tuning stays away from each requirement
+    search_margin      share of its limit by which a tuning would stay inside each requirement
 
 A coordinate that is chosen has its ends in SI, `low` and `high`, and `steps`, `equal` or `ratios`. The variable
 `generation` says which generation, from 0, asked for each case.

@@ -234,7 +234,7 @@ TUNE = BlockDeclaration(
         Entry(name="maximise", form="statement", written="maximise METRIC;", default="needed, this or `minimise`",
               doc="likewise, the largest"),
         Entry(name="margin", written="margin = 5 %;", default="5 %", parameter=MARGIN,
-              doc="by which share of its limit it tries to stay away from each requirement"),
+              doc="a distance to each limit, as a share of it, that is worth as large a share of the goal"),
         *_BUDGET,
         _ALLOW,
     ),

@@ -33,4 +33,4 @@ def search_lines(experiment: Experiment, search: Search) -> Iterator[str]:
         yield f"  against {count(len(search.plants), 'case')} of {search.against}: {', '.join(borne)}"
     if search.kind == "tune" and experiment.requirements:
         required = ", ".join(requirement.text for requirement in experiment.requirements)
-        yield f"  {100.0 * search.margin:g} % inside the limits of {required}"
+        yield f"  with a margin of {100.0 * search.margin:g} % to the limits of {required}"

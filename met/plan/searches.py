@@ -55,7 +55,8 @@ class Search:
     at_most      cases in all
     against      the sweep whose cases a tuning is held against, "" for none; plants: the values of its coordinates in
                  each of them, SI; these are the coordinates behind those that are chosen
-    margin       by which share of its limit a tuning tries to stay away from each requirement
+    margin       share of its limit by which a tuning would stay inside each requirement, and of its goal what it would
+                 pay for that
     generations  numbers of cases that each generation added to the case table; none before it has run
     """
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from met.frozen import frozen
 from met.plan.searches import Search
-from met.seeking.values import MET, Limit, hurt, served
+from met.seeking.values import Limit, hurt, served
 
 
 class NamedLimit(Limit, Protocol):
@@ -101,11 +101,6 @@ def answer(
         tuple(sorted((room for room in rooms if room.share == room.share), key=lambda room: room.share)),
         tuple(_ends(search, table[case])),
     )
-
-
-def is_good(worth: np.ndarray) -> np.ndarray:
-    """True for each case of a tuning that meets all that is required with its margin."""
-    return worth < MET
 
 
 def _met(limit: Limit, values: np.ndarray, done: np.ndarray) -> np.ndarray:

@@ -150,7 +150,7 @@ def test_the_commands_know_them(
         "Tune: minimise last, in at most 90 cases; 808 B of histories a case\n"
         "  drive.kp  0.01 to 0.1 V*s/rad, by equal ratios\n"
         "  against 3 cases of loads: links.bar.mass\n"
-        "  10 % inside the limits of last < 5 rad\n"
+        "  with a margin of 10 % to the limits of last < 5 rad\n"
     ) in capsys.readouterr().out
     assert main(["fmt", "d.ic", "--check"]) in (0, 1)
     assert main(["explain", "d.ic", "drive.kp", "--run", "most"]) == 0

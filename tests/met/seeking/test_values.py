@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from met.seeking.values import MET, MISSED, UNKNOWN, hurt, missed, served
+from met.seeking.values import MET, MISSED, UNKNOWN, hurt, missed, served, short
 
 
 @dataclass(frozen=True)
@@ -52,13 +52,25 @@ def test_a_value_on_its_limit_meets_what_includes_it(comparison: str, met: bool)
     assert (served_of([(0.0, 2.0, True)], Limit("other", comparison, 2.0))[0] < MET) is met
 
 
-def test_a_margin_is_a_share_of_the_limit() -> None:
+def test_a_margin_is_a_share_of_the_limit_and_costs_as_large_a_share_of_the_goal() -> None:
     limit = Limit("other", "<", -10.0)
-    assert missed(limit, np.array([-10.4, -10.6, -9.0, np.nan]), 0.05).tolist() == pytest.approx(
-        [0.01, 0.0, 0.15, np.nan], nan_ok=True
+    values = np.array([-10.0, -10.25, -10.5, -12.0, np.nan])
+    assert short(limit, values, 0.05).tolist() == pytest.approx([1.0, 0.5, 0.0, 0.0, np.nan], nan_ok=True)
+    assert short(Limit("other", ">", 0.0), values, 0.05).tolist() == [0.0] * 5
+    on_it, inside, better = served_of(
+        [(2.0, -10.0 - 1e-12, True), (2.1, -10.5, True), (1.99, -10.5, True)], limit, 0.05
     )
-    assert missed(Limit("other", ">", 0.0), np.array([0.1, -0.3]), 0.05).tolist() == pytest.approx([0.0, 0.3])
-    assert served_of([(0.0, -10.4, True)], limit, 0.05)[0] > MET > served_of([(0.0, -10.4, True)], limit)[0]
+    assert on_it == pytest.approx(inside, rel=1e-9), "2 on the limit is as good as 2.1 that keeps 5 % from it"
+    assert better < on_it
+    negative = served_of([(-2.0, -10.0 - 1e-12, True), (-1.9, -10.5, True)], limit, 0.05)
+    assert negative[0] == pytest.approx(negative[1], rel=1e-9)
+
+
+def test_what_is_missed_is_a_share_of_the_limit() -> None:
+    assert missed(Limit("other", "<", -10.0), np.array([-10.4, -9.0, np.nan])).tolist() == pytest.approx(
+        [0.0, 0.1, np.nan], nan_ok=True
+    )
+    assert missed(Limit("other", ">", 0.0), np.array([0.1, -0.3])).tolist() == pytest.approx([0.0, 0.3])
 
 
 def test_without_requirements_the_goal_alone_decides() -> None:
