@@ -3,7 +3,8 @@
     search             `search` or `tune`;  search_of: the run
     search_goal        `maximise NAME` or `minimise NAME`, the name of a metric's variable
     search_at_most     cases in all;  search_seed: of what is tried
-    search_against     the sweep that a tuning is held against;  search_plants: how many cases that has
+    search_against     the sweep that a tuning is held against;  search_plants: how many cases that has;
+                       search_drawn_with: the seed of what it draws
     search_margin      share of its limit by which a tuning would stay inside each requirement
 
 A coordinate that is chosen has its ends in SI, `low` and `high`, and `steps`, `equal` or `ratios`. The variable
@@ -39,7 +40,11 @@ def attributes(search: Search, metric: str) -> dict[str, Any]:
     if search.kind == "tune":
         told["search_margin"] = search.margin
     if search.against:
-        told |= {"search_against": search.against, "search_plants": len(search.plants)}
+        told |= {
+            "search_against": search.against,
+            "search_plants": len(search.plants),
+            "search_drawn_with": search.drawn_with,
+        }
     return told
 
 
@@ -61,9 +66,14 @@ def why_unsound(group: StoredGroup) -> str:
     word, _, metric = str(told.get("search_goal", "")).partition(" ")
     if word not in GOALS or metric not in {each.name for each in group.role("metric")}:
         return "attribute `search_goal` is no goal"
-    for name, most in (("search_at_most", MOST_SEARCHED), ("search_plants", MOST_PLANTS), ("search_seed", 1 << 53)):
-        value = told.get(name, int(name != "search_at_most"))
-        if not isinstance(value, int) or isinstance(value, bool) or not (name != "search_seed") <= value <= most:
+    for name, least, most in (
+        ("search_at_most", 1, MOST_SEARCHED),
+        ("search_plants", 1, MOST_PLANTS),
+        ("search_seed", 0, 1 << 53),
+        ("search_drawn_with", 0, 1 << 53),
+    ):
+        value = told.get(name, 1 if name != "search_at_most" else None)
+        if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
             return f"attribute `{name}` is no number of it"
     margin = told.get("search_margin", 0.0)
     if not isinstance(margin, float) or not 0.0 <= margin < 1.0:
@@ -106,5 +116,6 @@ def search_of(group: StoredGroup) -> Search | None:
         seed=told.get("search_seed", 0),
         against=str(told.get("search_against", "")),
         plants=((),) * int(told.get("search_plants", 0)),
+        drawn_with=told.get("search_drawn_with", 0),
         margin=told.get("search_margin", 0.0),
     )

@@ -59,7 +59,7 @@ def _commands(archive: ArchiveFile, group: ArchiveGroup, answer: SearchAnswer) -
     command = f"met run {quoted(how['deck'])} {quoted(name)} {' '.join(words)}"
     found = [("its worst case again:", again), ("run it:", f"{command} -o chosen.h5")]
     if answer.draws:
-        seed = f"--set seed={how['seed'] + 1}"
+        seed = f"--set seed={answer.search.drawn_with + 1}"
         said = "these cases chose it, so they flatter it: other draws confirm it or not:"
         found[1] = (said, f"{command} {seed} -o confirmed.h5")
     return found

@@ -98,6 +98,7 @@ def read_search(
         seed=reader.seed,
         against=against.name if against is not None else "",
         plants=plants,
+        drawn_with=0 if against is None else noise_seed if against.seed is None else against.seed,
         margin=reader.margin,
         place=reader.goal_place,
     )

@@ -20,6 +20,7 @@ def check_search(experiment: Experiment, search: Search, where: str) -> None:
         raise Damaged(f"{where}.metric", f"there is no metric `{search.metric}`")
     check_whole(search.at_most, 1, MOST_SEARCHED, f"{where}.at_most")
     check_whole(search.seed, 0, MOST_SEED, f"{where}.seed")
+    check_whole(search.drawn_with, 0, MOST_SEED, f"{where}.drawn_with")
     if not 0.0 <= search.margin < 1.0:
         raise Damaged(f"{where}.margin", "it should be at least 0 and below 1")
     _check_parameters(experiment, search, f"{where}.parameters")

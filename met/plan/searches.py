@@ -54,7 +54,8 @@ class Search:
     parameters   that are chosen; the first coordinates of the cases
     at_most      cases in all
     against      the sweep whose cases a tuning is held against, "" for none; plants: the values of its coordinates in
-                 each of them, SI; these are the coordinates behind those that are chosen
+                 each of them, SI; these are the coordinates behind those that are chosen;  drawn_with: the seed of what
+                 it draws
     margin       share of its limit by which a tuning would stay inside each requirement, and of its goal what it would
                  pay for that
     generations  numbers of cases that each generation added to the case table; none before it has run
@@ -69,6 +70,7 @@ class Search:
     seed: int = 0
     against: str = ""
     plants: tuple[tuple[float, ...], ...] = ()
+    drawn_with: int = 0
     margin: float = 0.0
     generations: tuple[int, ...] = ()
     place: Place | None = None

@@ -265,7 +265,7 @@ def test_generations_stand_beside_the_cases(place: Path) -> None:
         assert found.sizes["case"] <= at_most
     assert {name: value for name, value in data["still"].attrs.items() if name.startswith("search")} == {
         "search": "tune", "search_of": "swing", "search_goal": "minimise off", "search_at_most": TUNED,
-        "search_seed": 0, "search_margin": 0.05, "search_against": "loads", "search_plants": 5,
+        "search_seed": 0, "search_margin": 0.05, "search_against": "loads", "search_plants": 5, "search_drawn_with": 0,
     }  # fmt: skip
     chosen = data["back"]["environment.held.stiffness"].attrs
     assert (chosen["low"], chosen["high"], chosen["steps"]) == (5.0, 79.0, "equal")
