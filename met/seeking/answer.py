@@ -9,10 +9,10 @@ import numpy as np
 
 from met.frozen import frozen
 from met.plan.searches import Search
-from met.seeking.values import Limit, hurt, served
+from met.seeking.values import MetricLimit, hurt, served
 
 
-class NamedLimit(Limit, Protocol):
+class NamedLimit(MetricLimit, Protocol):
     """A requirement with its text."""
 
     @property
@@ -103,12 +103,12 @@ def answer(
     )
 
 
-def _met(limit: Limit, values: np.ndarray, done: np.ndarray) -> np.ndarray:
+def _met(limit: MetricLimit, values: np.ndarray, done: np.ndarray) -> np.ndarray:
     compare = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal}[limit.comparison]
     return np.asarray(compare(values, limit.limit) & done)
 
 
-def _room(limit: Limit, values: np.ndarray) -> float:
+def _room(limit: MetricLimit, values: np.ndarray) -> float:
     """How far the worst of these values is inside a limit, as a share of it, or in SI where it is 0."""
     inside = limit.limit - values if limit.comparison.startswith("<") else values - limit.limit
     return float(np.min(inside)) / (abs(limit.limit) or 1.0)

@@ -27,7 +27,7 @@ MET, MISSED, UNKNOWN = 1.0, 2.0, 3.0
 """The ends of the tiers of a tuning's cases: a value below the first is of a case that meets all."""
 
 
-class Limit(Protocol):
+class MetricLimit(Protocol):
     """A requirement as far as it counts here: the name of its metric, `<` or `>` with or without `=`, its limit."""
 
     @property
@@ -44,13 +44,13 @@ def hurt(goal: np.ndarray, largest: bool, done: np.ndarray) -> np.ndarray:
     return np.where(np.isnan(value), -np.inf, value)
 
 
-def missed(limit: Limit, values: np.ndarray) -> np.ndarray:
+def missed(limit: MetricLimit, values: np.ndarray) -> np.ndarray:
     """How far the values of its metric are beyond a limit, as a share of it, or in SI where that is 0; 0 within;
     not-a-number stays so."""
     return np.maximum(0.0, -_inside(limit, values) / (abs(limit.limit) or 1.0))
 
 
-def short(limit: Limit, values: np.ndarray, margin: float) -> np.ndarray:
+def short(limit: MetricLimit, values: np.ndarray, margin: float) -> np.ndarray:
     """Which share of the margin that its metric should keep from a limit is missing, from 0 to 1; of a limit of 0 none,
     which has no share."""
     wanted = margin * abs(limit.limit)
@@ -59,7 +59,7 @@ def short(limit: Limit, values: np.ndarray, margin: float) -> np.ndarray:
     return np.clip(1.0 - _inside(limit, values) / wanted, 0.0, 1.0)
 
 
-def _inside(limit: Limit, values: np.ndarray) -> np.ndarray:
+def _inside(limit: MetricLimit, values: np.ndarray) -> np.ndarray:
     return limit.limit - values if limit.comparison.startswith("<") else values - limit.limit
 
 
@@ -67,7 +67,7 @@ def served(
     goal: np.ndarray,
     largest: bool,
     done: np.ndarray,
-    limits: Sequence[Limit],
+    limits: Sequence[MetricLimit],
     metrics: Mapping[str, np.ndarray],
     margin: float,
 ) -> np.ndarray:
