@@ -397,3 +397,23 @@ def test_results_that_cannot_be_read_back_stop_it(here: Path, plan: Plan, monkey
     with pytest.raises(Problem) as stopped:
         batch.run(plan, output="a.h5", experiments=["back"])
     assert "what is computed of back cannot be read back from" in stopped.value.diagnostics[0].message
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("search", "guess"), ("search_goal", "minimise nothing"), ("search_goal", "far"), ("search_at_most", 0),
+        ("search_at_most", "many"), ("search_plants", -1), ("search_margin", 1.5), ("search_seed", -1),
+    ],
+)  # fmt: skip
+def test_an_archive_that_says_of_a_search_what_none_is_is_no_archive(
+    here: Path, undisturbed: bytes, name: str, value: object
+) -> None:
+    import h5py
+
+    (here / "a.h5").write_bytes(undisturbed)
+    with h5py.File(here / "a.h5", "r+") as file:
+        file["still"].attrs[name] = value
+    with pytest.raises(Problem) as refused, ArchiveFile(here / "a.h5") as file:
+        [SearchAnswer.of(group) for group in file.groups]
+    assert [each.code for each in refused.value.diagnostics] == ["E302"]
