@@ -139,6 +139,13 @@ class Prepared:
 
         return hashlib.sha256(emit(self.recording, 8).encode()).hexdigest()
 
+    def of_cases(self, experiment: Experiment) -> Prepared:
+        """The same program, ready to run the cases of an experiment that differs in its case table alone."""
+        made = Prepared(experiment, self.lanes, self.wire, self.late)
+        ready = ("program", "recording", "kernel", "code_key", "result_keys", "work_key", "old_code_key")
+        made.__dict__.update({name: self.__dict__[name] for name in ready if name in self.__dict__})
+        return made
+
     def is_work(self, key: str) -> bool:
         """True where the key is this work's, in this version of keys or the one before."""
         return key == self.work_key or key == self.old_code_key

@@ -35,7 +35,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from batch.archive import limits, step_errors
+from batch.archive import limits, searched, step_errors
 from met.frozen import frozen
 from met.plan import Coordinate, Experiment, Plan, Recorded
 from met.plan.channel import DIMENSIONS, channels
@@ -236,7 +236,12 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         variable("repeat", "int64", "number of the repeat"),
         variable("seed", "int64", "seed of the case's noise"),
     ]
-    taken = set(RESERVED) | {recorded.name for recorded in experiment.structure.record}
+    if experiment.search is not None:
+        words = "generation of the search that asked for the case, from 0"
+        out.append(variable(searched.GENERATION, "int64", words))
+    taken = {*RESERVED, *(variable.name for variable in out)} | {
+        recorded.name for recorded in experiment.structure.record
+    }
     taken |= {*joint_dimensions(experiment).values(), *component_dimensions(experiment).values()}
     paths = [coordinate.path for coordinate in experiment.cases.coordinates]
     paths += [choice.path for choice in experiment.cases.choices]
@@ -375,6 +380,7 @@ def _coordinate(experiment: Experiment, coordinate: Coordinate, name: str) -> Va
         written["path"] = coordinate.path
     if coordinate.design:
         written["design"] = coordinate.design
+    written |= searched.of_coordinate(experiment.search, coordinate.path)
     return Variable(name, "float64", ("case",), "coordinate", words, unit, written, coordinate.path)
 
 
@@ -431,6 +437,8 @@ def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, 
     coordinates = ["case_id", "case_key", *(v.name for v in variables if v.role in named)]
     if experiment.cases.repeats is not None:
         coordinates.append("repeat")
+    if experiment.search is not None:
+        coordinates.append(searched.GENERATION)
     return {
         "experiment": experiment.name,
         **({"sweep": experiment.sweep} if experiment.sweep else {}),
@@ -444,6 +452,7 @@ def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, 
         "structure_key": keys.structure_key(structure, keys.inputs(experiment)),
         "cases_in_table": experiment.cases.count,
         **_step_errors(experiment, variables),
+        **_search(experiment, variables),
         "frame": FRAME if structure.base is None else WHERE_IT_MOVES,
         "coordinates": " ".join(coordinates),
         **({"allowed": "\n".join(map(str, experiment.allowances))} if experiment.allowances else {}),
@@ -455,6 +464,13 @@ def _step_errors(experiment: Experiment, variables: list[Variable]) -> dict[str,
         return {}
     names = {variable.key: variable.name for variable in variables if variable.role == "metric"}
     return {step_errors.ATTRIBUTE: step_errors.written(experiment.step_errors, names)}
+
+
+def _search(experiment: Experiment, variables: list[Variable]) -> dict[str, Any]:
+    if experiment.search is None:
+        return {}
+    names = {variable.key: variable.name for variable in variables if variable.role == "metric"}
+    return searched.attributes(experiment.search, names[experiment.search.metric])
 
 
 def group_names(plan: Plan) -> tuple[str, ...]:

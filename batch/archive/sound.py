@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from batch.archive import searched
 from batch.archive.stored import Stored, StoredGroup, Unlike
 from met.messages.visible import line
 from met.plan.swept import blocks
@@ -32,7 +33,7 @@ ATTRIBUTES: dict[str, tuple[type, ...]] = {
 }
 """Attributes that every experiment's group has, with their types; numbers are above 0."""
 
-WORDED = ("sweep", "structure_key", "code_key", "frame", "coordinates", "allowed")
+WORDED = ("sweep", "structure_key", "code_key", "frame", "coordinates", "allowed", *searched.WORDS)
 """Attributes in words that an experiment's group may have besides."""
 
 VARIABLES = {"case": WHOLE, "case_id": WORDS, "cause": WORDS, "status": WHOLE, "n_valid": WHOLE}
@@ -93,6 +94,8 @@ def check(group: StoredGroup) -> None:
             raise Unlike(f"variable `{name}` is not of the size of its dimensions")
         _of_its_role(variable, types)
     _names(group)
+    if why := searched.why_unsound(group):
+        raise Unlike(why)
     _requirements(group)
     _values(group)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from batch.archive import layout as archive_layout
 from batch.archive.layout import AT_LIMIT, EXCESS, EXTREME_AT, GRAPPLE, Layout
+from batch.archive.searched import GENERATION
 from met.plan import Experiment, keys
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ def values_of_cases(experiment: Experiment, layout: Layout, run: Run, id_head: b
         "case_id": names,
         "seed": keys.case_seeds(experiment, rows),
         "repeat": 0 if experiment.cases.repeats is None else experiment.cases.repeats[rows],
+        **({} if experiment.search is None else {GENERATION: experiment.search.generation_of(rows)}),
         "status": run.status,
         "cause": run.cause,
         "warning": run.warning,

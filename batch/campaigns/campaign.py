@@ -20,6 +20,7 @@ from batch.campaigns.folder import Folder, beside
 from batch.campaigns.keep import Keep, KeptRows, as_list, keep, kept_before, kept_by_outcome, kept_rows
 from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.output import check_output, check_room, default_output
+from batch.campaigns.searching import check_first_generation
 from batch.campaigns.summarising import point_sizes
 from batch.campaigns.tasks import CampaignSection
 from batch.campaigns.verification.when import WORDS as VERIFY_WORDS
@@ -57,6 +58,8 @@ class CampaignPart:
     wires   whether its beds are real ones, and how late these are (met.program.build.build); None: they are emulated
     stops_early  whether its cases are run only until what is required of them is decided; then `rows` are the most
     written  the number of cases that have a row in the archive, about; None: all
+    searches  whether what its cases give decides which ones are run next; then `rows` are the first generation
+    keeps_best  whether of a search the history of its answer is kept
     """
 
     experiment: Experiment
@@ -67,6 +70,19 @@ class CampaignPart:
     wires: Wires | None = None
     stops_early: bool = False
     written: int | None = None
+    searches: bool = False
+    keeps_best: bool = False
+
+    @property
+    def most(self) -> int:
+        """The number of cases that are run, at most."""
+        search = self.experiment.search
+        return search.at_most if self.searches and search is not None else len(self.rows)
+
+    @property
+    def open_ended(self) -> bool:
+        """True if it is not known beforehand how many cases are run."""
+        return self.stops_early or self.searches
 
     def prepared(self) -> engine.Prepared:
         """The program that runs it."""
@@ -77,7 +93,7 @@ class CampaignPart:
     @property
     def recorded(self) -> int:
         """The number of cases whose histories are kept, at most."""
-        return min(len(self.rows), len(self.kept) + self.later)
+        return self.most if self.all_recorded else min(self.most, len(self.kept) + self.later + self.keeps_best)
 
     @property
     def all_recorded(self) -> bool:
@@ -87,7 +103,7 @@ class CampaignPart:
     def bytes(self) -> int:
         """About what is in the archive of it."""
         described = archive_layout.PARAMETER_TEXT * len(self.experiment.parameters)
-        rows = len(self.rows) if self.written is None else min(self.written, len(self.rows))
+        rows = self.most if self.written is None else min(self.written, len(self.rows))
         return archive_layout.layout(self.experiment, rows, self.recorded, self.single).bytes + described
 
     @property
@@ -95,7 +111,7 @@ class CampaignPart:
         """About what its shards take."""
         numbers = OUTPUTS + len(self.experiment.cases.coordinates) + len(self.experiment.structure.metrics)
         histories = self.recorded * self.experiment.structure.history_bytes // (2 if self.single else 1)
-        return 8 * numbers * len(self.rows) + histories
+        return 8 * numbers * self.most + histories
 
 
 @frozen
@@ -115,7 +131,7 @@ class Campaign:
 
     @property
     def cases(self) -> int:
-        return sum(len(part.rows) for part in self.parts)
+        return sum(part.most for part in self.parts)
 
     @property
     def asked(self) -> list[str]:
@@ -123,9 +139,9 @@ class Campaign:
         return list(dict.fromkeys(part.experiment.name_in_deck for part in self.parts))
 
     @property
-    def stops_early(self) -> bool:
+    def open_ended(self) -> bool:
         """True if it is not known beforehand how many cases are run: then `cases` and `bytes` are the most."""
-        return any(part.stops_early for part in self.parts)
+        return any(part.open_ended for part in self.parts)
 
     @property
     def bytes(self) -> int:
@@ -200,13 +216,20 @@ def prepare(
     whole = sum(part.bytes for part in parts)
     if wanted.default and whole > KEPT_BYTES:
         wanted, words = Keep(), ("none",)
-        take = "may take" if any(part.stops_early for part in parts) else "would take"
+        take = "may take" if any(part.open_ended for part in parts) else "would take"
         parts = _parts(selected, wanted, float32, decided)
         notes.append(
             f"histories {take} {size_text(whole)}, over {size_text(KEPT_BYTES)}: metrics only are kept "
             f"(`--histories all` keeps them; any case can be run again alone: `--case '#0'`)"
         )
     parts = tuple(replace(part, wires=wires) for part in parts)
+    for part in parts:
+        if part.searches:
+            check_first_generation(part.experiment)
+            if wires is not None:
+                message = f"`{part.experiment.name}` chooses its cases as it goes, which is not done on motor beds"
+                helps = "`met run` searches with beds that are emulated; a run with what it finds is driven on them"
+                raise Problem(error("E313", message, help=helps))
     kept_plan = replace(plan, experiments=tuple(part.experiment for part in parts), selected=())
     words = tuple("all" if word == "default" else word for word in words)
     checked: Verify = "none" if wires else verify
@@ -234,8 +257,9 @@ def _summarised(part: CampaignPart, rows: KeptRows) -> CampaignPart:
     """A part of which the archive has a summary. Raises Problem E351 where it has too many design points, or stops by
     its results."""
     experiment = part.experiment
-    if part.stops_early:
-        message = f"`{experiment.name_in_deck}` stops when its requirements are decided, which takes a row a case"
+    if part.open_ended:
+        does = "chooses its cases by what others gave" if part.searches else "stops when its requirements are decided"
+        message = f"`{experiment.name_in_deck}` {does}, which takes a row a case"
         raise Problem(error("E351", message, help="leave `--rows` away: its cases are few"))
     points = len(point_sizes(experiment, part.rows))
     named = 2 * len(experiment.structure.metrics) + (points + 1) * len(experiment.requirements)
@@ -267,7 +291,11 @@ def _parts(
             part = CampaignPart(experiment, rows, np.empty(0, np.int64))
         # some that a user chooses are all run, whatever they show
         whole = len(rows) == experiment.cases.count or experiment.name in decided
-        parts.append(replace(part, stops_early=experiment.cases.until_shown > 0 and whole))
+        part = replace(part, stops_early=experiment.cases.until_shown > 0 and whole)
+        if experiment.search is not None and not experiment.search.complete and whole:
+            part = replace(part, searches=True, keeps_best=wanted.default and experiment.structure.history_bytes > 0)
+            part = replace(part, kept=part.kept[:0] if wanted.default else part.kept)
+        parts.append(part)
     return tuple(parts)
 
 
@@ -298,15 +326,24 @@ def histories_section(
     return CampaignSection(number, values.experiment, values.prepared, part.rows[kept], True, part.single, values.begun)
 
 
-def without_dropped_rows(campaign: Campaign, sections: Sequence[CampaignSection]) -> tuple[Campaign, list[str]]:
+def with_known_rows(
+    campaign: Campaign, sections: Sequence[CampaignSection], best: Mapping[int, Sequence[int]]
+) -> tuple[Campaign, list[str]]:
     """The campaign of the cases that these sections have, one for each part; and a note on each case that is none of
-    them, and whose history was asked for by name."""
+    them, and whose history was asked for by name.
+
+    best  rows that answer a search, by the number of its section
+    """
     parts, notes = [], []
     for part, section in zip(campaign.parts, sections, strict=True):
-        wanted = part.rows[part.kept]
-        parts.append(replace(part, rows=section.rows, kept=np.flatnonzero(np.isin(section.rows, wanted))))
-        experiment = part.experiment
+        experiment = section.prepared.experiment
+        wanted = section.rows if part.searches and part.all_recorded else part.rows[part.kept]
+        if part.keeps_best:
+            wanted = np.concatenate([wanted, best[section.number]])
+        kept = np.flatnonzero(np.isin(section.rows, wanted))
+        parts.append(replace(part, experiment=experiment, rows=section.rows, kept=kept))
         for _, named in choosing.select_rows([experiment], campaign.keep.cases) if part.stops_early else ():
             for case in experiment.cases.table[named[~np.isin(named, section.rows)]].tolist():
                 notes.append(f"no history of case #{case} is kept: what is required was decided without it")
-    return replace(campaign, parts=tuple(parts)), notes
+    plan = replace(campaign.plan, experiments=tuple(part.experiment for part in parts))
+    return replace(campaign, plan=plan, parts=tuple(parts)), notes

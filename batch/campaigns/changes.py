@@ -28,6 +28,7 @@ from met.plan import (
 )
 from met.plan.columns import CaseValues, different
 from met.plan.keys import in_key, inputs, structure_key
+from met.plan.searches import Search
 from met.plan.swept import blocks
 
 AXES = ("x", "y", "z")
@@ -66,7 +67,10 @@ def between(before: Experiment, now: Experiment, *, ordered: bool) -> list[Chang
     structures = [*_structures(before.structure, now.structure)]
     new = {entity for entity, _ in structures if entity}
     out = [Change(text) for _, text in structures if text]
-    cases = [Change(text) for text in _cases(before.cases, now.cases, ordered)]
+    if before.search is None or now.search is None:
+        cases = [Change(text) for text in _cases(before.cases, now.cases, ordered)]
+    else:  # of which the cases follow from what is searched for
+        cases = [Change(text) for text in _searches(before.search, now.search)]
     cases += [Change(text) for text in _stops(before, now)]
     out += [*_parameters(before, now, new), *cases]
     if before.formulas != now.formulas and not out:
@@ -231,6 +235,27 @@ def _stops(before: Experiment, now: Experiment) -> Iterator[str]:
                 yield f"{text} is to be shown now"
             elif old[text] != new[text]:
                 yield f"{text}: with another limit, share or confidence"
+
+
+def _searches(before: Search, now: Search) -> Iterator[str]:
+    """Changes of what is searched for, between which ends, and in how many cases."""
+    if before.goal != now.goal:
+        yield f"goal: {before.goal} -> {now.goal}"
+    old, new = ({each.path: each for each in search.parameters} for search in (before, now))
+    for path in dict.fromkeys([*old, *new]):
+        if path not in new:
+            yield f"{path} is not chosen any more"
+        elif path not in old:
+            yield f"{path} is chosen now"
+        elif old[path] != new[path]:
+            yield f"{path} is chosen between other ends"
+    if before.against != now.against:
+        yield f"against: {before.against or 'nothing'} -> {now.against or 'nothing'}"
+    elif before.plants != now.plants:
+        yield f"against: other cases of {now.against}"
+    for name in ("at_most", "seed", "margin"):
+        if getattr(before, name) != getattr(now, name):
+            yield f"{name}: {getattr(before, name)} -> {getattr(now, name)}"
 
 
 def _shown_by(requirement: Requirement) -> tuple[object, ...]:

@@ -3,6 +3,7 @@
     two_link.gains.h5.campaign/
       campaign.json     what is computed: sections, the keys of their code and cases
       plan.json         the plan, for workers; large case tables and rows beside it
+      points.*.npy      the cases of a search, as far as it has come
       shards/           one file a task, named SECTION-FIRST-LAST; those of a long section in folders
       status*.json      how far who is, written every second (batch/campaigns/status.py)
       lock              held while somebody works here: by one driver alone, or by the jobs of a cluster together
@@ -24,15 +25,18 @@ import re
 import shlex
 import shutil
 import stat
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from batch.archive.sink import is_at
 from batch.campaigns import shard
+from batch.campaigns.points import NPY_HEAD_BYTES, grown_program, points_path, read_points
 from batch.campaigns.tasks import CampaignSection, Done, Task
 from batch.campaigns.verification.when import WORDS as VERIFY_WORDS
 from met import run as engine
@@ -40,19 +44,16 @@ from met.diagnostic import Problem, error
 from met.host.files import is_count, new_file, read_json, read_regular, whole_file
 from met.plan import Plan
 from met.plan import file as plan_file
-from met.plan.columns import CaseValues, all_rows
+from met.plan.columns import MOST_SWEPT, CaseValues, all_rows
 from met.program.step import TOO_FAST
 from met.version import VERSION
 
 SCHEMA, FORMAT = "met.campaign", 1
 ENDING = ".campaign"
 OURS = re.compile(
-    r"(lock|shards|logs|plan\.json|plan\..*\.npy|rows\.\d+\.npy|status(\.\d+)?\.json|jobs\.json|\..*\.tmp|\.nfs.*)$"
+    r"(lock|shards|logs|plan\.json|plan\..*\.npy|rows\.\d+\.npy|points\.\d+\.npy|status(\.\d+)?\.json|jobs\.json|\..*\.tmp|\.nfs.*)$"
 )
 SHARD = re.compile(r"(\d+)-(\d+)-(\d+)")
-
-NPY_HEAD_BYTES = 4096
-"""Before the numbers of a `.npy` file; numpy writes 128."""
 
 
 class FolderBusy(Exception):
@@ -149,11 +150,17 @@ class Folder:
     # What is computed
 
     def describe(
-        self, plan: Plan, sections: Iterable[CampaignSection], stops_early: Collection[int] = (), **about: Any
+        self,
+        plan: Plan,
+        sections: Iterable[CampaignSection],
+        stops_early: Collection[int] = (),
+        searches: Mapping[int, int] = MappingProxyType({}),
+        **about: Any,
     ) -> None:
         """Write down what is computed, for workers and for who comes back later.
 
         stops_early  numbers of sections of which no more cases are run than decide what is required
+        searches     of those whose cases are chosen as they go, by number, how many they are at most
         about   `key` of the campaign, name of its `archive`, words for the `histories` that are kept
         """
         self.shards.mkdir(exist_ok=True)
@@ -164,7 +171,7 @@ class Folder:
         told = []
         for section in sections:
             rows = None
-            if len(section.rows) < section.prepared.experiment.cases.count:
+            if section.number not in searches and len(section.rows) < section.prepared.experiment.cases.count:
                 rows = f"rows.{section.number}.npy"
                 with new_file(self.path / rows) as file:
                     np.save(file, np.asarray(section.rows))
@@ -174,12 +181,13 @@ class Folder:
                     "name": section.name,
                     "again": section.number != section.experiment,
                     "experiment": section.experiment,
-                    "cases": len(section.rows),
+                    "cases": searches.get(section.number, len(section.rows)),
                     "rows": rows,
                     "recorded": section.recorded,
                     "single": section.single,
                     "code": section.code,
                     "stops_early": section.number == section.experiment and section.number in stops_early,
+                    "searches": section.number in searches,
                 }
             )
         data = {"schema": SCHEMA, "version": FORMAT, "met": VERSION, "deck": plan.deck, "sections": told, **about}
@@ -205,17 +213,39 @@ class Folder:
         experiments = [engine.prepare(experiment) for experiment in plan.experiments]
         out = {}
         described = self.described()
+        searched = {told["experiment"] for told in described["sections"] if told.get("searches")}
+        experiments = [
+            self._grown(each, number) if number in searched else each for number, each in enumerate(experiments)
+        ]
         for told in described["sections"]:
             number, of = told["number"], told["experiment"]
             if of >= len(experiments):
                 raise self._damaged(self.path / "campaign.json")
             if not experiments[of].is_work(told["code"]):
                 raise Problem(_other_code(experiments[of].experiment.name, self.path, described))
-            rows = self._rows(told, experiments[of].experiment.cases.count)
+            count = experiments[of].experiment.cases.count
+            rows = all_rows(count) if told.get("searches") else self._rows(told, count)
             out[number] = CampaignSection(
                 number, of, experiments[of], rows, told["recorded"], told["single"], told["code"]
             )
         return out
+
+    def with_new_cases(self, section: CampaignSection) -> CampaignSection:
+        """A section of a search with the cases that were asked for meanwhile; any other as it is. Raises Problem."""
+        if section.prepared.experiment.search is None or not points_path(self.path, section.number).exists():
+            return section
+        prepared = self._grown(section.prepared, section.number)
+        return replace(section, prepared=prepared, rows=all_rows(prepared.experiment.cases.count))
+
+    def _grown(self, prepared: engine.Prepared, number: int) -> engine.Prepared:
+        """The program of a search with the cases that were asked for so far. Raises Problem."""
+        path = points_path(self.path, number)
+        if not path.exists():  # not begun
+            return prepared
+        try:
+            return grown_program(prepared, read_points(path, prepared.experiment))
+        except (OSError, ValueError) as reason:
+            raise self._damaged(path) from reason
 
     def _rows(self, told: dict[str, Any], count: int) -> CaseValues:
         """The rows of a section of an experiment with so many cases. Raises Problem."""
@@ -241,13 +271,16 @@ class Folder:
 
     # What is done
 
-    def named_tasks(self, number: int) -> list[Task]:
-        """The tasks of a section that have a file, sound or not, by their first cases."""
-        found = []
+    def named_tasks(self, number: int, stretch: tuple[int, int] | None = None) -> list[Task]:
+        """The tasks of a section that have a file, sound or not, by their first cases; of those within a stretch of
+        cases alone where one is given."""
+        found, (first, last) = [], stretch or (0, MOST_SWEPT)
         for path in self._shard_files():
             parts = SHARD.fullmatch(path.name)
             task = Task(*map(int, parts.groups())) if parts else None
-            if task is not None and task.section == number and path.name == task.name and path == self._path(task):
+            if task is None or task.section != number or (stretch and not first <= task.first < task.last <= last):
+                continue
+            if path.name == task.name and path == self._path(task):
                 found.append(task)
         return sorted(found, key=lambda task: (task.first, -task.last))
 
@@ -295,6 +328,10 @@ class Folder:
                 kept[task] = Done(found.seconds, found.failed_from(at - task.first))  # a case counts once
                 at = max(at, task.last)
         return kept, told
+
+    def remove_shard(self, task: Task) -> None:
+        """Take away a task's shard, sound or not: its cases are run again."""
+        _remove(self._path(task))
 
     def bytes(self) -> int:
         """The size of the shards that are there."""
@@ -379,6 +416,7 @@ def _checked(data: Any) -> dict[str, Any]:
             and each["rows"] in (None, f"rows.{each['number']}.npy")
             and all(isinstance(each[name], bool) for name in ("again", "recorded", "single"))
             and isinstance(each.get("stops_early", False), bool)
+            and isinstance(each.get("searches", False), bool)
         )
     if not good:
         raise ValueError("it is no description of a campaign")

@@ -17,13 +17,14 @@ import numpy as np
 from batch.archive.sink import FileBusy as ArchiveBusy
 from batch.archive.sink import temporary_of
 from batch.campaigns import instants, merge, resuming
-from batch.campaigns.campaign import Campaign, histories_section, values_sections, without_dropped_rows
-from batch.campaigns.drive import Driver, Progress, Stopped, TooManyFailures
+from batch.campaigns.campaign import Campaign, histories_section, values_sections, with_known_rows
+from batch.campaigns.drive import Count, Driver, Progress, Stopped, TooManyFailures
 from batch.campaigns.executor import Executor
 from batch.campaigns.folder import Folder, FolderBusy, beside, uncovered
 from batch.campaigns.keep import worst_wanted
 from batch.campaigns.outcomes import CaseOutcomes, CountedCases
 from batch.campaigns.output import busy, cannot_write, check_room, publish
+from batch.campaigns.searching import CampaignSearch, run_search
 from batch.campaigns.status import Reporter, died_lines
 from batch.campaigns.summarising import Summarised, summarise
 from batch.campaigns.tasks import CampaignSection
@@ -99,7 +100,7 @@ def perform(
         resuming.guard(campaign)
     check_room(campaign.output, campaign.bytes_missing)
     values = [
-        each if part.stops_early else now
+        each if part.open_ended else now
         for part, each, now in zip(campaign.parts, values, instants.with_memories(values), strict=True)
     ]
     values[0].prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
@@ -145,8 +146,8 @@ def perform(
 class _CampaignWork:
     """A campaign on its way, in its folder.
 
-    whole   the campaign less the cases that are dropped (`until_shown`);  values, kept: its sections, with these cases
-            and without them
+    whole   the campaign with the cases that it has in the end: less those that are dropped (`until_shown`), with those
+            that were searched;  values, kept: its sections, as they were begun and with these cases
     """
 
     def __init__(
@@ -191,7 +192,10 @@ class _CampaignWork:
         executor.open(self.folder, self.sections, driver.tell)
         try:
             for attempt in range(ATTEMPTS):
-                missing = [(section, driver.find(section)) for section in self.values]
+                searches = {each.number: CampaignSearch(each) for each in self.values if self._searches(each)}
+                for number in searches:
+                    driver.counts[number] = Count(self._done(self.values[number]))
+                missing = [(each, driver.find(each)) for each in self.values if each.number not in searches]
                 self._tell_found(first=not attempt)
                 left = sum(last - first for _, stretches in missing for first, last in stretches)
                 if together and left:
@@ -206,8 +210,10 @@ class _CampaignWork:
                         run_until_shown(driver, section, stops[section.number])
                     else:
                         driver.run(section, stretches)
+                for search in searches.values():
+                    run_search(driver, search, self.sections)
                 try:
-                    self._drop(stops)
+                    self._settle(stops, searches)
                     self._summarise()
                     histories = self._histories(driver)
                     self.reporter.state("merging")
@@ -236,33 +242,40 @@ class _CampaignWork:
             self.folder.remove()
             return ""
         self.reporter.state(state)
-        left = sum(
-            last - first
-            for section in self.values
-            for first, last in uncovered(self.folder.named_tasks(section.number), len(section.rows))
-        )
-        done = self._of_all(self.campaign.cases - left)
+        done = self._of_all(sum(map(self._done, self.values)))
         return f"{done} are kept in {self.folder.path}; the same command goes on"
+
+    def _searches(self, section: CampaignSection) -> bool:
+        return self.campaign.parts[section.experiment].searches
+
+    def _done(self, section: CampaignSection) -> int:
+        """The number of a section's cases that have a shard, sound or not."""
+        tasks = self.folder.named_tasks(section.number)
+        cases = max((task.last for task in tasks), default=0) if self._searches(section) else len(section.rows)
+        return cases - sum(last - first for first, last in uncovered(tasks, cases))
 
     def _of_all(self, done: int) -> str:
         """So many cases of those that are to be run, where it is known how many these are."""
-        return f"{done:,} cases" if self.campaign.stops_early else f"{done:,} of {self.campaign.cases:,} cases"
+        return f"{done:,} cases" if self.campaign.open_ended else f"{done:,} of {self.campaign.cases:,} cases"
 
-    def _drop(self, stops: Mapping[int, StoppingPoints]) -> None:
-        """Go on without the cases beyond these stops, by section."""
-        if not stops:
+    def _settle(self, stops: Mapping[int, StoppingPoints], searches: Mapping[int, CampaignSearch]) -> None:
+        """Go on with the cases that are known now: those up to these stops, and those of these searches, by section."""
+        if not stops and not searches:
             return
         self.kept = [
             without_dropped(self.folder, each, stops[each.number], 2 * len(self.values) + each.number)
             if each.number in stops
+            else searches[each.number].section
+            if each.number in searches
             else each
             for each in self.values
         ]
         self.kept = [
-            now if each.number in stops else each
+            now if each.number in stops or each.number in searches else each
             for each, now in zip(self.kept, instants.with_memories(self.kept), strict=True)
         ]
-        self.whole, notes = without_dropped_rows(self.campaign, self.kept)
+        best = {number: [search.answer.case] for number, search in searches.items()}
+        self.whole, notes = with_known_rows(self.campaign, self.kept, best)
         for note in notes:
             self._note(note)
 
@@ -337,7 +350,7 @@ class _CampaignWork:
                 )
             )
         temporary = temporary_of(self.campaign.output)
-        writer = ArchiveWriter(temporary, self.campaign.plan, parts)
+        writer = ArchiveWriter(temporary, self.whole.plan, parts)
         try:
             for number, section in enumerate(self.kept):
                 self.reporter.begin(f"{section.name}, merging", len(section.rows), 0, 0, "")
@@ -393,7 +406,7 @@ class _CampaignWork:
         from batch.campaigns.verification.choosing import chosen
         from batch.campaigns.verification.verifying import FACTORS, verify
 
-        experiment = self.campaign.parts[number].experiment
+        experiment = self.whole.parts[number].experiment
         done = outcomes.done
         places = done.select(np.arange(done.set)) if way == "all" else chosen(experiment, outcomes)
         if len(places):

@@ -23,6 +23,8 @@ from batch.campaigns.verification import when
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, read_json
 from met.plan import file as plan_file
+from met.plan.codec import encode
+from met.plan.searches import Search
 from met.plan.swept import blocks
 
 WHOLE, DAMAGED = "whole", "damaged"
@@ -40,7 +42,14 @@ MOST_CHANGES = 8
 def campaign_key(values: Sequence[CampaignSection]) -> str:
     """A digest of all that decides the numbers of a campaign: code, and what goes into it. Which cases are run again
     for their histories may change on the way."""
-    return hashlib.sha256(json.dumps([[section.name, section.key()] for section in values]).encode()).hexdigest()
+    told = [[section.name, section.key(), *_search_of(section)] for section in values]
+    return hashlib.sha256(json.dumps(told).encode()).hexdigest()
+
+
+def _search_of(section: CampaignSection) -> list[Any]:
+    """What decides which cases a search asks for, besides its first ones; nothing of what is no search."""
+    search = section.prepared.experiment.search
+    return [] if search is None else [encode(Search, replace(search, place=None))]
 
 
 def as_begun(folder: Folder, campaign: Campaign, values: list[CampaignSection]) -> tuple[list[CampaignSection], str]:
@@ -56,7 +65,7 @@ def as_begun(folder: Folder, campaign: Campaign, values: list[CampaignSection]) 
 
 def settled(campaign: Campaign, values: Sequence[CampaignSection]) -> Campaign:
     """The campaign, with `verify` as "auto" where that asks for the same."""
-    if campaign.verify == "auto" or campaign.stops_early:  # of how many cases is not known yet
+    if campaign.verify == "auto" or campaign.open_ended:  # of how many cases is not known yet
         return campaign
     return replace(campaign, verify=when.settled(campaign.verify, ((each.prepared, len(each.rows)) for each in values)))
 
@@ -167,7 +176,8 @@ def describe(folder: Folder, campaign: Campaign, sections: Iterable[CampaignSect
     folder.describe(
         campaign.plan,
         sections,
-        stops_early=[number for number, part in enumerate(campaign.parts) if part.stops_early],
+        stops_early=[number for number, part in enumerate(campaign.parts) if part.open_ended],
+        searches={number: part.most for number, part in enumerate(campaign.parts) if part.searches},
         key=key,
         archive=campaign.output.name,
         histories=campaign.words,

@@ -34,6 +34,8 @@ def best(
     """Choose among what a sweep chooses (`vary`, `zip`, `from`), held against what the arm must bear: a design that
     meets all requirements in all of its cases, far from where one is missed.
 
+    Of a search or a tuning it says the answer.
+
     It must bear what is drawn, what is of links, payloads, the environment or the start, and what --over names.
 
     Exit status: 0 a design meets all; 1 none does; 2 the input is wrong.
@@ -45,8 +47,11 @@ def best(
     from batch.queries.best import Designs
     from batch.queries.groups import groups_named
     from batch.queries.pool import pools
+    from batch.queries.summary import finite
     from batch.terminal.best import BestAnswer, context
+    from batch.terminal.search import search_result
     from met.diagnostic import Problem, error
+    from met.outputs import quoted
 
     with ArchiveFile(archive) as file:
         file.need_every_row("choosing among designs")
@@ -58,6 +63,18 @@ def best(
             helps = f"name one: {', '.join(f'`--run {each.name}`' for each in found)}"
             raise Problem(error("E395", f"{archive} holds several sweeps", help=helps))
         pool = found[0]
+        searched = search_result(file, pool.groups[0])
+        if searched is not None:
+            if over or choose or by or front:
+                message = (
+                    f"`{pool.name}` is a search, whose cases it chose itself: nothing but its answer follows from them"
+                )
+                helps = (
+                    f"`met best {quoted(archive)}` says it; a sweep over what it chooses has all cases of each design"
+                )
+                raise Problem(error("E395", message, help=helps))
+            say(json.dumps(finite(searched.data), indent=1) if form == "json" else "\n".join(map(line, searched.lines)))
+            return YES if searched.ok else NO
         designs = Designs(pool, over, choose)
         if not pool.requirements and not by:
             metrics = ", ".join(column.label for column in pool.metrics())

@@ -49,7 +49,11 @@ def submit(
     jobs     of the array; None: `JOBS`, or fewer where there is less to share
     options  further words for sbatch, of both jobs: `--partition=long`
     """
-    if campaign.stops_early:
+    if any(part.searches for part in campaign.parts):
+        message = "jobs have shares that are fixed beforehand, and a search asks for cases as it goes"
+        remedy = "`met run --dask` runs it on workers, which may be jobs of SLURM: docs/cluster.md"
+        raise Problem(error("E358", message, help=remedy))
+    if campaign.open_ended:
         message = "jobs have shares that are fixed beforehand, and `until_shown` runs cases until something is shown"
         helps = (
             "`met run --dask` runs it on workers, which may be jobs of SLURM: docs/cluster.md",

@@ -61,6 +61,8 @@ def main(arguments: list[str]) -> None:
             if task.section not in sections:
                 sections = folder.sections()
             section = sections[task.section]
+            if task.last > len(section.rows):
+                section = sections[task.section] = folder.with_new_cases(section)
             section.prepared.kernel  # noqa: B018 - compiled here, so that a case's time does not begin before
             parent.tell(begun=[])
             done = tasks.carry_out(

@@ -26,6 +26,7 @@ from batch.queries.structures import structures
 from batch.queries.summary import RequirementSummary, Summary, summarise
 from batch.queries.warnings import campaign_warnings
 from batch.terminal.progress import Bar
+from batch.terminal.search import SearchResult, search_result
 from batch.terminal.verdict import WorstCaseLines, announcement, result_lines, verdict_json, worst_cases, writing
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
@@ -54,6 +55,7 @@ class RunResult:
     tables   of sweeps of several structures
     picture  its file; None where there is none
     excuse   why there can be none, in words
+    answers  of searches, by summary; None of what is none
     warned   what errors by the step, the steps themselves and limits of machines call in question, with their places
     """
 
@@ -63,11 +65,13 @@ class RunResult:
     picture: Path | None
     excuse: str
     warned: tuple[Diagnostic, ...]
+    answers: tuple[SearchResult | None, ...]
 
     @property
     def ok(self) -> bool:
-        """True if every case reached its end and met its requirements."""
-        return all(summary.ok for summary in self.summaries)
+        """True if every case reached its end and met its requirements; of a tuning, if those of its answer did."""
+        pairs = zip(self.summaries, self.answers, strict=True)
+        return all(summary.ok if answer is None else answer.ok for summary, answer in pairs)
 
 
 def run_and_tell(
@@ -203,6 +207,7 @@ def _result(campaign: Campaign, performed: Performed, no_picture: bool, say: Cal
     with ArchiveFile(campaign.output) as file:
         summaries = summarise(file)
         worst = worst_cases(file)
+        answers = tuple(search_result(file, group) for group in file.groups)
         experiments = {part.experiment.name: part.experiment for part in campaign.parts}
         warned = [*performed.warned, *campaign_warnings(file.groups, experiments)]
         tables = list(structures(file))
@@ -216,7 +221,7 @@ def _result(campaign: Campaign, performed: Performed, no_picture: bool, say: Cal
         except KeyboardInterrupt as interrupt:
             say(f"{campaign.output} is whole; its picture is missing: `met plot {quoted(campaign.output)}`")
             raise type(interrupt) from None
-    return RunResult(summaries, worst, tables, picture, excuse, tuple(warned))
+    return RunResult(summaries, worst, tables, picture, excuse, tuple(warned), answers)
 
 
 MOST_READ = MANY
@@ -255,8 +260,9 @@ def _counted_result(campaign: Campaign, performed: Performed) -> RunResult:
                 sweep=experiment.sweep,
             )
         )
+    none = (WorstCaseLines(),) * len(summaries)
     excuse = NOT_DRAWN.format(MOST_READ)
-    return RunResult(tuple(summaries), (WorstCaseLines(),) * len(summaries), (), None, excuse, performed.warned)
+    return RunResult(tuple(summaries), none, (), None, excuse, performed.warned, (None,) * len(summaries))
 
 
 def _exported(
@@ -287,7 +293,9 @@ def _json(
 ) -> str:
     """The verdict for programs. notes: besides those of the run itself."""
     seconds, notes = performed.seconds, [*performed.notes, *notes]
-    return verdict_json(campaign, result.summaries, result.worst, result.picture, exported, seconds, notes, ok)
+    return verdict_json(
+        campaign, result.summaries, result.worst, result.picture, exported, seconds, notes, ok, result.answers
+    )
 
 
 def _lines(
@@ -305,6 +313,7 @@ def _lines(
         performed.seconds,
         result.ok,
         result.tables,
+        result.answers,
     )
 
 

@@ -37,6 +37,7 @@ from batch.queries.summary import (
 from batch.terminal import braille
 from batch.terminal.evidence import evidence_lines
 from batch.terminal.evidence_table import evidence_table_lines
+from batch.terminal.search import search_result
 from ic.printing.columns import count
 from ic.printing.columns import size as size_text
 from met.distinct import distinct
@@ -163,6 +164,9 @@ def _about(
         return [*name, *verdict(summary_of(group, position), width), *([""] if varied else []), *varied]
     summary = summary_of(group)
     out = [*verdict(summary, width), *warning_lines(summary, width)]
+    answer = search_result(archive, group)
+    if answer is not None:
+        out = [*answer.lines, "", *out]
     if group.count > 1:
         most = None if all_cases else cases.SHOWN_CASES
         if some.everything:
@@ -210,7 +214,9 @@ def as_json(
         if position is None:
             among = None if some.everything else _positions(archive, group, some)
             most = None if all_cases else cases.SHOWN_CASES
+            answer = search_result(archive, group)
             said: dict[str, Any] = {
+                **({} if answer is None else {"answer": outcomes.finite(answer.data)}),
                 "case_table": cases.rows_json(group, most, by=by, among=among),
                 "evidence": outcomes.finite([evidence_data(row) for row in _evidence(archive, [group])]),
             }

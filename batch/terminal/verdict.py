@@ -12,7 +12,8 @@ from batch.campaigns.campaign import Campaign, CampaignPart
 from batch.campaigns.status import duration
 from batch.queries.failures import failure_lines
 from batch.queries.step_errors.words import HINT
-from batch.queries.summary import Summary, as_json
+from batch.queries.summary import Summary, as_json, finite
+from batch.terminal.search import SearchResult
 from batch.terminal.show import verdict, warning_lines
 from ic.printing.columns import size as size_text
 from ic.sweeps.confidences import OF_CASES
@@ -48,7 +49,7 @@ def announcement(campaign: Campaign, verbose: bool = False, *, notes: bool = Fal
 def writing(campaign: Campaign) -> str:
     """The line that says where the archive will be, and how large: printed once there is a kernel to fill it."""
     instead = ", in place of the one that is there" if campaign.output.exists() else ""
-    most = "at most " * campaign.stops_early
+    most = "at most " * campaign.open_ended
     return f"writing {campaign.output}, {most}about {size_text(campaign.bytes)}{instead}"
 
 
@@ -56,11 +57,13 @@ def _part_lines(part: CampaignPart, verbose: bool) -> list[str]:
     experiment = part.experiment
     schedule = experiment.structure.schedule
     count, whole = len(part.rows), experiment.cases.count
+    if part.searches and experiment.search is not None:
+        count = whole = part.most
     cases = f"{count:,} case{'s' if count != 1 else ''}" + (f" of {whole:,}" if count < whole else "")
     if count == 1 and whole > 1:
         of = f"`{experiment.sweep}`" if experiment.sweep else f"{whole:,}"
         cases = f"case #{experiment.cases.table[part.rows[0]]} of {of}"
-    early = part.stops_early and count == whole
+    early = part.open_ended and count == whole
     if early:
         cases = f"at most {cases}"
     steps = schedule.ticks // schedule.dynamics
@@ -71,7 +74,13 @@ def _part_lines(part: CampaignPart, verbose: bool) -> list[str]:
     if early:
         out += [f"  {note.removeprefix(OF_CASES)}" for note in experiment.notes if note.startswith(OF_CASES)]
     recorded = ", ".join(recorded.name for recorded in experiment.structure.record)
-    if part.recorded:
+    if part.searches and experiment.search is not None:
+        paths = ", ".join(each.path for each in experiment.search.parameters)
+        against = f", against {len(experiment.search.plants):,} cases of {experiment.search.against}"
+        out.append(f"  {experiment.search.goal} by {paths}{against * bool(experiment.search.against)}")
+    if part.searches and part.keeps_best:
+        out.append(f"  histories of its answer: {recorded}")
+    elif part.recorded:
         each = size_text(experiment.structure.history_bytes // (2 if part.single else 1))
         of = "" if part.all_recorded else f" of {part.recorded:,} cases" + (" at most" if part.later else "")
         out.append(f"  histories{of}: {recorded}; {schedule.rows:,} rows, {each} a case")
@@ -122,11 +131,14 @@ def result_lines(
     seconds: Mapping[str, float],
     ok: bool,
     tables: Sequence[Sequence[str]],
+    answers: Sequence[SearchResult | None] = (),
 ) -> list[str]:
-    """The verdict, and where everything is. seconds: by experiment; tables: of sweeps of several structures."""
+    """The verdict, and where everything is. seconds: by experiment; tables: of sweeps of several structures; answers:
+    of searches, by summary; none where there are none."""
+    answers = answers or (None,) * len(summaries)
     out: list[str] = []
     many = {s.sweep for s in summaries if sum(s.sweep == other.sweep for other in summaries) > MOST_GROUPS} - {""}
-    for summary, cases in zip(summaries, worst, strict=True):
+    for summary, cases, answer in zip(summaries, worst, answers, strict=True):
         lines = verdict(summary, 100)
         if summary.sweep in many:
             if of_cases := (*summary.failures, *summary.doubts):
@@ -137,7 +149,8 @@ def result_lines(
         out += ["", f"{name}{lines[0]}{took}", *lines[1:]]
         if _may_be_verified(campaign, summary):
             out.append(f"  {HINT}")
-        out += ["", *cases.lines] if cases.lines else []
+        out += ["", *cases.lines] if cases.lines and (answer is None or not answer.tunes) else []
+        out += ["", *answer.lines] if answer is not None else []
     out += [line for table in tables for line in ("", *table)]
     path = campaign.output
     out += ["", f"archive  {path}  ({size_text(path.stat().st_size)})"]
@@ -152,7 +165,7 @@ def result_lines(
         out.append(f"export   {exported.path}  ({size_text(exported.path.stat().st_size)})")
     out.append(f"next     met show {quoted(path)}")
     for summary, cases in zip(summaries, worst, strict=True):
-        if cases.rows and summary.sweep not in many:
+        if cases.rows and summary.sweep not in many and not any(answers):
             only = f" --run {quoted(summary.name)}" if len(summaries) > 1 else ""
             out.append(f"         met show {quoted(path)}{only} --case '{cases.first}'")
     if not any(summary.recorded for summary in summaries) and campaign.parts[0].experiment.structure.record:
@@ -160,7 +173,13 @@ def result_lines(
         first = part.experiment.cases.table[part.rows[0]]
         out.append(f"         met run {quoted(source)} {part.experiment.name_in_deck} --case '#{first}'")
     if not ok:
-        out.append(f"exit 1: {_why_not(summaries)}")
+        judged = [each for each, answer in zip(summaries, answers, strict=True) if answer is None or not answer.tunes]
+        tuned = [
+            f"`{answer.name}` found nothing that meets all"
+            for answer in answers
+            if answer and answer.tunes and not answer.ok
+        ]
+        out.append(f"exit 1: {'; '.join(filter(None, [_why_not(tuple(judged)), *tuned]))}")
     return out
 
 
@@ -201,6 +220,7 @@ def verdict_json(
     seconds: Mapping[str, float],
     notes: Sequence[str],
     ok: bool,
+    answers: Sequence[SearchResult | None],
 ) -> str:
     """The verdict for programs."""
     data = {
@@ -210,8 +230,13 @@ def verdict_json(
         "export": None if exported is None else str(exported.path),
         "notes": [*campaign.notes, *notes],
         "experiments": [
-            {**as_json(summary), "worst": list(cases.rows), "seconds": seconds.get(summary.name)}
-            for summary, cases in zip(summaries, worst, strict=True)
+            {
+                **as_json(summary),
+                "worst": list(cases.rows),
+                "seconds": seconds.get(summary.name),
+                **({} if answer is None else {"answer": finite(answer.data)}),
+            }
+            for summary, cases, answer in zip(summaries, worst, answers, strict=True)
         ],
     }
     return json_module.dumps(data, indent=1)

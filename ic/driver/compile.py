@@ -11,6 +11,7 @@ from typing import Literal
 
 from ic.grammar.settings import command_line, read_settings
 from ic.grammar.syntax import Deck, Setting
+from ic.language import EXPERIMENTS
 from ic.meaning.checks.degrees import remark_degrees
 from ic.meaning.control.servos import check_servo_definition
 from ic.meaning.definitions.resolve import Definition, Definitions
@@ -152,7 +153,7 @@ def asked_definitions(definitions: Definitions, complaints: Complaints, select: 
 
     A deck's own come before those of files that it includes, whatever these mark.
     """
-    known = {d.name: d for kind in ("run", "sweep") for d in definitions.of_kind(kind).values()}
+    known = {d.name: d for kind in EXPERIMENTS for d in definitions.of_kind(kind).values()}
     if select == "all":
         return list(known.values())
     if select is not None:

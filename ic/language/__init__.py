@@ -8,19 +8,26 @@ from __future__ import annotations
 
 from ic.language.bodies import ARM, JOINT, LINK, PAYLOAD
 from ic.language.declaration import BlockDeclaration, Entry
-from ic.language.runs import ENVIRONMENT, INITIAL, METRIC, RATES, RUN, SUBSTITUTE, SWEEP, TOLERANCES
+from ic.language.runs import ENVIRONMENT, INITIAL, METRIC, RATES, RUN, SEARCH, SUBSTITUTE, SWEEP, TOLERANCES, TUNE
 from ic.language.servos import SERVO
 
 BLOCKS = {
     block.name: block
     for block in (
-        ARM, LINK, JOINT, SERVO, RUN, RATES, INITIAL, ENVIRONMENT, PAYLOAD, SUBSTITUTE, METRIC, TOLERANCES, SWEEP
+        ARM, LINK, JOINT, SERVO, RUN, RATES, INITIAL, ENVIRONMENT, PAYLOAD, SUBSTITUTE, METRIC, TOLERANCES, SWEEP,
+        SEARCH, TUNE,
     )
 }  # fmt: skip
 """All blocks, by name, in the order in which a reader meets them."""
 
 DEFINITIONS = tuple(block.name for block in BLOCKS.values() if not block.within)
 """The words that definitions of a deck begin with."""
+
+OF_A_RUN = ("sweep", "search", "tune")
+"""The definitions that are `of` a run."""
+
+EXPERIMENTS = ("run", *OF_A_RUN)
+"""The definitions that have cases to run; they share one space of names."""
 
 NAMED = ("JOINT", "SERVO")
 """Placeholders that stand for a name of the deck's at the start of a declared path."""
@@ -43,4 +50,4 @@ def choices(head: str) -> tuple[str, ...]:
     return tuple(last for first, _, last in split if first == head)
 
 
-__all__ = ["BLOCKS", "DEFINITIONS", "HEADS", "BlockDeclaration", "Entry", "choices"]
+__all__ = ["BLOCKS", "DEFINITIONS", "EXPERIMENTS", "HEADS", "OF_A_RUN", "BlockDeclaration", "Entry", "choices"]

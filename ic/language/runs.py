@@ -1,4 +1,4 @@
-"""The blocks of a deck about a run and a sweep."""
+"""The blocks of a deck about a run, a sweep, a search and a tuning."""
 
 from __future__ import annotations
 
@@ -8,6 +8,11 @@ from met.plan import BALANCED, VELOCITY_PRODUCTS
 
 DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
 SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")
+AT_MOST = Parameter(name="at_most", at_least=1.0, at_most=1e6, doc="cases of a search at most")
+SEARCH_SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of a search's own choices")
+MARGIN = Parameter(
+    name="margin", default=0.05, at_least=0.0, at_most=1.0, doc="share of each limit to stay away from it"
+)
 BASE_KINDS = ("fixed", "prescribed", "free")
 BED, LAW = "emulated", "velocity_tracking"
 """The models of a bed and of its law where a deck names none."""
@@ -190,5 +195,47 @@ SWEEP = BlockDeclaration(
               doc="each case has noise of its own, not that of its position alone",
               parameter=Parameter(name="seeds", shape="word", words=("common", "independent"), default="common",
                                   doc="whether each case has noise of its own")),
+    ),
+)  # fmt: skip
+
+_ALLOW = SWEEP["allow"]
+_BUDGET = (
+    Entry(name="at_most", written="at_most = 2000;", parameter=AT_MOST, doc="cases in all"),
+    Entry(name="seed", written="seed = 3;", default="0", parameter=SEARCH_SEED,
+          doc="of what is tried; the run's noise has its own"),
+)  # fmt: skip
+
+SEARCH = BlockDeclaration(
+    name="search",
+    written="search NAME of RUN { ... }",
+    doc="Looks for the case that hurts most; one that fails hurts most of all.",
+    entries=(
+        Entry(name="maximise", form="statement", written="maximise METRIC;", default="needed, this or `minimise`",
+              doc="looks for the case with the largest value of a metric"),
+        Entry(name="minimise", form="statement", written="minimise METRIC;", default="needed, this or `maximise`",
+              doc="looks for the case with the least value of a metric"),
+        *_BUDGET,
+        _ALLOW,
+    ),
+    free="`PATH = between(LOW, HIGH) UNIT;`, a parameter that is chosen; `logbetween`: by equal ratios, not steps",
+)  # fmt: skip
+
+TUNE = BlockDeclaration(
+    name="tune",
+    written="tune NAME of RUN { ... }",
+    doc="Looks for the parameters that serve best: all requirements of the run met, and then a goal.",
+    entries=(
+        Entry(name="choose", form="statement", written="choose PATH = between(LOW, HIGH) UNIT;",
+              doc="a parameter that is tuned; `logbetween` where equal ratios are equal steps"),
+        Entry(name="against", form="statement", written="against SWEEP;", default="the run as it is",
+              doc="a sweep of the same run: the worst of its cases counts"),
+        Entry(name="minimise", form="statement", written="minimise METRIC;", default="needed, this or `maximise`",
+              doc="the goal among those that meet all requirements"),
+        Entry(name="maximise", form="statement", written="maximise METRIC;", default="needed, this or `minimise`",
+              doc="likewise, the largest"),
+        Entry(name="margin", written="margin = 5 %;", default="5 %", parameter=MARGIN,
+              doc="a distance to each limit, as a share of it, that is worth as large a share of the goal"),
+        *_BUDGET,
+        _ALLOW,
     ),
 )  # fmt: skip

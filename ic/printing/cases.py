@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ic.printing.columns import columns, count, number, size
+from ic.printing.searches import budget
 from ic.sweeps.confidences import OF_CASES
 from met.plan import Coordinate, Experiment, keys
 from met.plan.columns import row_at
@@ -32,6 +33,8 @@ def print_cases(groups: Sequence[Experiment], *, everything: bool = False) -> It
     else:
         each = groups[0].structure.history_bytes
         yield title + (f", {size(each)} of histories each" if each and total > 1 else "")
+    if (search := groups[0].search) is not None and not search.complete:
+        yield f"  the first ones of a {search.kind}, {budget(search)}: what they give decides those behind them"
     for note in dict.fromkeys(note for group in groups for note in group.notes if note.startswith((SAMPLED, OF_CASES))):
         yield f"  {note}"
     cut = not everything and total > HEAD + TAIL

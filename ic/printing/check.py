@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from ic.printing.columns import count
 from ic.printing.plan import STEP_SIZE, passive
 from met.diagnostic import Diagnostic
-from met.plan import Plan
+from met.plan import Experiment, Plan
 
 
 def notes(plan: Plan) -> Iterator[str]:
@@ -21,14 +21,23 @@ def notes(plan: Plan) -> Iterator[str]:
 
 
 def verdict(plan: Plan, diagnostics: Sequence[Diagnostic], allowed: int = 0) -> str:
-    """`two_link.ic: 1 run, 1 sweep, 37 cases: no errors, 1 warning allowed`; the cases are those of all runs and
-    sweeps. allowed: the number of warnings that are not given."""
-    sweeps = len({experiment.name_in_deck for experiment in plan.experiments if experiment.varies})
+    """`two_link.ic: 1 run, 1 sweep, 37 cases: no errors, 1 warning allowed`; the cases are those of all of
+    them, of a search as many as it may run. allowed: the number of warnings that are not given."""
+    varying = [experiment for experiment in plan.experiments if experiment.varies]
+    sweeps = len({experiment.name_in_deck for experiment in varying if experiment.search is None})
+    kinds = [each.search.kind for each in varying if each.search is not None]
     runs = sum(1 for experiment in plan.experiments if not experiment.varies)
     parts = [count(runs, "run")] if runs else []
     parts += [count(sweeps, "sweep")] if sweeps else []
-    parts.append(count(sum(experiment.cases.count for experiment in plan.experiments), "case"))
+    parts += [count(kinds.count("search"), "search", "searches")] if "search" in kinds else []
+    parts += [count(kinds.count("tune"), "tuning")] if "tune" in kinds else []
+    parts.append(count(sum(_cases(experiment) for experiment in plan.experiments), "case"))
     warnings = sum(1 for diagnostic in diagnostics if diagnostic.severity == "warning")
     counted = f", {count(warnings, 'warning')}" if warnings else ""
     counted += f", {count(allowed, 'warning')} allowed" if allowed else ""
     return f"{plan.deck.strip('<>')}: {', '.join(parts)}: no errors{counted}"
+
+
+def _cases(experiment: Experiment) -> int:
+    """The number of an experiment's cases, at most."""
+    return experiment.cases.count if experiment.search is None else experiment.search.at_most

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from ic.printing.columns import columns, count, number, quantity, size, vector
+from ic.printing.searches import search_lines
 from ic.printing.settings import kept_keys
 from met import models
 from met.parameter import Parameter
@@ -388,6 +389,9 @@ def _metrics(experiment: Experiment) -> Iterator[str]:
 
 def _cases(experiment: Experiment) -> Iterator[str]:
     cases = experiment.cases
+    if experiment.search is not None and not experiment.search.complete:
+        yield from search_lines(experiment, experiment.search)
+        return
     each = experiment.structure.history_bytes
     written = f"{size(cases.count * each)} of histories" if each else "metrics alone are written"
     yield f"Cases: {'at most ' * (cases.until_shown > 0)}{cases.count}, {written}"

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ic.grammar.places import place_of
-from ic.grammar.syntax import Call, Expression, Group, Name, Setting, Statement, String, Word
+from ic.grammar.syntax import Call, Expression, Group, Name, Setting, Statement, String, Unit, Word
 from ic.language.runs import SWEEP
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import VariedPath
@@ -39,6 +39,7 @@ from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan import Design
 from met.plan.columns import MOST_SWEPT, CaseValues
+from met.plan.searches import Search
 from met.trace import Graph, Scalar
 
 MOST_COUNTED = 16  # axes that are read of a sweep that has too many cases
@@ -69,6 +70,8 @@ class Sweep:
 
     repeat       how often each case is run; repeated: where that is written, if it is
     independent  where `seeds = independent` is written, if it is
+    search       what its cases are the first generation of, where they are that;  borne: paths of a sweep that a tuning
+                 is held against, each with the design of the sample that drew it
     """
 
     name: str
@@ -79,6 +82,8 @@ class Sweep:
     repeat: int
     repeated: Place | None
     place: Place
+    search: Search | None = None
+    borne: tuple[tuple[str, Design], ...] = ()
 
     @property
     def varied(self) -> tuple[VariedPath, ...]:
@@ -91,7 +96,8 @@ class Sweep:
     @property
     def designs(self) -> dict[str, Design]:
         """The design of the sample that drew each path; without those that were not drawn."""
-        return {column.path: axis.design for axis in self.axes if axis.design for column in axis.columns}
+        drawn = {column.path: axis.design for axis in self.axes if axis.design for column in axis.columns}
+        return drawn | dict(self.borne)
 
     @property
     def early_axis(self) -> SweepAxis | None:
@@ -295,7 +301,7 @@ class _SweepReader:
         drawn = sample.draw(self.drawn)
         columns: list[Column] = []
         for part, numbers in zip(sample.parts, drawn, strict=True):
-            column = self.varied(part.path, part.place, numbers, part.low, part.unit)
+            column = varied_path(self.graph, part.path, part.place, numbers, part.low, part.unit)
             columns.append(replace(column, drawn=part.distribution))
         if sample.warning is not None:
             message, place, helps = sample.warning
@@ -388,7 +394,8 @@ class _SweepReader:
         unit = found.unit or first.unit
         bare = all(value.bare for value in values)
         self.places[path] = [value.place for value in values]
-        return self.varied(
+        return varied_path(
+            self.graph,
             path,
             path_place(entry),
             np.array([value.number for value in values], dtype=float),
@@ -396,13 +403,16 @@ class _SweepReader:
             unit,
         )
 
-    def varied(self, path: str, place: Place, numbers: CaseValues, like: Value, unit) -> VariedPath:  # type: ignore[no-untyped-def]
-        """A column of numbers in SI. like: a value of its dimension; unit: the one that the deck wrote."""
-        scale = 1.0
-        if unit is not None and measure_of(unit).dimension == like.dimension:
-            scale = measure_of(unit).scale
-        value = Value(self.graph.input(path), like.dimension, like.place, like.bare, unit, hertz=like.hertz)
-        return VariedPath(path, place, numbers, value, unit, scale)
+
+def varied_path(
+    graph: Graph, path: str, place: Place, numbers: CaseValues, like: Value, unit: Unit | None
+) -> VariedPath:
+    """A column of numbers in SI. like: a value of its dimension; unit: the one that the deck wrote."""
+    scale = 1.0
+    if unit is not None and measure_of(unit).dimension == like.dimension:
+        scale = measure_of(unit).scale
+    value = Value(graph.input(path), like.dimension, like.place, like.bare, unit, hertz=like.hertz)
+    return VariedPath(path, place, numbers, value, unit, scale)
 
 
 def _is(entry: Setting, name: str) -> bool:

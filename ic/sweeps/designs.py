@@ -295,7 +295,7 @@ def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> DrawnPara
     usage = f"write `{name}({', '.join(wanted)}) UNIT`"
     if len(call.positional) != len(wanted) or call.named or call.body is not None:
         raise Problem(error("D225", f"`{name}` takes {len(wanted)} numbers, in order", call.name.place, help=usage))
-    found = [evaluate_number(_in_unit(each, unit), names.find) for each in call.positional]
+    found = [evaluate_number(in_unit(each, unit), names.find) for each in call.positional]
     check_constant(path, entry, names, paths)
     for other in found[1:]:
         if not units.same(other.dimension, found[0].dimension):
@@ -315,7 +315,8 @@ def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> DrawnPara
     return DrawnParameter(path, entry.place, name, arguments, found[0], unit)
 
 
-def _in_unit(expression: Expression, unit: Unit | None) -> Expression:
+def in_unit(expression: Expression, unit: Unit | None) -> Expression:
+    """An expression with the unit that stands behind all of a call."""
     return expression if unit is None else WithUnit(expression, unit, place_of(expression))
 
 

@@ -9,6 +9,7 @@ from dataclasses import field, replace
 
 import numpy as np
 
+from ic.grammar.settings import path_of
 from ic.grammar.syntax import Deck, Expression, Name, Word, children
 from ic.meaning.checks.balance import check_balance
 from ic.meaning.checks.beds import check_beds
@@ -24,6 +25,7 @@ from ic.sweeps.choices import Choices, with_choices
 from ic.sweeps.confidences import check_confidences
 from ic.sweeps.effects import Effects
 from ic.sweeps.reach import check_coordinates, check_effects, plan_coordinates
+from ic.sweeps.searches import check_goal, each_case, read_search, with_corners
 from ic.sweeps.settings import Settings
 from ic.sweeps.table import columns, kept, repeats, structures
 from ic.text.complaints import Complaints, known_words
@@ -157,7 +159,11 @@ class _Sweep:
         definitions, base = settings.in_run(definitions, _base(definitions, definition, self.complaints))
         graph = Graph()
         seed, own_seed = _seed_of(definitions, base), not settings.sets_seed
-        sweep = read_sweep(definitions, self.complaints, definition, graph, seed=seed, own_seed=own_seed)
+        if definition.kind == "sweep":
+            sweep = read_sweep(definitions, self.complaints, definition, graph, seed=seed, own_seed=own_seed)
+        else:
+            fixed = {path_of(entry) for entry in settings.entries}
+            sweep = read_search(definitions, self.complaints, definition, graph, noise_seed=seed, fixed=fixed)
         sweep = settings.fixed_in(sweep)
         settings.check_sweep(sweep, self.complaints, definitions)
         return _Read(definitions, definition, base, sweep, graph)
@@ -202,7 +208,11 @@ class _Sweep:
         if not count:
             return None, dropped
         values = columns(there, rows)
-        scope.checks.run(values, count)
+        if there.search is None:
+            scope.checks.run(values, count)
+        else:
+            scope.checks.run(*with_corners(there.search, values), listed=count)
+            check_goal(self.complaints, there.name, there.search, resolved.structure)
         cases = Cases(
             count,
             plan_coordinates(scope, there, values, _dependents(scope)),
@@ -214,6 +224,9 @@ class _Sweep:
         )
         made = experiment(scope, there.name, there.place, resolved, cases, allowances)
         made = replace(made, notes=(*(axis.note for axis in there.axes if axis.note), *made.notes))
+        if there.search is not None:
+            requirements, notes = each_case(made.requirements)
+            made = replace(made, search=there.search, requirements=requirements, notes=(*made.notes, *notes))
         if not self.complaints.errors:
             check_effects(self.complaints, there, made)
             check_stops(self.complaints, made)
@@ -231,7 +244,7 @@ class _Sweep:
         if macros not in self.read_so_far:
             deck = self.source.reread(macros)
             definitions = self.source.settings.in_definitions(Definitions(deck, self.complaints))
-            definition = definitions.of_kind("sweep").get(self.definition.name)
+            definition = definitions.of_kind(self.definition.kind).get(self.definition.name)
             if definition is None or definition.parts:
                 raise Problem(
                     error(
@@ -382,6 +395,10 @@ def _slugs(groups: Sequence[Experiment]) -> list[str]:
 def _sum(source: DeckSource, definition: Definition, within: tuple[str, ...]) -> list[ScopedExperiment]:
     """The groups of all parts, one part's cases after the other's."""
     known = {**source.definitions.of_kind("run"), **source.definitions.of_kind("sweep")}
+    for named, kind in ((named, kind) for named in definition.parts for kind in ("search", "tune")):
+        if named.text in source.definitions.of_kind(kind):
+            message = f"`{named.text}` is a {kind}, and a sweep is made of runs and sweeps"
+            raise Problem(error("D120", message, named.place, help=f"ask for both: `met run DECK NAME {named.text}`"))
     unknown = [named for named in definition.parts if named.text not in known]
     for named in unknown:  # first of all: a mistake in another part hides no name
         source.complaints.error(

@@ -51,6 +51,7 @@ from met.frozen import frozen, keyed
 from met.parameter import BASE, Parameter
 from met.plan.columns import CaseValues, FormulaColumn, ShiftedColumn, all_rows, listed
 from met.plan.run_keys import RunKey, run_key
+from met.plan.searches import Search
 from met.trace.graph import Formulas
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
@@ -571,6 +572,7 @@ class Experiment:
     formulas   from the coordinates (inputs, by path) to every parameter that varies (`Formula.output`)
     sweep      what a group is of; "" where the experiment is the whole of its run or sweep
     allowances  warnings that are not given of it
+    search     what chooses its cases, where these are not listed beforehand
     """
 
     name: str
@@ -585,6 +587,7 @@ class Experiment:
     tolerances: tuple[Tolerance, ...] = ()
     step_errors: tuple[StepErrorLimit, ...] = ()
     allowances: tuple[Allowance, ...] = ()
+    search: Search | None = None
 
     def allows(self, code: str) -> bool:
         """Return True if a warning with this code is not to be given of this experiment, at a check or at a run."""

@@ -29,6 +29,7 @@ from met.plan import guides as guides
 from met.plan import relations as relations
 from met.plan import rest as rest
 from met.plan import structure as plan_structure
+from met.plan.checked_searches import check_search
 from met.plan.codec import Damaged
 from met.plan.columns import CaseValues
 from met.plan.defaults import INERTIA, declared, heads_of_models, related
@@ -70,6 +71,8 @@ def check(experiments: Iterable[Experiment]) -> None:
         _check_tolerances(experiment, f"{where}.tolerances")
         _check_allowances(experiment, f"{where}.allowances")
         _check_cases(experiment, f"{where}.cases")
+        if experiment.search is not None:
+            check_search(experiment, experiment.search, f"{where}.search")
         _check_formulas(experiment, where)
         _check_parameters(experiment, f"{where}.parameters")
     if not names:

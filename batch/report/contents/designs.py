@@ -9,6 +9,7 @@ from batch.queries.best import DesignAxis, Designs
 from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import number_text
 from batch.report.contents.parts import DesignAnswer, DesignMap, TextTable
+from batch.report.contents.searches import search_answer
 from batch.terminal.best import BestAnswer, context
 from met.diagnostic import Problem
 
@@ -17,7 +18,9 @@ MOST_CELLS = 10_000
 
 
 def design_answer(archive: ArchiveFile, pool: Pool) -> DesignAnswer | None:
-    """The answer for a sweep; None where nothing is chosen in it, or nothing required."""
+    """The answer for a sweep, or of a search; None where nothing is chosen in it, or nothing required."""
+    if (searched := search_answer(archive, pool.groups[0])) is not None:
+        return searched
     if pool.count < 2 or not pool.requirements:
         return None
     try:

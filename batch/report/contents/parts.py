@@ -279,6 +279,7 @@ class DesignAnswer:
 
     headline, why  which it is, and what it has for it;  table: it and others;  stretches: how far each parameter may go
     said, command  how to run it or confirm it;  map: None where no two parameters with an order are chosen
+    title, about   what the table is called, and what its numbers are
     """
 
     headline: str
@@ -289,6 +290,8 @@ class DesignAnswer:
     command: str
     notes: tuple[str, ...]
     map: DesignMap | None
+    title: str = "Designs"
+    about: str = "Each number is that of the worst case of a design."
 
 
 # Plots

@@ -16,15 +16,15 @@ SHADES = 4
 
 
 def designs(found: DesignAnswer) -> Html:
-    """The answer of `met best`."""
+    """The answer of `met best`, or of a search."""
     words: list[Child] = [el("p", found.headline, cls="pick"), el("p", found.why, cls="said")]
     if found.command:
         words += [el("p", found.said, cls="said"), el("p", command(found.command), cls="command")]
     words += [table(found.stretches, "How far each may go")] if found.stretches is not None else []
     words += [el("p", note, cls="note") for note in found.notes]
     head = el("div", el("div", words), _map(found.map) if found.map is not None else None, cls="answered")
-    about = el("p", "Each number is that of the worst case of a design.", cls="said")
-    return join([head, about, table(found.table, "Designs")])
+    about = el("p", found.about, cls="said")
+    return join([head, about, table(found.table, found.title)])
 
 
 def _map(found: DesignMap) -> Html:

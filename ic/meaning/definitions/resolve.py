@@ -10,7 +10,7 @@ from copy import copy
 from dataclasses import replace
 
 from ic.grammar.syntax import Binary, Call, Deck, Entry, Group, Let, Name, Setting, Word
-from ic.language import DEFINITIONS, HEADS
+from ic.language import DEFINITIONS, EXPERIMENTS, HEADS, OF_A_RUN
 from ic.meaning.definitions.csv_files import csv_files
 from ic.meaning.definitions.merge import MergedBlock, defined_twice, merge
 from ic.robots.files import RobotFiles
@@ -228,7 +228,7 @@ class Definitions:
                     entry.place,
                     help=[
                         f"a value: `let {name} = ...;`",
-                        "a definition: `arm`, `servo`, `run` or `sweep`, a name and a block in braces",
+                        f"a definition, its name and a block in braces: {', '.join(DEFINITIONS)}",
                     ],
                 )
             )
@@ -269,7 +269,7 @@ class Definitions:
                 help=[
                     *did_you_mean(kind.text, DEFINITIONS),
                     *where_it_belongs(kind.text),
-                    "kinds: arm, servo, run, sweep",
+                    known_words("kinds", DEFINITIONS),
                 ],
             )
             near = meant(kind.text, DEFINITIONS)
@@ -299,21 +299,23 @@ class Definitions:
                     help=f"write `{kind.text} {words[1].text} {{ ... }}`, `like BASE` before the brace",
                 )
             )
-        if default and kind.text not in ("run", "sweep"):
+        if default and kind.text not in EXPERIMENTS:
             raise Problem(
                 error(
                     "D048",
                     f"{with_article(kind.text)} cannot be the default",
                     group.words[0].place,
-                    help="`default` marks the run or sweep that `met run` takes unless told another",
+                    help="`default` marks a run, sweep, search or tune: that which `met run` takes unless told another",
                 )
             )
-        if (group.of is not None) != (kind.text == "sweep") or (kind.text == "sweep" and group.like is not None):
-            usage = f"sweep {words[1].text} of RUN {{ ... }}" if kind.text == "sweep" else f"{kind.text} NAME like BASE"
+        of_run = kind.text in OF_A_RUN
+        if (group.of is not None) != of_run or (of_run and group.like is not None):
+            usage = f"{kind.text} {words[1].text} of RUN {{ ... }}" if of_run else f"{kind.text} NAME like BASE"
+            what = kind.text if of_run else "sweep"
             raise Problem(
                 error(
                     "D049",
-                    "a sweep is `of` a run, other definitions are `like` another",
+                    f"{with_article(what)} is `of` a run, other definitions are `like` another",
                     kind.place,
                     help=f"write `{usage}`",
                 )
@@ -369,9 +371,10 @@ class Definitions:
         self._add(Definition("sweep", entry.path[0].text, group, len(entry.words) > 1, (at, *reversed(parts))))
 
     def _add(self, definition: Definition) -> None:
-        """Enters a definition under its name, which nothing else of its kind may bear; runs and sweeps share theirs."""
+        """Enters a definition under its name, which nothing else of its kind may bear; all that has cases shares one
+        space of names."""
         kind, name = definition.kind, definition.group.words[-1]
-        for space in ("run", "sweep") if kind in ("run", "sweep") else (kind,):
+        for space in EXPERIMENTS if kind in EXPERIMENTS else (kind,):
             if name.text in self._by_kind[space]:
                 raise Problem(defined_twice(space, name.text, name.place, self._by_kind[space][name.text].place))
         self._by_kind[kind][name.text] = definition
@@ -390,7 +393,7 @@ class Definitions:
                 )
 
     def _defaults(self) -> list[Definition]:
-        return [d for kind in ("run", "sweep") for d in self._by_kind[kind].values() if d.default]
+        return [d for kind in EXPERIMENTS for d in self._by_kind[kind].values() if d.default]
 
     def writes(self, definition: Definition) -> bool:
         """Return True if the deck itself, and no file that it includes, writes this definition."""

@@ -87,6 +87,7 @@ class Checks:
         self.complaints, self.graph, self.varied = complaints, graph, varied
         self._waiting: list[Check] = []
         self._failed: set[str] = set()
+        self._listed = 0  # cases that have a number
         self._rows: np.ndarray | None = None  # the cases that a test is looking at, where that is not all of them
         self._tested: Formulas | None = None  # of the values of all checks that wait, once no more come
 
@@ -173,8 +174,12 @@ class Checks:
             return row
         return int(self._rows[row]) if len(self._rows) else None
 
-    def run(self, cases: Mapping[str, CaseValues], count: int) -> None:
-        """Every check that waited for the cases, over all of them; names the first case that fails one."""
+    def run(self, cases: Mapping[str, CaseValues], count: int, listed: int | None = None) -> None:
+        """Every check that waited for the cases, over all of them; names the first case that fails one.
+
+        listed  how many of them have numbers; those behind may come, and have none yet. None: all
+        """
+        self._listed = count if listed is None else listed
         if not self._waiting or count == 0:
             return
         if count > WHOLE:
@@ -230,11 +235,12 @@ class Checks:
         self.fail(check.path)
         where = ", ".join(f"{path} = {self.shown(path, cases[path][row])}" for path in cases)
         more = f", and {count - 1} more" if count > 1 else ""
+        case = f"case #{row}" if row < self._listed else "a case that may be chosen"
         self.complaints.error(
             check.code,
-            f"{check.message}; case #{row} breaks it{more}",
+            f"{check.message}; {case} breaks it{more}",
             Label(check.place, causes[0] if causes else ""),
-            help=(f"case #{row}: {where}", *(self._narrower(check) or check.help)),
+            help=(f"{case}: {where}", *(self._narrower(check) or check.help)),
         )
 
     def _narrower(self, check: Check) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Entry, Name, Statement, String
+from ic.language import EXPERIMENTS, OF_A_RUN
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.text.complaints import Complaints
 from met.diagnostic import Diagnostic, Label, Place, did_you_mean
@@ -100,8 +101,8 @@ def warn_of_unneeded(
         return
     runs = definitions.of_kind("run")
     names = _with_parts(definitions, checked)
-    for each in (*runs.values(), *definitions.of_kind("sweep").values()):
-        sweep = each if each.kind == "sweep" else None
+    for each in (each for kind in EXPERIMENTS for each in definitions.of_kind(kind).values()):
+        sweep = each if each.kind in OF_A_RUN else None
         run = each if sweep is None else runs.get(each.group.of.text if each.group.of is not None else "")
         if each.name not in names and run is not None:
             elsewhere = {allowance.place for allowance in allowances_of(definitions, run, Complaints(), sweep)}
@@ -120,7 +121,7 @@ def _with_parts(definitions: Definitions, checked: Iterable[Definition]) -> set[
         each = waiting.pop()
         if each.name not in names:
             names.add(each.name)
-            known = {**definitions.of_kind("run"), **definitions.of_kind("sweep")}
+            known = {name: d for kind in EXPERIMENTS for name, d in definitions.of_kind(kind).items()}
             waiting += (known[part.text] for part in each.parts if part.text in known)
     return names
 

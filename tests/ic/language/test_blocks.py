@@ -87,4 +87,4 @@ def test_what_decides_the_program() -> None:
     assert set(choices("JOINT")) == {"servo", "bed", "law"}
     assert set(choices("SERVO")) == {"model", "command", "rate"}
     assert set(choices("rates")) == set(BLOCKS["rates"].keys)
-    assert DEFINITIONS == ("arm", "servo", "run", "sweep")
+    assert DEFINITIONS == ("arm", "servo", "run", "sweep", "search", "tune")

@@ -50,7 +50,7 @@ def test_units_lists_them_all_with_what_they_are_in_si(capsys: pytest.CaptureFix
 
 def test_the_list_of_models_ends_with_what_else_there_is(capsys: pytest.CaptureFixture[str]) -> None:
     assert printed(capsys).endswith(
-        "Blocks of a deck: arm, link, joint, run, rates, initial, payload, substitute, tolerances, sweep.\n"
+        "Blocks of a deck: arm, link, joint, run, rates, initial, payload, substitute, tolerances, sweep, search, tune.\n"
         "Also: designs, dh, distributions, functions, shapes, units; and the code of a message, as in `met doc D060`.\n"
     )
 
@@ -190,6 +190,12 @@ allow CODE because "REASON";  in a run
     a warning that is right, and not to be given; its code is printed with it: `allow D105 because "the report's own rates";`
     default: none
 allow CODE because "REASON";  in a sweep
+    a warning that is not to be given, beside those that the run allows
+    default: those of the run
+allow CODE because "REASON";  in a search
+    a warning that is not to be given, beside those that the run allows
+    default: those of the run
+allow CODE because "REASON";  in a tune
     a warning that is not to be given, beside those that the run allows
     default: those of the run
 """

@@ -589,7 +589,11 @@ BELONGS = "  = help: `substitute JOINT { ... }`, in a run, puts a joint's motor 
 @pytest.mark.parametrize(
     ("more", "first", "last"),
     [
-        ("substitute one {}", "error[D045]: no kind of definition `substitute`", "kinds: arm, servo, run, sweep"),
+        (
+            "substitute one {}",
+            "error[D045]: no kind of definition `substitute`",
+            "kinds: arm, servo, run, sweep, search, tune",
+        ),
         (
             "arm b like chain { substitute one {} }",
             "error[D082]: no `substitute` in an arm",

@@ -1,0 +1,179 @@
+"""A search as a campaign: each generation is a batch of cases, run as any are, and what it gave decides the next one.
+
+What is asked for depends on the search and on what the shards hold, and on nothing else. So a campaign that was killed
+asks again for what it had asked for, finds it done, and goes on to the same bits and the same answer; and it does not
+matter who ran which case, nor when.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from batch.campaigns import shard
+from batch.campaigns.drive import Count, Driver, Stopped
+from batch.campaigns.folder import uncovered
+from batch.campaigns.points import grown, write_points
+from batch.campaigns.tasks import CampaignSection, Task
+from batch.queries.search_answers import progress
+from met import run as engine
+from met.diagnostic import Problem, error
+from met.plan import Experiment
+from met.plan.searches import Search
+from met.run import DONE, Run
+from met.seeking import seeker
+from met.seeking.answer import Answer, answer
+from met.seeking.values import hurt, served
+
+READS = 2
+"""Times that what was just computed is read back."""
+
+
+def check_first_generation(experiment: Experiment) -> None:
+    """Refuse a plan of a search whose cases are not those that the search asks for first. Raises Problem E302."""
+    assert experiment.search is not None
+    asked = seeker(experiment.search).ask()
+    table = np.stack([np.asarray(each.values) for each in experiment.cases.coordinates], axis=1)
+    if asked.shape != table.shape or not (asked == table).all():
+        message = f"the cases of `{experiment.name}` in this plan are not those that it begins with"
+        helps = "they were changed, or are of another version of MET: make the plan again from its deck"
+        raise Problem(error("E302", message, help=helps))
+
+
+class CampaignSearch:
+    """A search on its way.
+
+    section  all cases that were asked for so far, in the order in which they were
+    worth    what each of those is worth that are done
+    """
+
+    def __init__(self, section: CampaignSection) -> None:
+        experiment = section.prepared.experiment
+        assert experiment.search is not None
+        self.search: Search = experiment.search
+        self.section = section
+        self.worth = np.empty(0)
+        self._requirements = experiment.requirements
+        self._metrics: dict[str, list[np.ndarray]] = {}
+        self._done: list[np.ndarray] = []
+        self._seeker = seeker(self.search)
+        self._table = np.empty((0, len(experiment.cases.coordinates)))
+        self._generations: list[int] = []
+
+    @property
+    def generations(self) -> int:
+        """The number of generations that were asked for."""
+        return len(self._generations)
+
+    @property
+    def table(self) -> np.ndarray:
+        """All cases so far, [case, coordinate], SI."""
+        return self._table
+
+    def grow(self) -> tuple[int, int] | None:
+        """Ask for the next generation: the stretch of its cases; None when the search has ended, and the section is
+        whole."""
+        asked, first = self._seeker.ask(), len(self._table)
+        if not len(asked):
+            self._complete()
+            return None
+        self._table = np.concatenate([self._table, asked])
+        self._generations.append(len(asked))
+        self.section = grown(self.section, self._table)
+        return first, len(self._table)
+
+    def take(self, run: Run) -> None:
+        """Take the results of the last generation's cases, in their order."""
+        done = run.status == DONE
+        goal = run.metrics[self.search.metric]
+        if self.search.kind == "tune":
+            worth = served(goal, self.search.largest, done, self._requirements, run.metrics, self.search.margin)
+        else:
+            worth = hurt(goal, self.search.largest, done)
+        self._done.append(done)
+        for name, values in run.metrics.items():
+            self._metrics.setdefault(name, []).append(values)
+        self.worth = np.concatenate([self.worth, worth])
+        self._seeker.tell(worth)
+
+    @property
+    def answer(self) -> Answer:
+        """The best so far."""
+        metrics = {name: np.concatenate(parts) for name, parts in self._metrics.items()}
+        table = self._table[: len(self.worth)]
+        return answer(self.search, table, np.concatenate(self._done), metrics, self._requirements)
+
+    def _complete(self) -> None:
+        prepared = self.section.prepared
+        search = replace(self.search, generations=tuple(self._generations))
+        experiment = replace(prepared.experiment, search=search)
+        self.section = replace(self.section, prepared=prepared.of_cases(experiment))
+
+
+def run_search(driver: Driver, search: CampaignSearch, sections: dict[int, CampaignSection]) -> None:
+    """Run a search to its end. Raises Stopped.
+
+    sections  of the campaign by their numbers, as the executor looks them up; the search's grows in it
+    """
+    number = search.section.number
+    driver.counts[number] = Count()
+    with driver.telling(search.section, cases=search.search.at_most):
+        while (stretch := search.grow()) is not None:
+            section = sections[number] = search.section
+            write_points(driver.folder.path, number, search.table)
+            shards, missing = _held(driver, section, *stretch, tell=True)
+            for _ in range(READS):
+                if missing:
+                    driver.work(section, missing)
+                    shards, missing = _held(driver, section, *stretch, tell=False)
+            if missing:
+                raise Stopped(f"what is computed of {section.name} cannot be read back from {driver.folder.shards}")
+            search.take(_results(section, *stretch, shards))
+            driver.more = progress(search.answer, section.prepared.experiment)
+            driver.tell()
+            driver.check()
+    sections[number] = search.section
+
+
+Held = list[tuple[Task, shard.Shard]]
+"""Shards, with the tasks whose they are."""
+
+
+def _held(
+    driver: Driver, section: CampaignSection, first: int, last: int, *, tell: bool
+) -> tuple[Held, list[tuple[int, int]]]:
+    """The shards of a stretch of cases, and what is missing of it.
+
+    tell  whether what is found counts as done before, and what is no shard is told of
+    """
+    count, found = driver.counts[section.number], list[tuple[Task, shard.Shard]]()
+    for task in driver.folder.named_tasks(section.number, (first, last)):
+        try:
+            found.append((task, driver.folder.read(section, task)))
+        except (shard.UnsoundShard, OSError) as reason:
+            why = str(reason) if isinstance(reason, shard.UnsoundShard) else f"cannot be read: {reason.strerror}"
+            driver.told.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
+            driver.folder.remove_shard(task)
+    at, kept = first, list[tuple[Task, shard.Shard]]()
+    for task, each in found:
+        if task.last > at:
+            kept.append((task, each))
+            if tell:
+                count.done += task.last - max(at, task.first)
+                count.failed += each.failed_from(max(0, at - task.first))
+                count.seconds += each.seconds
+            at = task.last
+    inside = [Task(task.section, task.first - first, task.last - first) for task, _ in kept]
+    return kept, [(first + a, first + b) for a, b in uncovered(inside, last - first)]
+
+
+def _results(section: CampaignSection, first: int, last: int, shards: Held) -> Run:
+    """The results of a stretch of cases from its shards; a case counts once, as it is merged."""
+    outputs, fates, at = list[np.ndarray](), dict[int, tuple[int, str]](), first
+    for task, each in shards:
+        skipped = max(0, at - task.first)
+        outputs.append(each.outputs[skipped:])
+        fates |= {task.first + case - first: fate for case, fate in each.fates.items() if case >= skipped}
+        at = task.last
+    return engine.results(section.prepared, np.arange(first, last), None, np.concatenate(outputs), fates)

@@ -1,0 +1,209 @@
+"""The answer of a search in an archive: read from its cases alone, and put into words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from batch.archive.limits import deck_unit
+from batch.archive.read import ArchiveGroup
+from batch.archive.searched import search_of
+from batch.queries.requirements import group_requirements
+from batch.queries.signals import number_text, pretty_unit
+from batch.queries.written import written
+from met.plan import Experiment
+from met.plan.outputs import metric_units
+from met.plan.searches import Search
+from met.run import DONE
+from met.seeking.answer import Answer, answer
+
+NEAREST = 1
+"""Requirements that are named of those that are nearest to their limits."""
+
+
+class SearchAnswer:
+    """The answer of a search or a tuning whose cases are a group of an archive."""
+
+    def __init__(self, group: ArchiveGroup, search: Search) -> None:
+        self.group, self.search = group, search
+
+    @staticmethod
+    def of(group: ArchiveGroup) -> SearchAnswer | None:
+        """The answer of a group; None where it is no search, or some of its cases alone."""
+        search = search_of(group)
+        return None if search is None else SearchAnswer(group, search)
+
+    @cached_property
+    def found(self) -> Answer:
+        """The best of its cases."""
+        return answer(self.search, *self._given)
+
+    @cached_property
+    def _given(self) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray], list[_Required]]:
+        """Coordinates of the cases, which of them reached their end, their metrics, and what is required of these."""
+        group = self.group
+        columns = [group.values(variable.name) for variable in group.role("coordinate")]
+        metrics = {variable.path: group.values(variable.name) for variable in group.role("metric")}
+        by_name = {variable.name: variable.path for variable in group.role("metric")}
+        required = [_Required(each.text, by_name[each.metric], each.comparison, each.limit)
+                    for each in group_requirements(group)]  # fmt: skip
+        return np.stack(columns, axis=1), group.values("status") == DONE, metrics, required
+
+    def progress(self, most: int) -> list[tuple[int, int, Answer]]:
+        """The best after some of the generations, `most` of them spread over all, the last among them: the number of
+        the generation, the cases by then, the best of these."""
+        ends = np.flatnonzero(np.diff(self.group.values("generation"), append=self.generations)) + 1
+        some = np.unique(np.linspace(0, len(ends) - 1, min(len(ends), most)).astype(int))
+        table, done, metrics, required = self._given
+        return [
+            (int(number), int(end), answer(self.search, table[:end], done[:end], cut(metrics, int(end)), required))
+            for number, end in zip(some, ends[some], strict=True)
+        ]
+
+    @property
+    def generations(self) -> int:
+        """The number of its generations."""
+        return int(self.group.values("generation")[-1]) + 1
+
+    @property
+    def position(self) -> int:
+        """The position in the case table of the case that stands for the answer."""
+        return int(self.group.values("case")[self.found.case])
+
+    @property
+    def ok(self) -> bool:
+        """True if what a tuning found meets all that is required; of a search, if it found nothing that fails or misses
+        something."""
+        return self.found.serves
+
+    def settings(self, *, exact: bool = True) -> list[tuple[str, str]]:
+        """What is chosen: each path, and its value as a deck would write it; to the bit, or to four digits."""
+        out = []
+        for each, variable in zip(self.search.parameters, self.group.role("coordinate"), strict=False):
+            value = float(self.group.at(variable.name, [self.found.case])[0])
+            unit = str(variable.attributes.get("deck_unit", variable.unit))
+            scale = float(variable.attributes.get("deck_scale", 1.0))
+            rounded = f"{number_text(value / scale)} {unit}".removesuffix(" 1")
+            out.append((each.path, written(value, unit) if exact else rounded))
+        return out
+
+    @property
+    def draws(self) -> bool:
+        """True if what a tuning is held against was drawn, so that other draws confirm it or not."""
+        return any(variable.attributes.get("design") for variable in self.group.role("coordinate"))
+
+    def value(self, found: Answer | None = None) -> str:
+        """The goal's value in the deck's unit, of the best or of what was best before."""
+        variable = next(each for each in self.group.role("metric") if each.path == self.search.metric)
+        scale = float(variable.attributes.get("deck_scale", 1.0))
+        unit = str(variable.attributes.get("deck_unit", variable.unit))
+        return goal_text((found or self.found).value, unit, scale)
+
+    def lines(self) -> list[str]:
+        """The answer in lines, without the commands that follow from it."""
+        found, search = self.found, self.search
+        out = self._tuned() if search.kind == "tune" else self._hardest()
+        if found.missed:
+            out.append(f"  misses {', '.join(found.missed)}")
+        elif found.rooms and not found.failed:
+            out.append(f"  nearest to its limit: {found.rooms[0].text}, {100.0 * found.rooms[0].share:.3g} % inside")
+        beyond = "worse" if search.kind == "search" else "better"
+        out += [f"  {path} is at the {end} end of its range: beyond it may be {beyond}" for path, end in found.ends]
+        return out
+
+    @property
+    def _cases(self) -> str:
+        generations = f"{self.generations:,} generation{'s' * (self.generations != 1)}"
+        return f"{self.group.count:,} cases in {generations}"
+
+    @property
+    def _chosen(self) -> str:
+        return ", ".join(f"{path} = {value}" for path, value in self.settings(exact=False))
+
+    def _tuned(self) -> list[str]:
+        found, search = self.found, self.search
+        out = [
+            f"use {self._chosen}" if found.serves else f"nothing meets all that is required; nearest: {self._chosen}"
+        ]
+        if found.failed:
+            out.append(f"  a case fails with it; {self._cases}")
+        else:
+            among = f" in the worst of {found.tried} cases of {search.against}" if found.all > 1 else ""
+            out.append(f"  {search.metric} is {self.value()}{among}; {self._cases}")
+        if not found.confirmed:
+            out[0] = f"not tried with all that it must bear: {self._chosen}"
+            out.append(
+                f"  {found.tried} of {found.all} cases of {search.against} were run of it; a larger `at_most` goes on"
+            )
+        return out
+
+    def _hardest(self) -> list[str]:
+        found, search = self.found, self.search
+        case = f"case #{self.position} with {self._chosen}"
+        if found.failed:
+            failed = int(np.count_nonzero(self.group.values("status") != DONE))
+            words = f"{failed:,} of {self._cases} fail, which hurts more than any {search.metric}"
+            return [f"hardest: {case} fails", f"  {words}"]
+        if np.isnan(found.value):
+            return [f"hardest: {case}, in which {search.metric} has no value", f"  of {self._cases}"]
+        which = "largest" if search.largest else "least"
+        return [f"hardest: {search.metric} = {self.value()}, {case}", f"  the {which} {search.metric} of {self._cases}"]
+
+    def as_data(self) -> dict[str, Any]:
+        """The answer for programs, SI."""
+        found = self.found
+        return {
+            "kind": self.search.kind,
+            "goal": self.search.goal,
+            "case": self.position,
+            "value": found.value,
+            "failed": found.failed,
+            "chosen": dict(self.settings()),
+            "cases": self.group.count,
+            "generations": self.generations,
+            "tried": found.tried,
+            "against": found.all,
+            "serves": found.serves,
+            "missed": list(found.missed),
+            "nearest": [{"requirement": room.text, "inside": room.share} for room in found.rooms],
+            "at_ends": [{"path": path, "end": end} for path, end in found.ends],
+        }
+
+
+def cut(metrics: dict[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
+    """The metrics of the first cases alone."""
+    return {name: values[:count] for name, values in metrics.items()}
+
+
+class _Required:
+    """A requirement of an archive by the name of its metric."""
+
+    def __init__(self, text: str, metric: str, comparison: str, limit: float) -> None:
+        self.text, self.metric, self.comparison, self.limit = text, metric, comparison, limit
+
+
+def goal_text(value: float, unit: str, scale: float) -> str:
+    """A goal's value, SI, in a unit of so many SI units."""
+    shown = "" if unit == "1" else f" {pretty_unit(unit)}"
+    return "no value" if np.isnan(value) else f"{number_text(value / scale)}{shown}"
+
+
+def progress(found: Answer, experiment: Experiment) -> str:
+    """The best so far in a few words, for who waits: `best settle 4.81 s, over < 10 % binds`."""
+    search = found.search
+    if found.failed:
+        best = "a case fails" if search.kind == "search" else "every candidate fails so far"
+        return best
+    unit, scale = deck_unit(search.metric, metric_units(experiment.structure)[search.metric], experiment.requirements)
+    word = "worst" if search.kind == "search" else "best"
+    return f"{word} {search.metric} {goal_text(found.value, unit, scale)}{_binding(found)}"
+
+
+def _binding(found: Answer) -> str:
+    if found.missed:
+        return f", misses {found.missed[0]}"
+    near: Sequence[str] = [room.text for room in found.rooms[:NEAREST] if found.search.kind == "tune"]
+    return f", {near[0]} is nearest" if near else ""

@@ -1,0 +1,65 @@
+"""The answer of a search as `met run` and `met show` say it: the best, what binds, and the commands that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.queries.pool import Pool
+from batch.queries.search_answers import SearchAnswer
+from batch.terminal.best import context
+from met.frozen import frozen
+from met.outputs import quoted
+
+
+@frozen
+class SearchResult:
+    """The answer of a search: as lines, for programs, and whether it is what was asked for.
+
+    commands  that follow from it, each with what it is for
+    tunes  whether it is a tuning: then the requirements count in its answer alone;  name: of the search
+    """
+
+    name: str
+    lines: tuple[str, ...]
+    commands: tuple[tuple[str, str], ...]
+    data: dict[str, Any]
+    ok: bool
+    tunes: bool
+
+
+def search_result(archive: ArchiveFile, group: ArchiveGroup) -> SearchResult | None:
+    """The answer of a group of an archive; None where it is no search, or some of its cases alone."""
+    answer = SearchAnswer.of(group)
+    if answer is None:
+        return None
+    commands = _commands(archive, group, answer)
+    tunes = answer.search.kind == "tune"
+    lines = (*answer.lines(), *(line for said, command in commands for line in _shown(said, command)))
+    data = {**answer.as_data(), "commands": [command for _, command in commands]}
+    # of a search the requirements of all cases count, as of any campaign
+    ok = answer.ok if tunes else bool((group.values("status") == 0).all() and (group.values("met") == 1).all())
+    return SearchResult(group.name, lines, tuple(commands), data, ok, tunes)
+
+
+def _shown(said: str, command: str) -> Sequence[str]:
+    return [f"{said} {command}"] if len(said) + len(command) < 100 else [said, f"  {command}"]
+
+
+def _commands(archive: ArchiveFile, group: ArchiveGroup, answer: SearchAnswer) -> list[tuple[str, str]]:
+    """Commands that follow from an answer, each with what it is for."""
+    again = f"met run {quoted(archive.path)} --case '#{answer.position}'"
+    if answer.search.kind == "search":
+        return [("run it again:", again)]
+    how = context(archive, Pool(group.name, [group]))
+    name = answer.search.against or answer.search.of
+    words = [f"-D {quoted(each)}" for each in how["defines"]]
+    words += [f"--set {quoted(f'{path}={value}')}" for path, value in answer.settings()]
+    command = f"met run {quoted(how['deck'])} {quoted(name)} {' '.join(words)}"
+    found = [("its worst case again:", again), ("run it:", f"{command} -o chosen.h5")]
+    if answer.draws:
+        seed = f"--set seed={answer.search.drawn_with + 1}"
+        said = "these cases chose it, so they flatter it: other draws confirm it or not:"
+        found[1] = (said, f"{command} {seed} -o confirmed.h5")
+    return found

@@ -1,0 +1,36 @@
+"""A search or a tuning of a plan in words: its goal, the ends of what it chooses, and what it is held against."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ic.printing.columns import columns, count, number, size
+from met.plan import Experiment
+from met.plan.searches import Search
+
+
+def budget(search: Search) -> str:
+    """`maximise effort, in at most 2,000 cases`."""
+    return f"{search.goal}, in at most {count(search.at_most, 'case')}"
+
+
+def search_lines(experiment: Experiment, search: Search) -> Iterator[str]:
+    """Line by line: what is looked for, and what of."""
+    each = experiment.structure.history_bytes
+    histories = f"; {size(each)} of histories a case" if each else ""
+    yield f"{search.kind.capitalize()}: {budget(search)}{histories}"
+    rows = []
+    scales = {coordinate.path: (coordinate.scale, coordinate.unit) for coordinate in experiment.cases.coordinates}
+    for each_parameter in search.parameters:
+        scale, unit = scales[each_parameter.path]
+        ends = f"{number(each_parameter.low / scale)} to {number(each_parameter.high / scale)} {unit}".removesuffix(
+            " 1"
+        )
+        rows.append((each_parameter.path, f"{ends}{', by equal ratios' * each_parameter.logarithmic}"))
+    yield from columns(rows)
+    if search.against:
+        borne = [coordinate.path for coordinate in experiment.cases.coordinates[len(search.parameters) :]]
+        yield f"  against {count(len(search.plants), 'case')} of {search.against}: {', '.join(borne)}"
+    if search.kind == "tune" and experiment.requirements:
+        required = ", ".join(requirement.text for requirement in experiment.requirements)
+        yield f"  with a margin of {100.0 * search.margin:g} % to the limits of {required}"

@@ -1,0 +1,440 @@
+"""The block of a search or a tuning, read: what is chosen between which ends, for which goal, and how many cases.
+
+It becomes a sweep of one axis, of which the values are those of its first generation (met/seeking); what comes after
+follows from what that gives.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from ic.grammar.places import place_of
+from ic.grammar.spell import spell
+from ic.grammar.syntax import Call, List, Name, Setting, Statement, WithUnit
+from ic.language import BLOCKS
+from ic.language.runs import MARGIN
+from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.expressions.conditions import VariedPath
+from ic.meaning.expressions.evaluate import PURE, evaluate_number
+from ic.meaning.expressions.names import Names
+from ic.meaning.expressions.quantity import Value, measure_of
+from ic.meaning.runs.allowances import ALLOW
+from ic.sweeps.axes import Sweep, SweepAxis, read_sweep, varied_path, whole_number
+from ic.sweeps.choices import check_constant, decides_structure, path_place
+from ic.sweeps.designs import in_unit
+from ic.text.complaints import Complaints, known_words
+from met import units
+from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.frozen import frozen
+from met.plan import Requirement, Structure
+from met.plan.columns import AxisColumn, CaseValues
+from met.plan.searches import MOST_PLANTS, MOST_SEARCHED, SHORTEST, Search, SearchedParameter
+from met.plan.swept import SweptRows
+from met.trace import Graph, Scalar
+
+RANGES = {"between": False, "logbetween": True}
+"""How ends are written, and whether equal ratios between them are equal steps."""
+
+CHOOSE, AGAINST = "choose", "against"
+GOALS = {"maximise": True, "minimise": False}
+MOST_CORNERS = 8
+"""Parameters of which all ends are looked at together, each with each; of more, one after the other."""
+
+
+@frozen
+class _Chosen:
+    """A parameter that is chosen. low: its lower end as written."""
+
+    parameter: SearchedParameter
+    place: Place
+    low: Value
+    with_unit: WithUnit | None
+
+
+def read_search(
+    definitions: Definitions,
+    complaints: Complaints,
+    definition: Definition,
+    graph: Graph,
+    *,
+    noise_seed: int = 0,
+    fixed: Collection[str] = (),
+) -> Sweep:
+    """The search as a sweep over its first generation; reports mistakes in it.
+
+    noise_seed  the run's, for what the sweep draws that a tuning is held against
+    fixed       paths that are set outside of the deck, and so not chosen
+    """
+    reader = _SearchReader(definitions, complaints, definition)
+    before = complaints.error_count
+    for entry in definition.group.body:
+        with complaints.gather():
+            reader.enter(entry)
+    with complaints.gather():
+        reader.check(complaints.error_count > before)
+    empty = Sweep(definition.name, (), (), None, None, 1, None, definition.place)
+    against: Sweep | None = None
+    if reader.against is not None:
+        with complaints.gather():
+            against = _against(definitions, complaints, reader, graph, noise_seed, fixed)
+    if complaints.error_count > before:
+        return empty
+    chosen = [each for each in reader.chosen if each.parameter.path not in fixed]
+    if not chosen:
+        message = f"all that `{definition.name}` chooses is set, so nothing is left to choose"
+        complaints.error("D361", message, definition.place, help="leave one of them out of `--set`")
+        return empty
+    plants = _plants(against)
+    search = Search(
+        kind="tune" if definition.kind == "tune" else "search",
+        metric=reader.metric,
+        largest=reader.largest,
+        parameters=tuple(each.parameter for each in chosen),
+        at_most=reader.at_most,
+        of=definition.group.of.text if definition.group.of is not None else "",
+        seed=reader.seed,
+        against=against.name if against is not None else "",
+        plants=plants,
+        drawn_with=0 if against is None else noise_seed if against.seed is None else against.seed,
+        margin=reader.margin,
+        place=reader.goal_place,
+    )
+    least = len(plants) + SHORTEST
+    if search.kind == "tune" and search.at_most < least:
+        of = f"{len(plants)} to try the best with each case of `{search.against}`, and " if plants else ""
+        complaints.error(
+            "D363",
+            f"{search.at_most} cases are too few to tune anything",
+            reader.at_most_place,
+            help=f"{least} at least: {of}{SHORTEST} to choose among; a thousand are no luxury",
+        )
+        return empty
+    from met.seeking import seeker
+
+    rows = seeker(search).ask()
+    columns = []
+    for number, each in enumerate(chosen):
+        unit = each.with_unit.unit if each.with_unit is not None else each.low.unit
+        if unit is not None and measure_of(unit).dimension != each.low.dimension:
+            unit = None
+        columns.append(varied_path(graph, each.parameter.path, each.place, rows[:, number], each.low, unit))
+    for number, column in enumerate(against.varied if against is not None else (), start=len(chosen)):
+        columns.append(VariedPath(column.path, column.place, rows[:, number], column.value, column.unit, column.scale))
+    axis = SweepAxis(tuple(columns))
+    drawn = tuple(against.designs.items()) if against is not None else ()
+    return Sweep(definition.name, (axis,), (), None, None, 1, None, definition.place, search, drawn)
+
+
+class _SearchReader:
+    """Entry after entry of the block of a search or a tuning."""
+
+    def __init__(self, definitions: Definitions, complaints: Complaints, definition: Definition) -> None:
+        self.definitions, self.complaints, self.definition = definitions, complaints, definition
+        self.tunes = definition.kind == "tune"
+        self.chosen: list[_Chosen] = []
+        self.metric, self.largest = "", False
+        self.at_most = self.seed = 0
+        self.margin = float(MARGIN.default) if self.tunes and isinstance(MARGIN.default, float) else 0.0
+        self.against: Name | None = None
+        self.goal_place = self.at_most_place = definition.place
+        self._written: dict[str, Place] = {}
+        entries = [entry for entry in definition.group.body if isinstance(entry, Setting)]
+        self._paths = {_path(entry): path_place(entry) for entry in entries}
+
+    @property
+    def usage(self) -> str:
+        """How a parameter that is chosen is written."""
+        return f"{f'{CHOOSE} ' * self.tunes}PATH = between(LOW, HIGH) UNIT;"
+
+    def enter(self, entry: object) -> None:
+        """Read one entry. Raises Problem."""
+        words = [word.text for word in getattr(entry, "words", ())]
+        match entry:
+            case Setting() if not words and _path(entry) in ("at_most", "seed", *(["margin"] * self.tunes)):
+                self._number(entry, _path(entry))
+            case Setting() if words == [CHOOSE] * self.tunes:
+                self._choose(entry)
+            case Statement() if words in ([each] for each in GOALS):
+                self._goal(entry, words[0])
+            case Statement() if words == [AGAINST] and self.tunes:
+                self._once(AGAINST, entry.place)
+                if not isinstance(entry.value, Name) or len(entry.value.path) > 1:
+                    help_ = "write `against SWEEP;`"
+                    raise Problem(
+                        error("D364", "`against` takes the name of a sweep", place_of(entry.value), help=help_)
+                    )
+                self.against = entry.value
+            case Statement() if words[:1] == [ALLOW]:
+                pass  # read with those of the run
+            case _:
+                self._refuse(entry, words)
+
+    def check(self, failed: bool) -> None:
+        """Report what is missing. failed: whether something of the block was wrong, so that it may be that."""
+        name = self.definition.name
+        if not any(goal in self._written for goal in GOALS) and not failed:
+            usage = "minimise METRIC;" if self.tunes else "maximise METRIC;"
+            self.complaints.error(
+                "D362", f"{self.definition.kind} `{name}` has no goal", self.definition.place, help=f"write `{usage}`"
+            )
+        if "at_most" not in self._written and not failed:
+            self.complaints.error(
+                "D363",
+                f"{self.definition.kind} `{name}` does not say how many cases it may run",
+                self.definition.place,
+                help="write `at_most = 2000;`: it never runs more",
+            )
+        if not self.chosen and not failed:
+            self.complaints.error(
+                "D361", f"{self.definition.kind} `{name}` chooses nothing", self.definition.place,
+                help=f"write `{self.usage}`",
+            )  # fmt: skip
+
+    def _once(self, key: str, place: Place) -> None:
+        if key in self._written:
+            raise Problem(
+                error("D040", f"`{key}` is written twice", place, also=[Label(self._written[key], "first")],
+                      help="leave one out")
+            )  # fmt: skip
+        self._written[key] = place
+
+    def _number(self, entry: Setting, key: str) -> None:
+        self._once(key, path_place(entry))
+        if key == "seed":
+            self.seed = whole_number(self.definitions, entry.value, "a seed", least=0)
+            return
+        found = evaluate_number(entry.value, Names(self.definitions, {}).find)
+        number = found.number
+        plain = not isinstance(number, Scalar) and found.dimension == PURE
+        if key == "margin":
+            if not plain or not 0.0 <= float(number) < 1.0:
+                message = "a margin is a share of a limit, from 0 % to less than 100 %"
+                raise Problem(error("D363", message, found.place, help="write `margin = 5 %;`"))
+            self.margin = float(number)
+            return
+        if not plain or not float(number).is_integer() or not 1 <= float(number) <= MOST_SEARCHED:
+            message = f"`at_most` is a whole number of cases from 1 to {MOST_SEARCHED}"
+            raise Problem(error("D363", message, found.place, help="write `at_most = 2000;`"))
+        self.at_most, self.at_most_place = int(number), found.place
+
+    def _goal(self, entry: Statement, word: str) -> None:
+        other = next((each for each in GOALS if each in self._written), None)
+        if other is not None:
+            helps = ["leave one out", "what else matters is required in the run: `require METRIC < LIMIT;`"]
+            raise Problem(
+                error("D362", f"`{self.definition.name}` has two goals", entry.place,
+                      also=[Label(self._written[other], "first")], help=helps)
+            )  # fmt: skip
+        if not isinstance(entry.value, Name) or len(entry.value.path) > 1:
+            helps = [f"write `{word} METRIC;`", "what is computed of several signals is a metric of an expression"]
+            raise Problem(error("D362", f"`{word}` takes the name of a metric", place_of(entry.value), help=helps))
+        self._written[word] = entry.place
+        self.metric, self.largest, self.goal_place = entry.value.text, GOALS[word], place_of(entry.value)
+
+    def _choose(self, entry: Setting) -> None:
+        path = _path(entry)
+        if path in self._written:
+            raise Problem(
+                error("D040", f"`{path}` is chosen twice", path_place(entry),
+                      also=[Label(self._written[path], "first")], help="leave one out")
+            )  # fmt: skip
+        self._written[path] = path_place(entry)
+        if entry.operator == "+=":
+            raise Problem(error("D056", f"nothing to append to in a {self.definition.kind}", path_place(entry),
+                                help="write `=`"))  # fmt: skip
+        self.chosen.append(self._ends(path, entry))
+
+    def _ends(self, path: str, entry: Setting) -> _Chosen:
+        names = Names(self.definitions, {}, watched=set(self._paths))
+        unit, call = (entry.value.unit, entry.value.inner) if isinstance(entry.value, WithUnit) else (None, entry.value)
+        ranges = known_words("ranges", RANGES)
+        if not isinstance(call, Call) or call.name.text not in RANGES:
+            near = did_you_mean(call.name.text, RANGES) if isinstance(call, Call) else ()
+            helps = [*near, f"write `{CHOOSE * self.tunes}{' ' * self.tunes}{path} = between(LOW, HIGH) UNIT;`", ranges]
+            raise Problem(error("D361", f"`{path}` is chosen between two ends", place_of(entry.value), help=helps))
+        name = call.name.text
+        if len(call.positional) != 2 or call.named or call.body is not None:
+            message = f"`{name}` takes two numbers, the lower end and the higher"
+            raise Problem(error("D361", message, call.name.place, help=f"write `{name}(LOW, HIGH) UNIT`"))
+        if decides_structure(self.definitions, path, List(call.positional, place_of(call)), names):
+            message = f"`{path}` decides the program, so that nothing chooses it between two ends"
+            remedy = f"write a {self.definition.kind} for each, of runs that differ in it"
+            raise Problem(error("D361", message, path_place(entry), help=remedy))
+        low, high = (evaluate_number(in_unit(each, unit), names.find) for each in call.positional)
+        check_constant(path, entry, names, self._paths)
+        if not units.same(high.dimension, low.dimension):
+            message = f"`{name}` of {units.text(low.dimension)} and {units.text(high.dimension)}"
+            raise Problem(error("D063", message, high.place, help="both must be of one dimension"))
+        ends = float(low.number), float(high.number)
+        if not (np.isfinite(ends).all() and ends[0] < ends[1]):
+            message = f"`{name}` goes from a lower to a higher value"
+            remedy = "change the two about, or leave the parameter out where they are equal"
+            raise Problem(error("D361", message, high.place, help=remedy))
+        if RANGES[name] and not ends[0] * ends[1] > 0.0:
+            message = "the ends of a `logbetween` are both above or both below zero"
+            raise Problem(error("D361", message, low.place, help="`between` has no such limit"))
+        shown = unit or low.unit or high.unit
+        text = shown.text if shown is not None and measure_of(shown).dimension == low.dimension else ""
+        parameter = SearchedParameter(path, *ends, RANGES[name], text)
+        return _Chosen(parameter, path_place(entry), low, entry.value if isinstance(entry.value, WithUnit) else None)
+
+    def _refuse(self, entry: object, words: list[str]) -> None:
+        place: Place = entry.place  # type: ignore[attr-defined]  # every entry has one
+        kind, base = self.definition.kind, self.definition.group.of
+        block = BLOCKS[kind]
+        known = [*(each.name for each in block.entries), *([] if self.tunes else ["PATH = between(LOW, HIGH)"])]
+        if isinstance(entry, Setting):
+            path, value = _path(entry), entry.value
+            call = value.inner if isinstance(value, WithUnit) else value
+            if isinstance(call, Call) and call.name.text in RANGES:
+                usage = f"{f'{CHOOSE} ' * self.tunes}{path} = {spell(value)};"
+                raise Problem(error("D360", f"in a {kind} this is written otherwise", place, help=f"write `{usage}`"))
+            where = f"set it in a run `like {base.text if base is not None else 'RUN'}`"
+            raise Problem(
+                error("D360", f"`{' '.join([*words, path])} = ...` in a {kind}", place,
+                      help=[f"to choose it write `{f'{CHOOSE} ' * self.tunes}{path} = between(LOW, HIGH) UNIT;`",
+                            f"or {where}"])
+            )  # fmt: skip
+        text = " ".join(words)
+        helps = [*did_you_mean(text, known), known_words(f"a {kind} has", known)]
+        if words[:1] == [AGAINST]:
+            helps = ["a tuning is held against a sweep: `tune NAME of RUN { ... }`",
+                     "a search chooses what is drawn, too: `PATH = between(LOW, HIGH) UNIT;`"]  # fmt: skip
+        if words[:1] == ["require"]:
+            helps = ["it belongs to the run"]
+        raise Problem(error("D360", f"no `{text}` in a {kind}", place, help=helps))
+
+
+def _path(entry: Setting) -> str:
+    return ".".join(word.text for word in entry.path)
+
+
+# Against a sweep
+
+
+def _against(
+    definitions: Definitions,
+    complaints: Complaints,
+    reader: _SearchReader,
+    graph: Graph,
+    seed: int,
+    fixed: Collection[str],
+) -> Sweep | None:
+    """The sweep that a tuning is held against. Raises Problem D364 where it is none that it can be held against."""
+    name = reader.against
+    assert name is not None
+    known, place = definitions.of_kind("sweep"), name.place
+    if name.text not in known:
+        helps = [*did_you_mean(name.text, known), known_words("sweeps of this deck", known)]
+        raise Problem(error("D041", f"no sweep `{name.text}`", place, help=helps))
+    found = known[name.text]
+    run, own = found.group.of, reader.definition.group.of
+    also = [Label(found.place, "written here")]
+    if found.parts or run is None or own is None or run.text != own.text:
+        of = "is made of others" if found.parts or run is None else f"is of `{run.text}`"
+        remedy = f"write a sweep of `{own.text if own is not None else 'RUN'}` with the cases that it must bear"
+        raise Problem(error("D364", f"sweep `{name.text}` {of}, and not of the run that is tuned", place, also=also,
+                            help=remedy))  # fmt: skip
+    before = complaints.error_count
+    sweep = read_sweep(definitions, complaints, found, graph, seed=seed)
+    if complaints.error_count > before:
+        return None
+    cannot = [
+        *((column.place, "it chooses what decides the program") for column in sweep.chosen),
+        *((each.place, "it leaves cases out") for each in sweep.excludes),
+        *([(sweep.repeated, "it repeats cases")] if sweep.repeated is not None else []),
+        *([(sweep.independent, "each of its cases has noise of its own")] if sweep.independent is not None else []),
+        *([(axis.until_shown, "it runs cases until something is shown") for axis in sweep.axes if axis.until_shown]),
+        *([(found.place, "it has a seed of its own")] if sweep.seed is not None and not _draws(sweep) else []),
+    ]
+    for where, why in cannot[:1]:
+        remedy = "a tuning is held against a list, a product or a sample of numbers: write such a sweep for it"
+        raise Problem(error("D364", f"nothing is tuned against sweep `{name.text}`: {why}", place,
+                            also=[Label(where, "here")], help=remedy))  # fmt: skip
+    places = {each.parameter.path: each.place for each in reader.chosen}
+    for column in sweep.varied:
+        if column.path in places:
+            message = f"`{column.path}` is chosen, and varies in `{name.text}`"
+            remedy = "one parameter cannot be both: leave it out of one of the two"
+            raise Problem(error("D364", message, places[column.path], also=[Label(column.place, "varies here")],
+                                help=remedy))  # fmt: skip
+        if column.path in fixed:
+            message = (
+                f"`{column.path}` is set, and varies in `{name.text}`, which `{reader.definition.name}` is against"
+            )
+            raise Problem(error("D364", message, place, also=[Label(column.place, "varies here")],
+                                help="leave it out of `--set`"))  # fmt: skip
+    count = int(np.prod([axis.size for axis in sweep.axes]))
+    if count > MOST_PLANTS:
+        message = f"sweep `{name.text}` has {count} cases, and a tuning is held against {MOST_PLANTS} at most"
+        raise Problem(error("D364", message, place, also=also, help="a hundred drawn at random tell most: draw fewer"))
+    return sweep
+
+
+def _draws(sweep: Sweep) -> bool:
+    return any(axis.design for axis in sweep.axes)
+
+
+def _plants(sweep: Sweep | None) -> tuple[tuple[float, ...], ...]:
+    """The values of a sweep's coordinates in each of its cases."""
+    if sweep is None:
+        return ()
+    rows = SweptRows(sweep.sizes, (None,) * len(sweep.sizes))
+    table = [
+        np.asarray(AxisColumn(rows, number, column.values))
+        for number, axis in enumerate(sweep.axes)
+        for column in axis.columns
+        if isinstance(column, VariedPath)
+    ]
+    return tuple(tuple(row) for row in np.stack(table, axis=1).tolist())
+
+
+# Looked at with the run
+
+
+def with_corners(search: Search, columns: Mapping[str, CaseValues]) -> tuple[dict[str, np.ndarray], int]:
+    """The cases of the first generation, then others that may come: at the ends of what is chosen, and with each plant;
+    and how many they are in all. What holds for these is taken to hold for what lies between."""
+    ends = [(each.low, each.high) for each in search.parameters]
+    if len(ends) <= MOST_CORNERS:
+        corners = list(itertools.product(*ends))
+    else:
+        low = tuple(end[0] for end in ends)
+        corners = [low, tuple(end[1] for end in ends)]
+        corners += [(*low[:n], end[1], *low[n + 1 :]) for n, end in enumerate(ends)]
+    plants = search.plants or ((),)
+    rows = [(*corner, *plants[number % len(plants)]) for number, corner in enumerate(corners)]
+    rows += [(*corners[0], *plant) for plant in plants[1:]]
+    more = np.array(rows)
+    table = {path: np.concatenate([np.asarray(own), more[:, n]]) for n, (path, own) in enumerate(columns.items())}
+    return table, len(next(iter(table.values())))
+
+
+def check_goal(complaints: Complaints, name: str, search: Search, structure: Structure) -> None:
+    """Report a goal that is no metric of the run."""
+    known = [use.name for use in structure.metrics]
+    if search.metric not in known:
+        missing = ["a run has one by `metric NAME = MODEL { of = ...; }`"] if not known else []
+        helps = [
+            *did_you_mean(search.metric, known),
+            *missing,
+            *([known_words("metrics of the run", known)] * bool(known)),
+        ]
+        complaints.error("D362", f"`{name}` goes by `{search.metric}`, which is no metric of its run", search.place,
+                         help=helps)  # fmt: skip
+
+
+def each_case(requirements: tuple[Requirement, ...]) -> tuple[tuple[Requirement, ...], list[str]]:
+    """The requirements as a search has them, of each case by itself, and notes on those that are of shares of cases:
+    cases that are chosen show nothing of a share."""
+    from dataclasses import replace
+
+    notes = [
+        f"`{each.text}` is of a share of cases, of which chosen cases show nothing: each is held against its limit"
+        for each in requirements
+        if each.share is not None
+    ]
+    return tuple(replace(each, share=None, confidence=None) for each in requirements), notes

@@ -1,0 +1,69 @@
+"""Checks of the search in a plan that its types cannot make. Everything raises `Damaged`."""
+
+from __future__ import annotations
+
+import math
+
+from met.plan import Experiment
+from met.plan.codec import Damaged
+from met.plan.searches import MOST_PLANTS, MOST_SEARCHED, SHORTEST, Search
+from met.plan.structure import check_whole
+from met.unit_parser import parse_unit
+
+MOST_SEED = 2**53
+
+
+def check_search(experiment: Experiment, search: Search, where: str) -> None:
+    """A search fits its run: its goal is a metric, what it chooses and what it is against are the coordinates, and its
+    generations are the case table."""
+    if search.metric not in {use.name for use in experiment.structure.metrics}:
+        raise Damaged(f"{where}.metric", f"there is no metric `{search.metric}`")
+    check_whole(search.at_most, 1, MOST_SEARCHED, f"{where}.at_most")
+    check_whole(search.seed, 0, MOST_SEED, f"{where}.seed")
+    check_whole(search.drawn_with, 0, MOST_SEED, f"{where}.drawn_with")
+    if not 0.0 <= search.margin < 1.0:
+        raise Damaged(f"{where}.margin", "it should be at least 0 and below 1")
+    _check_parameters(experiment, search, f"{where}.parameters")
+    _check_plants(experiment, search, f"{where}.plants")
+    if search.complete:
+        for index, count in enumerate(search.generations):
+            check_whole(count, 1, MOST_SEARCHED, f"{where}.generations[{index}]")
+        if sum(search.generations) != experiment.cases.count:
+            raise Damaged(f"{where}.generations", f"they are not of the {experiment.cases.count} cases")
+    if experiment.cases.count > search.at_most:
+        raise Damaged(f"{where}.at_most", f"there are {experiment.cases.count} cases")
+    cases = experiment.cases
+    if cases.choices or cases.repeats is not None or cases.positions is not None or cases.seeds != "common":
+        raise Damaged(where, "its cases should be of one structure, without repeats, and feel the same noise")
+
+
+def _check_parameters(experiment: Experiment, search: Search, where: str) -> None:
+    paths = [coordinate.path for coordinate in experiment.cases.coordinates]
+    if not search.parameters:
+        raise Damaged(where, "there is none")
+    for index, each in enumerate(search.parameters):
+        if index >= len(paths) or each.path != paths[index]:
+            raise Damaged(f"{where}[{index}].path", f"`{each.path}` is not coordinate {index} of the cases")
+        if not -math.inf < each.low < each.high < math.inf:
+            raise Damaged(f"{where}[{index}].low", "the ends should be finite, and rise")
+        if each.logarithmic and not each.low * each.high > 0.0:
+            raise Damaged(f"{where}[{index}].low", "both ends should be above or below 0")
+        try:
+            if each.unit:
+                parse_unit(each.unit)
+        except ValueError as reason:
+            raise Damaged(f"{where}[{index}].unit", f"{each.unit!r} is no unit") from reason
+
+
+def _check_plants(experiment: Experiment, search: Search, where: str) -> None:
+    more = len(experiment.cases.coordinates) - len(search.parameters)
+    if bool(search.plants) != bool(search.against) or bool(search.plants) != (more > 0):
+        raise Damaged(where, "they should be of the coordinates that are not chosen, and of a sweep")
+    if (search.plants or search.margin) and search.kind != "tune":
+        raise Damaged(where, "a tuning alone is held against something")
+    check_whole(len(search.plants), 0, MOST_PLANTS, where)
+    for index, plant in enumerate(search.plants):
+        if len(plant) != more or not all(map(math.isfinite, plant)):
+            raise Damaged(f"{where}[{index}]", f"it should be {more} finite numbers")
+    if search.kind == "tune" and search.at_most < len(search.plants) + SHORTEST:
+        raise Damaged(f"{where[: -len('plants')]}at_most", f"it should be at least {len(search.plants) + SHORTEST}")

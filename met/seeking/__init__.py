@@ -1,0 +1,35 @@
+"""Searches of a plan, step by step: which cases are tried next, from what those before gave.
+
+values   what a case is worth to a search
+hardest  a search for the case that hurts most
+robust   a tuning against plants, by turns
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from met.plan.searches import Search
+from met.seeking.hardest import HardestCase
+from met.seeking.robust import RobustTuning
+
+
+class Seeker(Protocol):
+    """Asks for cases, a generation at a time, each of them once; it depends on the search and on what it was told
+    alone, to the bit."""
+
+    def ask(self) -> np.ndarray:
+        """Coordinates of the next generation's cases, SI, [case, coordinate]; none, when it has ended."""
+
+    def tell(self, values: np.ndarray) -> None:
+        """Take what these cases are worth (met/seeking/values.py), [case]."""
+
+
+def seeker(search: Search) -> Seeker:
+    """Whoever carries out a search, at its beginning."""
+    return RobustTuning(search) if search.kind == "tune" else HardestCase(search)
+
+
+__all__ = ["Seeker", "seeker"]

@@ -1,0 +1,129 @@
+"""The best that a search has found, by what its cases gave, and what stands in the way of a better one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from met.frozen import frozen
+from met.plan.searches import Search
+from met.seeking.values import MetricLimit, hurt, served
+
+
+class NamedLimit(MetricLimit, Protocol):
+    """A requirement with its text."""
+
+    @property
+    def text(self) -> str: ...
+
+
+@frozen
+class Room:
+    """How far a value is inside a limit, as a share of it; beyond it where that is below 0. text: the requirement."""
+
+    text: str
+    share: float
+
+
+@frozen
+class Answer:
+    """The case that hurts most; or the candidate that serves best, with the worst of its cases.
+
+    case     its place among the cases;  cases: the places of all of the candidate's
+    value    of the goal there, SI; not-a-number where it failed, or has none
+    failed   whether that case failed
+    tried    the number of plants that the candidate was tried against; all: of how many
+    missed   texts of the requirements that are missed in any of its cases
+    rooms    how far it is inside each limit in its worst case, the nearest first; those without a value are not there
+    ends     paths of what is chosen that stand at an end of their range, with `lower` or `upper`
+    """
+
+    search: Search
+    case: int
+    cases: tuple[int, ...]
+    value: float
+    failed: bool
+    tried: int
+    all: int
+    missed: tuple[str, ...]
+    rooms: tuple[Room, ...]
+    ends: tuple[tuple[str, str], ...]
+
+    @property
+    def confirmed(self) -> bool:
+        """True if a candidate was tried against all plants."""
+        return self.tried == self.all
+
+    @property
+    def serves(self) -> bool:
+        """True if a candidate meets all that is required with all plants; of a search, if even the worst case does."""
+        return self.confirmed and not self.failed and not self.missed and self.value == self.value
+
+
+def answer(
+    search: Search,
+    table: np.ndarray,
+    done: np.ndarray,
+    metrics: Mapping[str, np.ndarray],
+    requirements: Sequence[NamedLimit],
+) -> Answer:
+    """The best of these cases. table: their coordinates, [case, coordinate], SI, what is chosen first; done: which of
+    them reached their end; metrics: by name, SI."""
+    goal, count = metrics[search.metric], len(search.parameters)
+    every = max(1, len(search.plants))
+    if search.kind == "tune":
+        worth = served(goal, search.largest, done, requirements, metrics, search.margin)
+        _, first, of_case = np.unique(table[:, :count], axis=0, return_index=True, return_inverse=True)
+        of_case = of_case.ravel()
+        tried = np.bincount(of_case)
+        worst = np.full(len(first), -np.inf)
+        np.maximum.at(worst, of_case, worth)
+        order = np.lexsort((first, worst, -tried))
+        cases = np.flatnonzero(of_case == order[0])
+        case = int(cases[np.argmax(worth[cases])])
+    else:
+        worth = hurt(goal, search.largest, done)
+        case = int(np.argmin(worth))
+        cases, every = np.array([case]), 1
+    missed = [each.text for each in requirements if not _met(each, metrics[each.metric][cases], done[cases]).all()]
+    rooms = [Room(each.text, _room(each, metrics[each.metric][cases])) for each in requirements]
+    return Answer(
+        search,
+        case,
+        tuple(cases.tolist()),
+        float(goal[case]) if done[case] else float("nan"),
+        not bool(done[case]),
+        len(cases),
+        every,
+        tuple(missed),
+        tuple(sorted((room for room in rooms if room.share == room.share), key=lambda room: room.share)),
+        tuple(_ends(search, table[case])),
+    )
+
+
+def _met(limit: MetricLimit, values: np.ndarray, done: np.ndarray) -> np.ndarray:
+    compare = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal}[limit.comparison]
+    return np.asarray(compare(values, limit.limit) & done)
+
+
+def _room(limit: MetricLimit, values: np.ndarray) -> float:
+    """How far the worst of these values is inside a limit, as a share of it, or in SI where it is 0."""
+    inside = limit.limit - values if limit.comparison.startswith("<") else values - limit.limit
+    return float(np.min(inside)) / (abs(limit.limit) or 1.0)
+
+
+def _ends(search: Search, case: np.ndarray) -> list[tuple[str, str]]:
+    found = []
+    for each, value in zip(search.parameters, case.tolist(), strict=False):
+        share = (value - each.low) / (each.high - each.low)
+        if each.logarithmic:
+            share = np.log(value / each.low) / np.log(each.high / each.low)
+        if not NEAR < share < 1.0 - NEAR:
+            found.append((each.path, "lower" if share < 0.5 else "upper"))
+    return found
+
+
+NEAR = 0.005
+"""The share of its range by which a parameter may be off an end of it to count as there."""

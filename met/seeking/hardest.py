@@ -1,0 +1,45 @@
+"""A search for the case that hurts most: the optimiser's points as cases, none of them twice."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from met import searching
+from met.plan.searches import Search
+
+
+class HardestCase:
+    """See `Seeker`. Points that are rounded to a case that was tried before are worth what that was."""
+
+    def __init__(self, search: Search) -> None:
+        self._search = search
+        self._optimiser = searching.hardest(len(search.parameters), search.seed, search.at_most)
+        self._known: dict[bytes, float] = {}
+        self._asked: list[bytes] = []
+        self._new: list[bytes] = []
+
+    def ask(self) -> np.ndarray:
+        """See `Seeker`."""
+        left = self._search.at_most - len(self._known)
+        while left > 0:
+            cases = self._search.values(self._optimiser.ask())
+            if not len(cases):
+                break
+            self._asked = [case.tobytes() for case in cases]
+            first = {key: place for place, key in reversed(list(enumerate(self._asked)))}
+            places = sorted(place for key, place in first.items() if key not in self._known)
+            if len(places) > left:
+                break
+            self._new = [self._asked[place] for place in places]
+            if places:
+                return cases[places]
+            self._pass_on()
+        return np.empty((0, len(self._search.parameters)))
+
+    def tell(self, values: np.ndarray) -> None:
+        """See `Seeker`."""
+        self._known.update(zip(self._new, values.tolist(), strict=True))
+        self._pass_on()
+
+    def _pass_on(self) -> None:
+        self._optimiser.tell(np.array([self._known[key] for key in self._asked]))

@@ -1,0 +1,154 @@
+"""A tuning against plants, by turns: tune against those that are active, try the best against all, add the worst.
+
+So an inner loop of a few plants decides for many (P. Apkarian, M. N. Dao, D. Noll, Parametric robust structured control
+design, IEEE Trans. Automatic Control 60 (2015) 1857). A candidate is worth what it is in the worst of its plants.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from met import searching
+from met.plan.searches import SHORTEST, Search
+from met.seeking.values import MET
+
+SHARE = 4
+"""A turn takes one in so many of the cases that are left, while plants may become active."""
+
+GAIN = 1e-3
+"""A turn that improves the goal by less than this share of it brings next to nothing."""
+
+IDLE = 2
+"""A tuning ends after so many turns that bring next to nothing; the second has twice as many cases."""
+
+INSIDE = 0.05
+"""How far inside the ends of the cube the middle of a turn is, at least: so both sides of it are there."""
+
+Candidate = bytes
+"""The values of a candidate's parameters, as they are in memory."""
+
+
+class RobustTuning:
+    """See `Seeker`. Without plants the candidates themselves are the cases.
+
+    A turn ends when the optimiser does, or when its share of the cases that are left is spent. The tuning ends when no
+    plant is worse than the worst active one and two turns brought next to nothing, or when no further turn has room.
+    """
+
+    def __init__(self, search: Search) -> None:
+        self._search, self._plants = search, search.plants or ((),)
+        self._left = search.at_most
+        self._points: dict[Candidate, np.ndarray] = {}
+        self._known: dict[Candidate, dict[int, float]] = {}
+        self._active, self._turn = [0], 0
+        self._batch: list[Candidate] = []
+        self._wanted: list[tuple[Candidate, int]] = []
+        self._confirmed = self._confirming = self._converged = False
+        self._may_ask = 0
+        self._borne: float | None = None
+        self._idle = 0
+        self._begin(None)
+
+    def ask(self) -> np.ndarray:
+        """See `Seeker`."""
+        while not self._confirmed:
+            self._wanted = self._next()
+            if self._wanted:
+                self._left -= len(self._wanted)
+                return np.array([[*np.frombuffer(each), *self._plants[plant]] for each, plant in self._wanted])
+            if not self._confirmed:
+                self._go_on()
+        return np.empty((0, len(self._search.parameters) + len(self._plants[0])))
+
+    def tell(self, values: np.ndarray) -> None:
+        """See `Seeker`."""
+        for (candidate, plant), value in zip(self._wanted, values.tolist(), strict=True):
+            self._known[candidate][plant] = value
+        self._go_on()
+
+    def _begin(self, start: np.ndarray | None) -> None:
+        """Begin a turn, around a good candidate where there is one, if it has room; else the tuning is over."""
+        room = self._left - self._reserve
+        if room < SHORTEST * len(self._active):
+            self._confirmed = True
+            return
+        least = SHORTEST * len(self._active)
+        cases = room if self._reserve == 0 or room < 2 * least else max(room // (SHARE >> self._idle), least)
+        dimension, seed = len(self._search.parameters), self._search.seed + self._turn
+        self._may_ask = cases // len(self._active)
+        self._tuner, self._middle = searching.tuner(dimension, seed, self._may_ask), start
+        self._turn += 1
+        self._confirming = False
+
+    @property
+    def _reserve(self) -> int:
+        """Cases that trying the best of a turn against all plants takes."""
+        return len(self._plants) - len(self._active)
+
+    def _next(self) -> list[tuple[Candidate, int]]:
+        """The next candidates with their plants, but those that were tried before."""
+        if not self._confirming:
+            points = around(self._middle, self._tuner.ask())
+            before, self._batch = len(self._batch), [each.tobytes() for each in self._search.values(points)]
+            self._converged = not self._batch and self._may_ask >= before
+            self._may_ask -= len(self._batch)
+            for candidate, point in zip(self._batch, points, strict=True):
+                self._points.setdefault(candidate, point)
+                self._known.setdefault(candidate, {})
+            wanted = self._unknown(self._batch, self._active)
+            self._confirming = not self._batch or len(wanted) > self._left - self._reserve
+            if not self._confirming:
+                return wanted
+        wanted = self._unknown([self._best()], range(len(self._plants)))
+        self._confirmed = len(wanted) > self._left
+        return [] if self._confirmed else wanted
+
+    def _unknown(self, candidates: list[Candidate], plants: list[int] | range) -> list[tuple[Candidate, int]]:
+        once = dict.fromkeys(candidates)
+        return [(each, plant) for each in once for plant in plants if plant not in self._known[each]]
+
+    def _go_on(self) -> None:
+        """Pass on what is known of a generation; or judge the best of a turn, which was tried against all plants."""
+        if not self._confirming:
+            self._tuner.tell(np.array([self._worst(each) for each in self._batch]))
+            return
+        best = self._best()
+        plant = max(range(len(self._plants)), key=lambda each: self._known[best][each])
+        if self._known[best][plant] > self._worst(best):
+            self._active.append(plant)
+        else:
+            worth, before = self._worst(best), self._borne
+            self._idle = self._idle + 1 if before is not None and hardly_better(worth, before) else 0
+            if self._converged or self._idle == IDLE:
+                self._confirmed = True
+                return
+            self._borne = worth
+        self._begin(self._points[best])
+
+    def _best(self) -> Candidate:
+        """The candidate that is worth most against the active plants, of those that were tried against all of these."""
+        tried = [each for each, known in self._known.items() if known.keys() >= set(self._active)]
+        return min(tried, key=self._worst)
+
+    def _worst(self, candidate: Candidate) -> float:
+        """The worth of a candidate against the active plants."""
+        return max(self._known[candidate][plant] for plant in self._active)
+
+
+def around(middle: np.ndarray | None, points: np.ndarray) -> np.ndarray:
+    """Points of the cube stretched so that its middle, where a tuner begins, comes to lie at a good one; the ends stay.
+
+    middle  None: the cube's own
+    """
+    if middle is None or not len(points):
+        return points
+    at = np.clip(middle, INSIDE, 1.0 - INSIDE)
+    return np.where(points < 0.5, 2.0 * at * points, at + (1.0 - at) * (2.0 * points - 1.0))
+
+
+def hardly_better(now: float, before: float) -> bool:
+    """True if the goal of one that meets all, by its worth (`served`), is hardly better than it was before."""
+    if not (abs(now) < MET and abs(before) < MET):
+        return False
+    one, other = (worth / (1.0 - abs(worth)) for worth in (now, before))
+    return abs(one - other) <= GAIN * abs(other)

@@ -1,0 +1,419 @@
+"""A search is a campaign with generations: the same bytes and the same answer, whoever runs it and however often it was
+killed."""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+import shlex
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import batch
+import ic
+from batch.archive.read import ArchiveFile
+from batch.campaigns import performing, searching, tasks
+from batch.campaigns.campaign import Wires, prepare
+from batch.campaigns.folder import Folder
+from batch.queries.search_answers import SearchAnswer
+from met.cli import main
+from met.diagnostic import Problem
+from met.plan import Plan
+from met.plan import file as plan_file
+from met.seeking.answer import Answer
+from tests.batch import whole
+
+MASS, FAR, AT_MOST, TUNED = 2.0, 0.1, 160, 300
+
+# A block on a spring: far = 0.1 m cos(t sqrt(k/m)) after t = 1 s, least where k = m pi^2.
+DECK = f"""
+arm slider {{
+    link block {{ mass = {MASS} kg;  shape = sphere(radius = 0.1 m); }}
+    joint slide prismatic {{ parent = base;  child = block;  axis = x; }}
+}}
+run swing {{
+    arm = slider;
+    initial {{ q = {FAR} m; }}
+    environment {{ held = spring {{ link = block;  stiffness = 40 N/m; }} }}
+    rates {{ dynamics = 200 Hz;  record = 10 Hz; }}
+    integrator = rk4;
+    duration = 1 s;
+    record = [q];
+    metric far = final {{ of = slide.q; }}
+    metric off = final {{ of = abs(slide.q); }}
+    metric top = max {{ of = slide.qd; }}
+    require far > -0.05 m;
+    require top < 1 m/s;
+}}
+search back of swing {{
+    minimise far;
+    environment.held.stiffness = between(5, 79) N/m;
+    at_most = {AT_MOST};
+}}
+search wild of swing {{
+    minimise far;
+    environment.held.stiffness = logbetween(1, 1e9) N/m;
+    at_most = 64;
+}}
+sweep loads of swing {{ vary links.block.mass = [2, 1, 1.5, 3, 2.5] kg; }}
+tune still of swing {{
+    choose environment.held.stiffness = between(2, 9) N/m;
+    against loads;
+    minimise off;
+    at_most = {TUNED};
+}}
+"""
+
+
+@dataclass(frozen=True)
+class Said:
+    """The answer of a search with one parameter: its value exactly, and rounded."""
+
+    found: Answer
+    position: int
+    exact: str
+    rounded: str
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the deck, its plan, and the archive of a serial run of a search and a tuning."""
+    folder = tmp_path_factory.mktemp("searches")
+    (folder / "d.ic").write_text(DECK)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        plan = ic.compile("d.ic", select=["back", "still"])
+        plan_file.write(plan, "p.json")
+        batch.run(plan, output="undisturbed.h5", threads=1)
+    return folder
+
+
+@pytest.fixture
+def plan(place: Path) -> Plan:
+    return plan_file.read(place / "p.json")
+
+
+@pytest.fixture
+def undisturbed(place: Path) -> bytes:
+    return (place / "undisturbed.h5").read_bytes()
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def answers(path: Path) -> dict[str, Said]:
+    found = {}
+    with ArchiveFile(path) as file:
+        for group in file.groups:
+            each = SearchAnswer.of(group)
+            assert each is not None
+            [(_, exact)], [(_, rounded)] = each.settings(), each.settings(exact=False)
+            found[group.name] = Said(each.found, each.position, exact, rounded)
+    return found
+
+
+def cases_of(archive: Path, number: int = 0) -> int:
+    """Cases of a search, by number, that have a shard."""
+    tasks = Folder(Path(f"{archive}.campaign")).named_tasks(number)
+    return max((task.last for task in tasks), default=0)
+
+
+# What it finds
+
+
+def test_the_least_value_is_where_the_closed_form_has_it(place: Path) -> None:
+    found = answers(place / "undisturbed.h5")["back"].found
+    assert found.value == pytest.approx(-FAR, abs=1e-6)
+    with ArchiveFile(place / "undisturbed.h5") as file:
+        stiffness = file.groups[0].values("environment.held.stiffness")[found.case]
+    assert stiffness == pytest.approx(MASS * math.pi**2, rel=1e-2)
+
+
+def test_every_case_of_it_obeys_the_closed_form(place: Path) -> None:
+    data = batch.open(place / "undisturbed.h5")["back"]
+    stiffness = data["environment.held.stiffness"].values
+    assert data["far"].values == pytest.approx(FAR * np.cos(np.sqrt(stiffness / MASS)), abs=1e-8)
+
+
+def test_a_tuning_is_held_against_the_worst_of_its_plants(place: Path) -> None:
+    """The lightest load and the heaviest are equally far from the middle where sqrt(k) (1 + 1/sqrt(3)) = pi."""
+    answer = answers(place / "undisturbed.h5")["still"].found
+    data = batch.open(place / "undisturbed.h5")["still"]
+    assert answer.confirmed and answer.serves and answer.tried == 5
+    assert sorted(data["links.block.mass"].values[list(answer.cases)].tolist()) == [1.0, 1.5, 2.0, 2.5, 3.0]
+    phase = math.pi / (1.0 + 1.0 / math.sqrt(3.0))
+    assert answer.value == pytest.approx(FAR * abs(math.cos(phase)), rel=1e-2)
+    assert data["environment.held.stiffness"].values[answer.case] == pytest.approx(phase**2, rel=1e-2)
+    assert data["links.block.mass"].values[answer.case] in (1.0, 3.0)
+    assert answer.ends == ()
+    assert answer.rooms[0].text == "far > -0.05 m"
+
+
+def test_a_case_that_fails_hurts_most(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "d.ic").write_text(DECK)
+    assert main(["run", "d.ic", "wild", "--no-picture", "-o", "w.h5"]) == 1
+    said = capsys.readouterr().out
+    answer = answers(here / "w.h5")["wild"]
+    assert answer.found.failed and not answer.found.serves
+    data = batch.open(here / "w.h5")
+    failed = int((data["status"] != 0).sum())
+    assert 0 < failed < data.sizes["case"]
+    where = f"case #{answer.position} with environment.held.stiffness = {answer.rounded}"
+    assert f"hardest: {where} fails\n  {failed} of {data.sizes['case']} cases in " in said
+    assert f"run it again: met run w.h5 --case '#{answer.position}'\n" in said
+
+
+# However it is run
+
+
+@pytest.mark.parametrize(
+    "way",
+    [{"threads": 2}, {"processes": 2}, pytest.param({"dask": "local"}, marks=pytest.mark.slow)],
+    ids=["threads", "processes", "dask"],
+)
+def test_whoever_runs_it_gives_the_same_bytes(here: Path, plan: Plan, undisturbed: bytes, way: dict[str, Any]) -> None:
+    assert batch.run(plan, output="a.h5", **way).path.read_bytes() == undisturbed
+
+
+def test_tasks_of_any_size_give_the_same_bytes(
+    here: Path, plan: Plan, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tasks, "MOST_CASES", 5)
+    assert batch.run(plan, output="a.h5").path.read_bytes() == undisturbed
+
+
+@pytest.mark.parametrize("after", [1, 4, 9])
+def test_what_was_interrupted_goes_on_to_the_same_bytes(
+    here: Path, plan: Plan, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch, after: int
+) -> None:
+    monkeypatch.setattr(performing, "WORTH_SECONDS", 0.0)
+    with pytest.raises(KeyboardInterrupt) as stopped:
+        batch.run(plan, output="a.h5", executor=whole.Watched(after=after))
+    kept = cases_of(here / "a.h5")
+    assert str(stopped.value) == f"{kept:,} cases are kept in a.h5.campaign; the same command goes on"
+    rest = whole.Watched()
+    again = batch.run(plan, output="a.h5", executor=rest)
+    assert again.path.read_bytes() == undisturbed and again.notes[0] == f"goes on: {kept:,} cases are done"
+    assert min(task.first for task in rest.tasks if task.section == 0) == kept, "what is done is not run again"
+    assert whole.beside_it(here / "a.h5") == ["a.h5", "a.h5.run.json"]
+    assert batch.run(plan, output="a.h5").path.read_bytes() == undisturbed, "it is whole, and nothing is run"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", [("--threads", "2"), ("--processes", "2")], ids=lambda way: way[0])
+def test_what_is_killed_at_ten_generations_goes_on_to_the_same_bytes(
+    here: Path, place: Path, undisturbed: bytes, way: tuple[str, str]
+) -> None:
+    words = ["run", str(place / "p.json"), "-o", "a.h5", "--no-picture", *way]
+    draws = random.Random(7)
+    for at in sorted(draws.sample(range(1, AT_MOST - 30), 10)):
+        with whole.started(words, here, {"batch.campaigns.tasks.MOST_CASES": 8}) as process:
+            whole.until(lambda at=at: cases_of(here / "a.h5") >= at, process)
+            process.kill()
+    assert whole.met(words, here).returncode == 1  # the search found what misses a requirement
+    assert (here / "a.h5").read_bytes() == undisturbed
+
+
+def test_a_shard_that_is_damaged_is_made_again(
+    here: Path, plan: Plan, undisturbed: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(performing, "WORTH_SECONDS", 0.0)
+    with pytest.raises(KeyboardInterrupt):
+        batch.run(plan, output="a.h5", executor=whole.Watched(after=5))
+    folder = Folder(here / "a.h5.campaign")
+    (folder.shards / folder.named_tasks(0)[1].name).write_bytes(b"MET shard 1\n")
+    again = batch.run(plan, output="a.h5")
+    assert again.path.read_bytes() == undisturbed
+    assert [note for note in again.notes if "is cut short" in note]
+
+
+def test_another_search_is_no_part_of_it(here: Path, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its first generation is the same; what comes after is not."""
+    monkeypatch.setattr(performing, "WORTH_SECONDS", 0.0)
+    for old, new in (("minimise far", "maximise top"), ("minimise far", "maximise far")):
+        (here / "d.ic").write_text(DECK)
+        with pytest.raises(KeyboardInterrupt):
+            batch.run(ic.compile("d.ic", select=["back"]), output="a.h5", executor=whole.Watched(after=2))
+        (here / "d.ic").write_text(DECK.replace(old, new))
+        with pytest.raises(Problem) as refused:
+            batch.run(ic.compile("d.ic", select=["back"]), output="a.h5")
+        [said] = refused.value.diagnostics
+        assert said.code == "E353" and "cases of another campaign, and is left as it is" in said.message
+        batch.run(ic.compile("d.ic", select=["back"]), output="a.h5", fresh=True)
+        (here / "a.h5").unlink()
+        (here / "a.h5.run.json").unlink()
+
+
+# What is in the archive
+
+
+def test_generations_stand_beside_the_cases(place: Path) -> None:
+    data = batch.open(place / "undisturbed.h5")
+    for name, at_most in (("back", AT_MOST), ("still", TUNED)):
+        found = data[name]
+        generation = found["generation"].values
+        assert "generation" in found.coords and (np.diff(generation) >= 0).all()
+        assert set(generation) == set(range(generation[-1] + 1))
+        assert found.sizes["case"] <= at_most
+    assert {name: value for name, value in data["still"].attrs.items() if name.startswith("search")} == {
+        "search": "tune", "search_of": "swing", "search_goal": "minimise off", "search_at_most": TUNED,
+        "search_seed": 0, "search_margin": 0.05, "search_against": "loads", "search_plants": 5, "search_drawn_with": 0,
+    }  # fmt: skip
+    chosen = data["back"]["environment.held.stiffness"].attrs
+    assert (chosen["low"], chosen["high"], chosen["steps"]) == (5.0, 79.0, "equal")
+
+
+def test_the_history_of_the_answer_alone_is_kept(place: Path) -> None:
+    with ArchiveFile(place / "undisturbed.h5") as file:
+        for group in file.groups:
+            answer = SearchAnswer.of(group)
+            assert answer is not None
+            assert group.recorded_positions.tolist() == [answer.found.case]
+
+
+@pytest.mark.parametrize(("histories", "kept"), [("all", None), ("none", 0), ("worst:2:top", 2)])
+def test_other_histories_are_kept_where_they_are_asked_for(here: Path, plan: Plan, histories: str, kept: int) -> None:
+    done = batch.run(plan, output="a.h5", experiments=["back"], histories=histories)
+    with ArchiveFile(done.path) as file:
+        [group] = file.groups
+        assert group.recorded == (group.count if kept is None else kept)
+
+
+def test_its_cases_are_run_again_to_the_same_bits(here: Path, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    archive = str(place / "undisturbed.h5")
+    position = answers(place / "undisturbed.h5")["back"].position
+    assert main(["run", archive, "--case", f"#{position}", "--no-picture"]) == 1
+    assert f"the same bits as in {archive}" in capsys.readouterr().out
+    assert main(["run", archive, "--all", "--no-picture", "-o", "again.h5"]) == 1
+    assert f"the same bits as in {archive}" in capsys.readouterr().out
+    assert (here / "again.h5").read_bytes() == (place / "undisturbed.h5").read_bytes()
+    assert main(["diff", archive, "again.h5"]) == 0
+
+
+def test_every_reader_of_archives_reads_it(here: Path, place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    archive = str(place / "undisturbed.h5")
+    for words in (
+        "show {} --no-plots", "show {} --where 'far < 0 m' --no-plots", "show {} --evidence --run still",
+        "best {} --run still", "report {} -o r.html", "plot {} --run back -o p.png",
+        "export {} --run back --to csv -o e.csv", "show {} --format json", "status {}",
+    ):  # fmt: skip
+        assert main(shlex.split(words.format(shlex.quote(archive)))) in (0, 1), words
+        assert "Traceback" not in capsys.readouterr().err
+
+
+def test_some_of_its_cases_are_no_search(here: Path, place: Path) -> None:
+    (here / "d.ic").write_text(DECK)
+    done = batch.run(ic.compile("d.ic", select=["back"]), output="a.h5", cases=[0, 3])
+    with ArchiveFile(done.path) as file:
+        assert file.groups[0].count == 2 and SearchAnswer.of(file.groups[0]) is None
+
+
+# What is said
+
+
+def test_it_is_said_beforehand_and_afterwards(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "d.ic").write_text(DECK)
+    assert main(["run", "d.ic", "still", "--no-picture"]) == 0, "its answer meets all, whatever was tried on the way"
+    said = capsys.readouterr().out
+    assert said.startswith(
+        f"still: at most {TUNED} cases, 1 s in 200 steps of 5 ms, rk4\n"
+        "  minimise off by environment.held.stiffness, against 5 cases of loads\n"
+        "  histories of its answer: q\n"
+        "writing d.still.h5, at most about "
+    )
+    answer = answers(here / "d.still.h5")["still"]
+    assert f"\nuse environment.held.stiffness = {answer.rounded}\n" in said
+    assert " in the worst of 5 cases of loads; " in said
+    assert f"run it: met run d.ic loads --set 'environment.held.stiffness={answer.exact}' -o chosen.h5\n" in said
+    assert "demonstrated" not in said
+    assert main(["show", "d.still.h5", "--no-plots"]) == 0
+    assert f"\nuse environment.held.stiffness = {answer.rounded}" in capsys.readouterr().out
+    assert main(["run", "d.ic", "still", "--format", "json"]) == 0
+    told = json.loads(capsys.readouterr().out)["experiments"][0]["answer"]
+    assert told["serves"] and told["tried"] == told["against"] == 5 and told["case"] == answer.position
+
+
+def test_progress_tells_the_best_so_far(here: Path, plan: Plan) -> None:
+    class Heard:
+        def __init__(self) -> None:
+            self.more: list[str] = []
+
+        def begin(self, name: str, cases: int, done: int, failed: int, workers: str) -> None: ...
+
+        def advance(self, done: int, failed: int, more: str = "") -> None:
+            self.more.append(more)
+
+        def end(self) -> None: ...
+
+    heard = Heard()
+    batch.run(plan, output="a.h5", experiments=["back"], progress=heard)
+    told = list(dict.fromkeys(filter(None, heard.more)))
+    assert told[-1] == "worst far -0.1 m, misses far > -0.05 m"
+    values = [float(each.split()[2]) for each in told]
+    assert values == sorted(values, reverse=True)
+
+
+# What is refused
+
+
+def test_jobs_with_fixed_shares_are_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "d.ic").write_text(DECK)
+    assert main(["submit", "d.ic", "back", "--slurm"]) == 2
+    assert capsys.readouterr().err == (
+        "error[E358]: jobs have shares that are fixed beforehand, and a search asks for cases as it goes\n"
+        " = help: `met run --dask` runs it on workers, which may be jobs of SLURM: docs/cluster.md\n\n1 error\n"
+    )
+
+
+def test_a_search_is_not_driven_on_beds(plan: Plan) -> None:
+    with pytest.raises(Problem) as refused:
+        prepare(plan, output="a.h5", wires=Wires(0))
+    assert [each.code for each in refused.value.diagnostics] == ["E313"]
+
+
+def test_a_plan_whose_cases_are_not_those_that_it_begins_with_is_refused(here: Path, plan: Plan) -> None:
+    experiment = plan.experiments[0]
+    [coordinate] = experiment.cases.coordinates
+    values = np.asarray(coordinate.values).copy()
+    values[2] += 1.0
+    cases = replace(experiment.cases, coordinates=(replace(coordinate, values=values),))
+    with pytest.raises(Problem) as refused:
+        batch.run(replace(plan, experiments=(replace(experiment, cases=cases),)), output="a.h5")
+    [said] = refused.value.diagnostics
+    assert said.code == "E302"
+    assert said.message == "the cases of `back` in this plan are not those that it begins with"
+
+
+def test_results_that_cannot_be_read_back_stop_it(here: Path, plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(searching, "_held", lambda driver, section, first, last, tell: ([], [(first, last)]))
+    with pytest.raises(Problem) as stopped:
+        batch.run(plan, output="a.h5", experiments=["back"])
+    assert "what is computed of back cannot be read back from" in stopped.value.diagnostics[0].message
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("search", "guess"), ("search_goal", "minimise nothing"), ("search_goal", "far"), ("search_at_most", 0),
+        ("search_at_most", "many"), ("search_plants", -1), ("search_margin", 1.5), ("search_seed", -1),
+    ],
+)  # fmt: skip
+def test_an_archive_that_says_of_a_search_what_none_is_is_no_archive(
+    here: Path, undisturbed: bytes, name: str, value: object
+) -> None:
+    import h5py
+
+    (here / "a.h5").write_bytes(undisturbed)
+    with h5py.File(here / "a.h5", "r+") as file:
+        file["still"].attrs[name] = value
+    with pytest.raises(Problem) as refused, ArchiveFile(here / "a.h5") as file:
+        [SearchAnswer.of(group) for group in file.groups]
+    assert [each.code for each in refused.value.diagnostics] == ["E302"]
