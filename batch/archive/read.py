@@ -54,7 +54,7 @@ class ArchiveGroup:
             self.step_errors = step_errors.read(self)
             self.summary = summarised.read(node, self)
         self.summed: summarised.CaseSummary | None = None
-        """What all cases came to, once somebody has gone through their rows for it (batch/queries/streamed.py)."""
+        """The summary of all cases, once somebody has gone through their rows for it (batch/queries/streamed.py)."""
         self.name: str = self.attributes["experiment"]
         self.sweep: str = str(self.attributes.get("sweep", ""))
         self.allowed: tuple[str, ...] = tuple(filter(None, str(self.attributes.get("allowed", "")).split("\n")))

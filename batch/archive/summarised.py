@@ -79,7 +79,8 @@ COUNTS = ("finite", "infinite", "unknown", "cause_cases", "judged_cases", "judge
 
 @frozen
 class CaseSummary:
-    """What came of all cases of an experiment. values: by `VARIABLES`, arrays; the rest as the attributes."""
+    """Counts, moments and extremes of all cases of an experiment. values: arrays by `VARIABLES`; the rest as the
+    attributes."""
 
     cases: int
     limited: int

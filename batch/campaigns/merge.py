@@ -188,8 +188,8 @@ def runs_in_blocks(folder: Folder, section: CampaignSection, threads: int | None
 
 
 def ahead(pool: ThreadPoolExecutor | None, calls: Iterable[Callable[[], T]], most: int) -> Iterator[T]:
-    """What these calls return, in order, made by a pool of threads, so many at most beyond the one that is waited for;
-    without a pool, each when it is asked for."""
+    """The answers of these calls, in order, made by a pool of threads, so many at most beyond the one that is waited
+    for; without a pool, each when it is asked for."""
     waiting: deque[Future[T]] = deque()
     try:
         for call in calls:

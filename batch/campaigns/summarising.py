@@ -1,5 +1,5 @@
-"""What came of very many cases, in place of a row of each (`met run --rows`): their summary, and which few cases have
-their rows kept."""
+"""The summary of very many cases in place of a row of each (`met run --rows`), and which few cases have their rows
+kept."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class Summarised:
 
 
 def point_sizes(experiment: Experiment, rows: CaseValues) -> list[int]:
-    """How many of some cases each design point has, in the order in which these first appear. Raises Problem E351 where
-    there are too many."""
+    """The number of cases of each design point among some rows, in the order in which these first appear. Raises
+    Problem E351 where there are too many."""
     chosen = _chosen(experiment)
     if not chosen:
         return [len(rows)]

@@ -1,5 +1,5 @@
-"""What all cases of a run or sweep came to, where that is not read from a row of each that is held in memory: as the
-archive keeps it, or from its rows, some at a time, where there are very many."""
+"""The summary of all cases of a run or sweep: as its archive keeps it, or made from its rows, some at a time, where
+these are too many to be held in memory."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def is_streamed(group: ArchiveGroup) -> bool:
 
 
 def summed_up(group: ArchiveGroup) -> CaseSummary | None:
-    """What all cases came to; None where each has a row, and they are few enough to be held, or are not to be told by
+    """The summary of all cases; None where each has a row, and they are few enough to be held, or are not to be told by
     counts alone: those that stop by their results, and those of very many design points."""
     if group.summary is None and group.summed is None and is_streamed(group):
         group.summed = _of_rows(group)
@@ -63,7 +63,7 @@ def _repeats(group: ArchiveGroup) -> bool:
 
 
 def _sizes(group: ArchiveGroup, chosen: list[Stored]) -> list[int]:
-    """How many cases each design point has."""
+    """The number of cases of each design point."""
     if not chosen:
         return [group.count]
     points, sizes = PointNumbers(), np.zeros(MOST_POINTS, np.int64)

@@ -152,7 +152,7 @@ class MetricTally:
 
 
 class CaseTallies:
-    """What all cases come to. metrics: by name; sizes: how many cases each design point has."""
+    """Counts, moments and extremes of all cases. metrics: by name; sizes: how many cases each design point has."""
 
     def __init__(
         self, metrics: Sequence[str], requirements: Sequence[RequiredOfCases], sizes: Sequence[int] | np.ndarray

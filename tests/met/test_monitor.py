@@ -66,7 +66,7 @@ sweep traces of trace {{ from "traces.csv"; }}
 
 @pytest.fixture(scope="module")
 def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[engine.Run, list[dict[str, float]]]:
-    """What MET has for the traces, and what rtamt has."""
+    """The answers of MET for the traces, and those of rtamt."""
     folder = tmp_path_factory.mktemp("traces")
     rows, answers = oracle.read()
     units = {"amplitude": "rad", "frequency": "Hz", "phase": "rad", "offset": "rad"}

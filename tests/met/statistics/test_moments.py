@@ -14,7 +14,7 @@ SIZES = (1, 7, 100, 1000)
 
 
 def values_of(seed: int, count: int = 1000) -> np.ndarray:
-    """Of very unlike sizes, so that sums of doubles lose digits."""
+    """Values of very unlike sizes, so that sums of doubles lose digits."""
     source = np.random.default_rng(seed)
     return source.normal(size=count) * 10.0 ** source.integers(-12, 12, count)
 
