@@ -15,12 +15,13 @@ from batch.queries.best import ENDS, Designs, Goal, Stretch
 from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import number_text, pretty_unit
 from batch.queries.summary import finite
+from ic.driver.written_value import WrittenValue
 from ic.meaning.expressions.command_line import ON_COMMAND_LINE
 from ic.printing.columns import columns, count
-from met.diagnostic import Problem
+from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.outputs import quoted
-from met.unit_parser import parse_unit
+from met.unit_parser import written
 from met.units import text as unit_text
 
 MACRO = "macro "
@@ -246,22 +247,43 @@ class BestAnswer:
     def settings(self, design: int, *, exact: bool = True) -> list[tuple[str, str]]:
         """The choices that make a design: each path, and its value as a deck would write it; exact, or to four
         digits."""
+        out = []
+        for column, si, unit in self._chosen(design):
+            if column.role == "choice":
+                out.append((column.label, column.words[int(si)]))
+            elif exact:
+                out.append((column.label, written(si, unit)))
+            else:
+                shown = number_text(column.values[int(self.designs.first[design])])
+                out.append((column.label, f"{shown} {unit}".removesuffix(" 1")))
+        return out
+
+    def values(self, design: int) -> list[WrittenValue]:
+        """The same for a deck's text. Raises Problem E397 for a choice among words."""
+        out = []
+        for column, si, unit in self._chosen(design):
+            if column.role == "choice":
+                path, word = column.label.removeprefix(MACRO), column.words[int(si)]
+                what = f"`#define {path} {word}`" if column.label.startswith(MACRO) else f"`{path} = {word};`"
+                message = f"`{path}` cannot be written into the deck: it is a choice among words, not a number"
+                raise Problem(error("E397", message, help=f"write it by hand: {what}"))
+            out.append(WrittenValue(column.label, si, unit))
+        return out
+
+    def _chosen(self, design: int) -> Iterator[tuple[CaseColumn, float, str]]:
+        """The parameters and choices that make a design, with SI value (of a choice its word's place), and unit."""
         pool, place = self.designs.pool, int(self.designs.first[design])
         variables = {each.path: each for each in pool.variables("coordinate")}
-        out = []
         for axis in self.designs.axes:
             for column in axis.columns:
                 if np.isnan(column.values[place]):
                     continue  # of a sum of sweeps, of which another part chooses it
                 if column.role == "choice":
-                    out.append((column.label, column.words[int(column.values[place])]))
-                else:
-                    variable = variables[column.label]
-                    si = float(pool.gathered(variable.name)[place])
-                    unit = str(variable.attributes.get("deck_unit", variable.unit))
-                    rounded = f"{number_text(column.values[place])} {unit}".removesuffix(" 1")
-                    out.append((column.label, written(si, unit) if exact else rounded))
-        return out
+                    yield column, float(column.values[place]), ""
+                    continue
+                variable = variables[column.label]
+                unit = str(variable.attributes.get("deck_unit", variable.unit))
+                yield column, float(pool.gathered(variable.name)[place]), unit
 
     def command(self, design: int, *, seed: int | None = None) -> str:
         """The command that runs a design's cases again, with other draws where there is a seed."""
@@ -313,26 +335,6 @@ class BestAnswer:
                 for goal in self.shown
             },
         }
-
-
-def written(si: float, unit: str) -> str:
-    """An SI value in a unit, in as few digits as give the same value again: `0.33 V*s/rad`; of a unit that cannot be
-    read, as no MET writes, the number alone."""
-    try:
-        measure = parse_unit(unit)
-    except ValueError:
-        return f"{si!r}"
-    rough = si / measure.to_si(1.0)
-    texts = (_plain(float(f"{rough:.{digits}g}")) for digits in range(1, 18))
-    text = next((each for each in texts if measure.to_si(float(each), each.lstrip("-")) == si), f"{rough!r}")
-    return text if unit in ("", "1") else f"{text} {unit}"
-
-
-def _plain(value: float) -> str:
-    """A number's own digits, without an exponent where it reads well without."""
-    if value and not 1e-4 <= abs(value) < 1e7:
-        return repr(value)
-    return np.format_float_positional(value, trim="-")
 
 
 def _least(goal: Goal) -> str:
