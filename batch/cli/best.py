@@ -89,6 +89,8 @@ def best(
             say("\n".join(map(line, answer.lines(width))))
             if deck is not None:
                 say("\n".join(["", *map(line, deck.diff())]))
+            elif diff or write:
+                say("\nno design is good, so none is written into the deck")
         if deck is not None and write:
             deck.write()
             if form != "json":

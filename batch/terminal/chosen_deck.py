@@ -79,7 +79,8 @@ def chosen_deck(file: ArchiveFile, answer: BestAnswer, output: str | None) -> Ch
         newline = _newline_as_archived(file.deck, before)
     elif target.exists():
         raise _other(f"`{target}` is there already", "name a file that is not: it would be lost")
-    remark = f"of {answer.designs.count:,} designs: {answer.name}, {file.path.name}"
+    name = "".join(each if each.isprintable() and each != "\\" else "?" for each in file.path.name)
+    remark = f"of {answer.designs.count:,} designs: {answer.name}, {name}"
     made = with_values(
         before,
         values,

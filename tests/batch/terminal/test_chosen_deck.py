@@ -189,6 +189,38 @@ def test_what_was_set_for_the_archive_must_be_in_the_deck_first(
     )
 
 
+def test_where_no_design_is_good_none_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    deck = DECK.replace("settle < 2 s", "settle < 0.1 s").replace("0.034, 5", "0.034, 2").replace("0.26, 5", "0.26, 2")
+    Path("arm.ic").write_text(deck, encoding="utf-8")
+    main(["run", "arm.ic", "grid", "-q", "--histories", "none", "--no-picture"])
+    capsys.readouterr()
+    status, out, _ = said(capsys, "arm.grid.h5", "--write")
+    assert status == 1 and out.endswith("\n\nno design is good, so none is written into the deck\n")
+    assert Path("arm.ic").read_text(encoding="utf-8") == deck
+
+
+def test_a_table_that_the_sweep_takes_values_from_is_part_of_its_deck(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    deck = DECK + 'sweep listed of arm { from "gains.csv"; }\n'
+    Path("arm.ic").write_text(deck, encoding="utf-8")
+    Path("gains.csv").write_text("slewing.kp [V*s/rad],slewing.ki [V/rad]\n0.02,0.1\n0.03,0.2\n", encoding="utf-8")
+    main(["run", "arm.ic", "listed", "-q", "--histories", "none", "--no-picture"])
+    capsys.readouterr()
+    assert said(capsys, "arm.listed.h5", "--by", "settle", "--diff")[0] == 0
+    Path("gains.csv").write_text("slewing.kp [V*s/rad],slewing.ki [V/rad]\n0.02,0.1\n0.03,0.3\n", encoding="utf-8")
+    assert said(capsys, "arm.listed.h5", "--by", "settle", "--diff") == (
+        2,
+        "",
+        "error[E398]: gains.csv is not what it was when the archive was made\n"
+        " = help: run the sweep again\n\n1 error\n",
+    )
+
+
 def test_a_file_without_write_is_no_command(archive: str, capsys: pytest.CaptureFixture[str]) -> None:
     status, _, err = said(capsys, archive, "-o", "x.ic")
     assert status == 2 and "-o is the file for --write" in err
