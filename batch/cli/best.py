@@ -21,6 +21,9 @@ from met.messages.visible import line, say
     "Without it: farthest from the border of what meets all requirements.",
 )
 @click.option("--front", multiple=True, metavar="METRIC", help="Also the trade-off of two such: name each.")
+@click.option("--diff", is_flag=True, help="Show what --write would change in the deck's text.")
+@click.option("--write", is_flag=True, help="Write the chosen values into the deck's text, and show what changed.")
+@click.option("-o", "output", metavar="FILE", help="With these: into a copy of the deck, a new file.")
 @format_option
 def best(
     archive: str,
@@ -29,6 +32,9 @@ def best(
     choose: tuple[str, ...],
     by: tuple[str, ...],
     front: tuple[str, ...],
+    diff: bool,
+    write: bool,
+    output: str | None,
     form: str,
 ) -> int:
     """Choose among what a sweep chooses (`vary`, `zip`, `from`), held against what the arm must bear: a design that
@@ -37,6 +43,9 @@ def best(
     Of a search or a tuning it says the answer.
 
     It must bear what is drawn, what is of links, payloads, the environment or the start, and what --over names.
+
+    --write puts the chosen values into the deck that was swept, where they stand or as entries of their definitions,
+    once it is proved that the run means the same as with --set.
 
     Exit status: 0 a design meets all; 1 none does; 2 the input is wrong.
     """
@@ -49,6 +58,7 @@ def best(
     from batch.queries.pool import pools
     from batch.queries.summary import finite
     from batch.terminal.best import BestAnswer, context
+    from batch.terminal.chosen_deck import chosen_deck
     from batch.terminal.search import search_result
     from met.diagnostic import Problem, error
     from met.outputs import quoted
@@ -83,10 +93,24 @@ def best(
         if len(front) == 1:
             raise click.UsageError("--front is of two: name each, `--front settle --front over`")
         goals, traded = ([designs.goal(text) for text in texts] for texts in (by, front))
+        if output is not None and not (diff or write):
+            raise click.UsageError("-o is the file for --write")
         answer = BestAnswer(designs, goals, traded, **context(file, pool))
+        deck = chosen_deck(file, answer, output) if (diff or write) and answer.best is not None else None
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
         if form == "json":
-            say(json.dumps(answer.as_data(), indent=1))
+            data = answer.as_data()
+            if deck is not None:
+                data["deck"] = {"file": str(deck.target), "diff": list(deck.diff()), "written": write}
+            say(json.dumps(data, indent=1))
         else:
             say("\n".join(map(line, answer.lines(width))))
+            if deck is not None:
+                say("\n".join(["", *map(line, deck.diff())]))
+            elif diff or write:
+                say("\nno design is good, so none is written into the deck")
+        if deck is not None and write:
+            deck.write()
+            if form != "json":
+                say(line(f"{deck.target}: written; it {deck.changes()}"))
         return NO if answer.best is None else YES

@@ -22,7 +22,7 @@ class LinearAnswer:
         return data.to_xarray(self.found)
 
     def state_space(self) -> Any:
-        """A `control.StateSpace` in discrete time. Raises Problem E398 where python-control is not there."""
+        """A `control.StateSpace` in discrete time. Raises Problem E451 where python-control is not there."""
         return data.state_space(self.found)
 
     def write(self, output: Path | str) -> None:
@@ -33,7 +33,7 @@ class LinearAnswer:
         files.write(self.found, Path(output))
 
     def draw(self, output: Path | str) -> None:
-        """Draws opened loops (Bode, Nichols) and steps: .png, .svg or .pdf. Raises Problem E397, E305, E326."""
+        """Draws opened loops (Bode, Nichols) and steps: .png, .svg or .pdf. Raises Problem E450, E305, E326."""
         from batch.linearized import picture
         from batch.plotting import output as places
 

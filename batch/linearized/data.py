@@ -52,12 +52,12 @@ def to_xarray(found: Linearized) -> Any:
 
 
 def state_space(found: Linearized) -> Any:
-    """A `control.StateSpace` in discrete time, with names. Raises Problem E398 where python-control is not there."""
+    """A `control.StateSpace` in discrete time, with names. Raises Problem E451 where python-control is not there."""
     try:
         import control
     except ImportError as reason:
         helps = "`pip install control`, or what MET's extra `control` names"
-        raise Problem(error("E398", "a `control.StateSpace` needs the package python-control", help=helps)) from reason
+        raise Problem(error("E451", "a `control.StateSpace` needs the package python-control", help=helps)) from reason
     return control.ss(
         found.A, found.B, found.C, found.D, found.seconds,
         states=[_word(name) for name in found.states],

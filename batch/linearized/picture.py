@@ -25,7 +25,7 @@ STEPS = 2000
 
 def draw(found: Linearized, output: Path) -> None:
     """Draws what there is: of each opened loop its Bode and Nichols curves, with margins marked; of inputs and outputs
-    the answers to steps. Raises Problem E397 where there is neither, E305, E326."""
+    the answers to steps. Raises Problem E450 where there is neither, E305, E326."""
     import matplotlib
 
     loops = [loop for loop in found.loops if loop.loop is not None and loop.returns]
@@ -34,7 +34,7 @@ def draw(found: Linearized, output: Path) -> None:
         helps = ("`--open SIGNAL` opens a loop", "`--input SIGNAL --output SIGNAL` asks for a step")
         raise Problem(
             error(
-                "E397",
+                "E450",
                 "there is nothing to draw: no loop of one rate that closes, and no input with an output",
                 help=helps,
             )

@@ -13,12 +13,12 @@ from batch.archive.read import ArchiveGroup
 from batch.archive.searched import search_of
 from batch.queries.requirements import group_requirements
 from batch.queries.signals import number_text, pretty_unit
-from batch.queries.written import written
 from met.plan import Experiment
 from met.plan.outputs import metric_units
 from met.plan.searches import Search
 from met.run import DONE
 from met.seeking.answer import Answer, answer
+from met.unit_parser import written
 
 NEAREST = 1
 """Requirements that are named of those that are nearest to their limits."""

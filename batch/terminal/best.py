@@ -15,12 +15,13 @@ from batch.queries.best import ENDS, Designs, Goal, Stretch
 from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import number_text, pretty_unit
 from batch.queries.summary import finite
-from batch.queries.written import written
+from ic.driver.written_value import WrittenValue
 from ic.meaning.expressions.command_line import ON_COMMAND_LINE
 from ic.printing.columns import columns, count
-from met.diagnostic import Problem
+from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.outputs import quoted
+from met.unit_parser import written
 from met.units import text as unit_text
 
 MACRO = "macro "
@@ -246,22 +247,43 @@ class BestAnswer:
     def settings(self, design: int, *, exact: bool = True) -> list[tuple[str, str]]:
         """The choices that make a design: each path, and its value as a deck would write it; exact, or to four
         digits."""
+        out = []
+        for column, si, unit in self._chosen(design):
+            if column.role == "choice":
+                out.append((column.label, column.words[int(si)]))
+            elif exact:
+                out.append((column.label, written(si, unit)))
+            else:
+                shown = number_text(column.values[int(self.designs.first[design])])
+                out.append((column.label, f"{shown} {unit}".removesuffix(" 1")))
+        return out
+
+    def values(self, design: int) -> list[WrittenValue]:
+        """The same for a deck's text. Raises Problem E397 for a choice among words."""
+        out = []
+        for column, si, unit in self._chosen(design):
+            if column.role == "choice":
+                path, word = column.label.removeprefix(MACRO), column.words[int(si)]
+                what = f"`#define {path} {word}`" if column.label.startswith(MACRO) else f"`{path} = {word};`"
+                message = f"`{path}` cannot be written into the deck: it is a choice among words, not a number"
+                raise Problem(error("E397", message, help=f"write it by hand: {what}"))
+            out.append(WrittenValue(column.label, si, unit))
+        return out
+
+    def _chosen(self, design: int) -> Iterator[tuple[CaseColumn, float, str]]:
+        """The parameters and choices that make a design, with SI value (of a choice its word's place), and unit."""
         pool, place = self.designs.pool, int(self.designs.first[design])
         variables = {each.path: each for each in pool.variables("coordinate")}
-        out = []
         for axis in self.designs.axes:
             for column in axis.columns:
                 if np.isnan(column.values[place]):
                     continue  # of a sum of sweeps, of which another part chooses it
                 if column.role == "choice":
-                    out.append((column.label, column.words[int(column.values[place])]))
-                else:
-                    variable = variables[column.label]
-                    si = float(pool.gathered(variable.name)[place])
-                    unit = str(variable.attributes.get("deck_unit", variable.unit))
-                    rounded = f"{number_text(column.values[place])} {unit}".removesuffix(" 1")
-                    out.append((column.label, written(si, unit) if exact else rounded))
-        return out
+                    yield column, float(column.values[place]), ""
+                    continue
+                variable = variables[column.label]
+                unit = str(variable.attributes.get("deck_unit", variable.unit))
+                yield column, float(pool.gathered(variable.name)[place]), unit
 
     def command(self, design: int, *, seed: int | None = None) -> str:
         """The command that runs a design's cases again, with other draws where there is a seed."""

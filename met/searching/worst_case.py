@@ -26,8 +26,9 @@ BOXES, BOXES_OF_ONE = 0.5, 1.25
 """Share of a generation for boxes: at most, and over the number of dimensions. What covers a square does not begin to
 cover a cube of 16 dimensions."""
 
-POLISHED = 0.45
-"""Share of the rest for polishing."""
+POLISHED = 0.2
+"""Share of the rest for polishing. With 0.45 functions of several basins ended in the lesser ones more often: of 240
+searches in 5, 10 and 16 dimensions 219 passed 100,000 random points, with 0.2 it was 233."""
 
 POLISHING_STEP, POLISHING_FINEST = 0.1, 1e-3
 """First and last standard deviation of polishing, in edges of the cube."""

@@ -121,7 +121,7 @@ def test_without_python_control_that_is_said(answer: LinearAnswer, monkeypatch: 
     with pytest.raises(Problem) as refused:
         answer.state_space()
     (told,) = refused.value.diagnostics
-    assert told.code == "E398" and told.message == "a `control.StateSpace` needs the package python-control"
+    assert told.code == "E451" and told.message == "a `control.StateSpace` needs the package python-control"
     assert told.help == ("`pip install control`, or what MET's extra `control` names",)
 
 

@@ -16,10 +16,9 @@ import batch
 from batch.archive.read import ArchiveFile
 from batch.queries.best import Designs
 from batch.queries.pool import CaseColumn, Pool, pools
-from batch.terminal.best import written
 from met.cli import main
 from met.diagnostic import Problem
-from met.unit_parser import parse_unit
+from met.unit_parser import parse_unit, written
 
 DECK = """
 #include <two_link.ic>

@@ -41,12 +41,12 @@ def test_the_same_values_told_make_it_ask_for_the_same_points(make):
     again = asked(make(5, 7, 800), landscapes.plateau)
     other = asked(make(5, 8, 800), landscapes.plateau)
     assert [x.tobytes() for x in once] == [x.tobytes() for x in again]
-    assert once[-1].tobytes() != other[-1].tobytes()
+    assert np.concatenate(once).tobytes() != np.concatenate(other).tobytes()
 
 
 @pytest.mark.parametrize(
     ("make", "digest"),
-    [(searching.hardest, "6a52018c16cac00c"), (searching.tuner, "21d2ab637e4f09bf")],
+    [(searching.hardest, "52abed6c97b59f22"), (searching.tuner, "21d2ab637e4f09bf")],
 )
 def test_its_points_are_the_same_on_every_machine(make, digest):
     """The values told are exact too: differences, squares and sums in order, of dyadic numbers."""

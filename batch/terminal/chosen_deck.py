@@ -1,0 +1,127 @@
+"""`met best --write`: the design that was chosen, written into the text of the deck that was swept."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from pathlib import Path
+
+from batch.archive.read import ArchiveFile
+from batch.terminal.best import BestAnswer
+from ic.driver.write_values import with_values
+from ic.formatting.files import write
+from ic.text.files import Files, decode, file_at
+from ic.text.limits import MOST_BYTES
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.host.files import read_regular, whole_file
+from met.outputs import quoted
+
+
+@frozen
+class ChosenDeck:
+    """A deck with the chosen values in it, not yet written.
+
+    target   the file it is for;  there: whether that is the deck itself, which is replaced
+    before, after  its text without them, and with them
+    run      that has them;  others: runs that change with it
+    newline  the ends of its lines
+    """
+
+    target: Path
+    there: bool
+    before: str
+    after: str
+    run: str
+    others: tuple[str, ...]
+    newline: str = "\n"
+
+    def diff(self) -> Iterator[str]:
+        """The lines that change, as `diff -u` prints them."""
+        old, new = self.before.splitlines(), self.after.splitlines()
+        return difflib.unified_diff(old, new, str(self.target), f"{self.target} (chosen)", lineterm="")
+
+    def changes(self) -> str:
+        """The runs that change, in words."""
+        others = f", and {', '.join(self.others)} with it" if self.others else ""
+        return f"changes {self.run}{others}"
+
+    def write(self) -> None:
+        """Raises Problem E338 where the system refuses; the file is then as it was."""
+        text = self.after.replace("\n", self.newline)
+        if self.there:
+            write(str(self.target), text)
+            return
+        try:
+            with whole_file(self.target) as file:
+                file.write(text.encode())
+        except OSError as reason:
+            raise Problem(error("E338", f"cannot write `{self.target}`: {reason.strerror}")) from None
+
+
+def chosen_deck(file: ArchiveFile, answer: BestAnswer, output: str | None) -> ChosenDeck:
+    """The deck of an archive with its best design in it; output: a copy for that file.
+
+    Raises Problem E397 where a value cannot be written, E398 where the deck is not the archive's, or is not to be
+    written to.
+    """
+    assert answer.best is not None
+    values, sources = answer.values(answer.best), file.sources()
+    if file.deck not in sources:
+        raise _other("the archive does not hold the text of its deck", "run the sweep again")
+    before = sources[file.deck]
+    settings = file.plan(as_written=True).settings
+    if settings:
+        message = f"the archive was made with `--set {settings[0]}`, which is not in its deck"
+        raise _other(message, "write that into the deck, and run the sweep again")
+    target, newline = Path(output) if output is not None else Path(file.deck), "\n"
+    if output is None:
+        newline = _newline_as_archived(file.deck, before)
+    elif target.exists():
+        raise _other(f"`{target}` is there already", "name a file that is not: it would be lost")
+    name = "".join(each if each.isprintable() and each != "\\" else "?" for each in file.path.name)
+    remark = f"of {answer.designs.count:,} designs: {answer.name}, {name}"
+    made = with_values(
+        before,
+        values,
+        name=file.deck.strip("<>"),
+        folder=target.parent,
+        experiment=answer.name,
+        defines=answer.defines,
+        remark=remark,
+    )
+    known = set(made.sources.values())
+    changed = [name for name, text in sources.items() if text not in known and not _is_there(name, text)]
+    if changed:
+        raise _other(f"{changed[0]} is not what it was when the archive was made", "run the sweep again")
+    return ChosenDeck(target, output is None, before, made.text, made.run, made.others, newline)
+
+
+def _is_there(name: str, text: str) -> bool:
+    """True if a file that the sweep alone is made of, such as a table, is as it was."""
+    try:
+        return decode(read_regular(name, len(text.encode()) * 2), name, "file")[0] == text
+    except OSError:
+        return False
+
+
+def _newline_as_archived(deck: str, archived: str) -> str:
+    """The ends of the lines of a deck's file, which has the text that the archive holds; else Problem E398."""
+    copy = "`-o FILE` writes a copy, of the text that the archive holds"
+    if deck.startswith("<"):
+        raise _other(f"{deck} comes with MET, and is not written to", copy)
+    if not Path(deck).is_file():
+        raise _other(f"there is no `{deck}` here, of which the archive is", f"go to its folder; or {copy}")
+    found = file_at(deck)
+    text = Files().text(found)
+    if text != archived:
+        raise _other(f"`{deck}` is not what it was when the archive was made", f"run the sweep again; or {copy}")
+    data = read_regular(found.path, MOST_BYTES)
+    for newline in ("\n", "\r\n"):
+        if archived.replace("\n", newline).encode() == data:
+            return newline
+    raise _other(f"the lines of `{deck}` do not end alike", f"`met fmt {quoted(deck)}` mends that; then run it again")
+
+
+def _other(message: str, help: str) -> Problem:
+    return Problem(error("E398", message, help=help))

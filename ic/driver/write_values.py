@@ -1,0 +1,278 @@
+"""Values written into a deck's text: where they stand, or as an entry of the definition that is to have them.
+
+An edit is a guess until it is proved: the deck with the values written must mean the same, to the bit, as the deck with
+the values set from outside (`--set`). What cannot be proved is refused.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ic.driver.compile import Compiled, Select, check
+from ic.driver.explain import explanations_of
+from ic.driver.written_value import WrittenValue
+from ic.formatting.formatter import formatted
+from ic.grammar.syntax import Deck, Entry, Group, Let
+from ic.read import read
+from ic.text.lexer import Text, Token, logical_lines
+from met.diagnostic import Place, Problem, error
+from met.frozen import frozen
+from met.plan.keys import structure_key
+from met.unit_parser import parse_unit, written
+
+REMARK = "// chosen "
+"""Beginning of the comment on a line that a value was written to; the next value takes its place."""
+
+LONGEST = 120
+"""Characters of a line with a remark at its end, at most."""
+
+_COMMENTS = ("//", "/*", "*/")
+_LITERAL = re.compile(r"[-+]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*(?P<unit>\S.*)?")
+
+
+@frozen
+class DeckWithValues:
+    """A deck's text with values written into it.
+
+    run      that has them;  others: runs that change with it
+    sources  texts of the files that its runs are made of before, by name
+    """
+
+    text: str
+    run: str
+    others: tuple[str, ...]
+    sources: Mapping[str, str]
+
+
+def with_values(
+    text: str,
+    values: Sequence[WrittenValue],
+    *,
+    name: str,
+    folder: Path,
+    experiment: str,
+    defines: Sequence[str] = (),
+    remark: str = "",
+) -> DeckWithValues:
+    """A deck whose run has these values, as if they had been set from outside.
+
+    name    of the deck's file;  folder: in which what it includes lies
+    experiment  the run, or a sweep of it
+    remark  for a comment on the lines that are changed, behind `// chosen `
+
+    Raises Problem E397 where a value has no place of its own in this text, or the deck would not mean the same.
+    """
+    laid_out = _is_laid_out(name, text)
+    with tempfile.TemporaryDirectory() as place:
+        copy = _Copy(Path(place) / Path(name).name, folder, tuple(defines))
+        copy.write(text)
+        deck = copy.read()
+        run = _run_of(deck, experiment)
+        runs = [each.words[-1].text for each in deck.entries if isinstance(each, Group) and _word(each) == "run"]
+        before = copy.compiled(text, runs)
+        wanted = copy.compiled(text, (run,), [value.setting for value in values])
+        after = text
+        for value in values:
+            after = _written_in(copy, after, value, run, remark)
+        if laid_out:
+            after = formatted(name, after)
+        found = copy.compiled(after, runs)
+        changed = [each for each in runs if each != run and _meaning(before, each) != _meaning(found, each)]
+    if _meaning(wanted, run) != _meaning(found, run):
+        raise _by_hand(values[0], "the deck with it would not mean the same as with `--set`")
+    return DeckWithValues(after, run, tuple(changed), before.sources)
+
+
+class _Copy:
+    """A copy of the deck in a folder of its own, where its text may be changed and compiled."""
+
+    def __init__(self, path: Path, folder: Path, defines: tuple[str, ...]) -> None:
+        self.path, self.folder, self.defines = path, folder, defines
+
+    def write(self, text: str) -> None:
+        self.path.write_text(text, encoding="utf-8", newline="")
+
+    def compiled(self, text: str, select: Select, settings: Sequence[str] = ()) -> Compiled:
+        """The deck of this text. Raises Problem E397 where it has errors."""
+        self.write(text)
+        found = check(self.path, include_dirs=(self.folder,), defines=self.defines, select=select, settings=settings)
+        if found.plan is None:
+            first = next(each for each in found.diagnostics if each.severity == "error")
+            raise Problem(error("E397", f"the deck cannot be compiled: {first.code}, {first.message}"))
+        return found
+
+    def read(self) -> Deck:
+        return read(self.path, (self.folder,), self.defines)
+
+    def is_own(self, place: Place | None) -> bool:
+        """True for a place in the deck's own text that came there through no macro."""
+        return place is not None and Path(place.file) == self.path and not place.expansions
+
+
+def _run_of(deck: Deck, name: str) -> str:
+    """The run that a sweep is of, and that its sweep is of. Raises Problem E397 for a sum of sweeps."""
+    groups = {each.words[-1].text: each for each in deck.entries if isinstance(each, Group) and _word(each) != "arm"}
+    for _ in groups:
+        if name in groups and _word(groups[name]) == "run":
+            return name
+        of = groups[name].of if name in groups else None
+        if of is None:
+            break
+        name = of.text
+    message = f"`{name}` is no sweep of one run, so no run can be given its values"
+    raise Problem(error("E397", message, help="`met best` of one of the sweeps that it is made of has a run"))
+
+
+def _meaning(compiled: Compiled, run: str) -> object:
+    """All that the results of a run follow from."""
+    assert compiled.plan is not None
+    return [
+        (
+            structure_key(each.structure),
+            {path: (quantity.value, quantity.unit) for path, quantity in each.parameters.items()},
+            [(one.text, one.comparison, one.limit, one.share, one.confidence) for one in each.requirements],
+        )
+        for each in compiled.plan.experiments
+        if each.name == run
+    ]
+
+
+def _written_in(copy: _Copy, text: str, value: WrittenValue, run: str, remark: str) -> str:
+    """The text with one value more."""
+    compiled = copy.compiled(text, (run,))
+    places = {each.place for each in explanations_of(compiled, value.path)}
+    if not places:
+        raise _by_hand(value, f"`{run}` has no such parameter")
+    place = places.pop() if len(places) == 1 else None
+    source, deck = Text(str(copy.path), text), copy.read()
+    home, _, rest = value.path.partition(".")
+    owners = [each for each in deck.entries if copy.is_own(each.place) and _may_own(each, home, run)]
+    for owner in owners:
+        first, last = _extent(source, owner)
+        if place is not None and copy.is_own(place) and first <= _offset(source, place) < last:
+            return _replaced(source, place, value, remark)
+    blocks = [each for each in owners if isinstance(each, Group) and _word(each) == "servo"]
+    if blocks and rest.isidentifier():
+        first, last = _extent(source, blocks[0])
+        uses = [each.use for each in place.expansions] if place is not None else []
+        if not any(copy.is_own(use) and first <= _offset(source, use) < last for use in uses):
+            return _added(source, last, rest, value, remark)
+    raise _by_hand(value, _why(copy, place, home))
+
+
+def _may_own(entry: Entry, home: str, run: str) -> bool:
+    """True for an entry of the deck in which a value may be replaced: the definition or `let` that the path begins
+    with, else an arm, or the run itself, but no run that it is like."""
+    if isinstance(entry, Let):
+        return entry.name.text == home
+    if not isinstance(entry, Group):
+        return False
+    name = entry.words[-1].text
+    return name == home if _word(entry) == "servo" else _word(entry) == "arm" or name == run
+
+
+def _word(group: Group) -> str:
+    words = [word.text for word in group.words]
+    return words[1] if words[0] == "default" and len(words) > 1 else words[0]
+
+
+def _why(copy: _Copy, place: Place | None, home: str) -> str:
+    if place is None:
+        return f"it stands in no place of its own, and no `servo {home} {{ ... }}` of this deck can have it"
+    if place.expansions:
+        return f"it comes through the macro {place.expansions[0].macro}"
+    if Path(place.file) != copy.path:
+        return f"it stands in {place.file}, line {place.line}, which other decks may use"
+    return f"it stands at line {place.line}, which is of more than this"
+
+
+def _by_hand(value: WrittenValue, why: str) -> Problem:
+    home, _, rest = value.path.rpartition(".")
+    write = f"`{rest} = {value.text};` in what `{home}` is" if home else f"`{rest} = {value.text}`"
+    helps = [f"write it by hand: {write}", f"or leave the deck as it is, and run it with `--set '{value.setting}'`"]
+    return Problem(error("E397", f"`{value.path}` cannot be written into the deck: {why}", help=helps))
+
+
+# The text
+
+
+def _tokens(source: Text) -> list[Token]:
+    return [token for line in logical_lines(source) for token in line]
+
+
+def _offset(source: Text, place: Place) -> int:
+    starts = [0, *(match.end() for match in re.finditer("\n", source.text))]
+    return starts[place.line - 1] + place.column - 1
+
+
+def _extent(source: Text, entry: Entry) -> tuple[int, int]:
+    """From the first character of an entry to its last one, a brace or a semicolon, not itself."""
+    first, depth = _offset(source, entry.place), 0
+    for token in _tokens(source):
+        if token.offset < first:
+            continue
+        depth += {"{": 1, "}": -1}.get(token.text, 0)
+        if depth == 0 and token.text in ("}", ";"):
+            return first, token.offset
+    return first, first
+
+
+def _replaced(source: Text, place: Place, value: WrittenValue, remark: str) -> str:
+    text, first = source.text, _offset(source, place)
+    last = first + place.length
+    found = _LITERAL.fullmatch(text[first:last])
+    own = (found["unit"] or "") if found else ""
+    return _with_remark(text[:first] + _in_unit(value, own) + text[last:], first, remark)
+
+
+def _in_unit(value: WrittenValue, unit: str) -> str:
+    """The value in the unit in which it was written so far, where that gives the same bits; else in its own."""
+    try:
+        measure, own = parse_unit(unit or "1"), parse_unit(value.unit or "1")
+    except ValueError:
+        return value.text
+    made = written(value.si, unit)
+    number = made.split(" ")[0]
+    same = measure.dimension == own.dimension and measure.to_si(float(number), number.lstrip("-")) == value.si
+    return made if same else value.text
+
+
+def _added(source: Text, brace: int, parameter: str, value: WrittenValue, remark: str) -> str:
+    """The text with an entry before the brace that closes a block."""
+    text, entry = source.text, f"{parameter} = {value.text};"
+    line = text.rfind("\n", 0, brace) + 1
+    if text[line:brace].strip():
+        inside = text[:brace].rstrip()
+        gap = " " if inside.endswith("{") else "  "
+        return _with_remark(f"{inside}{gap}{entry} {text[brace:]}", len(inside) + len(gap), remark)
+    above = text[:line].rstrip("\n").rpartition("\n")[2]
+    indent = above[: len(above) - len(above.lstrip())] if above.strip() and not above.rstrip().endswith("{") else "    "
+    return _with_remark(f"{text[:line]}{indent}{entry}\n{text[line:]}", line, remark)
+
+
+def _with_remark(text: str, at: int, remark: str) -> str:
+    """The text with the remark at the end of the line at an offset, or on a line above it where that is too long; in
+    the place of an earlier one. A line that has another comment keeps it, and so has one that a backslash joins."""
+    first, end = text.rfind("\n", 0, at) + 1, text.find("\n", at)
+    end = len(text) if end < 0 else end
+    line, mark, _ = text[first:end].partition(REMARK)
+    if not remark or line.rstrip().endswith("\\") or (not mark and any(each in line for each in _COMMENTS)):
+        return text
+    line = line.rstrip()
+    whole = f"{line}    {REMARK}{remark}"
+    if len(whole) <= LONGEST:
+        return text[:first] + whole + text[end:]
+    above = text.rfind("\n", 0, max(first - 1, 0)) + 1
+    start = above if text[above:first].lstrip().startswith(REMARK) else first
+    indent = line[: len(line) - len(line.lstrip())]
+    return f"{text[:start]}{indent}{REMARK}{remark}\n{line}{text[end:]}"
+
+
+def _is_laid_out(name: str, text: str) -> bool:
+    try:
+        return formatted(name, text) == text
+    except Problem:
+        return False
