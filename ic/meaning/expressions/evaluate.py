@@ -35,7 +35,7 @@ from ic.meaning.expressions.quantity import (
 from ic.meaning.expressions.ranges import range_of, spaced
 from ic.text.complaints import known_words
 from met import units
-from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error, write
 from met.trace import (
     Real,
     Scalar,
@@ -237,17 +237,18 @@ def _binary(node: Binary, left: Value | ValueList, lookup: Lookup) -> Value:
     return replace(_power(node, left, right), place=place, bare=bare, hertz=hertz)
 
 
-def _made_alike(node: Binary, left: Value, right: Value) -> str:
+def _made_alike(node: Binary, left: Value, right: Value) -> Help:
     """The remedy where a bare number is added to a quantity, or quantities of two dimensions are."""
     of_macro = [each.macro for each in node.place.expansions]
     outside = [each for each in (node.left, node.right) if not place_of(each).expansions]
     if of_macro and (outside or any(place_of(each).expansions != node.place.expansions for each in children(node))):
-        return f"`{node.operator}` comes from macro `{of_macro[0]}`: put brackets around the macro's body"
+        return Help(f"`{node.operator}` comes from macro `{of_macro[0]}`: put brackets around the macro's body")
     other, bare_one, written = (right, left, node.left) if left.bare else (left, right, node.right)
     if not bare_one.bare or isinstance(bare_one.number, Scalar):
-        return "both must be of one dimension"
+        return Help("both must be of one dimension")
     unit = units.text(other.dimension)
-    return f"write `{written.text} {unit}`" if isinstance(written, Number) else f"write `({spell(written)}) {unit}`"
+    old = spell(written)
+    return write(f"{old} {unit}" if isinstance(written, Number) else f"({old}) {unit}", old=old, at=place_of(written))
 
 
 def _power(node: Binary, base: Value, exponent: Value) -> Value:

@@ -13,7 +13,8 @@ from types import FrameType
 
 import ic
 from ic.driver.compile import Compiled, Select
-from met.messages.render import render, to_json
+from met.messages.programs import to_json
+from met.messages.render import render
 
 MOST_SECONDS = 20.0  # of processor time
 MOST_MEMORY = 1 << 30  # bytes, besides what the program itself takes

@@ -30,7 +30,8 @@ from ic.grammar.syntax import (
 )
 from ic.read import read
 from met.diagnostic import Place, Problem
-from met.messages.render import render, to_json
+from met.messages.programs import to_json
+from met.messages.render import render
 from tests.ic.decktext import Desk
 
 TWO_LINK = """\
