@@ -267,6 +267,7 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
     a deck, such as `met doc run` or `joint`; `channels`, what can be recorded; `dh`, Denavit-Hartenberg numbers;
     `shapes`, of links; `units`; `functions`; `designs` and `distributions` of samples; the code of a message, as
     in `met doc D060`; an entry of a block, such as `allow`; and a word of the glossary, such as `shard`.
+    `met doc language --format json` is all of it for programs.
     """
     from ic.language import BLOCKS
     from ic.printing import models as print_models
@@ -288,6 +289,14 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
         if form == "json":
             raise click.UsageError("what a code means is text: it has no --format")
         _print(print_code(words[0]))
+        return
+    if words == ("language",):
+        from ic.printing.description import description, print_overview
+
+        if form == "json":
+            _print_json(description())
+        else:
+            _print(print_overview())
         return
     if len(words) == 1 and words[0] in SUBJECTS:
         text, data = SUBJECTS[words[0]]

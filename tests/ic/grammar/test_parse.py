@@ -517,7 +517,7 @@ def _survives(desk: Desk, text: str | bytes) -> None:
         assert any(d.severity == "error" for d in found)
     told = render(found, sources)
     assert all(c.isprintable() or c == "\n" for c in told)
-    to_json(found)
+    to_json(found, sources)
     # rule 11 says seconds; a deck of this size takes milliseconds
     assert time.process_time() - start < 2
 
