@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from ic.grammar.syntax import Expression, Name
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, RESERVED, evaluate
+from ic.meaning.expressions.lists import COMPONENTS, component
 from ic.meaning.expressions.quantity import Value, ValueList
 from ic.text.complaints import MOST_DIAGNOSTICS, known_words
 from ic.text.lexer import COMMAND_LINE
@@ -52,6 +53,9 @@ class Names:
     def find(self, name: Name) -> Value | ValueList:
         """The value of a name. Raises Problem D065 where there is none, D073 where it needs itself."""
         text = self._reached(name)
+        if self.names_a_component(name):
+            let = name.path[0]
+            return component(name, self.find(Name((let,), let.place)))
         if text in self.varied:
             self.followed[text] = None
             return self.varied[text]
@@ -93,6 +97,16 @@ class Names:
             self._open.pop(text, None)
         self._worth[text] = found
         return found
+
+    def names_a_component(self, name: Name) -> bool:
+        """Return True for `v.x` of a `let`: a servo of that name, or a path that a sweep varies, comes before it."""
+        return (
+            len(name.path) == 2
+            and name.path[1].text in COMPONENTS
+            and name.path[0].text in self.definitions.lets
+            and name.path[0].text not in self.definitions.of_kind("servo")
+            and name.text not in self.varied
+        )
 
     def _reached(self, name: Name) -> str:
         """The path to go by: that of the base that a sweep varies, where a servo definition has the value from it."""

@@ -197,8 +197,10 @@ class ChannelTable:
             measure = parse_unit(settled.unit)
             return Value(settled.value, measure.dimension, name.place, hertz=measure.hertz)
         first = name.path[0].text
-        if first in scope.definitions.of_kind("servo") or (
-            len(name.path) == 1 and name.text not in recordable(self.structure)
+        if (
+            first in scope.definitions.of_kind("servo")
+            or scope.names.names_a_component(name)
+            or (len(name.path) == 1 and name.text not in recordable(self.structure))
         ):
             return scope.names.find(name)
         return self._no_channel(name)

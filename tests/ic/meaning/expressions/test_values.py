@@ -130,7 +130,7 @@ def test_a_name_with_a_dimension_inside_brackets_with_a_unit_is_refused(tmp_path
         ("sin(x = 1)", "D070"),
         ("sin(2 m)", "D061"),
         ("[1, 2] + 1", "D071"),
-        ("-[1, 2]", "D071"),
+        ("abs([1, 2])", "D071"),
         ("1 + [2]", "D071"),
         ("linspace(0, 1, 1)", "D072"),
         ("linspace(0, 1, 2.5)", "D072"),
