@@ -47,6 +47,57 @@ def test_each_number_has_the_bits_of_the_same_arithmetic_on_numbers(tmp_path: Pa
         assert made == [number(tmp_path, f"{k} * ({x} mm) / 7 + -({y} cm) * {k}") for x, y in zip(a, b, strict=True)]
 
 
+Written = tuple[str, str]
+"""An expression as a deck has it, and for numpy."""
+
+
+def random_number(pick: random.Random, depth: int) -> Written:
+    kind = pick.randrange(5) if depth else pick.randrange(2)
+    if kind == 0:
+        plain = repr(round(pick.uniform(0.1, 4), pick.randrange(4)))
+        return plain, plain
+    if kind == 1:
+        name, axis = pick.choice("vw"), pick.randrange(3)
+        return f"{name}.{'xyz'[axis]}", f"{name}[{axis}]"
+    if kind == 2:
+        word = pick.choice(("floor", "ceil", "sign", "abs"))
+        deck, numpy = random_number(pick, depth - 1)
+        return f"{word}({deck})", f"np.{word}({numpy})"
+    (a, x), (b, y) = random_number(pick, depth - 1), random_number(pick, depth - 1)
+    sign = pick.choice("+-*")
+    return f"({a}) {sign} ({b})", f"({x}) {sign} ({y})"
+
+
+def random_vector(pick: random.Random, depth: int) -> Written:
+    kind = pick.randrange(6) if depth else pick.randrange(2)
+    if kind == 0:
+        name = pick.choice("vw")
+        return name, name
+    if kind == 1:
+        parts = [random_number(pick, max(depth - 1, 0)) for _ in range(3)]
+        return f"[{', '.join(a for a, _ in parts)}]", f"np.array([{', '.join(b for _, b in parts)}])"
+    deck, numpy = random_vector(pick, depth - 1)
+    if kind == 2:
+        return f"-({deck})", f"-({numpy})"
+    if kind == 3:
+        other, too = random_vector(pick, depth - 1)
+        sign = pick.choice("+-")
+        return f"({deck}) {sign} ({other})", f"({numpy}) {sign} ({too})"
+    factor, also = random_number(pick, depth - 1)
+    if kind == 4:
+        return f"({factor}) * ({deck})", f"({also}) * ({numpy})"
+    return f"({deck}) / (3 + abs({factor}))", f"({numpy}) / (3 + np.abs({also}))"
+
+
+def test_random_arithmetic_of_vectors_is_that_of_numpy(tmp_path: Path) -> None:
+    named = {"v": np.array([1.5, -2.0, 0.25]), "w": np.array([0.1, 0.2, 0.3])}
+    lets = "".join(f"let {name} = {values.tolist()};\n" for name, values in named.items())
+    for seed in range(150):
+        deck, numpy = random_vector(random.Random(seed), 4)
+        made = eval(numpy, {"np": np}, named)
+        assert numbers(tmp_path, deck, lets) == made.tolist(), (seed, deck)
+
+
 def test_a_component_is_the_number_of_that_name(tmp_path: Path) -> None:
     assert number(tmp_path, "v.x - v.y + 2 * w.z", V) == pytest.approx(4.1, rel=1e-15)
     assert number(tmp_path, "both.z", V + "\nlet both = v + w;") == pytest.approx(0.55, rel=1e-15)

@@ -35,8 +35,8 @@ def number(folder: Path, expression: str, before: str = "") -> float:
     return float(found.number)
 
 
-def numbers(folder: Path, expression: str) -> list[float]:
-    found = value(folder, expression)
+def numbers(folder: Path, expression: str, before: str = "") -> list[float]:
+    found = value(folder, expression, before)
     assert isinstance(found, ValueList)
     return [float(item.number) for item in found.items if isinstance(item, Value)]
 
