@@ -61,7 +61,9 @@ def _edit(change: Change, place: Place, sources: Mapping[str, str]) -> Edit | No
     first = line_at + place.column - 1
     last = min(first + place.length, line_end)
     found = _stretch(change, text, (line_at, line_end), min(first, line_end), last)
-    return None if found is None else _between(place.file, starts, *found)
+    if found is None or text[found[0] : found[1]] == found[2]:  # what stands there is what would be written
+        return None
+    return _between(place.file, starts, *found)
 
 
 def _stretch(change: Change, text: str, line: tuple[int, int], first: int, last: int) -> tuple[int, int, str] | None:
@@ -76,7 +78,9 @@ def _stretch(change: Change, text: str, line: tuple[int, int], first: int, last:
         return _at_its_end(text, last, change.new)
     if change.where == "entry":
         entry = _entry(text, first)
-        return None if entry is None else (*_with_its_line(text, *entry), change.new)
+        if entry is None or change.new:
+            return entry and (*entry, change.new)
+        return (*_with_its_line(text, *entry), "")
     if change.old is not None:
         words = [each for each in _words(change.old, text[slice(*line)], line[0]) if _meet(each, first, last)]
         return (*words[0], change.new) if len(words) == 1 else None

@@ -21,7 +21,7 @@ from tests.docs.test_diagnostics_page import ALL, GIVEN, Shown, in_a_folder, off
 
 CHECKED = [one for one in ALL if one.commands[-1].startswith("check ")]
 
-WITH_EDITS = 78
+WITH_EDITS = 79
 """Helps of the page that an edit is with: fewer would say that one was lost."""
 
 

@@ -12,7 +12,7 @@ from ic.meaning.expressions.quantity import Value, ValueList
 from ic.text.complaints import MOST_DIAGNOSTICS, known_words
 from ic.text.lexer import COMMAND_LINE
 from met import units
-from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error
 from met.messages import other_units
 
 DEEPEST = 64  # lets that need lets: far more than a deck has, far less than Python's recursion bears
@@ -26,6 +26,10 @@ def _uses(place: Place) -> list[Place]:
 def _macro(place: Place) -> str:
     """The macro whose body a place is in."""
     return place.expansions[0].macro
+
+
+def _if_a_unit(help: str) -> Help:
+    return Help(f"if a unit is meant: {help}", *(help.changes if isinstance(help, Help) else ()))
 
 
 class Names:
@@ -169,7 +173,7 @@ class Names:
             ]
         elif not helps:
             unit = other_units.remedy(first) if len(first) > 1 else ()
-            helps = [f"define it: `let {first} = ...;`", *(f"if a unit is meant: {each}" for each in unit)]
+            helps = [f"define it: `let {first} = ...;`", *(_if_a_unit(each) for each in unit)]
         raise Problem(error("D065", f"no value `{name.text}`", name.place, help=helps))
 
     def check_lets(self) -> list[Problem]:

@@ -101,3 +101,24 @@ def test_other_commands_have_no_such_forms(capsys: pytest.CaptureFixture[str]) -
     assert cli.main(["plan", "good.ic", "--format", "sarif"]) == cli.BAD_INPUT
     out, err = capsys.readouterr()
     assert out == "" and "Invalid value for '--format'" in err
+
+
+ADDRESSES = {
+    "run here like nominal { shoulder.servo.kp = 3 V*s/rad; }": "servos { shoulder { kp = 3 V*s/rad; } }",
+    "run here like nominal { elbow.q = 3 deg; }": "initial { elbow.q = 3 deg; }",
+    "run here like nominal { dynamics = 100 Hz; }": "rates { dynamics = 100 Hz; }",
+    "arm here like two_link { links.upper.mass = 4 kg; }": "upper { mass = 4 kg; }",
+}
+
+
+@pytest.mark.parametrize("text", ADDRESSES)
+def test_a_path_that_stands_as_an_entry_is_written_as_the_block_that_it_means(
+    text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("path.ic").write_text(f"#include <two_link.ic>\n{text}\n", encoding="utf-8")
+    _, out, _ = asked(capsys, "path.ic", "--format", "json")
+    made = [edit for each in json.loads(out)["diagnostics"] for edit in each["edits"]]
+    (edit,) = made
+    assert edit["text"] == ADDRESSES[text] and edit.pop("help") == 0
+    Path("path.ic").write_text(apply(Edit(**edit), Path("path.ic").read_text(encoding="utf-8")), encoding="utf-8")
+    assert asked(capsys, "path.ic", "-q") == (cli.YES, "", "")

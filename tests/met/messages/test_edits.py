@@ -41,6 +41,16 @@ def test_a_word_is_replaced_where_it_stands_and_not_where_the_text_is_another():
     assert edited(found, DECK.replace("recrod", "recrods")) == []
 
 
+def test_an_edit_changes_something():
+    found = error("D116", "no", at(2, 20, 6), help=did_you_mean("recrod", ["recrod"]))
+    assert found.help == ("did you mean `recrod`?",) and edited(found) == []
+
+
+def test_an_entry_is_written_anew():
+    found = error("D350", "no", at(3, 13, 5), help=write("require a < 4 in 99 % of cases;", where="entry"))
+    assert edited(found) == [DECK.replace("require a < 3;", "require a < 4 in 99 % of cases;")]
+
+
 def test_each_of_several_ways_to_write_it_is_an_edit_of_one_help():
     found = error("D060", "no", at(2, 16, 1), help=write_either(["2 s", "2 min"]))
     assert found.help == ("write `2 s` or `2 min`",)
