@@ -300,7 +300,8 @@ class Expressions(Quantities):
             self.tell("D024", f"a `,` is missing before {token_in_words(token)}", self.behind(self.previous))
             return True
         if token.text == "=":
-            self.unexpected(f"`,` or `{closing}`", help=write("==", "to compare, write `==`"))
+            compare = "to compare, write `==`"
+            self.unexpected(f"`,` or `{closing}`", help=write("==", compare) if closing == ")" else compare)
         return False
 
     def ends_entry(self) -> bool:
