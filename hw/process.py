@@ -25,7 +25,7 @@ from hw import realtime
 from hw.bed import About, BedDriver
 from met.diagnostic import Problem, error
 from met.host import interpreter
-from met.messages.render import to_json
+from met.messages.programs import to_json
 
 PAUSE = 0.1
 """s between two calls of `idle` while the process says nothing."""

@@ -10,24 +10,41 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from met.cli import BAD_INPUT, YES, check_options, complain, deck_options, format_option, loudness_options
-from met.diagnostic import Problem, did_you_mean, error
+from met.cli import (
+    BAD_INPUT,
+    PROGRAM_FORMS,
+    YES,
+    check_options,
+    complain,
+    deck_options,
+    format_option,
+    loudness_options,
+)
+from met.diagnostic import Diagnostic, Problem, did_you_mean, error
+from met.frozen import frozen
 from met.messages.visible import say
 
 if TYPE_CHECKING:
     from ic.driver.compile import Compiled
+    from ic.meaning.runs.allowances import Allowance
     from met.plan import Plan
 
 DECK = click.argument("deck")
 
 
 @click.command()
-@DECK
+@click.argument("decks", nargs=-1, required=True, metavar="DECK...")
 @deck_options
-@format_option
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["text", *PROGRAM_FORMS]),
+    default="text",
+    help="How to print; json and sarif for programs, github for the workflows of GitHub.",
+)
 @loudness_options
 def check(
-    deck: str,
+    decks: tuple[str, ...],
     defines: tuple[str, ...],
     include_dirs: tuple[str, ...],
     settings: tuple[str, ...],
@@ -35,47 +52,90 @@ def check(
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """Find all that is wrong with a deck.
+    """Find all that is wrong with decks.
 
-    Every run and sweep of it is compiled to its plan; nothing is run. A plan file is read, and what it holds is said.
+    Every run and sweep of a deck is compiled to its plan; nothing is run. A plan file is read, and what it holds is
+    said.
     """
-    check_options(deck, defines=defines, include_dirs=include_dirs, settings=settings)
-    if deck.endswith(".json"):
-        return _check_plan(deck, form, quiet)
+    for deck in decks:
+        check_options(deck, defines=defines, include_dirs=include_dirs, settings=settings)
+    found: list[_Checked] = []
+    for deck in decks:
+        try:
+            each = _checked(deck, include_dirs, defines, settings)
+        except Problem as problem:
+            each = _Checked(deck, None, problem.diagnostics, problem.sources)
+        found.append(each)
+        if form != "text":
+            continue
+        if each.diagnostics and (each.plan is None or not quiet):
+            complain(each.diagnostics, each.sources)
+        if each.plan is not None and not quiet:
+            _print_verdict(each, verbose)
+    if form != "text":
+        _complain_together(found, form)
+    return BAD_INPUT if any(each.plan is None for each in found) else YES
+
+
+@frozen
+class _Checked:
+    """What `met check` found in one file: its plan, None where it has none, and messages.
+
+    allowed  warnings that runs allow, each with how and why they do
+    """
+
+    file: str
+    plan: Plan | None
+    diagnostics: tuple[Diagnostic, ...]
+    sources: Mapping[str, str]
+    allowed: tuple[tuple[Diagnostic, Allowance], ...] = ()
+
+
+def _checked(file: str, include_dirs: tuple[str, ...], defines: tuple[str, ...], settings: tuple[str, ...]) -> _Checked:
+    """A deck, or a plan file, checked. Raises Problem where it cannot be read."""
+    if file.endswith(".json"):
+        from met.plan import file as plan_file
+
+        return _Checked(file, plan_file.read(file), (), {})
     import ic
     from ic.find import find
 
-    find(deck, include_dirs)
-    compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, set=settings, select="all")
-    if form == "json":
-        allowed = [(warning, allowance.because) for warning, allowance in compiled.allowed]
-        complain(compiled.diagnostics, compiled.sources, json=True, allowed=allowed)
-        return YES if compiled.plan is not None else BAD_INPUT
-    if compiled.diagnostics and (compiled.plan is None or not quiet):
-        complain(compiled.diagnostics, compiled.sources)
-    if compiled.plan is None:
-        return BAD_INPUT
-    if not quiet:
-        from ic.printing.check import notes, verdict
-
-        if verbose:
-            _print(notes(compiled.plan))
-            _print(f"allowed: {warning.message} ({allowance})" for warning, allowance in compiled.allowed)
-        say(verdict(compiled.plan, compiled.diagnostics, len(compiled.allowed)))
-    return YES
+    find(file, include_dirs)
+    compiled = ic.check(file, include_dirs=include_dirs, defines=defines, set=settings, select="all")
+    return _Checked(file, compiled.plan, tuple(compiled.diagnostics), compiled.sources, tuple(compiled.allowed))
 
 
-def _check_plan(path: str, form: str, quiet: bool) -> int:
-    """Find all that is wrong with a plan file. Raises Problem where it cannot be read."""
-    from ic.printing.check import verdict
-    from met.plan import file as plan_file
+def _print_verdict(checked: _Checked, verbose: bool) -> None:
+    from ic.printing.check import notes, verdict
 
-    made = plan_file.read(path)
-    if form == "json":
-        complain((), {}, json=True)
-    elif not quiet:
-        say(f"{path}: plan of {verdict(made, ())}")
-    return YES
+    assert checked.plan is not None
+    if checked.file.endswith(".json"):
+        say(f"{checked.file}: plan of {verdict(checked.plan, ())}")
+        return
+    if verbose:
+        _print(notes(checked.plan))
+        _print(f"allowed: {warning.message} ({allowance})" for warning, allowance in checked.allowed)
+    say(verdict(checked.plan, checked.diagnostics, len(checked.allowed)))
+
+
+def _complain_together(found: Iterable[_Checked], form: str) -> None:
+    """Print the messages of several files as one, for programs: what decks have in common is told once."""
+    from ic.printing.codes import titles
+
+    diagnostics: dict[Diagnostic, None] = {}
+    allowed: dict[Diagnostic, str] = {}
+    sources: dict[str, str] = {}
+    for each in found:
+        diagnostics |= dict.fromkeys(each.diagnostics)
+        allowed |= {warning: allowance.because for warning, allowance in each.allowed}
+        sources |= each.sources
+    complain(
+        tuple(diagnostics),
+        sources,
+        form=form,
+        allowed=[each for each in allowed.items() if each[0] not in diagnostics],
+        titles=titles() if form == "sarif" else None,
+    )
 
 
 @click.command()
@@ -207,6 +267,7 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
     a deck, such as `met doc run` or `joint`; `channels`, what can be recorded; `dh`, Denavit-Hartenberg numbers;
     `shapes`, of links; `units`; `functions`; `designs` and `distributions` of samples; the code of a message, as
     in `met doc D060`; an entry of a block, such as `allow`; and a word of the glossary, such as `shard`.
+    `met doc language --format json` is all of it for programs.
     """
     from ic.language import BLOCKS
     from ic.printing import models as print_models
@@ -228,6 +289,14 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
         if form == "json":
             raise click.UsageError("what a code means is text: it has no --format")
         _print(print_code(words[0]))
+        return
+    if words == ("language",):
+        from ic.printing.description import description, print_overview
+
+        if form == "json":
+            _print_json(description())
+        else:
+            _print(print_overview())
         return
     if len(words) == 1 and words[0] in SUBJECTS:
         text, data = SUBJECTS[words[0]]

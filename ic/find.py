@@ -27,6 +27,11 @@ def find(name: str, include_dirs: Sequence[str | Path] = ()) -> Path:
     raise Problem(error("D173", f"no deck `{name}`", help=[*helps, f"standard decks: {', '.join(standard)}"]))
 
 
+def library_files() -> list[str]:
+    """The names of all decks of the standard library, as an include between angles names them."""
+    return sorted(path.relative_to(LIBRARY).as_posix() for path in LIBRARY.rglob("*.ic"))
+
+
 def standard_decks() -> list[str]:
     """The decks of the standard library that can be run as they are; those in its folders are to be included."""
     return sorted(path.name for path in LIBRARY.glob("*.ic"))

@@ -14,7 +14,7 @@ from ic.text.limits import Findings, GiveUp
 from ic.text.preprocess import preprocess
 from ic.text.source import SourceFile, UnreadableStretch
 from met.diagnostic import Diagnostic, Problem
-from met.messages.render import shown_place
+from met.messages.message import shown_place
 
 UNKNOWN_TEXT = ("D001", "D002", "D005", "D006", "D007", "D008", "D009", "D010", "D014", "D016", "D018")
 """Errors after which it is not known what the deck says: a file or a branch of it may be lacking."""

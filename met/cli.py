@@ -168,6 +168,10 @@ def check_options(
                 raise click.UsageError(f"{option} is for decks: `{source}` is an archive, of what was run")
 
 
+PROGRAM_FORMS = ("json", "sarif", "github")
+"""Forms of diagnostics that programs read; `met check` writes them all, other commands JSON alone."""
+
+
 def format_option(face: Face) -> Face:
     """--format: text for people or JSON for programs, diagnostics included; given on as `form`."""
     return click.option(
@@ -203,8 +207,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return PIPE_CLOSED
 
 
+def _form_asked(arguments: Sequence[str]) -> str:
+    """The form in which a mistake of usage is said too: that of --format."""
+    known = PROGRAM_FORMS if arguments[:1] == ["check"] else ("json",)
+    asked = [form for option, form in pairwise(arguments) if option == "--format"]
+    asked += [each.removeprefix("--format=") for each in arguments if each.startswith("--format=")]
+    return asked[-1] if asked and asked[-1] in known else "text"
+
+
 def _run(arguments: list[str]) -> int:
-    json = "--format=json" in arguments or ("--format", "json") in pairwise(arguments)
+    form = _form_asked(arguments)
     verbose = "-v" in arguments or "--verbose" in arguments
     try:
         if "_MET_COMPLETE" in os.environ:
@@ -216,11 +228,11 @@ def _run(arguments: list[str]) -> int:
     except click.exceptions.Exit as leaving:  # --help, --version, or a command that leaves early
         return leaving.exit_code
     except Problem as problem:
-        complain(problem.diagnostics, problem.sources, json=json)
+        complain(problem.diagnostics, problem.sources, form=form)
         return BAD_INPUT
     except click.ClickException as mistake:
-        if json:
-            complain([error("U001", mistake.format_message())], {}, json=True)
+        if form != "text":
+            complain([error("U001", mistake.format_message())], {}, form=form)
         else:
             shown = io.StringIO()
             mistake.show(shown)
@@ -233,13 +245,13 @@ def _run(arguments: list[str]) -> int:
         raise
     except MemoryError:
         message = "there is not enough memory for this"
-        complain([error("E337", message, help="run fewer cases at once, or record less")], {}, json=json)
+        complain([error("E337", message, help="run fewer cases at once, or record less")], {}, form=form)
         return BAD_INPUT
     except OSError as mistake:
         if verbose:
             _show_traceback()
         about = f"`{os.fsdecode(mistake.filename)}`: " if isinstance(mistake.filename, str | bytes) else ""
-        complain([error("E338", f"{about}{mistake.strerror or mistake}")], {}, json=json)
+        complain([error("E338", f"{about}{mistake.strerror or mistake}")], {}, form=form)
         return BAD_INPUT
     except Exception as defect:
         _confess(defect, arguments, verbose)
@@ -250,14 +262,25 @@ def complain(
     diagnostics: Sequence[Diagnostic],
     sources: Mapping[str, str],
     *,
-    json: bool = False,
+    form: str = "text",
     allowed: Sequence[tuple[Diagnostic, str]] | None = None,
+    titles: Mapping[str, str] | None = None,
 ) -> None:
-    """Print diagnostics: for people on stderr, for programs as JSON on stdout, with what a deck allows and why."""
-    from met.messages import render
+    """Print diagnostics: for people on stderr, for programs on stdout, with what a deck allows and why.
 
-    if json:
-        print(render.to_json(diagnostics, allowed))
+    form    text, or one of `PROGRAM_FORMS`
+    titles  what codes are about, for SARIF
+    """
+    from met.messages import programs, render
+
+    if form == "json":
+        print(programs.to_json(diagnostics, sources, allowed))
+        return
+    if form == "sarif":
+        print(programs.to_sarif(diagnostics, sources, allowed or (), titles or {}))
+        return
+    if form == "github":
+        print(programs.to_github(diagnostics), end="")
         return
     print(render.render(diagnostics, sources, colour=render.wants_colour(sys.stderr)), end="", file=sys.stderr)
 

@@ -10,19 +10,35 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from met.messages.alike import did_you_mean, meant, nearest
-from met.messages.message import Diagnostic, Expansion, Label, Place, Severity
+from met.messages.message import (
+    Change,
+    Diagnostic,
+    Expansion,
+    Help,
+    Label,
+    Place,
+    Severity,
+    leave_out,
+    write,
+    write_either,
+)
 
 __all__ = [
+    "Change",
     "Diagnostic",
     "Expansion",
+    "Help",
     "Label",
     "Place",
     "Problem",
     "Severity",
     "did_you_mean",
     "error",
+    "leave_out",
     "meant",
     "nearest",
+    "write",
+    "write_either",
 ]
 
 

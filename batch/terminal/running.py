@@ -388,10 +388,10 @@ def _of_deck(
 
 def _complain(problem: Problem, json: bool) -> None:
     """Print a problem: for people on stderr, for programs as JSON."""
-    from met.messages import render
+    from met.messages import programs, render
 
     if json:
-        print(render.to_json(problem.diagnostics))
+        print(programs.to_json(problem.diagnostics, problem.sources))
     else:
         colour = render.wants_colour(sys.stderr)
         print(render.render(problem.diagnostics, problem.sources, colour=colour), end="", file=sys.stderr)

@@ -11,7 +11,7 @@ from typing import NoReturn
 
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, Token
 from ic.text.limits import DEPTH, MOST_OPERATORS, Findings, GiveUp
-from met.diagnostic import Label, Place
+from met.diagnostic import Help, Label, Place, write
 
 OPENING = {"(": ")", "[": "]", "{": "}"}
 SHOWN = 40  # characters of a token in a message
@@ -102,6 +102,11 @@ class Cursor:
 
     def unexpected(self, wanted: str, help: str | Iterable[str] = ()) -> NoReturn:
         self.fail("D020", f"expected {wanted}, found {token_in_words(self.token)}", self.token, help=help)
+
+    def write(self, new: str, first: Token, last: Token) -> Help:
+        """The help which says to write this in place of what stands from the first token to the last."""
+        place = span(first, last)
+        return write(new, at=place) if first is last or place != first.place else Help(f"write `{new}`")
 
     def behind(self, token: Token) -> Place:
         """The place just behind a token, where something is missing."""

@@ -25,7 +25,7 @@ from ic.grammar.syntax import (
 from ic.text.lexer import BAD, NAME, NUMBERS, STRING, Token
 from ic.text.limits import LONGEST_NUMBER, LONGEST_STRING
 from met import units
-from met.diagnostic import Label
+from met.diagnostic import Label, write
 
 _LEVEL = {
     "or": 1, "||": 1, "and": 2, "&&": 2, "<": 4, "<=": 4, ">": 4, ">=": 4, "==": 4, "!=": 4, "+": 5, "-": 5,
@@ -77,7 +77,12 @@ class Expressions(Quantities):
             self.advance()
             operator = self.in_words(token)
             if operator == "*" and self.token.text == "*" and self.token.offset == token.end:
-                self.fail("D020", "`**` is not an operator", span(token, self.token), help="a power is written `a^b`")
+                self.fail(
+                    "D020",
+                    "`**` is not an operator",
+                    span(token, self.token),
+                    help=write("^", "a power is written `a^b`"),
+                )
             right = self.expression(level if operator == "^" else level + 1)
             left = Binary(operator, left, right, token.place)
             if level == _COMPARISON and _LEVEL.get(self.token.text) == _COMPARISON:
@@ -107,7 +112,7 @@ class Expressions(Quantities):
         word = _WORDS.get(token.text)
         if word is None:
             return token.text
-        self.tell("D020", f"`{token.text}` is not an operator here", token, help=f"write `{word}`")
+        self.tell("D020", f"`{token.text}` is not an operator here", token, help=write(word))
         return word
 
     def only_a_name(self) -> bool:
@@ -213,7 +218,10 @@ class Expressions(Quantities):
         word = units.UNITS[token.text].word
         if after.kind in NUMBERS:
             self.fail(
-                "D025", "a unit follows its number", span(token, after), help=f"write `{after.text} {token.text}`"
+                "D025",
+                "a unit follows its number",
+                span(token, after),
+                help=self.write(f"{after.text} {token.text}", token, after),
             )
         before = self.previous.text
         if before in ("+", "-", "*", "/", "^", "<", ">", "<=", ">=", "==", "!=") or after.text in (
@@ -229,9 +237,9 @@ class Expressions(Quantities):
                 "D025",
                 f"`{token.text}` is the unit {word}, and stands here without a number",
                 token,
-                help=f"write `{number.text} {token.text}`"
+                help=self.write(f"{number.text} {token.text}", number, token)
                 if factor
-                else f"write `1 {token.text}`; behind a unit, as in `2 m/s`, it needs none",
+                else write(f"1 {token.text}", f"write `1 {token.text}`; behind a unit, as in `2 m/s`, it needs none"),
             )
 
     def call(self, name: Name, first: Token) -> Expression:
@@ -285,14 +293,15 @@ class Expressions(Quantities):
         if token.text == closing:
             return False
         if token.text == ";" and not self.ends_entry():
-            self.tell("D024", "`;` between items", token, help="write `,`")
+            self.tell("D024", "`;` between items", token, help=write(","))
             self.advance()
             return True
         if self.begins_value() and not self.begins_entry(self.at) and token.kind != BAD:
             self.tell("D024", f"a `,` is missing before {token_in_words(token)}", self.behind(self.previous))
             return True
         if token.text == "=":
-            self.unexpected(f"`,` or `{closing}`", help="to compare, write `==`")
+            compare = "to compare, write `==`"
+            self.unexpected(f"`,` or `{closing}`", help=write("==", compare) if closing == ")" else compare)
         return False
 
     def ends_entry(self) -> bool:

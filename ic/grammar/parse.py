@@ -23,7 +23,7 @@ from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, 
 from ic.text.limits import Findings, GiveUp, without_collection
 from ic.text.source import UnreadableStretch
 from met import units
-from met.diagnostic import Diagnostic, Label, Place
+from met.diagnostic import Diagnostic, Label, Place, write
 
 COMPARE = ("require", "exclude")
 _OVER_CASES = "write `require METRIC < LIMIT in 99 % of cases with 90 % confidence;`"
@@ -196,7 +196,7 @@ class _Parser(Expressions):
                 "D020",
                 "a file is named by what it is",
                 self.token,
-                help=f"write `from urdf({self.token.text[:SHOWN]})`",
+                help=write(f"urdf({self.token.text})", f"write `from urdf({self.token.text[:SHOWN]})`"),
             )
         if text == "," and _base_at(names) is not None:
             self.fail("D032", "there is one base only", self.token, help="a definition takes after one other")
@@ -207,7 +207,7 @@ class _Parser(Expressions):
         if text == ":":
             self.unexpected("`=`", help="a deck writes `name = value;`")
         if text == "==" and len(names) == 1 and not tail:
-            self.fail("D023", "`==` compares", self.token, help="to set a value, write `=`")
+            self.fail("D023", "`==` compares", self.token, help=write("=", "to set a value, write `=`"))
         if _base_at(names) is not None and not self.begins_value_on_this_line():
             self.no_brace([*names, *tail])
         return self.statement(start, names, tail)
@@ -284,7 +284,7 @@ class _Parser(Expressions):
             message = f"`{name.text}` is the unit {units.UNITS[name.text].word}, so it cannot name a value"
             self.tell("D026", message, name, help="choose another name: after a number it would be read as the unit")
         if self.token.text == "+=":
-            self.fail("D023", "`let` gives a value once", self.token, help="write `=`")
+            self.fail("D023", "`let` gives a value once", self.token, help=write("="))
         self.advance()
         value = self.value()
         self.semicolon(value)
@@ -294,7 +294,7 @@ class _Parser(Expressions):
         operator = self.advance()
         words, path = names[:-1], [names[-1], *tail]
         if words and words[0].text in COMPARE and operator.text == "=":
-            self.fail("D023", "`=` sets a value", operator, help="to compare, write `==`")
+            self.fail("D023", "`=` sets a value", operator, help=write("==", "to compare, write `==`"))
         value = self.value()
         self.semicolon(value)
         return Setting(_words(words), _words(path), operator.text, value, span(names[0], path[-1]))
@@ -422,18 +422,18 @@ class _Parser(Expressions):
         if token.kind == BAD:
             raise Unreadable
         if token.text == "}" or token.kind == END or self.on_new_line(self.at):
-            self.tell("D021", "expected `;`", self.behind(self.previous), help=_SEMICOLON)
+            self.tell("D021", "expected `;`", self.behind(self.previous), help=write(";", _SEMICOLON, where="before"))
             return
         another = self.following.kind == NAME and self.tokens[self.at + 2].text in ("=", "+=")
         if token.text == "," and (another or self.on_new_line(self.at + 1) or self.following.text == "}"):
-            self.tell("D024", "`,` at the end of an entry", token, help="write `;`")
+            self.tell("D024", "`,` at the end of an entry", token, help=write(";"))
             self.advance()
             return
         if token.text in (")", "]"):
             self.unbalanced = True
             self.fail("D022", f"this `{token.text}` closes nothing", token, help=_NOT_OPEN)
         if token.kind == NAME and self.following.text in ("=", "+=", "{", "."):
-            self.tell("D021", "expected `;`", self.behind(self.previous), help=_SEMICOLON)
+            self.tell("D021", "expected `;`", self.behind(self.previous), help=write(";", _SEMICOLON, where="before"))
             return
         helps = {
             "=": "to compare, write `==`; to set two things, write two entries",

@@ -13,6 +13,7 @@ from ic.grammar.syntax import Expression, Number, Unit, Word
 from ic.text.lexer import NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import LONGEST_NUMBER
 from met import units
+from met.diagnostic import write
 from met.messages import other_units
 
 _POWERED = re.compile(r"([A-Za-z]+)([2-9])")
@@ -35,7 +36,7 @@ class Quantities(Cursor):
             self.fail("D027", f"a number has at most {LONGEST_NUMBER} characters", token)
         if text[1:2] in ("x", "X"):
             self.fail(
-                "D027", f"`{text}` is hexadecimal; a deck's numbers are decimal", token, help=f"write `{int(text, 16)}`"
+                "D027", f"`{text}` is hexadecimal; a deck's numbers are decimal", token, help=write(str(int(text, 16)))
             )
         value = float(text)
         if math.isinf(value):
@@ -147,14 +148,15 @@ class Quantities(Cursor):
         token = self.token
         if token.kind == NAME and units.is_unit(token.text) and not self.on_new_line(self.at):
             written = "".join(t.text for t in self.tokens[start : self.at])
-            self.fail("D030", "units are multiplied with `*`", token, help=f"write `{written}*{token.text}`")
+            helps = self.write(f"{written}*{token.text}", self.tokens[start], token)
+            self.fail("D030", "units are multiplied with `*`", token, help=helps)
         operator, named = token, self.following
         if operator.text not in ("*", "/") or named.kind != NAME:
             return
         powered = _POWERED.fullmatch(named.text)
         if powered and units.is_unit(powered.group(1)):
             self.fail(
-                "D028", f"`{named.text}` is not a unit", named, help=f"write `{powered.group(1)}^{powered.group(2)}`"
+                "D028", f"`{named.text}` is not a unit", named, help=write(f"{powered.group(1)}^{powered.group(2)}")
             )
         near = other_units.suggest(named.text)
         if (
@@ -163,7 +165,7 @@ class Quantities(Cursor):
             and self.tokens[self.at + 2].text in (";", ",", ")", "]")
         ):
             # `rad/sec`: said here, since after a unit this is what was meant more often than a name of one's own
-            self.fail("D028", f"`{named.text}` is not a unit", named, help=f"did you mean `{near}`?")
+            self.fail("D028", f"`{named.text}` is not a unit", named, help=write(near, f"did you mean `{near}`?"))
 
     def not_joined_otherwise(self, at: int, start: int) -> None:
         """Refuses `N.m` and `N-m`, and `s-1`, whose last unit before the sign is token `at`, of a unit from `start` on.
@@ -179,10 +181,14 @@ class Quantities(Cursor):
         before = "".join(token.text for token in self.tokens[start : at + 1])
         near = more.text if units.is_unit(more.text) else other_units.suggest(more.text)
         if more.kind == NAME and near is not None:
-            self.fail("D030", "units are multiplied with `*`", more, help=f"write `{before}*{near}`")
+            helps = self.write(f"{before}*{near}", self.tokens[start], more)
+            self.fail("D030", "units are multiplied with `*`", more, help=helps)
         if more.kind == WHOLE and sign.text == "-" and len(more.text) == 1 and at + 3 < len(self.tokens):
             self.fail(
-                "D030", "a unit's exponent stands behind `^`", span(sign, more), help=f"write `{before}^-{more.text}`"
+                "D030",
+                "a unit's exponent stands behind `^`",
+                span(sign, more),
+                help=self.write(f"{before}^-{more.text}", self.tokens[start], more),
             )
 
     def unknown_unit(self) -> None:
@@ -199,9 +205,11 @@ class Quantities(Cursor):
         number = before.text if before.kind in NUMBERS else ""
         helps = other_units.remedy(token.text, number, alone=self.following.text not in ("^", "*", "/"))
         if powered and units.is_unit(powered.group(1)):
-            helps = (f"did you mean `{powered.group(1)}^{powered.group(2)}`?",)
-        elif powered and (near := other_units.suggest(powered.group(1))) and "/" not in near:
-            helps = (f"did you mean `{near}^{powered.group(2)}`?",)
+            near = f"{powered.group(1)}^{powered.group(2)}"
+            helps = (write(near, f"did you mean `{near}`?"),)
+        elif powered and (other := other_units.suggest(powered.group(1))) and "/" not in other:
+            near = f"{other}^{powered.group(2)}"
+            helps = (write(near, f"did you mean `{near}`?"),)
         self.fail("D028", f"`{token.text}` is not a unit", token, help=helps or _units_known())
 
 

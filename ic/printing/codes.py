@@ -18,6 +18,15 @@ def is_code(word: str) -> bool:
     return re.fullmatch(r"[A-Za-z]\d{2,3}", word) is not None
 
 
+def titles() -> dict[str, str]:
+    """What each code is about, in a line, as the page's headings have it; empty where the page is not installed."""
+    if not PAGE.is_file():
+        return {}
+    page = PAGE.read_text(encoding="utf-8")
+    rows = {row[1]: in_plain_text(row[2]) for row in _ROW.finditer(page)}
+    return rows | {head[1]: head[2] for head in re.finditer(r"^### ([A-Z]\d{3}): (.*)$", page, re.MULTILINE)}
+
+
 def print_code(word: str) -> Iterator[str]:
     """The entry of a code. Raises Problem D171 where there is none, or no page."""
     code = word[0].upper() + word[1:].zfill(3)

@@ -18,6 +18,7 @@ from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import Diagnostic, Label, Place, Problem, error, nearest
 from met.messages import render
+from met.messages.message import shown_place
 from met.models import parameter as declared
 from met.parameter import Parameter
 from met.plan import Coordinate, Experiment, Formula, Origin, Quantity
@@ -207,7 +208,7 @@ def _in_short(experiment: Experiment, name: str) -> tuple[str, ...]:
     said = _note(found.origin) or SAID[found.origin.kind].removesuffix(" here").rstrip(",")
     if place is None and found.origin.kind == "deck":
         said = IN_PLAN
-    return name, f"= {_shown(experiment, found)}", said, "" if place is None else str(render.shown_place(place))
+    return name, f"= {_shown(experiment, found)}", said, "" if place is None else str(shown_place(place))
 
 
 def _note(origin: Origin) -> str:

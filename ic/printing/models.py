@@ -34,7 +34,7 @@ ON_LINK = "sensor NAME = MODEL { link = LINK; ... }, in a run"
 OF_LANGUAGE = tuple(name for name in BLOCKS if name not in KINDS)
 """Blocks of the deck language that have no models."""
 
-OTHERS = (*OF_LANGUAGE, "channels", "designs", "dh", "distributions", "functions", "shapes", "units")
+OTHERS = (*OF_LANGUAGE, "channels", "designs", "dh", "distributions", "functions", "language", "shapes", "units")
 """Further subjects of `met doc` (ic/printing/subjects.py)."""
 
 FIELDS = tuple(field.name for field in fields(Parameter))

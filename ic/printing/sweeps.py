@@ -24,6 +24,8 @@ OF_FUNCTIONS: Mapping[str, str] = MappingProxyType({
     "abs": "size, whatever the sign", "tan": "of an angle, as sin", "asin": "angle of a sine", "acos": "of a cosine",
     "atan": "of a tangent", "atan2": "angle of the point (x, y), both of one dimension",
     "exp": "of a pure number, as log and tanh", "log": "natural logarithm", "tanh": "hyperbolic tangent",
+    "floor": "greatest whole number not above a pure number", "ceil": "least whole number not below it",
+    "round": "nearest whole number, halves away from zero", "sign": "1, 0 or -1, of any value",
 })  # fmt: skip
 
 OF_DESIGNS: Mapping[str, str] = MappingProxyType(

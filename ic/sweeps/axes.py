@@ -35,7 +35,7 @@ from ic.sweeps.choices import (
 from ic.sweeps.designs import DESIGNS, UNTIL_SHOWN, read_sample
 from ic.text.complaints import Complaints, known_words, where_it_belongs
 from met import units
-from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.diagnostic import Label, Place, Problem, did_you_mean, error, write
 from met.frozen import frozen
 from met.plan import Design
 from met.plan.columns import MOST_SWEPT, CaseValues
@@ -487,7 +487,7 @@ def _refuse(entry: object, words: list[str], base: str) -> None:
                 "D136",
                 "a condition names a macro by its name alone",
                 place,
-                help="leave out the word `macro`: the macro's value is put in as text",
+                help=write("", "leave out the word `macro`: the macro's value is put in as text", old="macro "),
             )
         )
     if words[:1] == ["require"]:

@@ -29,7 +29,7 @@ from ic.sweeps.searches import check_goal, each_case, read_search, with_corners
 from ic.sweeps.settings import Settings
 from ic.sweeps.table import columns, kept, repeats, structures
 from ic.text.complaints import Complaints, known_words
-from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error, leave_out, write
 from met.frozen import frozen
 from met.plan import Allowance, Cases, Choice, Experiment, keys
 from met.plan.columns import PositionColumn, ShiftedColumn, listed
@@ -292,9 +292,11 @@ class _Sweep:
                     keys.structure_key(made.structure, keys.inputs(made)) + keys.case_ids(replace(made, cases=bare))[0]
                 )
             if all(len(found) > 1 and len(set(found)) == 1 for found in same.values()):
-                remedy = "with each of its values the run is the same: leave it out"
+                remedy = leave_out("with each of its values the run is the same: leave it out")
                 if column.macro:
-                    remedy = f"the run is the same with each of its values: does an `#if` ask for `{column.macro}`?"
+                    remedy = Help(
+                        f"the run is the same with each of its values: does an `#if` ask for `{column.macro}`?"
+                    )
                 self.complaints.error("D137", f"`{column.path}` changes nothing in this run", column.place, help=remedy)
 
 
@@ -315,7 +317,7 @@ def _base(definitions: Definitions, definition: Definition, complaints: Complain
                 "D059",
                 f"`{of.text}` is a path; the name of a run is needed",
                 of.place,
-                help=f"write `{of.path[0].text}`",
+                help=write(of.path[0].text, old=of.text),
             )
         )
     return definitions.find_or_meant("run", Word(of.text, of.place), complaints)

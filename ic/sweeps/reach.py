@@ -7,7 +7,7 @@ from ic.sweeps.axes import Sweep
 from ic.sweeps.choices import ONE_OF_TWO
 from ic.text.complaints import Complaints, known_words
 from met import units
-from met.diagnostic import Label, did_you_mean
+from met.diagnostic import Label, did_you_mean, leave_out
 from met.plan import REPEAT, Coordinate, Experiment
 from met.plan.columns import CaseValues
 
@@ -141,7 +141,7 @@ def check_effects(complaints: Complaints, sweep: Sweep, experiment: Experiment) 
                     "D137",
                     f"`{name}` changes nothing in this run",
                     places[name],
-                    help="nothing that the run computes depends on it: leave it out",
+                    help=leave_out("nothing that the run computes depends on it: leave it out"),
                 )
             elif name == REPEAT:
                 complaints.error(
@@ -149,7 +149,7 @@ def check_effects(complaints: Complaints, sweep: Sweep, experiment: Experiment) 
                     "there is no noise in this run, so a repeat is the same case again",
                     sweep.repeated,
                     help=[
-                        "leave `repeat` out",
+                        leave_out("leave `repeat` out"),
                         "a sensor may be noisy: `sensor qd = tachometer { noise = 0.1 rad/s; }` in a servo",
                         "and so may a bed: `substitute JOINT { bed = emulated(faults = typical); }`",
                     ],
@@ -159,5 +159,5 @@ def check_effects(complaints: Complaints, sweep: Sweep, experiment: Experiment) 
                     "D230",
                     "there is no noise in this run, so no case has noise of its own",
                     sweep.independent,
-                    help="leave `seeds` out",
+                    help=leave_out("leave `seeds` out"),
                 )

@@ -16,7 +16,7 @@ from ic.meaning.expressions.truths import NumberComparison, Truths
 from ic.meaning.parameters.scope import Scope
 from ic.sweeps.axes import Sweep, SweepAxis
 from ic.sweeps.choices import OF_JOINT, OF_RUN, ChoiceColumn, Choices
-from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
+from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error, write_either
 from met.plan import Structure
 from met.plan.channel import channels
 from met.plan.columns import AxisColumn, CaseValues, CountedRows, listed
@@ -214,13 +214,12 @@ class _Truths(Truths):
                 if isinstance(own, Value):
                     numbers.add(own.number.ref if isinstance(own.number, Scalar) else own.number)
         if len(numbers) > 1:
-            choice = " or ".join(f"`{path}`" for path in list(found)[:MOST_NAMED])
             raise Problem(
                 error(
                     "D165",
                     f"`{name.text}` is not the same wherever it is used in this sweep",
                     name.place,
-                    help=f"say which is meant: write {choice}",
+                    help=write_either(list(found)[:MOST_NAMED], "say which is meant: ", old=name.text),
                 )
             )
         for settled in found.values():

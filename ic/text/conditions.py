@@ -17,7 +17,7 @@ from typing import NamedTuple, NoReturn
 from ic.text.lexer import BAD, CHARACTER, DECIMAL, NAME, SPACE, STRING, WHOLE, Token
 from ic.text.limits import CONDITION_NESTING, LONGEST_NUMBER, MOST_TERMS, Findings
 from ic.text.strays import complain_of_stray
-from met.diagnostic import Place
+from met.diagnostic import Place, write
 
 _NUMBER = re.compile(r"(?:0[xX](?P<hex>[0-9a-fA-F]+)|0(?P<octal>[0-7]*)|(?P<decimal>[1-9][0-9]*))")
 _SUFFIX = re.compile(r"[uU](?:l|L|ll|LL)?|(?:l|L|ll|LL)[uU]?")
@@ -138,7 +138,7 @@ class _Condition:
         token, before = self.tokens[self.at], self.tokens[self.at - 1]
         self.no_stray(token)
         if token.text == "=":
-            self.refuse("`=` does not compare", token, "write `==`")
+            self.refuse("`=` does not compare", token, write("=="))
         if token.text == "(" and before.kind == NAME:
             self.not_understood(f"`{before.text[:LONGEST_NUMBER]}` is not a macro with arguments", before)
         if token.text == ":":
@@ -160,7 +160,7 @@ class _Condition:
             if after.source is token.source and after.offset == token.end:
                 both = token.source.place(token.offset, 2, token.expansions)
                 self.refuse(
-                    f"`{token.text * 2}` has no meaning in a condition", both, f"write `{token.text} {token.text}`"
+                    f"`{token.text * 2}` has no meaning in a condition", both, write(f"{token.text} {token.text}")
                 )
 
     # reading

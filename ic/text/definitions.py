@@ -9,7 +9,7 @@ from ic.text.limits import LONGEST_NAME, MOST_MACRO_BODY, Findings
 from ic.text.strays import complain_of_stray
 from ic.text.substitute import OPTIONAL, REST, Macro, closing
 from met import units
-from met.diagnostic import Label
+from met.diagnostic import Help, Label, write
 
 CLOCK = ("__DATE__", "__TIME__", "__TIMESTAMP__")
 LONGEST_UNIT = 200  # tokens
@@ -233,9 +233,11 @@ def warn_of_quantity(name: Token, body: list[Token], findings: Findings) -> None
         return
     quantity = "".join(token.text for token in body).strip()
     why = f"a macro is put in as text, so `{name.text}^2` would be `{quantity}^2`"
-    help = f"write `let {name.text} = {quantity};`: {why}"
+    line = name.source.text.rfind("#", 0, name.offset)
+    definition = name.source.place(line, written[-1].end - line, name.expansions)
+    help = write(f"let {name.text} = {quantity};", f"write `let {name.text} = {quantity};`: {why}", at=definition)
     if name.source.name == COMMAND_LINE:
-        help = f"write `let {name.text} = ...;` in the deck, and `--set '{name.text}={quantity}'`: {why}"
+        help = Help(f"write `let {name.text} = ...;` in the deck, and `--set '{name.text}={quantity}'`: {why}")
     findings.warn("D017", f"macro `{name.text}` is a quantity", name.place, help=help)
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from ic.text.limits import MOST_BYTES
 from ic.text.source import SourceFile
-from met.diagnostic import Diagnostic, Place, Problem, error
+from met.diagnostic import Diagnostic, Help, Place, Problem, error, write
 from met.frozen import frozen
 from met.host.files import open_regular
 
@@ -174,6 +174,13 @@ def library_defines(kind: str, name: str, library: Path = LIBRARY) -> str | None
         if definition.search(path.read_text(encoding="utf-8", errors="replace")):
             return path.relative_to(library).as_posix()
     return None
+
+
+def add_include(file: str, place: Place, what: str = "it") -> Help:
+    """The help which says to include a standard deck, in the file that the place is in."""
+    head = Place(place.file, 1, 1, 0)
+    text = f"a standard deck defines {what}: add `#include <{file}>`"
+    return write(f"#include <{file}>\n", text, at=head, where="before")
 
 
 def _shown(names: Iterable[str], ending: str) -> list[str]:

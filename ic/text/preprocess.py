@@ -34,7 +34,7 @@ from ic.text.limits import (
 from ic.text.macros import Macros
 from ic.text.source import SourceFile
 from ic.text.strays import complain_of_stray, complain_of_unseen
-from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, nearest
+from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, meant, nearest, write
 from met.frozen import frozen
 
 CONDITIONALS = ("if", "ifdef", "ifndef", "elif", "elifdef", "elifndef", "else", "endif")
@@ -338,9 +338,12 @@ class _Preprocessor(Macros):
                 help="leave it out",
             )
         else:
-            meant = "elif" if name in ("elseif", "elsif") else name
-            near = did_you_mean(meant, CONDITIONALS if name.startswith(("if", "el", "end")) else DIRECTIVES)
-            self._misspelt_ifs += any(f"`{each}`?" in " ".join(near) for each in ("if", "ifdef", "ifndef"))
+            close = meant(
+                "elif" if name in ("elseif", "elsif") else name,
+                CONDITIONALS if name.startswith(("if", "el", "end")) else DIRECTIVES,
+            )
+            near = [write(close, f"did you mean `{close}`?", old=name)] if close is not None else []
+            self._misspelt_ifs += close in ("if", "ifdef", "ifndef")
             apart = directive.source.text[directive.offset - 1] != "#"
             self.findings.error(
                 "D007",

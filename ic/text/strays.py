@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 from ic.text.lexer import CHARACTER, Text, Token
 from ic.text.limits import Findings
+from met.diagnostic import write
 
 # characters that come out of word processors and other notations, and what a deck writes for them
 _PLAIN: Mapping[str, str] = MappingProxyType({
@@ -46,7 +47,7 @@ def complain_of_unseen(source: Text, findings: Findings) -> None:
             "D038",
             f"U+{ord(match[0]):04X} ({known}) is not seen, so this may not say what it seems to say",
             place,
-            help="leave it out",
+            help=write("", "leave it out"),
         )
 
 
@@ -59,7 +60,7 @@ def complain_of_stray(token: Token, findings: Findings) -> None:
     elif text.startswith('"'):
         tell("D003", "this string is not closed", token.place, help='a string ends with `"` on the line it began on')
     elif token.kind == CHARACTER:
-        tell("D004", "a string is written in double quotes", token.place, help=f'write `"{text[1:-1]}"`')
+        tell("D004", "a string is written in double quotes", token.place, help=write(f'"{text[1:-1]}"'))
     elif text.startswith("'"):
         tell("D004", "a stray `'`", token.place, help='a string is written in double quotes: `"text"`')
     elif text.startswith("#"):
@@ -82,6 +83,6 @@ def complain_of_stray(token: Token, findings: Findings) -> None:
         said = f"`{text[:8]}`" if text.isprintable() else f"U+{ord(first):04X}"
         if not text.isascii():
             said += f" ({known})"
-        remedy = f"write {plain}" if plain == "a space" else f"write `{plain}`"
-        usual = "leave it out" if text.isascii() else "names and units are written in plain ASCII"
+        remedy = write(" ", "write a space", old=first) if plain == "a space" else write(plain or "", old=first)
+        usual = write("", "leave it out", old=first) if text.isascii() else "names and units are written in plain ASCII"
         tell("D004", f"{said} does not belong in a deck", token.place, help=remedy if plain else usual)

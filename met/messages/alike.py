@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from met.messages.message import Change, Help
+
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
     """The known word that is most like this one; None where none is `cutoff` like it (1 is the same word)."""
@@ -21,6 +23,6 @@ def meant(word: str, known: Iterable[str]) -> str | None:
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> tuple[str, ...]:
-    """The help line that offers the word that may have been meant; or none."""
+    """The help line that offers the word that may have been meant, with the change that writes it; or none."""
     close = meant(word, known)
-    return (f"did you mean `{close}`?",) if close is not None else ()
+    return (Help(f"did you mean `{close}`?", Change(close, word)),) if close is not None else ()

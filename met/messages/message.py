@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Literal
 
 from met.frozen import frozen
 
 Severity = Literal["error", "warning", "note"]
+Where = Literal["instead", "value", "before", "behind", "inside", "entry"]
 
 
 @frozen
@@ -47,6 +49,60 @@ class Label:
 
 
 @frozen
+class Change:
+    """What a line of help says to write, as a change of the deck's text (`met.messages.edits` finds its stretch).
+
+    new    the text to write; "" where something is left out
+    old    the words in whose place it stands, of which one at least is at the place; None: all of the place
+    at     the place; None: that of the diagnostic
+    where  "instead"  in place of that
+           "value"    in place of that, which is a whole value
+           "before"   before it
+           "behind"   behind it, which is a whole value
+           "inside"   at the beginning of the block of what is defined there
+           "entry"    in place of the whole entry of a block that it stands in
+    """
+
+    new: str
+    old: str | None = None
+    at: Place | None = None
+    where: Where = "instead"
+
+
+class Help(str):
+    """One line of help, and the changes of the deck's text of which each does what it says; none where it takes a
+    person to write it."""
+
+    __slots__ = ("changes",)
+
+    changes: tuple[Change, ...]
+
+    def __new__(cls, text: str, *changes: Change) -> Help:
+        made = super().__new__(cls, text)
+        made.changes = changes
+        return made
+
+
+def write(
+    new: str, text: str = "", *, old: str | None = None, at: Place | None = None, where: Where = "instead"
+) -> Help:
+    """The help which says to write this, "write `2 m`" or the text given, with its change; see `Change`."""
+    return Help(text or f"write `{new}`", Change(new, old, at, where))
+
+
+def write_either(news: Iterable[str], text: str = "", *, old: str | None = None, where: Where = "instead") -> Help:
+    """The help which says to write one of these, "write `30 deg` or `30 rad`", or a text that ends so."""
+    texts = tuple(news)
+    said = f"{text}write {' or '.join(f'`{each}`' for each in texts)}"
+    return Help(said, *(Change(each, old, None, where) for each in texts))
+
+
+def leave_out(text: str, at: Place | None = None) -> Help:
+    """The help which says to leave an entry of a block out, with its change: the entry that the place stands in."""
+    return Help(text, Change("", None, at, "entry"))
+
+
+@frozen
 class Diagnostic:
     """One message for a user: what is wrong, where, why, and what to do."""
 
@@ -54,5 +110,17 @@ class Diagnostic:
     message: str
     at: Label | None = None
     also: tuple[Label, ...] = ()
-    help: tuple[str, ...] = ()
+    help: tuple[str, ...] = ()  # each may be a `Help`, which carries a change of the text
     severity: Severity = "error"
+
+
+def shown_place(place: Place) -> Place:
+    """The place where the deck's author should look: the place itself, or the outermost use of the macro that made it.
+
+    A macro's body stands before its uses, or in another file; what stands behind the use is one of its arguments.
+    """
+    if not place.expansions:
+        return place
+    use = place.expansions[-1].use
+    argument = place.file == use.file and (place.line, place.column) > (use.line, use.column)
+    return place if argument and place.included == use.included else use

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from met.messages.alike import nearest
+from met.messages.message import write
 from met.units import UNITS, is_unit
 
 LONGEST = 16  # of a word that is looked for
@@ -174,16 +175,17 @@ def remedy(name: str, number: str = "", *, alone: bool = True) -> tuple[str, ...
     """
     near = suggest(name)
     if near is not None:
-        return (f"did you mean `{near}`?",)
+        return (write(near, f"did you mean `{near}`?", old=name),)
     if name in _NOT_HERE:
         return _NOT_HERE[name]
     number = number if alone else ""
     if name in _OTHERS:
         what, size, unit = _OTHERS[name]
-        written = f"`{_times(number or '1', size)} {unit}`"
+        new = f"{_times(number or '1', size)} {unit}"
+        written = f"`{new}`"
         weight = f"`{_times(number or '1', _AS_FORCE[name])} N`" if name in _AS_FORCE else ""
         return (
-            f"{what} is not in the table: write {written}"
+            write(new, f"{what} is not in the table: write {written}", old=f"{number} {name}")
             if number
             else f"{what} is {written}: put that into the number",
             *([f"as a force it is {weight}"] if weight else []),
@@ -192,9 +194,10 @@ def remedy(name: str, number: str = "", *, alone: bool = True) -> tuple[str, ...
     prefixed = _with_prefix(name) if len(name) <= LONGEST else None
     if prefixed is not None:
         unit, power = prefixed
-        written = f"`{_shifted(number or '1', power)} {unit}`"
+        new = f"{_shifted(number or '1', power)} {unit}"
+        written = f"`{new}`"
         return (
-            f"the table has no such prefix: write {written}"
+            write(new, f"the table has no such prefix: write {written}", old=f"{number} {name}")
             if number
             else f"1 {name} is {written}: put that into the number",
         )

@@ -1,4 +1,4 @@
-"""Diagnostics as people and editors read them: one renderer for the terminal, one for JSON.
+"""Diagnostics as people read them in a terminal; `met.messages.programs` writes them for programs.
 
     error[D031]: servo `shoulder` at 300 Hz does not divide the base rate, 1000 Hz
       --> arm.ic:42:12
@@ -17,11 +17,10 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import Any, TextIO
+from typing import TextIO
 
-from met.messages.message import Diagnostic, Label, Place
+from met.messages.message import Diagnostic, Place, shown_place
 
-JSON_VERSION = 1
 TAB = 4
 WIDEST = 120  # columns of a source line; a longer one is shown in part
 MOST_STEPS = 8  # of macro expansion, or of includes
@@ -59,63 +58,6 @@ def count_line(diagnostics: Iterable[Diagnostic]) -> str:
 def wants_colour(stream: TextIO, environ: Mapping[str, str] = os.environ) -> bool:
     """True where output to this stream should be coloured: a terminal, and NO_COLOR is not set."""
     return stream.isatty() and not environ.get("NO_COLOR") and environ.get("TERM") != "dumb"
-
-
-def shown_place(place: Place) -> Place:
-    """The place where the deck's author should look: the place itself, or the outermost use of the macro that made it.
-
-    A macro's body stands before its uses, or in another file; what stands behind the use is one of its arguments.
-    """
-    if not place.expansions:
-        return place
-    use = place.expansions[-1].use
-    argument = place.file == use.file and (place.line, place.column) > (use.line, use.column)
-    return place if argument and place.included == use.included else use
-
-
-def to_json(diagnostics: Iterable[Diagnostic], allowed: Iterable[tuple[Diagnostic, str]] | None = None) -> str:
-    """The diagnostics for programs: an object with `version`, `diagnostics`, `errors` and `warnings`.
-
-    allowed  the warnings of a deck that are not among them, for a run allows them, and why: `allowed` of the object
-    """
-    found = tuple(diagnostics)
-    result: dict[str, Any] = {
-        "version": JSON_VERSION,
-        "errors": sum(d.severity == "error" for d in found),
-        "warnings": sum(d.severity == "warning" for d in found),
-        "diagnostics": [_diagnostic_json(d) for d in found],
-    }
-    if allowed is not None:
-        result["allowed"] = [{**_diagnostic_json(d), "because": because} for d, because in allowed]
-    import json
-
-    return json.dumps(result, indent=1)
-
-
-def _diagnostic_json(diagnostic: Diagnostic) -> dict[str, Any]:
-    at = diagnostic.at
-    return {
-        "code": diagnostic.code,
-        "severity": diagnostic.severity,
-        "message": diagnostic.message,
-        "shown": _place_json(shown_place(at.place)) if at else None,
-        "at": _label_json(at) if at else None,
-        "also": [_label_json(label) for label in diagnostic.also],
-        "help": list(diagnostic.help),
-    }
-
-
-def _label_json(label: Label) -> dict[str, Any]:
-    return {"place": _place_json(label.place), "text": label.text}
-
-
-def _place_json(place: Place) -> dict[str, Any]:
-    made: dict[str, Any] = {"file": place.file, "line": place.line, "column": place.column, "length": place.length}
-    if place.expansions:
-        made["expansions"] = [{"macro": step.macro, "use": _place_json(step.use)} for step in place.expansions]
-    if place.included:
-        made["included"] = [{"file": file, "line": line} for file, line in place.included]
-    return made
 
 
 class _Paint:

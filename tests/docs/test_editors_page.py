@@ -78,4 +78,24 @@ def test_the_page_names_commands_and_files_that_there_are() -> None:
     for path in re.findall(r"docs/editors[\w./]*", text):
         assert (ROOT / path.rstrip(".")).exists(), path
     used = {line.split()[1] for line in text.splitlines() if line.startswith("    met ")}
-    assert used == {"fmt", "new"} and used <= set(cli.met.list_commands(None))  # type: ignore[arg-type]
+    assert used == {"check", "fmt", "new"} and used <= set(cli.met.list_commands(None))  # type: ignore[arg-type]
+
+
+def test_the_hooks_before_a_commit_are_commands_of_met_and_those_that_the_page_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hooks = (ROOT / ".pre-commit-hooks.yaml").read_text(encoding="utf-8")
+    entries = dict(
+        zip(re.findall(r"^- id: (.*)$", hooks, re.M), re.findall(r"^  entry: (.*)$", hooks, re.M), strict=True)
+    )
+    page = (ROOT / "docs" / "editors.md").read_text(encoding="utf-8")
+    assert set(re.findall(r"^ +- id: (\S+)$", page, re.M)) == set(entries) == {"met-check", "met-fmt"}
+    monkeypatch.chdir(tmp_path)
+    for name, text in (("good.ic", "#include <two_link.ic>\n"), ("bad.ic", "arm one { link\n")):
+        Path(name).write_text(text)
+    for entry in entries.values():
+        program, *arguments = entry.split()
+        assert program == "met"
+        assert cli.main([*arguments, "good.ic", "good.ic"]) == cli.YES
+        assert cli.main([*arguments, "good.ic", "bad.ic"]) == cli.BAD_INPUT
+    assert set(re.findall(r"^  files: (.*)$", hooks, re.M)) == {r"\.ic$"}

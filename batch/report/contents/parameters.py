@@ -15,7 +15,7 @@ from ic.printing.columns import number
 from ic.printing.settings import settings
 from met.diagnostic import Place
 from met.distinct import distinct
-from met.messages.render import shown_place
+from met.messages.message import shown_place
 from met.plan import Experiment, Formula, Origin, Quantity
 
 SAID = {"deck": "deck", "case": "varied", "default": "default", "derived": "computed"}

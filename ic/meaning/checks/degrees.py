@@ -12,7 +12,7 @@ from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value
 from ic.text.complaints import Complaints
-from met.diagnostic import Problem
+from met.diagnostic import Problem, write
 from met.trace import Scalar
 
 
@@ -40,8 +40,12 @@ def remark_degrees(deck: Deck, definitions: Definitions, complaints: Complaints)
             f"`{call.name.text}` of {found.number:g}, a bare number: these are radians",
             place_of(argument),
             help=[
-                f"if degrees are meant, write `{call.name.text}({written} deg)`",
-                f"if radians are meant, write `{call.name.text}({written} rad)`",
+                write(
+                    f"{written} deg", f"if degrees are meant, write `{call.name.text}({written} deg)`", where="value"
+                ),
+                write(
+                    f"{written} rad", f"if radians are meant, write `{call.name.text}({written} rad)`", where="value"
+                ),
             ],
         )
 

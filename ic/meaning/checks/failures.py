@@ -16,7 +16,7 @@ from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
 from met.analysis.probe import accelerates
-from met.diagnostic import Label, Place
+from met.diagnostic import Label, Place, leave_out
 from met.frozen import frozen
 from met.instants import has_come
 from met.plan import EnvironmentUse, Schedule, ServoUse, Substitution
@@ -55,7 +55,8 @@ def check_failures(
             also = [Label(bed, "on a bed")] if (bed := beds[joint]) is not None else []
         if wrong is not None:
             message, help, at = wrong
-            scope.complaints.error("D247", message, at or place, also=also, help=help)
+            helps = leave_out(help, use.place) if "leave it out" in help else help
+            scope.complaints.error("D247", message, at or place, also=also, help=helps)
         elif servo is not None:
             sound.append(failure)
             _check_full(scope, failure, servo)
@@ -76,7 +77,10 @@ def check_friction(scope: Scope, uses: Iterable[Use], environment: Iterable[Envi
                 f"`{failure.use.name}` puts friction on joint `{failure.joint}`, which {label} tells its acceleration",
                 failure.place,
                 also=[Label(servo.place, "its servo")],
-                help="leave it out for this joint: no friction slows down or holds what is told its acceleration",
+                help=leave_out(
+                    "leave it out for this joint: no friction slows down or holds what is told its acceleration",
+                    failure.use.place,
+                ),
             )
 
 
@@ -176,7 +180,7 @@ def _remark_between_ticks(scope: Scope, failure: ServoFailure, period: float, du
             f"environment `{failure.use.name}` never acts: the law of joint `{failure.joint}` ticks at "
             f"{(tick - 1) * period:.9g} s and at {tick * period:.9g} s, and not in between",
             settled.origin.place or failure.place,
-            help="change that, or leave it out",
+            help=leave_out("change that, or leave it out", failure.use.place),
         )
 
 

@@ -14,7 +14,7 @@ from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters.models import value_place
 from ic.meaning.parameters.scope import Scope
 from met import models
-from met.diagnostic import Label
+from met.diagnostic import Label, leave_out
 from met.plan import EnvironmentUse
 from met.trace import Scalar
 
@@ -35,7 +35,7 @@ def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str,
             "D168",
             f"environment `{item.name}` never acts: {found[1]}",
             value_place(written[0]) if written else item.place,
-            help="change that, or leave it out",
+            help=leave_out("change that, or leave it out", item.place),
         )
     return found is not None
 
@@ -51,7 +51,7 @@ def remark_kinds(scope: Scope, environment: Any, item: Item, arm: ResolvedArm) -
                 f"`{parameter.name}` of environment `{item.name}` changes nothing: no "
                 f"joint of arm `{arm.name}` is {parameter.joints}",
                 value_place(written),
-                help="leave it out",
+                help=leave_out("leave it out"),
             )
 
 

@@ -10,6 +10,7 @@ from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
 from met.analysis.probe import reads
+from met.diagnostic import leave_out
 from met.plan import ServoUse, Structure
 from met.plan.uses import quantities
 
@@ -32,7 +33,10 @@ def remark_unread(scope: Scope, uses: Iterable[Use], structure: Structure) -> No
                     "D290",
                     f"sensor `{sensor.of}` changes nothing: {label} does not read `{sensor.of}`",
                     sensor.place,
-                    help=[helps, f"leave it out, or record it: `record += [{servo.joint}.servo.sensor.{sensor.of}];`"],
+                    help=[
+                        helps,
+                        leave_out(f"leave it out, or record it: `record += [{servo.joint}.servo.sensor.{sensor.of}];`"),
+                    ],
                 )
         for name, of in _dead(scope, structure, use.joint):
             if str(of.value) not in read and of.origin.place is not None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ic.meaning.parameters.scope import Scope
 from met import models
-from met.diagnostic import Label, Place
+from met.diagnostic import Label, Place, leave_out
 from met.metrics.metric import Metric
 from met.metrics.window import ROUNDING
 from met.plan import MetricUse, Requirement, Structure
@@ -54,7 +54,7 @@ def _remark_bound(scope: Scope, requirement: Requirement, metric: Metric, place:
             f"`require {requirement.text}` cannot be {'met' if upper else 'missed'}: a metric `{metric.name}` is never "
             f"below {metric.least:g}",
             place,
-            help="write a limit that it may pass, or leave it out",
+            help=leave_out("write a limit that it may pass, or leave it out"),
         )
     return beyond
 

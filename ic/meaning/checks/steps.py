@@ -17,7 +17,7 @@ from ic.meaning.checks.step_words import at_the_start, fault_warning, loop_warni
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.diagnostic import Problem
-from met.messages.render import shown_place
+from met.messages.message import shown_place
 from met.plan import Experiment
 from met.plan.columns import ends
 

@@ -24,7 +24,7 @@ from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models, units
-from met.diagnostic import Label, Place
+from met.diagnostic import Label, Place, leave_out
 from met.frozen import frozen
 from met.plan import COMPONENTS, Course, GuideUse, Structure
 from met.plan.channel import carries
@@ -310,7 +310,7 @@ def _courses(
                 also=[Label(part.place, "written here")] if later else [],
                 help=[
                     f"it guides {', '.join(guided)}",
-                    f"write `remove {name};`, or guide more" if later else "leave it out, or guide more",
+                    f"write `remove {name};`, or guide more" if later else leave_out("leave it out, or guide more"),
                 ],
             )
             continue

@@ -12,7 +12,7 @@ from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
-from met.diagnostic import did_you_mean
+from met.diagnostic import did_you_mean, leave_out
 from met.plan import SensorUse, ServoUse
 from met.plan.uses import quantities
 
@@ -39,7 +39,7 @@ def use_sensor(scope: Scope, servo: Owner, use: ServoUse, item: Item) -> SensorU
             "D246",
             f"{servo.label} ({use.model}) has no law that would see through a sensor",
             item.place,
-            help="leave the sensor out",
+            help=leave_out("leave the sensor out"),
         )
         return None
     known = quantities(use)

@@ -30,9 +30,9 @@ from ic.meaning.parameters.models import (
 from ic.meaning.parameters.owner import Owner, Settled
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
-from ic.text.files import library_defines
+from ic.text.files import add_include, library_defines
 from met import models
-from met.diagnostic import Label, Place, Problem, did_you_mean, error, meant
+from met.diagnostic import Label, Place, Problem, did_you_mean, error, leave_out, meant
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Command, SensorUse, ServoUse
@@ -137,7 +137,7 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
     place = item.value.name.place if isinstance(item.value, Call) else item.value.place
     if name not in scope.definitions.of_kind("servo") and name in models.find_own("servo"):
         file = library_defines("servo", name)
-        include = [f"a standard deck defines a servo of this name: add `#include <{file}>`"] if file else []
+        include = [add_include(file, place, "a servo of this name")] if file else []
         scope.complaints.error(
             "D147",
             f"`{name}` is a servo model; a servo definition is needed here",
@@ -179,7 +179,7 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
             "D150",
             f"the model `{servo.name}` has no computer that ticks, so no rate",
             block.items["rate"].place,
-            help="leave `rate` out",
+            help=leave_out("leave `rate` out"),
         )
     elif block.get("rate") is not None:
         rate = fixed_rate(
@@ -230,7 +230,7 @@ def moving_kind(scope: Scope, item: Item, arm: ResolvedArm, so: str) -> str | No
             f"joint `{item.name}` is fixed, {so}",
             item.place,
             also=[Label(place, "fixed here") for j in arm.joints if j.name == item.name and (place := j.place)],
-            help="leave it out, or make the joint revolute or prismatic",
+            help=leave_out("leave it out, or make the joint revolute or prismatic"),
         )
         return None
     return kind
@@ -297,7 +297,7 @@ def check_rest(scope: Scope, use: Use) -> None:
             message=f"joint `{use.joint}` begins with a rate, and servo `{use.definition}` ({use.servo.name}) needs it "
             "at rest",
             place=begins.origin.place,
-            help=(f"leave `{use.joint}.qd` out of `initial`", "or give the joint another servo"),
+            help=(leave_out(f"leave `{use.joint}.qd` out of `initial`"), "or give the joint another servo"),
             path=f"{path}.rest",
             needs=(path, f"{use.joint}.servo"),
         )
@@ -384,7 +384,8 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
     call = item.value
     place = place_of(call) if call is not None else item.place
     if not servo.commands:
-        scope.complaints.error("D150", f"the model `{servo.name}` takes no command", place, help="leave `command` out")
+        helps = leave_out("leave `command` out")
+        scope.complaints.error("D150", f"the model `{servo.name}` takes no command", place, help=helps)
         return None
     word = word_of(call)
     if word is not None and word not in COMMAND_UNIT and word in models.available("command"):

@@ -19,7 +19,7 @@ from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
-from met.diagnostic import Label, Place
+from met.diagnostic import Label, Place, leave_out
 from met.parameter import Parameter
 from met.plan import EnvironmentUse, Origin, Schedule, Substitution
 
@@ -98,7 +98,7 @@ def check_brakes(scope: Scope, found: tuple[Substitution, ...], environment: Ite
                     message,
                     use.place,
                     also=[Label(each.place, "on a bed")],
-                    help="leave it out: on a bed, friction is the bed's",
+                    help=leave_out("leave it out: on a bed, friction is the bed's"),
                 )
 
 

@@ -22,7 +22,7 @@ from ic.named_files import NamedFiles
 from ic.text.complaints import known_words
 from ic.text.limits import MOST_CSV_BYTES, MOST_CSV_ROWS
 from met import units
-from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error, write, write_either
 from met.frozen import frozen
 from met.messages.other_units import suggest
 from met.unit_parser import parse_unit
@@ -236,14 +236,12 @@ def _stripped(cell: str) -> tuple[str, int]:
 
 def _measure(column: CsvColumn, text: str, dimension: Dimension, label: Label) -> Measure:
     """The measure of a column's unit. Raises Problem D193 where it has none, or another than is wanted."""
-    shown = " or ".join(f"`{column.name} [{each}]`" for each in in_degrees(text))
+    helps = write_either((f"{column.name} [{each}]" for each in in_degrees(text)), old=column.name)
     if column.unit is None:
         if dimension == PURE:
             return units.ONE
-        raise Problem(
-            error("D193", f"column `{column.name}` has no unit", column.place, also=[label], help=f"write {shown}")
-        )
-    measure = _meaning(column, f"write {shown}", [label], dimension)
+        raise Problem(error("D193", f"column `{column.name}` has no unit", column.place, also=[label], help=helps))
+    measure = _meaning(column, Help(str(helps)), [label], dimension)
     if not units.same(measure.dimension, dimension):
         found = "a pure number" if measure.dimension == PURE else f"in {units.text(measure.dimension)}"
         raise Problem(
@@ -252,7 +250,7 @@ def _measure(column: CsvColumn, text: str, dimension: Dimension, label: Label) -
                 f"column `{column.name}` is {found}, and {text} is needed",
                 column.place,
                 also=[label],
-                help=f"write {shown}, with numbers in that unit",
+                help=f"{helps}, with numbers in that unit",
             )
         )
     return measure
@@ -266,7 +264,7 @@ def _meaning(column: CsvColumn, remedy: str, also: Iterable[Label], dimension: D
     except (ValueError, OverflowError, ZeroDivisionError):
         near = suggest(column.unit)
         if near is not None and (dimension is None or units.same(parse_unit(near).dimension, dimension)):
-            remedy = f"did you mean `{column.name} [{near}]`?"
+            remedy = write(near, f"did you mean `{column.name} [{near}]`?", old=column.unit)
         known = remedy or f"the units: {', '.join(units.UNITS)}"
         raise Problem(error("D193", f"`{column.unit}` is not a unit", column.place, also=also, help=known)) from None
 

@@ -11,7 +11,7 @@ from dataclasses import field, replace
 
 from ic.grammar.syntax import Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
 from ic.text.complaints import Complaints, known_words
-from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error, meant
+from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error, leave_out, meant, write
 from met.frozen import frozen
 
 REQUIREMENT = "requirement"
@@ -158,7 +158,7 @@ class _Merger:
                     entry.place,
                     also=[Label(earlier.place, "here")],
                     help=[
-                        f"leave out the word `{kind}` to change it",
+                        write("", f"leave out the word `{kind}` to change it", old=f"{kind} "),
                         f"`remove {name};` first, to put another in its place",
                     ],
                 )
@@ -395,9 +395,10 @@ def _taken_over(item: Item, homes: tuple[str, ...]) -> Item:
 
 def defined_twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnostic:
     what = f"{kind} `{name}`" if kind else f"`{name}`"
-    helps = ["remove one of the two"]
+    helps: list[str] = [leave_out("remove one of the two")]
     if (place.file, place.line, place.column) == (earlier.file, earlier.line, earlier.column):
-        helps = ["its file is included twice: begin that file with `#pragma once`"]
+        once = "its file is included twice: begin that file with `#pragma once`"
+        helps = [write("#pragma once\n", once, at=Place(place.file, 1, 1, 0), where="before")]
         if place.expansions and place.expansions != earlier.expansions:
             helps = [
                 f"macro `{place.expansions[-1].macro}` is used twice here: give it the name as an argument, "

@@ -15,10 +15,10 @@ from ic.meaning.definitions.csv_files import csv_files
 from ic.meaning.definitions.merge import MergedBlock, defined_twice, merge
 from ic.robots.files import RobotFiles
 from ic.text.complaints import Complaints, known_words, where_it_belongs, with_article
-from ic.text.files import library_defines
-from met.diagnostic import Label, Place, Problem, did_you_mean, error, meant
+from ic.text.files import add_include, library_defines
+from met.diagnostic import Label, Place, Problem, did_you_mean, error, meant, write
 from met.frozen import frozen
-from met.messages.render import shown_place
+from met.messages.message import shown_place
 
 """What paths of a run begin with, besides joints."""
 
@@ -101,7 +101,7 @@ class Definitions:
                     )
                 )
         file = library_defines(kind, name.text)
-        include = [f"a standard deck defines it: add `#include <{file}>`"] if file else did_you_mean(name.text, known)
+        include = [add_include(file, name.place)] if file else did_you_mean(name.text, known)
         raise Problem(
             error(
                 "D041",
@@ -242,7 +242,10 @@ class Definitions:
             and words[0].text != "default"
         ):
             self._complaints.error(
-                "D045", f"no kind of definition `{words[0].text}`", words[0].place, help="did you mean `default`?"
+                "D045",
+                f"no kind of definition `{words[0].text}`",
+                words[0].place,
+                help=write("default", "did you mean `default`?"),
             )
             words[0] = replace(words[0], text="default")
         default = len(words) > 1 and words[0].text == "default"
@@ -258,7 +261,11 @@ class Definitions:
                     "D045",
                     f"no kind of definition `{kind.text}`",
                     kind.place,
-                    help=f"write `{written}`: the language's words are in lower case",
+                    help=write(
+                        written.split()[-1],
+                        f"write `{written}`: the language's words are in lower case",
+                        old=kind.text,
+                    ),
                 )
             )
         if kind.text not in DEFINITIONS:
@@ -417,7 +424,7 @@ def _single(name: Name) -> Word:
                 "D059",
                 f"`{name.text}` is a path; the name of a definition is needed",
                 name.place,
-                help=f"write `{name.path[0].text}`",
+                help=write(name.path[0].text, old=name.text),
             )
         )
     return name.path[0]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from ic.grammar.syntax import Unit
 from ic.meaning.expressions.quantity import Value, measure_of
 from met import units
+from met.diagnostic import Help, write
 from met.frozen import frozen
 from met.trace import Scalar
 from met.unit_parser import parse_unit
@@ -62,7 +63,10 @@ def _hertz_for_rate(value: Value) -> AmbiguousUnit:
         )
     return AmbiguousUnit(
         f"in 1/s, and {_written(value)} is taken as {number} 1/s",
-        (f"if that is meant, write `{number} 1/s`", f"if cycles a second are meant, write `(2*pi*{number}) 1/s`"),
+        (
+            _write("if that is meant", f"{number} 1/s"),
+            _write("if cycles a second are meant", f"(2*pi*{number}) 1/s"),
+        ),
     )
 
 
@@ -81,7 +85,10 @@ def _no_hertz(value: Value) -> AmbiguousUnit | None:
         )
     return AmbiguousUnit(
         f"in Hz, and {_written(value)} is taken as {number} Hz, cycles a second",
-        (f"if that is meant, write `{number} Hz`", f"if radians a second are meant, write `({number}/(2*pi)) Hz`"),
+        (
+            _write("if that is meant", f"{number} Hz"),
+            _write("if radians a second are meant", f"({number}/(2*pi)) Hz"),
+        ),
     )
 
 
@@ -90,13 +97,13 @@ def _hertz_for_rad(value: Value, text: str) -> AmbiguousUnit:
     unit = _unit(value)
     if unit is not None and "kHz" not in unit.text:
         number = _in(value, unit)
-        helps = (
-            f"if that is meant, write `{number} {unit.text.replace('Hz', '(rad/s)')}`",
-            f"if cycles a second are meant, write `{number} {unit.text.replace('Hz', '(cycle/s)')}`",
+        helps: tuple[str, ...] = (
+            _write("if that is meant", f"{number} {unit.text.replace('Hz', '(rad/s)')}"),
+            _write("if cycles a second are meant", f"{number} {unit.text.replace('Hz', '(cycle/s)')}"),
         )
     else:
         helps = (
-            f"if that is meant, write `{_number(value)} {text}`",
+            _write("if that is meant", f"{_number(value)} {text}"),
             "if cycles a second are meant, write `cycle/s` in the place of the hertz",
         )
     return AmbiguousUnit(f"in {text}, and {_written(value)} is taken as {_number(value)} {text}", helps)
@@ -111,12 +118,12 @@ def _no_angle(value: Value, text: str, power: int) -> AmbiguousUnit:
     def angled(angle: str) -> str:
         angle = angle if abs(power) == 1 else f"{angle}^{abs(power)}"
         if power < 0:
-            return f"`{number} {plain}/{angle}`"
-        return f"`{number} {angle}{plain[1:]}`" if plain.startswith("1/") else f"`{number} {angle}*{plain}`"
+            return f"{number} {plain}/{angle}"
+        return f"{number} {angle}{plain[1:]}" if plain.startswith("1/") else f"{number} {angle}*{plain}"
 
     return AmbiguousUnit(
         f"in {text}, and {_written(value)} is taken as {_number(value)} {text}",
-        (f"if that is meant, write {angled('rad')}", f"if turns are meant, write {angled('cycle')}"),
+        (_write("if that is meant", angled("rad")), _write("if turns are meant", angled("cycle"))),
     )
 
 
@@ -128,8 +135,12 @@ def _angle_for_none(value: Value, text: str) -> AmbiguousUnit | None:
     number = _number(value)
     return AmbiguousUnit(
         f"in {text}, and {_written(value)} is taken as {number} {text}: angles count in radians",
-        (f"write `{number} {text}`",),
+        (write(f"{number} {text}", where="value"),),
     )
+
+
+def _write(condition: str, new: str) -> Help:
+    return write(new, f"{condition}, write `{new}`", where="value")
 
 
 def _unit(value: Value) -> Unit | None:

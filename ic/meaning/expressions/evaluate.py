@@ -22,6 +22,7 @@ from ic.grammar.syntax import (
     WithUnit,
     children,
 )
+from ic.meaning.expressions.lists import list_arithmetic, signed
 from ic.meaning.expressions.quantity import (
     Value,
     ValueList,
@@ -33,9 +34,10 @@ from ic.meaning.expressions.quantity import (
     too_large,
 )
 from ic.meaning.expressions.ranges import range_of, spaced
+from ic.meaning.expressions.whole import ceiling, nearest_whole
 from ic.text.complaints import known_words
 from met import units
-from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error, write
 from met.trace import (
     Real,
     Scalar,
@@ -46,9 +48,11 @@ from met.trace import (
     atan2,
     cos,
     exp,
+    floor,
     log,
     maximum,
     minimum,
+    sign,
     sin,
     sqrt,
     tan,
@@ -62,13 +66,29 @@ BIGGEST_EXPONENT = 16
 RESERVED = ("sqrt", "sin", "cos", "min", "max", "linspace", "logspace")
 """Functions whose names may not name a `let`; those of the others may, in decks that are older than they are."""
 
-FUNCTIONS = (*RESERVED, "abs", "tan", "asin", "acos", "atan", "atan2", "exp", "log", "tanh")
+FUNCTIONS = (
+    *RESERVED,
+    "abs",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "atan2",
+    "exp",
+    "log",
+    "tanh",
+    "floor",
+    "ceil",
+    "round",
+    "sign",
+)
 
 CONSTANTS = {"pi": math.pi}
 
 _OF_ANGLE = {"sin": sin, "cos": cos, "tan": tan}
 _TO_ANGLE = {"asin": asin, "acos": acos, "atan": atan}
 _OF_NUMBER = {"exp": exp, "log": log, "tanh": tanh}
+_TO_WHOLE = {"floor": floor, "ceil": ceiling, "round": nearest_whole}
 
 
 Lookup = Callable[[Name], Value | ValueList]
@@ -184,15 +204,17 @@ def _written_unit(expression: Expression) -> Place | None:
     return None
 
 
-def _unary(expression: Unary, lookup: Lookup) -> Value:
+def _unary(expression: Unary, lookup: Lookup) -> Value | ValueList:
     if expression.operator == "not":
         raise Problem(error("D064", "`not` stands only in `exclude when`", expression.place))
-    value = evaluate_number(expression.operand, lookup)
+    value = evaluate(expression.operand, lookup)
     place = spanned(expression.place, value.place)
+    if isinstance(value, ValueList):
+        return signed(expression.operator, value, place)
     return replace(value, number=-value.number if expression.operator == "-" else value.number, place=place)
 
 
-def _binary(node: Binary, left: Value | ValueList, lookup: Lookup) -> Value:
+def _binary(node: Binary, left: Value | ValueList, lookup: Lookup) -> Value | ValueList:
     operator = node.operator
     if operator in COMPARISONS or operator in ("and", "or"):
         raise Problem(
@@ -203,9 +225,14 @@ def _binary(node: Binary, left: Value | ValueList, lookup: Lookup) -> Value:
                 help="comparisons stand in `exclude when` and `require`",
             )
         )
-    if isinstance(left, ValueList):
-        raise Problem(error("D071", f"`{operator}` needs one number on its left, and this is a list", left.place))
-    right = evaluate_number(node.right, lookup)
+    right = evaluate(node.right, lookup)
+    if isinstance(left, ValueList) or isinstance(right, ValueList):
+        return list_arithmetic(node, left, right, _of_numbers)
+    return _of_numbers(node, left, right)
+
+
+def _of_numbers(node: Binary, left: Value, right: Value) -> Value:
+    operator = node.operator
     place = spanned(left.place, right.place)
     bare = left.bare and right.bare
     if operator in ("+", "-"):
@@ -237,17 +264,18 @@ def _binary(node: Binary, left: Value | ValueList, lookup: Lookup) -> Value:
     return replace(_power(node, left, right), place=place, bare=bare, hertz=hertz)
 
 
-def _made_alike(node: Binary, left: Value, right: Value) -> str:
+def _made_alike(node: Binary, left: Value, right: Value) -> Help:
     """The remedy where a bare number is added to a quantity, or quantities of two dimensions are."""
     of_macro = [each.macro for each in node.place.expansions]
     outside = [each for each in (node.left, node.right) if not place_of(each).expansions]
     if of_macro and (outside or any(place_of(each).expansions != node.place.expansions for each in children(node))):
-        return f"`{node.operator}` comes from macro `{of_macro[0]}`: put brackets around the macro's body"
+        return Help(f"`{node.operator}` comes from macro `{of_macro[0]}`: put brackets around the macro's body")
     other, bare_one, written = (right, left, node.left) if left.bare else (left, right, node.right)
     if not bare_one.bare or isinstance(bare_one.number, Scalar):
-        return "both must be of one dimension"
+        return Help("both must be of one dimension")
     unit = units.text(other.dimension)
-    return f"write `{written.text} {unit}`" if isinstance(written, Number) else f"write `({spell(written)}) {unit}`"
+    old = spell(written)
+    return write(f"{old} {unit}" if isinstance(written, Number) else f"({old}) {unit}", old=old, at=place_of(written))
 
 
 def _power(node: Binary, base: Value, exponent: Value) -> Value:
@@ -367,6 +395,8 @@ def _call(call: Call, lookup: Lookup) -> Value | ValueList:
         return replace(result, place=call.place)
     if name == "abs":
         return replace(first, number=as_float(absolute(first.number)), place=call.place, decimal="")
+    if name == "sign":
+        return Value(as_float(sign(first.number)), PURE, call.place)
     if name == "atan2":
         other = arguments[1]
         if not units.same(first.dimension, other.dimension):
@@ -379,11 +409,16 @@ def _call(call: Call, lookup: Lookup) -> Value | ValueList:
                 error("D061", f"`{name}` of {in_words(first)}", first.place, help="an angle is needed, as 30 deg")
             )
         return Value(_number_of(call, _OF_ANGLE[name](first.number)), PURE, call.place)
+    if first.dimension != PURE and name in _TO_WHOLE:
+        helps = f"divide by the step that is meant, and multiply with it: `{name}(x / (1 mm)) * 1 mm`"
+        raise Problem(error("D061", f"`{name}` of {in_words(first)}", first.place, help=helps))
     if first.dimension != PURE:
         helps = "a pure number is needed: divide by a quantity of the same unit"
         raise Problem(error("D061", f"`{name}` of {in_words(first)}", first.place, help=helps))
     if name in _TO_ANGLE:
         return Value(_number_of(call, _TO_ANGLE[name](first.number)), Dimension(rad=1), call.place)
+    if name in _TO_WHOLE:
+        return Value(as_float(_TO_WHOLE[name](first.number)), PURE, call.place)
     return Value(_number_of(call, _OF_NUMBER[name](first.number)), PURE, call.place)
 
 
@@ -411,6 +446,10 @@ USAGE = {
     "exp": ("x",),
     "log": ("x",),
     "tanh": ("x",),
+    "floor": ("x",),
+    "ceil": ("x",),
+    "round": ("x",),
+    "sign": ("x",),
 }
 
 

@@ -7,11 +7,12 @@ from collections.abc import Collection, Mapping
 from ic.grammar.syntax import Expression, Name
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, RESERVED, evaluate
+from ic.meaning.expressions.lists import COMPONENTS, component
 from ic.meaning.expressions.quantity import Value, ValueList
 from ic.text.complaints import MOST_DIAGNOSTICS, known_words
 from ic.text.lexer import COMMAND_LINE
 from met import units
-from met.diagnostic import Label, Place, Problem, did_you_mean, error
+from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error
 from met.messages import other_units
 
 DEEPEST = 64  # lets that need lets: far more than a deck has, far less than Python's recursion bears
@@ -25,6 +26,10 @@ def _uses(place: Place) -> list[Place]:
 def _macro(place: Place) -> str:
     """The macro whose body a place is in."""
     return place.expansions[0].macro
+
+
+def _if_a_unit(help: str) -> Help:
+    return Help(f"if a unit is meant: {help}", *(help.changes if isinstance(help, Help) else ()))
 
 
 class Names:
@@ -52,6 +57,9 @@ class Names:
     def find(self, name: Name) -> Value | ValueList:
         """The value of a name. Raises Problem D065 where there is none, D073 where it needs itself."""
         text = self._reached(name)
+        if self.names_a_component(name):
+            let = name.path[0]
+            return component(name, self.find(Name((let,), let.place)))
         if text in self.varied:
             self.followed[text] = None
             return self.varied[text]
@@ -93,6 +101,16 @@ class Names:
             self._open.pop(text, None)
         self._worth[text] = found
         return found
+
+    def names_a_component(self, name: Name) -> bool:
+        """Return True for `v.x` of a `let`: a servo of that name, or a path that a sweep varies, comes before it."""
+        return (
+            len(name.path) == 2
+            and name.path[1].text in COMPONENTS
+            and name.path[0].text in self.definitions.lets
+            and name.path[0].text not in self.definitions.of_kind("servo")
+            and name.text not in self.varied
+        )
 
     def _reached(self, name: Name) -> str:
         """The path to go by: that of the base that a sweep varies, where a servo definition has the value from it."""
@@ -155,7 +173,7 @@ class Names:
             ]
         elif not helps:
             unit = other_units.remedy(first) if len(first) > 1 else ()
-            helps = [f"define it: `let {first} = ...;`", *(f"if a unit is meant: {each}" for each in unit)]
+            helps = [f"define it: `let {first} = ...;`", *(_if_a_unit(each) for each in unit)]
         raise Problem(error("D065", f"no value `{name.text}`", name.place, help=helps))
 
     def check_lets(self) -> list[Problem]:

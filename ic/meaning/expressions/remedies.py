@@ -9,6 +9,7 @@ from ic.grammar.syntax import Expression, List, Number, WithUnit
 from ic.language.unit_words import in_degrees, units_of
 from ic.meaning.definitions.merge import Item
 from ic.meaning.expressions.quantity import Value
+from met.diagnostic import Help, write
 from met.trace import Scalar
 from met.units import PURE, Dimension
 
@@ -28,17 +29,20 @@ def components(item: Item | None, count: int) -> tuple[Expression | None, ...]:
     return (*parts, *[None] * (count - len(parts)))
 
 
-def unit_remedy(value: Value, text: str, dimension: Dimension) -> str:
+def unit_remedy(value: Value, text: str, dimension: Dimension) -> Help:
     """The remedy where a value has the wrong dimension."""
     number = None if isinstance(value.number, Scalar) else float(value.number)
     if dimension == PURE:
-        return "leave the unit out; `%` is the only unit of a pure number"
+        return Help("leave the unit out; `%` is the only unit of a pure number")
     if value.dimension == Dimension(s=-1) and dimension == Dimension(s=-1, rad=1):
-        return "Hz counts cycles without an angle: write rad/s, deg/s, rpm or cycle/s"
+        return Help("Hz counts cycles without an angle: write rad/s, deg/s, rpm or cycle/s")
     if value.dimension == Dimension(s=-1, rad=1) and dimension == Dimension(s=-1):
         if text == "Hz":
-            shown = "" if number is None else f": write `{number / (2.0 * math.pi):g} Hz`"
-            return f"a frequency counts cycles, without an angle{shown}"
-        return f"leave the angle out: write `{'...' if number is None else f'{number:g}'} {text}`"
+            why = "a frequency counts cycles, without an angle"
+            hertz = "" if number is None else f"{number / (2.0 * math.pi):g} Hz"
+            return write(hertz, f"{why}: write `{hertz}`", where="value") if hertz else Help(why)
+        if number is None:
+            return Help(f"leave the angle out: write `... {text}`")
+        return write(f"{number:g} {text}", f"leave the angle out: write `{number:g} {text}`", where="value")
     known = list(dict.fromkeys((text, *sorted(in_degrees(text)), *units_of(dimension))))
-    return f"write it in {', '.join(known[:-1])} or {known[-1]}" if len(known) > 1 else f"write it in {known[0]}"
+    return Help(f"write it in {', '.join(known[:-1])} or {known[-1]}" if len(known) > 1 else f"write it in {known[0]}")

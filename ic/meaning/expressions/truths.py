@@ -13,7 +13,7 @@ from ic.meaning.expressions.evaluate import COMPARISONS, Lookup, evaluate_number
 from ic.meaning.expressions.quantity import Value, in_words
 from ic.text.complaints import known_words
 from met import units
-from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
+from met.diagnostic import Diagnostic, Help, Label, Problem, did_you_mean, error, write
 from met.frozen import frozen
 from met.trace import Formulas, Graph, Scalar
 from met.units import PURE
@@ -113,10 +113,10 @@ class Truths:
         """A comparison of numbers, read. Raises Problem where its sides cannot be compared."""
         left, right = (evaluate_number(side, self.find) for side in (expression.left, expression.right))
         if not units.same(left.dimension, right.dimension):
-            helps = "both must be of one dimension"
+            helps = Help("both must be of one dimension")
             for one, other in ((left, right), (right, left)):
                 if one.bare and one.dimension == PURE and not isinstance(one.number, Scalar):
-                    helps = f"write `{one.number:g} {units.text(other.dimension)}`"
+                    helps = write(f"{one.number:g} {units.text(other.dimension)}", at=one.place, where="value")
             message = f"`{expression.operator}` of {in_words(left)} and {in_words(right)}"
             also = [Label(side.place, in_words(side)) for side in (left, right)]
             raise Problem(error("D063", message, expression.place, also=also, help=helps))

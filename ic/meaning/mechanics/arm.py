@@ -21,7 +21,7 @@ from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_relations, no_direction
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words, where_it_belongs
-from met.diagnostic import Label, Place, did_you_mean, meant
+from met.diagnostic import Label, Place, did_you_mean, leave_out, meant, write
 from met.frozen import frozen
 from met.plan import BASE, Joint, Link
 from met.trace import Scalar, sqrt
@@ -194,7 +194,8 @@ def _limits(scope: Scope, owner: Owner, body: MergedBlock) -> tuple[str, ...]:
     if owner.joint == "fixed":
         for wanted, item in written.items():
             message = f"a fixed joint has no `{wanted.name}`"
-            scope.complaints.error("D346", message, item.place, help=f"leave `{wanted.name}` out: it does not move")
+            helps = leave_out(f"leave `{wanted.name}` out: it does not move")
+            scope.complaints.error("D346", message, item.place, help=helps)
         return ()
     values = {wanted.name: scope.number(owner, wanted, item) for wanted, item in written.items()}
     ends = [name for name in ("q_min", "q_max") if name in values]
@@ -238,7 +239,11 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping
         )
     else:
         ground = name in scope.definitions.robot_files.roots
-        near = (f"`{name}` is the root of its robot: write `base`",) if ground else did_you_mean(name, known)
+        near = (
+            (write("base", f"`{name}` is the root of its robot: write `base`", old=name),)
+            if ground
+            else did_you_mean(name, known)
+        )
         scope.complaints.error(
             "D094", f"no link `{name}` in this arm", value_place(item), help=[*near, known_words("links", known)]
         )
@@ -248,7 +253,8 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping
 def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
     if kind == "fixed":
         if item is not None:
-            scope.complaints.error("D095", "a fixed joint has no axis", item.place, help="leave `axis` out")
+            helps = leave_out("leave `axis` out")
+            scope.complaints.error("D095", "a fixed joint has no axis", item.place, help=helps)
         return
     if item is None:
         scope.complaints.missing(

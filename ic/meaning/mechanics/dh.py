@@ -22,7 +22,7 @@ from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, word_of
 from ic.meaning.parameters.owner import XYZ, Owner
 from ic.meaning.parameters.scope import Scope
-from met.diagnostic import Label, did_you_mean
+from met.diagnostic import Label, did_you_mean, leave_out, write
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.trace import Real, Scalar, atan2, cos, sin
@@ -118,7 +118,9 @@ def _refuse_others(scope: Scope, owner: Owner, item: Item, body: MergedBlock) ->
                 f"{owner.label} has both `dh` and `{name}`",
                 other.place,
                 also=[Label(item.place, "the Denavit-Hartenberg numbers")],
-                help=f"`dh` says all of the joint's frame: leave `{name}` out (`remove {name};` where a base has it)",
+                help=leave_out(
+                    f"`dh` says all of the joint's frame: leave `{name}` out (`remove {name};` where a base has it)"
+                ),
             )
         for path in (name, *(f"{name}.{axis}" for axis in XYZ)):
             scope.not_sweepable[owner.join(path)] = not_sweepable.follows(owner.join("dh"), _numbers(owner))
@@ -140,7 +142,7 @@ def _convention(scope: Scope, item: Item) -> str | None:
             return None
         return name
     meant = OTHER_NAMES.get(name or "")
-    helps = [f"write `{meant}`"] if meant else list(did_you_mean(name, CONVENTIONS)) if name else []
+    helps = [write(meant, old=name)] if meant else list(did_you_mean(name, CONVENTIONS)) if name else []
     message = f"no Denavit-Hartenberg convention `{name}`" if name else "the name of a convention is needed here"
     scope.complaints.error(
         "D180", message, place_of(item.value) if item.value is not None else item.place, help=[*helps, USAGE]

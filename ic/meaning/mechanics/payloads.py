@@ -18,7 +18,7 @@ from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
-from met.diagnostic import Label, Place, did_you_mean
+from met.diagnostic import Label, Place, did_you_mean, leave_out
 from met.parameter import WORLD
 from met.plan import BASE, INSTANT, Payload, Structure
 from met.plan.defaults import INERTIA
@@ -137,7 +137,7 @@ def _check_unused(scope: Scope, item: Item, body: MergedBlock, grappled: bool) -
         message, helps = (
             f"payload `{item.name}` is held from the start",
             [
-                f"leave `{name}` out: `at` and `rpy` say where on its link it is",
+                leave_out(f"leave `{name}` out: `at` and `rpy` say where on its link it is"),
                 "or write `grapple = 3 s;` if it flies first",
             ],
         )
@@ -146,7 +146,7 @@ def _check_unused(scope: Scope, item: Item, body: MergedBlock, grappled: bool) -
             message, helps = (
                 f"payload `{item.name}` is held as it is when it is grappled",
                 [
-                    f"leave `{name}` out: `attitude` and `rate` say how it flies before",
+                    leave_out(f"leave `{name}` out: `attitude` and `rate` say how it flies before"),
                     "or leave `grapple` out if it is held from the start",
                 ],
             )
@@ -220,7 +220,7 @@ def _remark_time(scope: Scope, payload: Payload, event: str, time: float, struct
             "D268",
             f"{does} at {time:g} s, and the run ends at {schedule.duration:g} s",
             place,
-            help=f"leave `{event}` out, or let the run last longer"
+            help=leave_out(f"leave `{event}` out, or let the run last longer")
             if event == "release"
             else "let the run last longer, or leave it: then the payload flies by",
         )

@@ -7,6 +7,7 @@ from ic.language.bodies import JOINT, LINK
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.parameters.models import word_of
+from met.diagnostic import Help, write
 
 OF_JOINT = (*JOINT.keys, "pivot")
 
@@ -20,23 +21,23 @@ def in_run(definitions: Definitions, block: MergedBlock, item: Item, rates: tupl
     value = spell(item.value) if item.value is not None else "..."
     match item.name.split("."):
         case ["servos", joint, key] | [joint, "servo", key] if joint in joints:
-            return [f"write `servos {{ {joint} {{ {key} = {value}; }} }}`"]
+            return [_write(item, f"servos {{ {joint} {{ {key} = {value}; }} }}")]
         case [joint, "servo"] | ["servos", joint] if joint in joints:
-            return [f"write `servos {{ {joint} = {value}; }}`"]
+            return [_write(item, f"servos {{ {joint} = {value}; }}")]
         case [joint, "q" | "qd" as key] | ["initial", joint, "q" | "qd" as key] if joint in joints:
-            return [f"write `initial {{ {joint}.{key} = {value}; }}`"]
+            return [_write(item, f"initial {{ {joint}.{key} = {value}; }}")]
         case ["environment", model, key]:
-            return [f"write `environment {{ {model} {{ {key} = {value}; }} }}`"]
+            return [_write(item, f"environment {{ {model} {{ {key} = {value}; }} }}")]
         case ["links", thing, key] if thing in links:
             return _in_arm(arm, thing, key, value)
         case [thing, key] if (thing in joints and key in OF_JOINT) or (thing in links and key in LINK.keys):
             return _in_arm(arm, thing, key, value)
         case [rate] if rate in rates:
-            return [f"write `rates {{ {rate} = {value}; }}`"]
+            return [_write(item, f"rates {{ {rate} = {value}; }}")]
         case ["rates" | "tolerances" | "initial" | "environment" as head, *rest] if len(rest) == 1:
-            return [f"write `{head} {{ {rest[0]} = {value}; }}`"]
+            return [_write(item, f"{head} {{ {rest[0]} = {value}; }}")]
         case ["tolerances", *rest]:
-            return [f"write `tolerances {{ {'.'.join(rest)} = {value}; }}`"]
+            return [_write(item, f"tolerances {{ {'.'.join(rest)} = {value}; }}")]
     return []
 
 
@@ -45,8 +46,13 @@ def in_arm(item: Item, known: list[str]) -> list[str]:
     value = spell(item.value) if item.value is not None else "..."
     words = item.name.removeprefix("links.").split(".")
     if len(words) == 2 and words[0] in known and item.body is None:
-        return [f"write `{words[0]} {{ {words[1]} = {value}; }}`"]
+        return [_write(item, f"{words[0]} {{ {words[1]} = {value}; }}")]
     return []
+
+
+def _write(item: Item, entry: str) -> Help:
+    """The help which says to write an entry in place of the item's, where that has a value to write there."""
+    return write(entry, where="entry") if item.value is not None and not item.appended else Help(f"write `{entry}`")
 
 
 def _in_arm(arm: str, thing: str, key: str, value: str) -> list[str]:

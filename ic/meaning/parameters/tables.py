@@ -16,7 +16,7 @@ from ic.meaning.parameters.owner import Owner, Settled
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import units
-from met.diagnostic import Label, Problem, did_you_mean, error
+from met.diagnostic import Label, Problem, did_you_mean, error, leave_out
 from met.environments.environment import FILE, Environment
 from met.parameter import Parameter
 from met.plan import Origin
@@ -37,7 +37,7 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Merged
                 f"`{each.name}` of {owner.label} stands in the file",
                 item.place,
                 also=[Label(body.items[FILE.name].place, "which is named here")],
-                help="leave one of the two out",
+                help=leave_out("leave one of the two out"),
             )
     own = [each.name for each in environment.parameters if each.shape != "list"]
     values = use_model(

@@ -17,7 +17,7 @@ from ic.meaning.expressions.remedies import unit_remedy
 from ic.meaning.parameters.owner import Owner
 from ic.text.complaints import Complaints
 from met import units
-from met.diagnostic import Place, Problem, error
+from met.diagnostic import Change, Help, Place, Problem, error, write, write_either
 from met.parameter import Parameter
 from met.plan import JointKind
 from met.trace import Real, Scalar
@@ -48,18 +48,18 @@ class ValueChecks:
         also = self.names.label(value)
         apart: str | list[str] = self._of_its_own(owner, wanted, value, text)
         if value.dimension == PURE:
-            shown = f"a number in {text}"
+            wrote: Help | str = f"write a number in {text}"
             if not isinstance(value.number, Scalar):
-                shown = either(f"{value.number:.12g} {each}" for each in in_degrees(text))
+                wrote = write_either((f"{value.number:.12g} {each}" for each in in_degrees(text)), where="value")
             if value.bare and any(source.name == value.place.file for source in self.definitions.csv_files.sources):
-                shown = f"the unit in square brackets behind the column's name: `[{text}]`"
+                wrote = f"write the unit in square brackets behind the column's name: `[{text}]`"
             raise Problem(
                 error(
                     "D060",
                     f"{what} is in {text}, and this is a {'bare' if value.bare else 'pure'} number",
                     value.place,
                     also=also,
-                    help=apart or (f"write {shown}" if value.bare else f"a unit is missing on the way here: {text}"),
+                    help=apart or (wrote if value.bare else f"a unit is missing on the way here: {text}"),
                 )
             )
         found = units.text(value.dimension)
@@ -117,8 +117,7 @@ class ValueChecks:
                     "D060",
                     f"{owner.what(wanted)} is in {text}, and these are bare numbers",
                     found.place,
-                    help=f"write {either(f'[...] {each}' for each in in_degrees(text))}: "
-                    "a unit after the bracket is for all of them",
+                    help=_one_unit_for_all(in_degrees(text)),
                 )
             )
         dimensions = {value.dimension for value in numbers}
@@ -217,7 +216,10 @@ class ValueChecks:
         if abs(number) <= 1.0:
             return
         shown, per_cent = f"{number:.12g}", f"{100.0 * number:.12g} %"
-        helps = [f"if per cent are meant, write `{shown} %`", f"if that is meant, write `{per_cent}`"]
+        helps: list[str] = [
+            write(f"{shown} %", f"if per cent are meant, write `{shown} %`", where="value"),
+            write(per_cent, f"if that is meant, write `{per_cent}`", where="value"),
+        ]
         if isinstance(value.number, Scalar):
             helps = [
                 "if per cent are meant, write `%` behind the values",
@@ -257,3 +259,10 @@ class ValueChecks:
         if owner.homes[-1] != both[-1]:
             return f"{why}: write `{written}` in servo `{owner.homes[-1]}`"
         return f"{why}: give its servo a {key} of its own, `{joint} = {both[-1]} {{ {written} }}`"
+
+
+def _one_unit_for_all(written: Iterable[str]) -> Help:
+    """The help for a list of bare numbers, which a unit behind its bracket is for."""
+    shown = either(f"[...] {each}" for each in written)
+    changes = (Change(f" {each}", where="behind") for each in written)
+    return Help(f"write {shown}: a unit after the bracket is for all of them", *changes)

@@ -9,7 +9,7 @@ from ic.grammar.syntax import Entry, Name, Statement, String
 from ic.language import EXPERIMENTS, OF_A_RUN
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.text.complaints import Complaints
-from met.diagnostic import Diagnostic, Label, Place, did_you_mean
+from met.diagnostic import Diagnostic, Label, Place, did_you_mean, leave_out
 from met.messages.warning_codes import WARNINGS, WHILE_RUNNING
 from met.plan import Allowance, Experiment
 
@@ -52,7 +52,7 @@ def _read(body: Iterable[Entry], complaints: Complaints) -> dict[str, Allowance]
                 f"`{first.code}` is allowed twice",
                 Label(words[0].place, "again"),
                 also=[Label(first.place, "first")],
-                help="leave one of the two out",
+                help=leave_out("leave one of the two out"),
             )
         else:
             found[words[0].text] = Allowance(words[0].text, " ".join(value.value.split()), words[0].place)
@@ -109,7 +109,10 @@ def warn_of_unneeded(
             unneeded = {place: code for place, code in unneeded.items() if place not in elsewhere}
     for place, code in unneeded.items():
         complaints.warn(
-            "D333", f"`allow {code}` silences nothing here", place, help="leave it out: no such warning is given"
+            "D333",
+            f"`allow {code}` silences nothing here",
+            place,
+            help=leave_out("leave it out: no such warning is given"),
         )
 
 
@@ -134,7 +137,7 @@ def _refuse(code: str, place: Place, complaints: Complaints) -> None:
             "D331",
             f"`{code}` is no warning of a run, and nothing else is allowed",
             place,
-            help=f"mend what it says, and leave this out: `met doc {code}`",
+            help=leave_out(f"mend what it says, and leave this out: `met doc {code}`"),
         )
         return
     complaints.error(

@@ -20,7 +20,7 @@ from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
-from met.diagnostic import Label, Place, did_you_mean
+from met.diagnostic import Help, Label, Place, did_you_mean, leave_out
 from met.parameter import WORLD, Parameter
 from met.plan import BASE, COMPONENTS, Base, Course, Link, Payload, Structure, ground
 from met.plan.defaults import INERTIA, OF_FREE_BASE, component
@@ -80,7 +80,7 @@ def check_base(
             f"{what} moves by velocity products, and they are off",
             place_of(off.value) if off.value is not None else off.place,
             also=[Label(item.place, f"{what}")],
-            help="leave `velocity_products = off` out",
+            help=leave_out("leave `velocity_products = off` out"),
         )
     if base is None or base.kind != "free" or item is None:
         return
@@ -118,10 +118,11 @@ def initial_base(scope: Scope, body: MergedBlock, base: Base | None) -> None:
             scope.vector(Owner("the base", place, f"initial.{BASE}"), wanted, item)
         elif item is not None:
             message = "a fixed base stays at the world's origin"
-            help = "write `base = free;`, or put the arm elsewhere: `at` and `rpy` of the joints on the base"
+            help = Help("write `base = free;`, or put the arm elsewhere: `at` and `rpy` of the joints on the base")
             if base is not None:
                 message = "a prescribed base begins where its courses do"
-                help = f"leave it out; `base = prescribed {{ ... }}` says where it is: {', '.join(COMPONENTS)}"
+                shown = ", ".join(COMPONENTS)
+                help = leave_out(f"leave it out; `base = prescribed {{ ... }}` says where it is: {shown}")
             scope.complaints.error("D255", f"{message}, so `{item.name}` has no effect", item.place, help=help)
 
 

@@ -20,7 +20,7 @@ from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.record import not_one, of_lost
 from ic.text.complaints import known_words
 from met import models, units
-from met.diagnostic import Label, Place, Problem, error
+from met.diagnostic import Help, Label, Place, Problem, error, write
 from met.frozen import frozen
 from met.metrics.metric import Metric
 from met.plan import CHANNEL_INPUT, SignalExpression, Structure
@@ -197,8 +197,10 @@ class ChannelTable:
             measure = parse_unit(settled.unit)
             return Value(settled.value, measure.dimension, name.place, hertz=measure.hertz)
         first = name.path[0].text
-        if first in scope.definitions.of_kind("servo") or (
-            len(name.path) == 1 and name.text not in recordable(self.structure)
+        if (
+            first in scope.definitions.of_kind("servo")
+            or scope.names.names_a_component(name)
+            or (len(name.path) == 1 and name.text not in recordable(self.structure))
         ):
             return scope.names.find(name)
         return self._no_channel(name)
@@ -234,10 +236,10 @@ class ChannelTable:
     def _comparison(self, comparison: Binary, negated: bool) -> ConditionMargin:
         left, right = (self._number(side) for side in (comparison.left, comparison.right))
         if not units.same(left.dimension, right.dimension):
-            helps = "both must be of one dimension"
+            helps = Help("both must be of one dimension")
             for one, other in ((left, right), (right, left)):
                 if one.bare and one.dimension == PURE and not isinstance(one.number, Scalar):
-                    helps = f"write `{one.number:g} {units.text(other.dimension)}`"
+                    helps = write(f"{one.number:g} {units.text(other.dimension)}", at=one.place, where="value")
             message = f"`{comparison.operator}` of {in_words(left)} and {in_words(right)}"
             also = [Label(side.place, in_words(side)) for side in (left, right)]
             raise Problem(error("D063", message, comparison.place, also=also, help=helps))

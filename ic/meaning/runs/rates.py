@@ -17,7 +17,7 @@ from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words, with_article
 from met import models
-from met.diagnostic import Label, did_you_mean
+from met.diagnostic import Help, Label, did_you_mean, write
 from met.plan import Schedule
 
 ANY_RATE = 1000  # Hz, where the deck's could not be had
@@ -31,7 +31,7 @@ def resolve_rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate
             ("rates",),
             "D115",
             f"{run.label} has no rates",
-            help="write `rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }`",
+            help=write("rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }", where="inside"),
         )
         return rates
     body = body_of(scope, item)
@@ -51,9 +51,19 @@ def resolve_rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate
             rates[part.name] = rate
     if "dynamics" not in body.items and item.body is not None:
         scope.complaints.missing(
-            item.place, ("dynamics",), "D117", "no rate of the dynamics", help="write `dynamics = 1 kHz;`"
+            item.place,
+            ("dynamics",),
+            "D117",
+            "no rate of the dynamics",
+            help=_add(item, "dynamics = 1 kHz;"),
         )
     return rates
+
+
+def _add(rates: Item, entry: str, text: str = "") -> Help:
+    """The help to add an entry to `rates`: where these are a base's, a run has blocks of its own for that."""
+    text = text or f"write `{entry}`"
+    return write(entry, text, where="inside") if len(rates.homes) == 1 else Help(text)
 
 
 def resolve_schedule(
@@ -77,7 +87,9 @@ def resolve_schedule(
                 ("servos",),
                 "D118",
                 "no rate of the servos",
-                help="write `servos = 1 kHz;`, or a `rate` in each servo's definition",
+                help=_add(
+                    rates_item, "servos = 1 kHz;", "write `servos = 1 kHz;`, or a `rate` in each servo's definition"
+                ),
             )
     if dynamics is None:  # already reported: nothing is said of rates, and what does not depend on them is looked at
         ticks = {use.joint: Ticks(1, continuous=False) for use in uses}

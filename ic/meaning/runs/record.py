@@ -12,7 +12,7 @@ from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
-from met.diagnostic import Label, Place, did_you_mean, nearest
+from met.diagnostic import Help, Label, Place, did_you_mean, nearest, write
 from met.plan import Recorded, Structure
 from met.plan.channel import FAMILIES, carries, recordable
 
@@ -32,7 +32,11 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
             ("record",),
             "D124",
             f"{run.label} records nothing",
-            help="write `record = [q, qd, tau];`, or `record = [];` where metrics are all you want",
+            help=write(
+                "record = [q, qd, tau];",
+                "write `record = [q, qd, tau];`, or `record = [];` where metrics are all you want",
+                where="inside",
+            ),
         )
         return ()
     asked = [name for expression in (item.value, *item.appended) for name in _names(scope, item, expression)]
@@ -116,7 +120,7 @@ def nearest_channels(name: Name, known: dict[str, tuple[Recorded, ...]], structu
     if own:
         rests = [each.removeprefix(f"{head}.") for each in known if each.startswith(f"{head}.")]
         near = nearest(name.text.removeprefix(f"{head}."), rests)  # all that begins with the joint looks alike
-        meant = [] if near is None else [f"did you mean `{head}.{near}`?"]
+        meant = [] if near is None else [_did_you_mean(name, f"{head}.{near}")]
         return [*meant, known_words(f"channels of `{head}`", own)]
     joints = [each for each in whole if known[each][0].joints and not each.startswith("links.")]
     arm = [each for each in whole if each in FAMILIES and not known[each][0].joints]
@@ -130,6 +134,10 @@ def nearest_channels(name: Name, known: dict[str, tuple[Recorded, ...]], structu
         known_words("channels of the arm, and of a link", [*arm, *some]),
         *([known_words("channels of a payload", of_payload)] if of_payload else []),
     ]
+
+
+def _did_you_mean(name: Name, near: str) -> Help:
+    return write(near, f"did you mean `{near}`?", old=name.text)
 
 
 def _why_none(words: list[str], structure: Structure) -> str:

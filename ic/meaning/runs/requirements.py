@@ -18,7 +18,7 @@ from ic.meaning.runs.expressions import is_over_time
 from ic.meaning.runs.step_errors import FLIPPED, is_step_error
 from ic.text.complaints import known_words
 from met import models
-from met.diagnostic import did_you_mean
+from met.diagnostic import Help, did_you_mean, write
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Requirement, Structure
@@ -72,7 +72,7 @@ def read_requirements(
                     "D355",
                     f"`{model.name}` is a share, and there is no limit for it",
                     place_of(statement.value),
-                    help=f"write `require {spell(_over_cases(statement.value)[0])} > 95 %;`",
+                    help=_write(statement, f"{spell(_over_cases(statement.value)[0])} > 95 %"),
                 )
             else:
                 found.append(WrittenRequirement(statement, comparison.text, ">=", None, share, False, confidence))
@@ -90,7 +90,7 @@ def read_requirements(
         if is_step_error(comparison):
             if share is not None or confidence is not None:
                 message = "an error by the step is of a metric, not of a share of cases"
-                helps = f"write `require {spell(comparison)};`"
+                helps = _write(statement, spell(comparison))
                 scope.complaints.error("D350", message, place_of(statement.value), help=helps)
             continue  # `resolve_step_errors` reads it
         removed = {
@@ -112,7 +112,7 @@ def read_requirements(
                 "D350",
                 "a confidence without the share of cases that it is of",
                 place_of(statement.value),
-                help=f"write `require {spell(comparison)} in 99 % of cases with {spell(confidence)} confidence;`",
+                help=_write(statement, f"{spell(comparison)} in 99 % of cases with {spell(confidence)} confidence"),
             )
             continue
         if not _is_metric(metric, written | removed) and _is_metric(limit, written | removed):
@@ -141,6 +141,12 @@ def read_requirements(
 
 def _is_metric(expression: Expression, metrics: set[str]) -> bool:
     return isinstance(expression, Name) and expression.text in metrics
+
+
+def _write(statement: Statement, requirement: str) -> Help:
+    """The help which says to write this requirement in place of a statement."""
+    name = f" {statement.name.text}:" if statement.name is not None else ""
+    return write(f"require{name} {requirement};", f"write `require {requirement};`", where="entry")
 
 
 def _over_cases(value: Expression) -> tuple[Expression, Expression | None, Expression | None]:

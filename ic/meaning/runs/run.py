@@ -49,7 +49,7 @@ from ic.meaning.runs.step_errors import resolve_step_errors
 from ic.meaning.runs.tolerances import resolve_tolerances
 from ic.text.complaints import known_words, where_it_belongs
 from met import models
-from met.diagnostic import Place, did_you_mean
+from met.diagnostic import Place, did_you_mean, write
 from met.frozen import frozen
 from met.plan import Experiment, Requirement, Schedule, ServoUse, StepErrorLimit, Structure, Tolerance
 
@@ -90,7 +90,8 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     duration = scope.constant(run, DURATION, block.items["duration"]) if "duration" in block.items else None
     if "duration" not in block.items:
         message = f"{run.label} has no duration"
-        scope.complaints.missing(run.place, ("duration",), "D107", message, help="write `duration = 10 s;`")
+        helps = write("duration = 10 s;", where="inside")
+        scope.complaints.missing(run.place, ("duration",), "D107", message, help=helps)
     if arm is None:
         return None
     scope.failed_parts = arm.failed

@@ -13,7 +13,8 @@ from types import FrameType
 
 import ic
 from ic.driver.compile import Compiled, Select
-from met.messages.render import render, to_json
+from met.messages.programs import to_json, to_sarif
+from met.messages.render import render
 
 MOST_SECONDS = 20.0  # of processor time
 MOST_MEMORY = 1 << 30  # bytes, besides what the program itself takes
@@ -53,7 +54,8 @@ def _all_of_it(path: Path, select: Select) -> Compiled:
     text = render(compiled.diagnostics, compiled.sources)
     assert "\x1b" not in text and "\x00" not in text, "a message could steer the terminal"
     assert all(d.at is not None or _of_a_file(d.code) for d in errors), "an error without a place"
-    to_json(compiled.diagnostics)
+    to_json(compiled.diagnostics, compiled.sources)
+    to_sarif(compiled.diagnostics, compiled.sources)
     if compiled.plan is None:
         return compiled
     from ic.printing.cases import print_cases

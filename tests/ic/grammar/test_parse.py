@@ -30,7 +30,8 @@ from ic.grammar.syntax import (
 )
 from ic.read import read
 from met.diagnostic import Place, Problem
-from met.messages.render import render, to_json
+from met.messages.programs import to_json
+from met.messages.render import render
 from tests.ic.decktext import Desk
 
 TWO_LINK = """\
@@ -516,7 +517,7 @@ def _survives(desk: Desk, text: str | bytes) -> None:
         assert any(d.severity == "error" for d in found)
     told = render(found, sources)
     assert all(c.isprintable() or c == "\n" for c in told)
-    to_json(found)
+    to_json(found, sources)
     # rule 11 says seconds; a deck of this size takes milliseconds
     assert time.process_time() - start < 2
 

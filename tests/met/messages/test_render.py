@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import io
-import json
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from met.diagnostic import Diagnostic, Expansion, Label, Place, error
-from met.messages.render import count_line, render, shown_place, to_json, wants_colour
+from met.messages.message import shown_place
+from met.messages.render import count_line, render, wants_colour
 
 ARM = "\n" * 41 + "    rate = 300 Hz;\n"
 
@@ -213,36 +213,3 @@ def test_colour_is_for_terminals_and_for_those_who_did_not_decline():
     assert wants_colour(Terminal(), {"NO_COLOR": ""})
     assert not wants_colour(Terminal(), {"TERM": "dumb"})
     assert not wants_colour(io.StringIO(), {})
-
-
-def test_json_has_a_version_and_every_place():
-    place = Place("c.ic", 1, 5, 3, (Expansion("ROD", USE),), (("a.ic", 3),))
-    found = [error("D028", "no", Label(place, "why"), also=[Label(USE, "there")], help="so")]
-    assert json.loads(to_json(found)) == {
-        "version": 1,
-        "errors": 1,
-        "warnings": 0,
-        "diagnostics": [
-            {
-                "code": "D028",
-                "severity": "error",
-                "message": "no",
-                "shown": {"file": "two.ic", "line": 3, "column": 3, "length": 3},
-                "at": {
-                    "place": {
-                        "file": "c.ic",
-                        "line": 1,
-                        "column": 5,
-                        "length": 3,
-                        "expansions": [
-                            {"macro": "ROD", "use": {"file": "two.ic", "line": 3, "column": 3, "length": 3}}
-                        ],
-                        "included": [{"file": "a.ic", "line": 3}],
-                    },
-                    "text": "why",
-                },
-                "also": [{"place": {"file": "two.ic", "line": 3, "column": 3, "length": 3}, "text": "there"}],
-                "help": ["so"],
-            }
-        ],
-    }

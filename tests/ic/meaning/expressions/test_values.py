@@ -35,8 +35,8 @@ def number(folder: Path, expression: str, before: str = "") -> float:
     return float(found.number)
 
 
-def numbers(folder: Path, expression: str) -> list[float]:
-    found = value(folder, expression)
+def numbers(folder: Path, expression: str, before: str = "") -> list[float]:
+    found = value(folder, expression, before)
     assert isinstance(found, ValueList)
     return [float(item.number) for item in found.items if isinstance(item, Value)]
 
@@ -130,7 +130,7 @@ def test_a_name_with_a_dimension_inside_brackets_with_a_unit_is_refused(tmp_path
         ("sin(x = 1)", "D070"),
         ("sin(2 m)", "D061"),
         ("[1, 2] + 1", "D071"),
-        ("-[1, 2]", "D071"),
+        ("abs([1, 2])", "D071"),
         ("1 + [2]", "D071"),
         ("linspace(0, 1, 1)", "D072"),
         ("linspace(0, 1, 2.5)", "D072"),

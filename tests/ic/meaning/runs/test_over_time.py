@@ -28,6 +28,7 @@ arm pair {
     joint rail prismatic { parent = arm; child = sled; axis = x; }
 }
 let limit = 0.04 rad/s;
+let two = [1, 2, 3];
 """
 RUN = """\
 run hold {
@@ -68,6 +69,11 @@ EXPRESSIONS = {
     "atan2(sin(hinge.q), cos(hinge.q) + 0.5)": lambda s: np.arctan2(np.sin(s("hinge.q")), np.cos(s("hinge.q")) + 0.5),
     "sqrt(hinge.qd^2 + knee.qd^2)": lambda s: np.hypot(s("hinge.qd"), s("knee.qd")),
     "hinge.servo.voltage * hinge.servo.v_max": lambda s: s("hinge.servo.voltage") * 24.0,
+    "floor(hinge.q / (1 mrad)) + 1": lambda s: np.floor(s("hinge.q") / 1e-3) + 1,
+    "ceil(2 - hinge.q / (1 mrad))": lambda s: np.ceil(2 - s("hinge.q") / 1e-3),
+    "round(hinge.q / (2 mrad)) * 2 mrad + 1 rad": lambda s: np.floor(s("hinge.q") / 2e-3 + 0.5) * 2e-3 + 1,
+    "sign(hinge.qd - knee.qd) + 2": lambda s: np.sign(s("hinge.qd") - s("knee.qd")) + 2,
+    "hinge.qd * two.y + 1 rad/s": lambda s: s("hinge.qd") * 2 + 1,
 }
 
 

@@ -1,0 +1,88 @@
+"""Arithmetic of lists, number by number: `[1, 2, 3] m * 2`, `a + b`, `-v`; and the components of a vector, `v.x`.
+
+Each number of the result is that of the same arithmetic on single numbers, so it has the same bits, and is recorded
+where a sweep varies what it comes from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from ic.grammar.places import spanned
+from ic.grammar.syntax import Binary, Name
+from ic.meaning.expressions.quantity import Value, ValueList
+from met.diagnostic import Label, Place, Problem, error
+from met.units import PURE
+
+COMPONENTS = ("x", "y", "z")
+
+Arithmetic = Callable[[Binary, Value, Value], Value]
+
+
+def list_arithmetic(
+    node: Binary, left: Value | ValueList, right: Value | ValueList, of_numbers: Arithmetic
+) -> ValueList:
+    """The operator between lists, or a list and a number. Raises Problem D071 where that has no meaning."""
+    operator, place = node.operator, spanned(left.place, right.place)
+    if isinstance(left, ValueList) and isinstance(right, ValueList):
+        if operator not in ("+", "-"):
+            helps = "write what is meant number by number: `[a.x * b.x, a.y * b.y, a.z * b.z]`, or their sum"
+            raise Problem(
+                error("D071", f"`{operator}` of two lists", node.place, also=_labels(left, right), help=helps)
+            )
+        if len(left.items) != len(right.items):
+            message = f"`{operator}` of {len(left.items)} numbers and {len(right.items)}"
+            helps = "lists are added and subtracted number by number, so both have as many"
+            raise Problem(error("D071", message, node.place, also=_labels(left, right), help=helps))
+        pairs = [(a, b) for a, b in zip(_numbers(left), _numbers(right), strict=True)]
+        return _made([of_numbers(node, a, b) for a, b in pairs], place)
+    if isinstance(left, ValueList) and isinstance(right, Value) and operator in ("*", "/"):
+        kept = left.unit if right.dimension == PURE else None
+        return replace(_made([of_numbers(node, each, right) for each in _numbers(left)], place), unit=kept)
+    if isinstance(left, Value) and isinstance(right, ValueList) and operator == "*":
+        kept = right.unit if left.dimension == PURE else None
+        return replace(_made([of_numbers(node, left, each) for each in _numbers(right)], place), unit=kept)
+    message = f"`{operator}` of {_what(left)} and {_what(right)}"
+    helps = "a list is multiplied with a number and divided by one; lists of as many numbers are added and subtracted"
+    raise Problem(error("D071", message, node.place, also=_labels(left, right), help=helps))
+
+
+def signed(operator: str, written: ValueList, place: Place) -> ValueList:
+    """A list behind a sign."""
+    if operator == "+":
+        return replace(written, place=place)
+    items = [replace(each, number=-each.number, decimal="") for each in _numbers(written)]
+    return replace(_made(items, place), unit=written.unit)
+
+
+def component(name: Name, vector: Value | ValueList) -> Value:
+    """The number that `v.x` names of a vector. Raises Problem D071 where the value is no list of three numbers."""
+    head, axis = name.path
+    if not isinstance(vector, ValueList) or len(vector.items) != len(COMPONENTS):
+        has = "is one number" if isinstance(vector, Value) else f"has {len(vector.items)}"
+        helps = "`.x`, `.y` and `.z` are of a list of three"
+        raise Problem(error("D071", f"`{head.text}` {has}, and `.{axis.text}` is one of three", name.place, help=helps))
+    return replace(_numbers(vector)[COMPONENTS.index(axis.text)], place=name.place)
+
+
+def _made(items: list[Value], place: Place) -> ValueList:
+    """The list of what was computed, each number at the place of the whole, where its unit is to be mended."""
+    bare = len(items) > 1 and all(each.bare for each in items)
+    return ValueList(tuple(replace(each, place=place, bare=bare) for each in items), place)
+
+
+def _numbers(written: ValueList) -> list[Value]:
+    numbers = [each for each in written.items if isinstance(each, Value)]
+    inner = next((each for each in written.items if isinstance(each, ValueList)), None)
+    if inner is not None:
+        raise Problem(error("D071", "a list inside a list", inner.place))
+    return numbers
+
+
+def _what(value: Value | ValueList) -> str:
+    return "a list" if isinstance(value, ValueList) else "a number"
+
+
+def _labels(left: Value | ValueList, right: Value | ValueList) -> list[Label]:
+    return [Label(each.place, _what(each)) for each in (left, right)]

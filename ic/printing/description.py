@@ -1,0 +1,95 @@
+"""The whole language as one JSON object, `met doc language --format json`: for editors, generators and checkers.
+
+It is made of the declarations that the compiler itself goes by, models of other packages among them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from ic.find import library_files
+from ic.language import BLOCKS, DEFINITIONS
+from ic.language.bodies import JOINT_KINDS
+from ic.language.runs import BASE_KINDS
+from ic.meaning.expressions.evaluate import COMPARISONS, CONSTANTS, RESERVED, USAGE
+from ic.printing import codes, subjects
+from ic.printing.columns import columns, count
+from ic.printing.language import block_json
+from ic.printing.models import FIELDS, KINDS, UNIT_WORDS, model_json, where_written
+from ic.printing.sweeps import words_json
+from ic.text.preprocess import DIRECTIVES
+from met import models, units
+from met.messages.warning_codes import WARNINGS
+from met.version import VERSION
+
+SCHEMA = "met.language"
+VERSION_OF_SCHEMA = 1
+"""Raised where a key goes or gets another meaning; new keys come without that."""
+
+
+def description() -> dict[str, Any]:
+    """The language: blocks with their entries, models with their parameters, and all words that a deck may use."""
+    return {
+        "schema": SCHEMA,
+        "version": VERSION_OF_SCHEMA,
+        "met": VERSION,
+        "definitions": list(DEFINITIONS),
+        "blocks": [
+            {
+                "name": block.name,
+                "doc": block.doc,
+                "written": block.written,
+                "within": block.within,
+                "head": block.head,
+                "free": block.free,
+                "entries": [
+                    {**json, "parameter": None if entry.parameter is None else parameter_json(entry.parameter)}
+                    for json, entry in zip(block_json(block), block.entries, strict=True)
+                ],
+            }
+            for block in BLOCKS.values()
+        ],
+        "models": [
+            {**model_json(kind, model), "written": where_written(kind, model)}
+            for kind in KINDS
+            for model in models.available(kind).values()
+        ],
+        "shapes": subjects.shapes_json(),
+        "dh": subjects.dh_json(),
+        "joint_kinds": list(JOINT_KINDS),
+        "base_kinds": list(BASE_KINDS),
+        "channels": subjects.channels(),
+        "units": subjects.unit_table(),
+        "unit_words": {**UNIT_WORDS, **subjects.MORE_WORDS},
+        "functions": [
+            {**each, "arguments": list(USAGE[each["name"]])}
+            for each in words_json("functions")
+            if each["name"] in USAGE
+        ],
+        "constants": dict(CONSTANTS),
+        "comparisons": list(COMPARISONS),
+        "designs": words_json("designs"),
+        "distributions": words_json("distributions"),
+        "directives": list(DIRECTIVES),
+        "taken_names": [*CONSTANTS, *RESERVED, *(name for name in units.UNITS if name.isidentifier())],
+        "diagnostics": [
+            {"code": code, "title": title, "may_be_allowed": code in WARNINGS}
+            for code, title in sorted(codes.titles().items())
+        ],
+        "library": library_files(),
+    }
+
+
+def parameter_json(parameter: Any) -> dict[str, Any]:
+    """A parameter with all that is declared of it; bounds are in SI."""
+    return {field: getattr(parameter, field) for field in FIELDS}
+
+
+def print_overview() -> Iterator[str]:
+    """The parts of the description with how much is in each, for a terminal."""
+    found = description()
+    yield f"language: all of it, for programs: `met doc language --format json`, {SCHEMA} {VERSION_OF_SCHEMA}"
+    yield ""
+    lists = [(name, each) for name, each in found.items() if isinstance(each, list | dict)]
+    yield from columns([(name, count(len(each), "entry", "entries")) for name, each in lists])
