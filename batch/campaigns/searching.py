@@ -22,9 +22,9 @@ from met.diagnostic import Problem, error
 from met.plan import Experiment
 from met.plan.searches import Search
 from met.run import DONE, Run
-from met.seeking import seeker
-from met.seeking.answer import Answer, answer
-from met.seeking.values import hurt, served
+from met.searches import seeker
+from met.searches.answer import Answer, answer
+from met.searches.values import hurt, served
 
 READS = 2
 """Times that what was just computed is read back."""

@@ -17,7 +17,7 @@ from met.plan import Experiment
 from met.plan.outputs import metric_units
 from met.plan.searches import Search
 from met.run import DONE
-from met.seeking.answer import Answer, answer
+from met.searches.answer import Answer, answer
 from met.unit_parser import written
 
 NEAREST = 1

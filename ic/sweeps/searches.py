@@ -1,6 +1,6 @@
 """The block of a search or a tuning, read: what is chosen between which ends, for which goal, and how many cases.
 
-It becomes a sweep of one axis, of which the values are those of its first generation (met/seeking); what comes after
+It becomes a sweep of one axis, of which the values are those of its first generation (met/searches); what comes after
 follows from what that gives.
 """
 
@@ -112,7 +112,7 @@ def read_search(
             help=f"{least} at least: {of}{SHORTEST} to choose among; a thousand are no luxury",
         )
         return empty
-    from met.seeking import seeker
+    from met.searches import seeker
 
     rows = seeker(search).ask()
     columns = []

@@ -1,7 +1,7 @@
 """A search or a tuning as a plan holds it: which parameters it may choose, between which ends, and for which goal.
 
 Which cases it consists of is not known before it has run: each generation follows from what the ones before gave
-(met/seeking). Before that its case table is its first generation.
+(met/searches). Before that its case table is its first generation.
 """
 
 from __future__ import annotations

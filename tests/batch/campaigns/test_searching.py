@@ -25,7 +25,7 @@ from met.cli import main
 from met.diagnostic import Problem
 from met.plan import Plan
 from met.plan import file as plan_file
-from met.seeking.answer import Answer
+from met.searches.answer import Answer
 from tests.batch import whole
 
 MASS, FAR, AT_MOST, TUNED = 2.0, 0.1, 160, 300

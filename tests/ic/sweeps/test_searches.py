@@ -15,7 +15,7 @@ from met.messages.render import render
 from met.plan import Plan
 from met.plan import file as plan_file
 from met.plan.searches import Search, SearchedParameter
-from met.seeking import seeker
+from met.searches import seeker
 
 DECK = """#include <servos/rigid_gearbox.ic>
 arm swing {

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from met import searching
+from met import optimisers
 from met.plan.searches import SHORTEST, Search
-from met.seeking.values import MET
+from met.searches.values import MET
 
 SHARE = 4
 """A turn takes one in so many of the cases that are left, while plants may become active."""
@@ -76,7 +76,7 @@ class RobustTuning:
         cases = room if self._reserve == 0 or room < 2 * least else max(room // (SHARE >> self._idle), least)
         dimension, seed = len(self._search.parameters), self._search.seed + self._turn
         self._may_ask = cases // len(self._active)
-        self._tuner, self._middle = searching.tuner(dimension, seed, self._may_ask), start
+        self._tuner, self._middle = optimisers.tuner(dimension, seed, self._may_ask), start
         self._turn += 1
         self._confirming = False
 

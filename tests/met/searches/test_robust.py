@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from met.plan.searches import Search, SearchedParameter
-from met.seeking import seeker
-from met.seeking.robust import RobustTuning, around, hardly_better
-from met.seeking.values import served
+from met.searches import seeker
+from met.searches.robust import RobustTuning, around, hardly_better
+from met.searches.values import served
 
 Worth = Callable[[np.ndarray], np.ndarray]
 """Cases [case, coordinate], the plant's number last -> what each is worth."""

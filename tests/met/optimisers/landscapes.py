@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from met.searching.optimiser import Optimiser
+from met.optimisers.optimiser import Optimiser
 
 Landscape = Callable[[np.ndarray], np.ndarray]
 

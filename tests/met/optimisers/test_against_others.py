@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from met import searching
-from tests.met.searching import landscapes
-from tests.met.searching.landscapes import Landscape, least, least_of_random
+from met import optimisers
+from tests.met.optimisers import landscapes
+from tests.met.optimisers.landscapes import Landscape, least, least_of_random
 
 pytestmark = pytest.mark.slow
 
@@ -16,7 +16,7 @@ POINTS, SEEDS = 2000, 20
 
 def found(landscape: Landscape, dimension: int, below: float) -> tuple[int, int]:
     """Of 20 seeds, in how many a search and as many random points come below a value."""
-    searched = sum(least(searching.hardest(dimension, seed, POINTS), landscape) < below for seed in range(SEEDS))
+    searched = sum(least(optimisers.hardest(dimension, seed, POINTS), landscape) < below for seed in range(SEEDS))
     drawn = sum(least_of_random(dimension, seed, POINTS, landscape) < below for seed in range(SEEDS))
     return searched, drawn
 
@@ -63,5 +63,5 @@ def test_the_best_of_a_hundred_thousand_random_points_is_passed_in_nine_seeds_of
     """Of a valley a hundred times as long as wide, turned out of the axes, in seven of ten in five dimensions: with the
     share of its points that polishing has, a search is not at its bottom by then."""
     random = least_of_random(dimension, 1, 100_000, landscape)
-    passed = sum(least(searching.hardest(dimension, seed, POINTS), landscape) < random for seed in range(10))
+    passed = sum(least(optimisers.hardest(dimension, seed, POINTS), landscape) < random for seed in range(10))
     assert passed >= (7 if (landscape, dimension) == (landscapes.ellipsoid, 5) else 9)

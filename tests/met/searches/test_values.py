@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from met.seeking.values import MET, MISSED, UNKNOWN, hurt, missed, served, short
+from met.searches.values import MET, MISSED, UNKNOWN, hurt, missed, served, short
 
 
 @dataclass(frozen=True)

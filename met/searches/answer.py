@@ -9,7 +9,7 @@ import numpy as np
 
 from met.frozen import frozen
 from met.plan.searches import Search
-from met.seeking.values import MetricLimit, hurt, served
+from met.searches.values import MetricLimit, hurt, served
 
 
 class NamedLimit(MetricLimit, Protocol):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from met.searching.draws import Draws
+from met.optimisers.draws import Draws
 
 LEADING = 0.15
 """A trial goes towards one of this share of the population, the best."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from met import searching
 from met.plan.searches import Search, SearchedParameter
-from met.seeking import seeker
-from met.seeking.hardest import HardestCase
+from met.searches import seeker
+from met.searches.hardest import HardestCase
 
 
 def search(at_most: int = 300, **ends: float) -> Search:

@@ -6,9 +6,9 @@ what they were told, to the bit, on every machine: so a campaign that was cut of
 
 from __future__ import annotations
 
-from met.searching.optimiser import Optimiser
-from met.searching.tuning import RestartedAdaptation
-from met.searching.worst_case import WorstCaseSearch
+from met.optimisers.optimiser import Optimiser
+from met.optimisers.tuning import RestartedAdaptation
+from met.optimisers.worst_case import WorstCaseSearch
 
 
 def hardest(dimension: int, seed: int, at_most: int) -> Optimiser:

@@ -1,6 +1,6 @@
 """`searching.hardest` with 2,000 cases against 100,000 random ones, on decks that are shipped, ten seeds each.
 
-python -m tests.met.searching.against_random [CASES]     prints a line for each metric: some minutes on two cores
+python -m tests.met.optimisers.against_random [CASES]     prints a line for each metric: some minutes on two cores
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import ic
-from met import run, searching
+from met import run
 from met.frozen import frozen
 from met.program.build import METRIC
 from met.unit_parser import parse_unit
@@ -144,7 +144,7 @@ def compare(question: Question, count: int) -> None:
         for metric, name in enumerate(cases.metrics):
             found, after = [], []
             for seed in range(SEEDS):
-                search = searching.hardest(cases.dimension, seed, SEARCHED)
+                search = optimisers.hardest(cases.dimension, seed, SEARCHED)
                 best, used, passed = np.inf, 0, None
                 while len(points := search.ask()):
                     values = cases.values(points)[:, metric]

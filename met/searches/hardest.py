@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from met import searching
+from met import optimisers
 from met.plan.searches import Search
 
 
@@ -13,7 +13,7 @@ class HardestCase:
 
     def __init__(self, search: Search) -> None:
         self._search = search
-        self._optimiser = searching.hardest(len(search.parameters), search.seed, search.at_most)
+        self._optimiser = optimisers.hardest(len(search.parameters), search.seed, search.at_most)
         self._known: dict[bytes, float] = {}
         self._asked: list[bytes] = []
         self._new: list[bytes] = []

@@ -7,10 +7,10 @@ import hashlib
 import numpy as np
 import pytest
 
-from met import searching
-from met.searching.optimiser import Optimiser
-from tests.met.searching import landscapes
-from tests.met.searching.landscapes import least, least_of_random
+from met import optimisers
+from met.optimisers.optimiser import Optimiser
+from tests.met.optimisers import landscapes
+from tests.met.optimisers.landscapes import least, least_of_random
 
 EVERY = [searching.hardest, searching.tuner]
 
@@ -90,7 +90,7 @@ def test_failures_all_around_do_not_hide_the_minimum(make):
 
 
 def test_a_search_ends_with_the_first_case_that_nothing_can_hurt_more():
-    search = searching.hardest(2, 1, 2000)
+    search = optimisers.hardest(2, 1, 2000)
     points = search.ask()
     values = landscapes.sphere(points)
     values[3] = -np.inf
@@ -99,7 +99,7 @@ def test_a_search_ends_with_the_first_case_that_nothing_can_hurt_more():
 
 
 def test_a_tuning_goes_on_where_a_candidate_is_infinitely_good():
-    tuning = searching.tuner(2, 1, 800)
+    tuning = optimisers.tuner(2, 1, 800)
     values = landscapes.sphere(tuning.ask())
     values[:2] = -np.inf, np.inf
     tuning.tell(values)
@@ -107,22 +107,22 @@ def test_a_tuning_goes_on_where_a_candidate_is_infinitely_good():
 
 
 def test_a_generation_keeps_lanes_and_threads_busy():
-    sizes = {at_most: len(searching.hardest(5, 1, at_most).ask()) for at_most in (100, 2000, 4000, 100_000)}
+    sizes = {at_most: len(optimisers.hardest(5, 1, at_most).ask()) for at_most in (100, 2000, 4000, 100_000)}
     assert sizes == {100: 8, 2000: 56, 4000: 120, 100_000: 256}
-    assert len(searching.tuner(8, 1, 3200).ask()) == 32
+    assert len(optimisers.tuner(8, 1, 3200).ask()) == 32
 
 
 @pytest.mark.parametrize("dimension", [2, 5, 16])
 def test_a_search_reaches_the_corner(dimension):
     """2,000 points; the best of 100,000 random ones in 16 dimensions is 3.2 from it."""
     bound = {2: 1e-12, 5: 1e-3, 16: 1.0}[dimension]
-    assert max(least(searching.hardest(dimension, seed, 2000), landscapes.corner) for seed in range(3)) < bound
+    assert max(least(optimisers.hardest(dimension, seed, 2000), landscapes.corner) for seed in range(3)) < bound
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 5, 16])
 def test_a_search_finds_a_resonance_that_is_one_percent_wide(dimension):
     for seed in range(3):
-        assert least(searching.hardest(dimension, seed, 2000), landscapes.resonance) < -95.0
+        assert least(optimisers.hardest(dimension, seed, 2000), landscapes.resonance) < -95.0
 
 
 @pytest.mark.parametrize(
@@ -130,11 +130,11 @@ def test_a_search_finds_a_resonance_that_is_one_percent_wide(dimension):
     [(landscapes.sphere, 1e-9), (landscapes.ellipsoid, 1e-4), (landscapes.ackley, 1e-3), (landscapes.corner, 1e-3)],
 )
 def test_a_tuning_of_eight_finds_the_minimum(landscape, bound):
-    assert max(least(searching.tuner(8, seed, 3200), landscape) for seed in range(3)) < bound
+    assert max(least(optimisers.tuner(8, seed, 3200), landscape) for seed in range(3)) < bound
 
 
 def test_a_tuning_that_has_converged_starts_again_elsewhere_with_twice_the_population():
-    generations = asked(searching.tuner(2, 1, 6400), landscapes.sphere)
+    generations = asked(optimisers.tuner(2, 1, 6400), landscapes.sphere)
     sizes = [len(points) for points in generations]
     again = sizes.index(128)
     assert set(sizes[:again]) == {64} and np.ptp(generations[again - 1], axis=0).max() < 1e-5
@@ -146,6 +146,6 @@ def test_noise_does_not_lead_astray():
         noise = np.random.default_rng(points.tobytes()[0]).normal(size=len(points))
         return landscapes.sphere(points) + 0.1 * noise
 
-    tuning = searching.tuner(4, 1, 3200)
+    tuning = optimisers.tuner(4, 1, 3200)
     last = asked(tuning, noisy)[60]
     assert landscapes.sphere(last).mean() < 0.3

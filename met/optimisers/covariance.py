@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from met.searching.arithmetic import added, growth, logarithm, lower_factor, power, total, transformed
-from met.searching.draws import Draws
+from met.optimisers.arithmetic import added, growth, logarithm, lower_factor, power, total, transformed
+from met.optimisers.draws import Draws
 
 WIDEST = 1.0
 """The largest step, in edges of the cube: points are as good as even in the cube then."""

@@ -12,8 +12,8 @@ from typing import Protocol
 import numpy as np
 
 from met.plan.searches import Search
-from met.seeking.hardest import HardestCase
-from met.seeking.robust import RobustTuning
+from met.searches.hardest import HardestCase
+from met.searches.robust import RobustTuning
 
 
 class Seeker(Protocol):
@@ -24,7 +24,7 @@ class Seeker(Protocol):
         """Coordinates of the next generation's cases, SI, [case, coordinate]; none, when it has ended."""
 
     def tell(self, values: np.ndarray) -> None:
-        """Take what these cases are worth (met/seeking/values.py), [case]."""
+        """Take what these cases are worth (met/searches/values.py), [case]."""
 
 
 def seeker(search: Search) -> Seeker:

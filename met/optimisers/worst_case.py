@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
-from met.searching.covariance import CovarianceAdaptation
-from met.searching.division import BoxDivision
-from met.searching.draws import Draws
-from met.searching.evolution import DifferentialEvolution
+from met.optimisers.covariance import CovarianceAdaptation
+from met.optimisers.division import BoxDivision
+from met.optimisers.draws import Draws
+from met.optimisers.evolution import DifferentialEvolution
 
 GENERATIONS = 32
 """Generations of a search, where they are neither too small for the processor nor larger than of use."""

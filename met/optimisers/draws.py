@@ -6,7 +6,7 @@ import zlib
 
 import numpy as np
 
-from met.searching.arithmetic import added
+from met.optimisers.arithmetic import added
 
 SUMMED = 12
 """Even numbers in a nearly normal one: the variance of their sum is 1."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from met.searching.covariance import CovarianceAdaptation
-from met.searching.draws import Draws
+from met.optimisers.covariance import CovarianceAdaptation
+from met.optimisers.draws import Draws
 
 STEP = 0.2
 """The first standard deviation, in edges of the cube. With 0.3 and 3,200 candidates it came less far in 16 dimensions:
