@@ -22,7 +22,7 @@ from met.diagnostic import Problem, error
 from met.plan import Experiment
 from met.plan.searches import Search
 from met.run import DONE, Run
-from met.searches import seeker
+from met.searches import search_method
 from met.searches.answer import Answer, answer
 from met.searches.values import hurt, served
 
@@ -33,7 +33,7 @@ READS = 2
 def check_first_generation(experiment: Experiment) -> None:
     """Refuse a plan of a search whose cases are not those that the search asks for first. Raises Problem E302."""
     assert experiment.search is not None
-    asked = seeker(experiment.search).ask()
+    asked = search_method(experiment.search).ask()
     table = np.stack([np.asarray(each.values) for each in experiment.cases.coordinates], axis=1)
     if asked.shape != table.shape or not (asked == table).all():
         message = f"the cases of `{experiment.name}` in this plan are not those that it begins with"
@@ -57,7 +57,7 @@ class CampaignSearch:
         self._requirements = experiment.requirements
         self._metrics: dict[str, list[np.ndarray]] = {}
         self._done: list[np.ndarray] = []
-        self._seeker = seeker(self.search)
+        self._method = search_method(self.search)
         self._table = np.empty((0, len(experiment.cases.coordinates)))
         self._generations: list[int] = []
 
@@ -74,7 +74,7 @@ class CampaignSearch:
     def grow(self) -> tuple[int, int] | None:
         """Ask for the next generation: the stretch of its cases; None when the search has ended, and the section is
         whole."""
-        asked, first = self._seeker.ask(), len(self._table)
+        asked, first = self._method.ask(), len(self._table)
         if not len(asked):
             self._complete()
             return None
@@ -95,7 +95,7 @@ class CampaignSearch:
         for name, values in run.metrics.items():
             self._metrics.setdefault(name, []).append(values)
         self.worth = np.concatenate([self.worth, worth])
-        self._seeker.tell(worth)
+        self._method.tell(worth)
 
     @property
     def answer(self) -> Answer:

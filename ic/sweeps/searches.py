@@ -112,9 +112,9 @@ def read_search(
             help=f"{least} at least: {of}{SHORTEST} to choose among; a thousand are no luxury",
         )
         return empty
-    from met.searches import seeker
+    from met.searches import search_method
 
-    rows = seeker(search).ask()
+    rows = search_method(search).ask()
     columns = []
     for number, each in enumerate(chosen):
         unit = each.with_unit.unit if each.with_unit is not None else each.low.unit

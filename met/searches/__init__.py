@@ -16,9 +16,9 @@ from met.searches.hardest import HardestCase
 from met.searches.robust import RobustTuning
 
 
-class Seeker(Protocol):
-    """Asks for cases, a generation at a time, each of them once; it depends on the search and on what it was told
-    alone, to the bit."""
+class SearchMethod(Protocol):
+    """How a search goes on: it asks for cases, a generation at a time, each of them once. What it asks for depends on the
+    search and on what it was told alone, to the bit."""
 
     def ask(self) -> np.ndarray:
         """Coordinates of the next generation's cases, SI, [case, coordinate]; none, when it has ended."""
@@ -27,9 +27,9 @@ class Seeker(Protocol):
         """Take what these cases are worth (met/searches/values.py), [case]."""
 
 
-def seeker(search: Search) -> Seeker:
-    """Whoever carries out a search, at its beginning."""
+def search_method(search: Search) -> SearchMethod:
+    """The method of a search, at its beginning."""
     return RobustTuning(search) if search.kind == "tune" else HardestCase(search)
 
 
-__all__ = ["Seeker", "seeker"]
+__all__ = ["SearchMethod", "search_method"]

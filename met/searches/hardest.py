@@ -9,7 +9,7 @@ from met.plan.searches import Search
 
 
 class HardestCase:
-    """See `Seeker`. Points that are rounded to a case that was tried before are worth what that was."""
+    """See `SearchMethod`. Points that are rounded to a case that was tried before are worth what that was."""
 
     def __init__(self, search: Search) -> None:
         self._search = search
@@ -19,7 +19,7 @@ class HardestCase:
         self._new: list[bytes] = []
 
     def ask(self) -> np.ndarray:
-        """See `Seeker`."""
+        """See `SearchMethod`."""
         left = self._search.at_most - len(self._known)
         while left > 0:
             cases = self._search.values(self._optimiser.ask())
@@ -37,7 +37,7 @@ class HardestCase:
         return np.empty((0, len(self._search.parameters)))
 
     def tell(self, values: np.ndarray) -> None:
-        """See `Seeker`."""
+        """See `SearchMethod`."""
         self._known.update(zip(self._new, values.tolist(), strict=True))
         self._pass_on()
 

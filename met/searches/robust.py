@@ -29,7 +29,7 @@ Candidate = bytes
 
 
 class RobustTuning:
-    """See `Seeker`. Without plants the candidates themselves are the cases.
+    """See `SearchMethod`. Without plants the candidates themselves are the cases.
 
     A turn ends when the optimiser does, or when its share of the cases that are left is spent. The tuning ends when no
     plant is worse than the worst active one and two turns brought next to nothing, or when no further turn has room.
@@ -50,7 +50,7 @@ class RobustTuning:
         self._begin(None)
 
     def ask(self) -> np.ndarray:
-        """See `Seeker`."""
+        """See `SearchMethod`."""
         while not self._confirmed:
             self._wanted = self._next()
             if self._wanted:
@@ -61,7 +61,7 @@ class RobustTuning:
         return np.empty((0, len(self._search.parameters) + len(self._plants[0])))
 
     def tell(self, values: np.ndarray) -> None:
-        """See `Seeker`."""
+        """See `SearchMethod`."""
         for (candidate, plant), value in zip(self._wanted, values.tolist(), strict=True):
             self._known[candidate][plant] = value
         self._go_on()

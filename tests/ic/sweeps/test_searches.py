@@ -15,7 +15,7 @@ from met.messages.render import render
 from met.plan import Plan
 from met.plan import file as plan_file
 from met.plan.searches import Search, SearchedParameter
-from met.searches import seeker
+from met.searches import search_method
 
 DECK = """#include <servos/rigid_gearbox.ic>
 arm swing {
@@ -71,7 +71,7 @@ def test_a_search_is_a_sweep_whose_cases_are_its_first_generation(tmp_path: Path
     assert experiment.search is not None and not experiment.search.complete
     [coordinate] = experiment.cases.coordinates
     assert coordinate.path == "drive.kp" and coordinate.sets == ("hinge.servo.kp",)
-    assert (np.asarray(coordinate.values) == seeker(experiment.search).ask()[:, 0]).all()
+    assert (np.asarray(coordinate.values) == search_method(experiment.search).ask()[:, 0]).all()
 
 
 def test_a_tuning_has_the_cases_of_the_sweep_as_plants(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""`searching.hardest` with 2,000 cases against 100,000 random ones, on decks that are shipped, ten seeds each.
+"""`optimisers.hardest` with 2,000 cases against 100,000 random ones, on decks that are shipped, ten seeds each.
 
 python -m tests.met.optimisers.against_random [CASES]     prints a line for each metric: some minutes on two cores
 """
@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import ic
-from met import run
+from met import optimisers, run
 from met.frozen import frozen
 from met.program.build import METRIC
 from met.unit_parser import parse_unit

@@ -12,7 +12,7 @@ from met.optimisers.optimiser import Optimiser
 from tests.met.optimisers import landscapes
 from tests.met.optimisers.landscapes import least, least_of_random
 
-EVERY = [searching.hardest, searching.tuner]
+EVERY = [optimisers.hardest, optimisers.tuner]
 
 
 def asked(optimiser: Optimiser, landscape: landscapes.Landscape) -> list[np.ndarray]:
@@ -46,7 +46,7 @@ def test_the_same_values_told_make_it_ask_for_the_same_points(make):
 
 @pytest.mark.parametrize(
     ("make", "digest"),
-    [(searching.hardest, "52abed6c97b59f22"), (searching.tuner, "21d2ab637e4f09bf")],
+    [(optimisers.hardest, "52abed6c97b59f22"), (optimisers.tuner, "21d2ab637e4f09bf")],
 )
 def test_its_points_are_the_same_on_every_machine(make, digest):
     """The values told are exact too: differences, squares and sums in order, of dyadic numbers."""

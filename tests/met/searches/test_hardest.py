@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from met import optimisers
 from met.plan.searches import Search, SearchedParameter
-from met.searches import seeker
+from met.searches import search_method
 from met.searches.hardest import HardestCase
 
 
@@ -52,8 +53,8 @@ class Repeats:
 
 def test_a_point_that_was_tried_is_worth_what_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     optimiser = Repeats()
-    monkeypatch.setattr(searching, "hardest", lambda *_: optimiser)
-    of = seeker(search())
+    monkeypatch.setattr(optimisers, "hardest", lambda *_: optimiser)
+    of = search_method(search())
     first = of.ask()
     assert len(first) == 2 and not (first[0] == first[1]).all()
     of.tell(np.array([3.0, -1.0]))

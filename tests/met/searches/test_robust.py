@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from met.plan.searches import Search, SearchedParameter
-from met.searches import seeker
+from met.searches import search_method
 from met.searches.robust import RobustTuning, around, hardly_better
 from met.searches.values import served
 
@@ -25,7 +25,7 @@ def tuning(dimension: int, plants: list[float], at_most: int, seed: int = 0) -> 
 
 def asked(search: Search, worth: Worth) -> list[np.ndarray]:
     """The generations of a tuning."""
-    found, of = [], seeker(search)
+    found, of = [], search_method(search)
     while len(cases := of.ask()):
         found.append(cases)
         of.tell(worth(cases))
@@ -92,7 +92,7 @@ def test_a_tuning_in_which_every_case_fails_ends() -> None:
 def test_candidates_lie_within_their_ends() -> None:
     cases = np.concatenate(asked(tuning(2, [0.9], 300), away))
     assert (np.abs(cases[:, :2]) <= 1.0).all()
-    assert isinstance(seeker(tuning(2, [0.9], 300)), RobustTuning)
+    assert isinstance(search_method(tuning(2, [0.9], 300)), RobustTuning)
 
 
 def test_the_middle_of_a_cube_comes_to_lie_at_a_good_point_and_its_ends_stay() -> None:
