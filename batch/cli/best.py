@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
 import click
 
 from met.cli import NO, YES, format_option
 from met.messages.visible import line, say
+
+if TYPE_CHECKING:
+    from batch.terminal.chosen_deck import ChosenDeck
 
 
 @click.command(short_help="Say which of the designs of a sweep to use.")
@@ -49,7 +55,6 @@ def best(
 
     Exit status: 0 a design meets all; 1 none does; 2 the input is wrong.
     """
-    import json
     import shutil
 
     from batch.archive.read import ArchiveFile
@@ -74,6 +79,8 @@ def best(
             raise Problem(error("E395", f"{archive} holds several sweeps", help=helps))
         pool = found[0]
         searched = search_result(file, pool.groups[0])
+        if output is not None and not (diff or write):
+            raise click.UsageError("-o is the file for --write")
         if searched is not None:
             if over or choose or by or front:
                 message = (
@@ -83,7 +90,13 @@ def best(
                     f"`met best {quoted(archive)}` says it; a sweep over what it chooses has all cases of each design"
                 )
                 raise Problem(error("E395", message, help=helps))
-            say(json.dumps(finite(searched.data), indent=1) if form == "json" else "\n".join(map(line, searched.lines)))
+            if (diff or write) and not searched.tunes:
+                message = f"`{pool.name}` looks for the case that hurts most, which is nothing to write into a deck"
+                raise Problem(error("E395", message, help="a `tune` chooses values that are"))
+            deck = None
+            if (diff or write) and searched.ok:
+                deck = chosen_deck(file, searched.values, output, experiment=searched.name, of=searched.of)
+            _tell(form, finite(searched.data), searched.lines, deck, asked=diff or write, write=write)
             return YES if searched.ok else NO
         designs = Designs(pool, over, choose)
         if not pool.requirements and not by:
@@ -93,24 +106,38 @@ def best(
         if len(front) == 1:
             raise click.UsageError("--front is of two: name each, `--front settle --front over`")
         goals, traded = ([designs.goal(text) for text in texts] for texts in (by, front))
-        if output is not None and not (diff or write):
-            raise click.UsageError("-o is the file for --write")
         answer = BestAnswer(designs, goals, traded, **context(file, pool))
-        deck = chosen_deck(file, answer, output) if (diff or write) and answer.best is not None else None
+        deck = None
+        if (diff or write) and answer.best is not None:
+            of = f"{designs.count:,} designs"
+            deck = chosen_deck(file, answer.values(answer.best), output, experiment=answer.name, of=of)
         width = min(100, shutil.get_terminal_size((100, 24)).columns)
-        if form == "json":
-            data = answer.as_data()
-            if deck is not None:
-                data["deck"] = {"file": str(deck.target), "diff": list(deck.diff()), "written": write}
-            say(json.dumps(data, indent=1))
-        else:
-            say("\n".join(map(line, answer.lines(width))))
-            if deck is not None:
-                say("\n".join(["", *map(line, deck.diff())]))
-            elif diff or write:
-                say("\nno design is good, so none is written into the deck")
-        if deck is not None and write:
-            deck.write()
-            if form != "json":
-                say(line(f"{deck.target}: written; it {deck.changes()}"))
+        data = answer.as_data() if form == "json" else {}
+        _tell(form, data, answer.lines(width), deck, asked=diff or write, write=write)
         return NO if answer.best is None else YES
+
+
+def _tell(
+    form: str, data: dict[str, Any], lines: Iterable[str], deck: ChosenDeck | None, *, asked: bool, write: bool
+) -> None:
+    """Say the answer, and what changes in the deck; write it.
+
+    data, lines  the answer for programs, and for people;  deck: None where nothing is good enough to be written
+    asked        whether the deck is asked for
+    """
+    import json
+
+    if form == "json":
+        if deck is not None:
+            data["deck"] = {"file": str(deck.target), "diff": list(deck.diff()), "written": write}
+        say(json.dumps(data, indent=1))
+    else:
+        say("\n".join(map(line, lines)))
+        if deck is not None:
+            say("\n".join(["", *map(line, deck.diff())]))
+        elif asked:
+            say("\nnothing meets all requirements, so nothing is written into the deck")
+    if deck is not None and write:
+        deck.write()
+        if form != "json":
+            say(line(f"{deck.target}: written; it {deck.changes()}"))

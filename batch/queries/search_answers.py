@@ -13,12 +13,12 @@ from batch.archive.read import ArchiveGroup
 from batch.archive.searched import search_of
 from batch.queries.requirements import group_requirements
 from batch.queries.signals import number_text, pretty_unit
+from ic.driver.written_value import WrittenValue
 from met.plan import Experiment
 from met.plan.outputs import metric_units
 from met.plan.searches import Search
 from met.run import DONE
 from met.searches.answer import Answer, answer
-from met.unit_parser import written
 
 NEAREST = 1
 """Requirements that are named of those that are nearest to their limits."""
@@ -79,16 +79,21 @@ class SearchAnswer:
         something."""
         return self.found.serves
 
-    def settings(self, *, exact: bool = True) -> list[tuple[str, str]]:
-        """What is chosen: each path, and its value as a deck would write it; to the bit, or to four digits."""
-        out = []
+    def values(self) -> list[WrittenValue]:
+        """What is chosen, for a deck's text or `--set`."""
+        found = []
         for each, variable in zip(self.search.parameters, self.group.role("coordinate"), strict=False):
             value = float(self.group.at(variable.name, [self.found.case])[0])
-            unit = str(variable.attributes.get("deck_unit", variable.unit))
+            found.append(WrittenValue(each.path, value, str(variable.attributes.get("deck_unit", variable.unit))))
+        return found
+
+    def shown(self) -> list[tuple[str, str]]:
+        """What is chosen, to four digits: each path, and its value as a deck would write it."""
+        found = []
+        for each, variable in zip(self.values(), self.group.role("coordinate"), strict=False):
             scale = float(variable.attributes.get("deck_scale", 1.0))
-            rounded = f"{number_text(value / scale)} {unit}".removesuffix(" 1")
-            out.append((each.path, written(value, unit) if exact else rounded))
-        return out
+            found.append((each.path, f"{number_text(each.si / scale)} {each.unit}".removesuffix(" 1")))
+        return found
 
     @property
     def draws(self) -> bool:
@@ -121,7 +126,7 @@ class SearchAnswer:
 
     @property
     def _chosen(self) -> str:
-        return ", ".join(f"{path} = {value}" for path, value in self.settings(exact=False))
+        return ", ".join(f"{path} = {value}" for path, value in self.shown())
 
     def _tuned(self) -> list[str]:
         found, search = self.found, self.search
@@ -161,7 +166,7 @@ class SearchAnswer:
             "case": self.position,
             "value": found.value,
             "failed": found.failed,
-            "chosen": dict(self.settings()),
+            "chosen": {each.path: each.text for each in self.values()},
             "cases": self.group.count,
             "generations": self.generations,
             "tried": found.tried,

@@ -1,14 +1,14 @@
-"""`met best --write`: the design that was chosen, written into the text of the deck that was swept."""
+"""`met best --write`: what was chosen, written into the text of the deck that was swept or tuned."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from batch.archive.read import ArchiveFile
-from batch.terminal.best import BestAnswer
 from ic.driver.write_values import with_values
+from ic.driver.written_value import WrittenValue
 from ic.formatting.files import write
 from ic.text.files import Files, decode, file_at
 from ic.text.limits import MOST_BYTES
@@ -59,20 +59,24 @@ class ChosenDeck:
             raise Problem(error("E338", f"cannot write `{self.target}`: {reason.strerror}")) from None
 
 
-def chosen_deck(file: ArchiveFile, answer: BestAnswer, output: str | None) -> ChosenDeck:
-    """The deck of an archive with its best design in it; output: a copy for that file.
+def chosen_deck(
+    file: ArchiveFile, values: Sequence[WrittenValue], output: str | None, *, experiment: str, of: str
+) -> ChosenDeck:
+    """The deck of an archive with these values in it.
+
+    output      a file for a copy; None: the deck itself
+    experiment  the sweep or tuning that chose them;  of: among what, in words, `400 designs`
 
     Raises Problem E397 where a value cannot be written, E398 where the deck is not the archive's, or is not to be
     written to.
     """
-    assert answer.best is not None
-    values, sources = answer.values(answer.best), file.sources()
+    sources = file.sources()
     if file.deck not in sources:
         raise _other("the archive does not hold the text of its deck", "run the sweep again")
     before = sources[file.deck]
-    settings = file.plan(as_written=True).settings
-    if settings:
-        message = f"the archive was made with `--set {settings[0]}`, which is not in its deck"
+    plan = file.plan(as_written=True)
+    if plan.settings:
+        message = f"the archive was made with `--set {plan.settings[0]}`, which is not in its deck"
         raise _other(message, "write that into the deck, and run the sweep again")
     target, newline = Path(output) if output is not None else Path(file.deck), "\n"
     if output is None:
@@ -80,15 +84,14 @@ def chosen_deck(file: ArchiveFile, answer: BestAnswer, output: str | None) -> Ch
     elif target.exists():
         raise _other(f"`{target}` is there already", "name a file that is not: it would be lost")
     name = "".join(each if each.isprintable() and each != "\\" else "?" for each in file.path.name)
-    remark = f"of {answer.designs.count:,} designs: {answer.name}, {name}"
     made = with_values(
         before,
         values,
         name=file.deck.strip("<>"),
         folder=target.parent,
-        experiment=answer.name,
-        defines=answer.defines,
-        remark=remark,
+        experiment=experiment,
+        defines=plan.defines,
+        remark=f"of {of}: {experiment}, {name}",
     )
     known = set(made.sources.values())
     changed = [name for name, text in sources.items() if text not in known and not _is_there(name, text)]

@@ -9,6 +9,7 @@ from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.pool import Pool
 from batch.queries.search_answers import SearchAnswer
 from batch.terminal.best import context
+from ic.driver.written_value import WrittenValue
 from met.frozen import frozen
 from met.outputs import quoted
 
@@ -19,6 +20,7 @@ class SearchResult:
 
     commands  that follow from it, each with what it is for
     tunes  whether it is a tuning: then the requirements count in its answer alone;  name: of the search
+    values  what it chose;  of: among what, in words
     """
 
     name: str
@@ -27,6 +29,8 @@ class SearchResult:
     data: dict[str, Any]
     ok: bool
     tunes: bool
+    values: tuple[WrittenValue, ...]
+    of: str
 
 
 def search_result(archive: ArchiveFile, group: ArchiveGroup) -> SearchResult | None:
@@ -40,7 +44,8 @@ def search_result(archive: ArchiveFile, group: ArchiveGroup) -> SearchResult | N
     data = {**answer.as_data(), "commands": [command for _, command in commands]}
     # of a search the requirements of all cases count, as of any campaign
     ok = answer.ok if tunes else bool((group.values("status") == 0).all() and (group.values("met") == 1).all())
-    return SearchResult(group.name, lines, tuple(commands), data, ok, tunes)
+    of = f"{len(group.values('case')):,} cases"
+    return SearchResult(group.name, lines, tuple(commands), data, ok, tunes, tuple(answer.values()), of)
 
 
 def _shown(said: str, command: str) -> Sequence[str]:
@@ -55,7 +60,7 @@ def _commands(archive: ArchiveFile, group: ArchiveGroup, answer: SearchAnswer) -
     how = context(archive, Pool(group.name, [group]))
     name = answer.search.against or answer.search.of
     words = [f"-D {quoted(each)}" for each in how["defines"]]
-    words += [f"--set {quoted(f'{path}={value}')}" for path, value in answer.settings()]
+    words += [f"--set {quoted(each.setting)}" for each in answer.values()]
     command = f"met run {quoted(how['deck'])} {quoted(name)} {' '.join(words)}"
     found = [("its worst case again:", again), ("run it:", f"{command} -o chosen.h5")]
     if answer.draws:
