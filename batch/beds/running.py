@@ -147,7 +147,7 @@ def run_and_tell(
     for line in timing_lines(executor):
         say(line)
     ok = all(summary.ok for summary in summaries)
-    say("\n".join(result_lines(source, campaign, summaries, worst, picture, excuse, None, performed.seconds, ok, ())))
+    say("\n".join(result_lines(campaign, summaries, worst, picture, excuse, None, performed.seconds, ok, ())))
     return ok
 
 

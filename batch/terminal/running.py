@@ -131,7 +131,7 @@ def run_and_tell(
     if json:
         print(_json(campaign, result, exported, performed, [*compared, *refused], ok))
         return ok
-    say("\n".join(_lines(source, campaign, result, exported, performed)))
+    say("\n".join(_lines(campaign, result, exported, performed)))
     if result.warned and not quiet:
         _complain(Problem(result.warned, {each.name: each.text for each in campaign.plan.sources}), json)
     for line in compared:
@@ -298,12 +298,9 @@ def _json(
     )
 
 
-def _lines(
-    source: str, campaign: Campaign, result: RunResult, exported: Exported | None, performed: Performed
-) -> list[str]:
+def _lines(campaign: Campaign, result: RunResult, exported: Exported | None, performed: Performed) -> list[str]:
     """The verdict for people."""
     return result_lines(
-        source,
         campaign,
         result.summaries,
         result.worst,

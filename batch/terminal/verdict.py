@@ -121,7 +121,6 @@ def worst_cases(archive: ArchiveFile) -> tuple[WorstCaseLines, ...]:
 
 
 def result_lines(
-    source: str,
     campaign: Campaign,
     summaries: tuple[Summary, ...],
     worst: tuple[WorstCaseLines, ...],
@@ -169,9 +168,9 @@ def result_lines(
             only = f" --run {quoted(summary.name)}" if len(summaries) > 1 else ""
             out.append(f"         met show {quoted(path)}{only} --case '{cases.first}'")
     if not any(summary.recorded for summary in summaries) and campaign.parts[0].experiment.structure.record:
-        part = campaign.parts[0]
-        first = part.experiment.cases.table[part.rows[0]]
-        out.append(f"         met run {quoted(source)} {part.experiment.name_in_deck} --case '#{first}'")
+        part, name = campaign.parts[0], f" {quoted(summaries[0].name)}" if len(summaries) > 1 else ""
+        first = worst[0].first if worst[0].rows else f"#{part.experiment.cases.table[part.rows[0]]}"
+        out.append(f"         met run {quoted(path)}{name} --case '{first}'")
     if not ok:
         judged = [each for each, answer in zip(summaries, answers, strict=True) if answer is None or not answer.tunes]
         tuned = [

@@ -94,7 +94,7 @@ def test_every_word_that_a_value_may_use_is_there(found: dict[str, Any]) -> None
     assert sorted(names(found["shapes"])) == sorted(SHAPES)
     assert set(names(found["designs"])) == set(DESIGNS)
     assert set(names(found["distributions"])) >= set(DISTRIBUTIONS)
-    assert set(found["definitions"]) == {"arm", "servo", "run", "sweep"}
+    assert set(found["definitions"]) == {"arm", "servo", "run", "sweep", "search", "tune"}
     assert found["constants"]["pi"] == 3.141592653589793
 
 
