@@ -11,6 +11,7 @@ data = sim.run({"gearbox.kp": [0.01, 0.02, 0.03]})
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -210,17 +211,24 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     chunks  as xarray.open_dataset has it: `{}` for arrays of Dask, in the archive's own chunks
 
     What it can besides is in `data.met` (batch.notebook): cases by what is varied in them, where links are, and more.
+    Of an archive of `--rows summary` it has the rows that were kept, which are no sample: it warns (UserWarning), and
+    the attribute `summary_of_cases` is the number of cases of the summary.
     """
     from batch.archive.read import ArchiveFile, reading
 
     with ArchiveFile(Path(path)) as file:
         several = len(file.groups) > 1
+        summed = {group.name: group.summary.cases for group in file.groups if group.summary is not None}
+        kept = {group.name: group.count for group in file.groups}
     import xarray
 
     import batch.notebook  # noqa: F401 - registers `data.met`
 
     opened = xarray.open_datatree if several else xarray.open_dataset
-    if chunks is not None:
-        return opened(path, engine="h5netcdf", chunks=chunks)
     with reading(Path(path)):
-        return opened(path, engine="h5netcdf")
+        found = opened(path, engine="h5netcdf", **({} if chunks is None else {"chunks": chunks}))
+    for name, cases in summed.items():
+        (found[name] if several else found).attrs["summary_of_cases"] = cases
+        message = f"{path} keeps a summary of {cases:,} cases of `{name}`, and the rows of {kept[name]:,} that it names"
+        warnings.warn(f"{message}: these are no sample of them; `data.met.evidence()` judges all", stacklevel=2)
+    return found

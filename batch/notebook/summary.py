@@ -20,7 +20,10 @@ def summary(data: xarray.Dataset) -> str:
         return "a Dataset that is of no archive of MET"
     deck = str(data.attrs.get("deck", "")).strip("<>")
     out = [f"{name_of(data)}{f' of {deck}' if deck else ''}: {_cases(data)}"]
-    if CASE in data.dims and "status" in data:
+    summed = int(data.attrs.get("summary_of_cases", 0))
+    if summed:
+        out.append(f"  rows that a summary of {summed:,} cases names, no sample of them; `evidence()` judges all")
+    if CASE in data.dims and "status" in data and not summed:
         status = data["status"].values
         ended = (
             f"{(status == code).sum():,} {word}"
@@ -28,7 +31,7 @@ def summary(data: xarray.Dataset) -> str:
             if code == DONE or (status == code).any()
         )
         out.append(f"  {', '.join(ended)}")
-    if "met" in data and data["met"].dims == (CASE, "requirement"):
+    if not summed and "met" in data and data["met"].dims == (CASE, "requirement"):
         for text, met in zip(data["requirement"].values.astype(str), data["met"].values.T, strict=True):
             out.append(f"  require {text}: met by {(met == 1).sum():,} of {len(met):,}")
     dim = next((name for name in (CASE, RECORDED) if name in data.dims), "")

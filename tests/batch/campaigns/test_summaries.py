@@ -254,6 +254,25 @@ def test_what_needs_a_row_a_case_is_refused_with_the_remedy(here: Path, what: st
     assert "`met run DECK --rows all` keeps a row a case" in said.text
 
 
+@pytest.mark.parametrize("name", ["many", pytest.param("ways", marks=pytest.mark.slow)])
+def test_python_is_warned_that_its_rows_are_no_sample(here: Path, name: str) -> None:
+    archives(name)
+    with pytest.warns(UserWarning) as told:
+        data = batch.open(f"{name}.summary.h5")
+    nodes = [data] if name == "many" else data.children.values()
+    parts = [part for part in nodes if "experiment" in part.attrs]
+    assert sum(part.attrs["summary_of_cases"] for part in parts) == {"many": 600, "ways": 120}[name]
+    assert [str(each.message) for each in told] == [
+        f"{name}.summary.h5 keeps a summary of {part.attrs['summary_of_cases']:,} cases of `{part.attrs['experiment']}`"
+        f", and the rows of {part.sizes['case']:,} that it names: these are no sample of them; `data.met.evidence()` "
+        "judges all"
+        for part in parts
+    ]
+    said = repr(parts[0].met)
+    assert "no sample of them" in said and "met by" not in said
+    assert "summary_of_cases" not in batch.open(f"{name}.rows.h5").attrs
+
+
 def test_its_evidence_is_exported(here: Path) -> None:
     for kind in ("rows", "summary"):
         assert met("export", f"many.{kind}.h5", "--evidence", "-o", f"{kind}.csv").status == 0
