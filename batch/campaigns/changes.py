@@ -71,6 +71,7 @@ def between(before: Experiment, now: Experiment, *, ordered: bool) -> list[Chang
         cases = [Change(text) for text in _cases(before.cases, now.cases, ordered)]
     else:  # of which the cases follow from what is searched for
         cases = [Change(text) for text in _searches(before.search, now.search)]
+        cases += [Change(text) for text in _tuned_limits(before, now)]
     cases += [Change(text) for text in _stops(before, now)]
     out += [*_parameters(before, now, new), *cases]
     if before.formulas != now.formulas and not out:
@@ -256,6 +257,14 @@ def _searches(before: Search, now: Search) -> Iterator[str]:
     for name in ("at_most", "seed", "margin"):
         if getattr(before, name) != getattr(now, name):
             yield f"{name}: {getattr(before, name)} -> {getattr(now, name)}"
+
+
+def _tuned_limits(before: Experiment, now: Experiment) -> Iterator[str]:
+    """Changes of the requirements of a tuning, which decide what its cases are worth, and so which ones follow."""
+    old, new = ([each.text for each in run.requirements] for run in (before, now))
+    if old != new and now.search is not None and now.search.kind == "tune":
+        gone, come = ([text for text in one if text not in other] for one, other in ((old, new), (new, old)))
+        yield f"requirements: {', '.join(gone) or 'none'} -> {', '.join(come) or 'none'}"
 
 
 def _shown_by(requirement: Requirement) -> tuple[object, ...]:

@@ -47,9 +47,14 @@ def campaign_key(values: Sequence[CampaignSection]) -> str:
 
 
 def _search_of(section: CampaignSection) -> list[Any]:
-    """What decides which cases a search asks for, besides its first ones; nothing of what is no search."""
-    search = section.prepared.experiment.search
-    return [] if search is None else [encode(Search, replace(search, place=None))]
+    """What decides which cases a search asks for, besides its first ones, of a tuning also the limits that its cases
+    are worth more or less by; nothing of what is no search."""
+    experiment = section.prepared.experiment
+    search = experiment.search
+    if search is None:
+        return []
+    limits = [[each.metric, each.comparison, each.limit] for each in experiment.requirements]
+    return [encode(Search, replace(search, place=None)), *([limits] if search.kind == "tune" else [])]
 
 
 def as_begun(folder: Folder, campaign: Campaign, values: list[CampaignSection]) -> tuple[list[CampaignSection], str]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +20,12 @@ from met.frozen import frozen
 
 ON_CIRCLE = 1e-4
 """Distance from the unit circle at which a root of a pencil is looked at: double roots are no nearer."""
+
+APART = 1e-10
+"""A state that is moved by less than this share of what moves others is not moved."""
+
+EDGE = 1e-7
+"""Of a gain: so near to 1 is a loop that is at its edge as it is."""
 
 STABLE = 1e-7
 """Growth of a period up to which a loop is not called unstable, at least: a drift in place and rate has poles so near
@@ -67,6 +74,36 @@ class ScalarLoop:
             return True
         return bool(np.max(np.abs(np.linalg.eigvals(self.closed(gain))), initial=0.0) > 1.0 + self.drift)
 
+    def minimal(self) -> ScalarLoop:
+        """The same loop with those states alone that it moves and sees: others have poles that are none of its own."""
+        from scipy.linalg import matrix_balance
+
+        n = len(self.A)
+        moves = np.block([[self.A - np.eye(n), self.B[:, None]], [self.C[None, :], np.zeros((1, 1))]])
+        _, (scale, _) = matrix_balance(moves, permute=False, separate=True)
+        by = scale[:n] / scale[n]
+        A, B, C = self.A * (by[None, :] / by[:, None]), self.B / by, self.C * by
+        moved = _krylov(A, B)
+        A, B, C = moved.T @ A @ moved, moved.T @ B, C @ moved
+        seen = _krylov(A.T, C)
+        return replace(self, A=seen.T @ A @ seen, B=seen.T @ B, C=C @ seen)
+
+
+def _krylov(A: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """An orthonormal basis, [state, basis], of all that a vector becomes by powers of A."""
+    n, length = len(A), float(np.linalg.norm(start))
+    basis = np.zeros((n, 0)) if length == 0.0 else start[:, None] / length
+    while 0 < basis.shape[1] < n:
+        new = A @ basis[:, -1] - basis[:, -1]  # of a slow A too, this is far from what it is made of
+        before = float(np.linalg.norm(new))
+        for _ in range(2):
+            new = new - basis @ (basis.T @ new)
+        after = float(np.linalg.norm(new))
+        if after <= APART * before:
+            break
+        basis = np.column_stack([basis, new / after])
+    return basis
+
 
 @frozen
 class LoopMargins:
@@ -106,6 +143,7 @@ def margins(loop: ScalarLoop) -> LoopMargins | None:
     """The margins of a loop; None where it is unstable as it is."""
     if loop.grows():
         return None
+    loop = loop.minimal()
     up, down = _gains(loop)
     crossings = [(w, loop.at(cmath.exp(1j * w * loop.period))) for w in _where_size_is(loop, 1.0)]
     # to -1, from L the way that a delay turns it; and the other way, which is that of the crossing below 0
@@ -121,9 +159,10 @@ def _gains(loop: ScalarLoop) -> tuple[tuple[float | None, float | None], tuple[f
     """The gains at which the closed loop comes to the unit circle: the least above 1 and the largest below, each with
     its frequency."""
     found = [(-1.0 / L.real, w) for w in _where_real(loop) if (L := loop.at(cmath.exp(1j * w * loop.period))).real < 0]
-    above = min(((k, w) for k, w in found if k > 1.0), default=(None, None))
-    below = max(((k, w) for k, w in found if k < 1.0), default=(None, None))
-    return above, below
+    edge = [(1.0, w) for k, w in found if abs(k - 1.0) <= EDGE]
+    above = [(k, w) for k, w in found if k > 1.0 + EDGE] + (edge if loop.grows(1.01) else [])
+    below = [(k, w) for k, w in found if k < 1.0 - EDGE] + (edge if loop.grows(0.99) else [])
+    return min(above, default=(None, None)), max(below, default=(None, None))
 
 
 def _roots(loop: ScalarLoop, last: Sequence[Sequence[np.ndarray | float]], by_output: bool) -> list[float]:
@@ -168,8 +207,16 @@ def _where_size_is(loop: ScalarLoop, size: float) -> list[float]:
 
 
 def _is_number(loop: ScalarLoop, w: float) -> bool:
+    """True where L, of a loop with no states but its own, has a value: no pole lies there. A pole of several turns out
+    as several beside it, by the root of the rounding error that is as many times."""
     z = cmath.exp(1j * w * loop.period)
-    return bool(np.min(np.abs(np.linalg.eigvals(loop.A) - z), initial=math.inf) > 1e-9)
+    poles = np.linalg.eigvals(loop.A)
+    poles = poles[np.argsort(np.abs(poles - z))]
+    # rounding spreads a pole of several around itself, by the root of it that is as many times; their mean stays
+    return not any(
+        abs(poles[many - 1] - z) <= 20.0 * 2.2e-16 ** (1.0 / many) + 1e-9 and abs(poles[:many].mean() - z) <= 1e-9
+        for many in range(1, min(len(poles), 4) + 1)
+    )
 
 
 def _refined(found: Sequence[float], zero: Callable[[float], float], nyquist: float) -> list[float]:

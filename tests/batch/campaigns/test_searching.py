@@ -252,6 +252,24 @@ def test_another_search_is_no_part_of_it(here: Path, place: Path, monkeypatch: p
         (here / "a.h5.run.json").unlink()
 
 
+def test_a_tuning_with_another_limit_is_no_part_of_it(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its cases are worth more or less by the limits, so others follow; of a search they are what they were."""
+    monkeypatch.setattr(performing, "WORTH_SECONDS", 0.0)
+    for name in ("still", "back"):
+        (here / "d.ic").write_text(DECK)
+        with pytest.raises(KeyboardInterrupt):
+            batch.run(ic.compile("d.ic", select=[name]), output=f"{name}.h5", executor=whole.Watched(after=3))
+        (here / "d.ic").write_text(DECK.replace("top < 1 m/s", "top < 2 m/s"))
+        if name == "back":
+            assert batch.run(ic.compile("d.ic", select=[name]), output="back.h5").notes[0].startswith("goes on: ")
+            continue
+        with pytest.raises(Problem) as refused:
+            batch.run(ic.compile("d.ic", select=[name]), output="still.h5")
+        [said] = refused.value.diagnostics
+        assert said.code == "E353"
+        assert "requirements: top < 1 m/s -> top < 2 m/s" in " ".join(said.help)
+
+
 # What is in the archive
 
 

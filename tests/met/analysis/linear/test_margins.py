@@ -5,9 +5,11 @@ from __future__ import annotations
 import cmath
 import math
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from met.analysis.linear.margins import ScalarLoop, gain_limits, margins
 
@@ -137,3 +139,57 @@ def test_200_loops_have_the_margins_that_python_control_finds() -> None:
             assert math.isclose(found.phase, named, rel_tol=1e-9)
             compared += 1
     assert compared > 150
+
+
+# Poles that are none of the loop's own
+
+
+def beside(loop: ScalarLoop, *poles: float, moved: float = 0.0) -> ScalarLoop:
+    """The loop among states of an arm that it does not see, turned so that no zero tells which they are.
+
+    poles  of the others;  moved: how much what stands at the open place moves them
+    """
+    n, more = len(loop.A), len(poles)
+    A = np.block([[loop.A, np.zeros((n, more))], [np.zeros((more, n)), np.diag(poles)]])
+    B = np.concatenate([loop.B, np.full(more, moved)])
+    C = np.concatenate([loop.C, np.zeros(more)])
+    turn, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(n + more, n + more)))
+    return replace(loop, A=turn.T @ A @ turn, B=turn.T @ B, C=C @ turn)
+
+
+def pendulum(least: float) -> ScalarLoop:
+    """A pole that stands up, held by its rate and place: it needs this times its gain."""
+    gravity = 9.0
+    A = expm(PERIOD * np.array([[0.0, 1.0], [gravity, 0.0]]))
+    B = np.array([0.5 * PERIOD**2, PERIOD])
+    C = -np.array([1.0, 0.4])
+    at_rest = -(C @ np.linalg.solve(np.eye(2) - A, B))
+    return ScalarLoop(A, B, C / (-at_rest * least), 0.0, PERIOD)
+
+
+@pytest.mark.parametrize("moved", [0.0, 1.0])
+def test_a_pole_that_a_loop_does_not_see_hides_no_limit_at_rest(moved: float) -> None:
+    own = margins(pendulum(0.3))
+    found = margins(beside(pendulum(0.3), 1.0, 1.0, 0.5, moved=moved))
+    assert own is not None and found is not None
+    assert own.gain_down == pytest.approx(0.3, rel=1e-9) and own.at_gain_down == 0.0
+    assert found.gain_down == pytest.approx(0.3, rel=1e-6) and found.at_gain_down == 0.0
+    assert found.gain_up == pytest.approx(own.gain_up, rel=1e-6)
+
+
+def test_two_integrals_have_no_limit_at_rest_that_rounding_makes() -> None:
+    """Their double pole comes out as two beside it; what a loop gives there is no number."""
+    for seed in range(20):
+        turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+        A = turn.T @ np.array([[1.0, PERIOD, 0.0], [0.0, 0.98, 0.02], [0.0, 0.0, 1.0]]) @ turn
+        loop = ScalarLoop(A, turn.T @ np.array([0.0, 1e-3, 1e-5]), -np.array([8.0, 2.0, 1.0]) @ turn, 0.0, PERIOD)
+        found = margins(loop)
+        assert found is not None and (found.gain_down is None or found.gain_down > 1e-6)
+
+
+def test_a_loop_at_its_edge_has_the_limit_1() -> None:
+    loop = ScalarLoop(np.array([[0.99]]), np.array([0.01]), np.array([1.0]), 0.0, PERIOD)
+    assert np.max(np.abs(np.linalg.eigvals(loop.closed(1.01)))) > 1.0
+    found = margins(loop)
+    assert found is not None
+    assert (found.gain_up, found.at_gain_up, found.gain_down) == (1.0, 0.0, None)
