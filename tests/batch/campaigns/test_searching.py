@@ -115,8 +115,8 @@ def answers(path: Path) -> dict[str, Said]:
         for group in file.groups:
             each = SearchAnswer.of(group)
             assert each is not None
-            [(_, exact)], [(_, rounded)] = each.settings(), each.settings(exact=False)
-            found[group.name] = Said(each.found, each.position, exact, rounded)
+            [chosen], [(_, rounded)] = each.values(), each.shown()
+            found[group.name] = Said(each.found, each.position, chosen.text, rounded)
     return found
 
 
