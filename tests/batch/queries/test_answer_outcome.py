@@ -204,3 +204,16 @@ def test_the_exit_status_of_a_run_is_that_of_its_answers(archive: Path, capsys: 
     assert capsys.readouterr().out.endswith("exit 1: not met everywhere: far > -0.05 m\n")
     assert main(["run", deck, "poor", *output]) == 1
     assert capsys.readouterr().out.endswith("exit 1: `poor` found nothing that meets all\n")
+
+
+def test_what_a_search_depends_on_is_no_question_to_its_cases(
+    archive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["sensitivity", str(archive), "--run", "still"]) == 2
+    assert capsys.readouterr().err == (
+        "error[E361]: the cases of `still` were chosen by its search, and are no sample of what may be\n"
+        " = help: a sweep draws one: `sweep NAME of RUN { sample random(1000) { PATH = uniform(LOW, HIGH) UNIT; } }`\n"
+        "\n1 error\n"
+    )
+    page = report(archive, tmp_path / "r.html", experiments=["still"]).read_text(encoding="utf-8")
+    assert "Which parameters matter" not in page
