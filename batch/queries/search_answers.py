@@ -126,7 +126,7 @@ class SearchAnswer:
     def lines(self) -> list[str]:
         """The answer in lines, without the commands that follow from it."""
         found, search = self.found, self.search
-        out = self._tuned() if search.kind == "tune" else self._hardest()
+        out = self._tuned() if search.kind == "tune" else self._worst()
         if found.missed:
             out.append(f"  misses {', '.join(found.missed)}")
         elif found.rooms and not found.failed:
@@ -161,17 +161,17 @@ class SearchAnswer:
             )
         return out
 
-    def _hardest(self) -> list[str]:
+    def _worst(self) -> list[str]:
         found, search = self.found, self.search
-        case = f"case #{self.position} with {self._chosen}"
+        case, worst = f"case #{self.position} with {self._chosen}", f"the worst of search `{self.group.name}`"
         if found.failed:
             failed = int(np.count_nonzero(self.group.values("status") != DONE))
             words = f"{failed:,} of {self._cases} fail, which hurts more than any {search.metric}"
-            return [f"hardest: {case} fails", f"  {words}"]
+            return [f"{worst}: {case} fails", f"  {words}"]
         if np.isnan(found.value):
-            return [f"hardest: {case}, in which {search.metric} has no value", f"  of {self._cases}"]
+            return [f"{worst}: {case}, in which {search.metric} has no value", f"  of {self._cases}"]
         which = "largest" if search.largest else "least"
-        return [f"hardest: {search.metric} = {self.value()}, {case}", f"  the {which} {search.metric} of {self._cases}"]
+        return [f"{worst}: {search.metric} = {self.value()}, {case}", f"  the {which} {search.metric} of {self._cases}"]
 
     def as_data(self) -> dict[str, Any]:
         """The answer for programs, SI."""

@@ -283,6 +283,9 @@ class DesignAnswer:
     headline, why  which it is, and what it has for it;  table: it and others;  stretches: how far each parameter may go
     said, command  how to run it or confirm it;  map: None where no two parameters with an order are chosen
     title, about   what the table is called, and what its numbers are
+    heading, link  over all of it, and in the page's menu
+    progress       of a search: the cases after each look at it, the best value by then, and the cases of a sweep that
+                   this was tried with; none of what is none
     """
 
     headline: str
@@ -295,6 +298,9 @@ class DesignAnswer:
     map: DesignMap | None
     title: str = "Designs"
     about: str = "Each number is that of the worst case of a design."
+    heading: str = "Which design to use"
+    link: str = "Which design"
+    progress: tuple[tuple[int, float, int], ...] = ()
 
 
 # Plots

@@ -167,7 +167,7 @@ def test_a_case_that_fails_hurts_most(here: Path, capsys: pytest.CaptureFixture[
     failed = int((data["status"] != 0).sum())
     assert 0 < failed < data.sizes["case"]
     where = f"case #{answer.position} with environment.held.stiffness = {answer.rounded}"
-    assert f"hardest: {where} fails\n  {failed} of {data.sizes['case']} cases in " in said
+    assert f"the worst of search `wild`: {where} fails\n  {failed} of {data.sizes['case']} cases in " in said
     assert f"run it again: met run w.h5 --case '#{answer.position}'\n" in said
 
 
