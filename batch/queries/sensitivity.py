@@ -88,8 +88,8 @@ def sensitivities(
     """
     if is_search(group):
         message = f"the cases of `{group.name}` were chosen by its search, and are no sample of what may be"
-        helps = "a sweep draws one: `sweep NAME of RUN { sample random(1000) { PATH = uniform(LOW, HIGH) UNIT; } }`"
-        raise Problem(error("E361", message, help=helps))
+        remedy = "a sweep draws one: `sweep NAME of RUN { sample random(1000) { PATH = uniform(LOW, HIGH) UNIT; } }`"
+        raise Problem(error("E361", message, help=remedy))
     metrics = {variable.name: variable for variable in group.role("metric")}
     if before is not None:
         metrics = {name: each for name, each in metrics.items() if name in before[0].variables}
