@@ -79,7 +79,7 @@ def verdict(found: Verdict, anchors: Anchors) -> Html:
     )
     evidence = [_parts(found) if found.cases > 1 else None, _demands(found)]
     if found.failing:
-        evidence.append(_failing(found.failing, found.cases if found.kind != "answer" else 2))
+        evidence.append(_failing(found.failing, single=found.cases == 1))
     evidence += [_warning(each, anchors) for each in found.warnings]
     evidence += [el("p", note, cls="note") for note in found.notes]
     return el("div", answer, el("div", evidence, cls="evidence"), cls=f"verdict {'yes' if found.ok else 'no'}")
@@ -281,7 +281,7 @@ def case_link(case: int) -> Html:
     return el("button", f"#{case}", type="button", cls="case", data_case=case, title=f"Choose case #{case}")
 
 
-def _failing(found: Sequence[FailureRow], of: int) -> Html:
+def _failing(found: Sequence[FailureRow], *, single: bool) -> Html:
     """The causes, the cases of each, and what they have in common once."""
     rows = []
     for each in found:
@@ -289,11 +289,11 @@ def _failing(found: Sequence[FailureRow], of: int) -> Html:
         rows.append(
             el(
                 "li",
-                el("p", el("strong", who if of > 1 else "The case", " ", each.status), " ", el("span", each.cause)),
+                el("p", el("strong", "The case" if single else who, " ", each.status), " ", el("span", each.cause)),
                 el("p", each.cases, cls="cases") if each.count > 1 else None,
             )
         )
-    return join([el("h4", "Did not reach their end" if of > 1 else "Why"), el("ul", rows, cls="failing")])
+    return join([el("h4", "Why" if single else "Did not reach their end"), el("ul", rows, cls="failing")])
 
 
 # What was run

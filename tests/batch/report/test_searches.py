@@ -33,6 +33,7 @@ run swing {
     require far > -0.05 m;
 }
 search slowest of swing { minimise far;  environment.held.stiffness = between(5, 79) N/m;  at_most = 60; }
+search wild of swing { minimise far;  environment.held.stiffness = logbetween(1, 1e9) N/m;  at_most = 64; }
 tune still of swing { choose environment.held.stiffness = between(2, 9) N/m;  maximise far;  at_most = 60; }
 """
 
@@ -41,7 +42,9 @@ tune still of swing { choose environment.held.stiffness = between(2, 9) N/m;  ma
 def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("searches")
     (folder / "d.ic").write_text(DECK, encoding="utf-8")
-    return batch.run(ic.compile(folder / "d.ic", select=["slowest", "still"]), output=folder / "a.h5", threads=1).path
+    return batch.run(
+        ic.compile(folder / "d.ic", select=["slowest", "wild", "still"]), output=folder / "a.h5", threads=1
+    ).path
 
 
 @pytest.mark.parametrize(
@@ -53,6 +56,13 @@ def test_its_heading_says_what_was_asked(archive: Path, tmp_path: Path, name: st
     assert re.search(rf'<section id="s0-designs" class="designs"><h[23]>{heading}</h[23]>', page)
     assert f'<a href="#s0-designs">{link}</a>' in page or f">{link}</a>" in page
     assert ("The worst of search <code>slowest</code>: far = " in page) == (name == "slowest")
+
+
+def test_a_search_that_found_a_case_that_fails_opens_with_it(archive: Path, tmp_path: Path) -> None:
+    page = report(archive, tmp_path / "r.html", experiments=["wild"]).read_text(encoding="utf-8")
+    opens = page[page.index("<main") :].partition("</section>")[0]
+    assert re.search(r"A miss was found</p><p class=\"headline\">The worst case found, #\d+, fails\.</p>", opens)
+    assert "<h4>Did not reach their end</h4>" in opens and "not known in the worst case found" in opens
 
 
 @pytest.mark.parametrize("name", ["slowest", "still"])
