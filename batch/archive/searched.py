@@ -94,6 +94,11 @@ def _is_range(variable: Stored) -> bool:
     return steps == "equal" or (steps == "ratios" and low * high > 0.0)
 
 
+def is_search(group: StoredGroup) -> bool:
+    """True if the cases of a group, all of them or some, were chosen by a search or a tuning."""
+    return "search" in group.attributes
+
+
 def search_of(group: StoredGroup) -> Search | None:
     """The search whose cases are a group's, of which the goal is a variable's name, and plants are counted alone; None
     where it is none, or some of its cases alone."""

@@ -5,8 +5,12 @@ from __future__ import annotations
 import xarray
 
 from batch.notebook.quantities import in_deck_unit
+from batch.notebook.source import experiment, file_of
 from batch.notebook.table import CASE, RECORDED, name_of, varied
+from batch.queries.answer_outcome import answer_outcome
 from batch.queries.failures import STATUS
+from batch.queries.search_answers import SearchAnswer
+from met.diagnostic import Problem
 from met.distinct import distinct
 from met.run import DONE
 
@@ -31,12 +35,28 @@ def summary(data: xarray.Dataset) -> str:
             if code == DONE or (status == code).any()
         )
         out.append(f"  {', '.join(ended)}")
-    if not summed and "met" in data and data["met"].dims == (CASE, "requirement"):
+    if "search" in data.attrs:
+        out += _answered(data)
+    elif not summed and "met" in data and data["met"].dims == (CASE, "requirement"):
         for text, met in zip(data["requirement"].values.astype(str), data["met"].values.T, strict=True):
             out.append(f"  require {text}: met by {(met == 1).sum():,} of {len(met):,}")
     dim = next((name for name in (CASE, RECORDED) if name in data.dims), "")
     out += [f"  {path}: {_values(array)}" for path, array in (varied(data, dim) if dim else {}).items()]
     return "\n".join(out)
+
+
+def _answered(data: xarray.Dataset) -> list[str]:
+    """The requirements of a search in the cases of its answer, which its archive says; none where that is gone, or was
+    opened in part."""
+    try:
+        with experiment(file_of(data), data) as (_, group):
+            answer = SearchAnswer.of(group)
+            found = None if answer is None else answer_outcome(answer)
+    except (Problem, OSError):
+        return []
+    if found is None:
+        return []
+    return [f"  {found.headline}", *(f"  require {each.text}: {each.said}" for each in found.requirements)]
 
 
 def _cases(data: xarray.Dataset) -> str:

@@ -10,14 +10,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 
 from batch.archive.read import ArchiveGroup, Stored
+from batch.archive.searched import is_search
 from batch.archive.summarised import CaseSummary
 from batch.queries import requirements
 from batch.queries.requirements import GroupRequirement
+from batch.queries.search_answers import SearchAnswer
 from batch.queries.signals import deck_unit, number_text
 from batch.queries.streamed import summed_up
 from met.frozen import frozen
@@ -32,6 +35,7 @@ ROUNDING = 1e-12
 """Of a share: 7 % of 100 cases are 7.000000000000001 cases in floating point, and 7 of them are enough."""
 
 NOTHING_DRAWN = "no case was drawn at random: without a confidence"
+SEARCHED = "in the cases of the answer alone, as an optimiser chose all others"
 SOME_OF_THE_TABLE = "only some cases of the table were run: without a confidence"
 
 
@@ -81,7 +85,9 @@ class EvidenceRow:
 
 def evidence(group: ArchiveGroup) -> list[EvidenceRow]:
     """The rows of an experiment's requirements over a share of cases, at each of its design points; none, and no values
-    are read, where it has no such requirement."""
+    are read, where it has no such requirement, or is a search, whose cases an optimiser chose."""
+    if is_search(group):
+        return []
     return evidence_for(group, [each for each in requirements.group_requirements(group) if each.share is not None])
 
 
@@ -89,6 +95,10 @@ def evidence_for(group: ArchiveGroup, found: Sequence[GroupRequirement]) -> list
     """The rows of these requirements: a row a design point, and one alone for what every case is to meet."""
     if not found:
         return []
+    if (answer := SearchAnswer.of(group)) is not None:
+        return _of_answer(answer)
+    if is_search(group):  # some of its cases: an optimiser chose them, so that each is held against every requirement
+        found = [replace(each, share=None, confidence=None) for each in found]
     if (summed := summed_up(group)) is not None:
         return _of_summary(group, summed, found)
     outcomes = requirements.outcomes(group)
@@ -104,6 +114,18 @@ def evidence_for(group: ArchiveGroup, found: Sequence[GroupRequirement]) -> list
             out.append(
                 EvidenceRow(requirement=each, unit=unit, scale=scale, chosen=point.chosen, worst=worst, **judged)
             )
+    return out
+
+
+def _of_answer(answer: SearchAnswer) -> list[EvidenceRow]:
+    """The rows of the requirements in the cases of a search's answer, each asked of every one of these."""
+    group, here = answer.group, np.array(answer.found.cases)
+    met, out = requirements.outcomes(group), []
+    for each in answer.required:
+        judged = _judged(each, group.values(each.metric)[here], met[here, each.place], SEARCHED, early=False)
+        scale, unit = deck_unit(group.variables[each.metric])
+        worst = int(here[judged.pop("worst")])
+        out.append(EvidenceRow(requirement=each, unit=unit, scale=scale, chosen={}, worst=worst, **judged))
     return out
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -11,7 +13,7 @@ import numpy as np
 from batch.archive.limits import deck_unit
 from batch.archive.read import ArchiveGroup
 from batch.archive.searched import search_of
-from batch.queries.requirements import group_requirements
+from batch.queries.requirements import GroupRequirement, group_requirements, outcomes
 from batch.queries.signals import number_text, pretty_unit
 from ic.driver.written_value import WrittenValue
 from met.plan import Experiment
@@ -19,6 +21,9 @@ from met.plan.outputs import metric_units
 from met.plan.searches import Search
 from met.run import DONE
 from met.searches.answer import Answer, answer
+
+OVER_CASES = re.compile(r" in [^<>]* of cases\b[^<>]*$")
+"""The words by which a requirement is one over a share of cases."""
 
 NEAREST = 1
 """Requirements that are named of those that are nearest to their limits."""
@@ -48,8 +53,7 @@ class SearchAnswer:
         columns = [group.values(variable.name) for variable in group.role("coordinate")]
         metrics = {variable.path: group.values(variable.name) for variable in group.role("metric")}
         by_name = {variable.name: variable.path for variable in group.role("metric")}
-        required = [_Required(each.text, by_name[each.metric], each.comparison, each.limit)
-                    for each in group_requirements(group)]  # fmt: skip
+        required = [_Required(each.text, by_name[each.metric], each.comparison, each.limit) for each in self.required]
         return np.stack(columns, axis=1), group.values("status") == DONE, metrics, required
 
     def progress(self, most: int) -> list[tuple[int, int, Answer]]:
@@ -73,11 +77,23 @@ class SearchAnswer:
         """The position in the case table of the case that stands for the answer."""
         return int(self.group.values("case")[self.found.case])
 
-    @property
+    @cached_property
+    def required(self) -> list[GroupRequirement]:
+        """The requirements as each case is held against them: one over a share of cases is asked of every case, and
+        none is there twice."""
+        found: dict[tuple[str, str, float], GroupRequirement] = {}
+        for each in group_requirements(self.group):
+            one = replace(each, text=OVER_CASES.sub("", each.text), share=None, confidence=None)
+            found.setdefault((each.metric, each.comparison, each.limit), one)
+        return list(found.values())
+
+    @cached_property
     def ok(self) -> bool:
         """True if what a tuning found meets all that is required; of a search, if it found nothing that fails or misses
         something."""
-        return self.found.serves
+        if self.search.kind == "tune":
+            return self.found.serves
+        return bool((self.group.values("status") == DONE).all() and (outcomes(self.group) == 1).all())
 
     def values(self) -> list[WrittenValue]:
         """What is chosen, for a deck's text or `--set`."""
@@ -110,7 +126,7 @@ class SearchAnswer:
     def lines(self) -> list[str]:
         """The answer in lines, without the commands that follow from it."""
         found, search = self.found, self.search
-        out = self._tuned() if search.kind == "tune" else self._hardest()
+        out = self._tuned() if search.kind == "tune" else self._worst()
         if found.missed:
             out.append(f"  misses {', '.join(found.missed)}")
         elif found.rooms and not found.failed:
@@ -145,17 +161,17 @@ class SearchAnswer:
             )
         return out
 
-    def _hardest(self) -> list[str]:
+    def _worst(self) -> list[str]:
         found, search = self.found, self.search
-        case = f"case #{self.position} with {self._chosen}"
+        case, worst = f"case #{self.position} with {self._chosen}", f"the worst of search `{self.group.name}`"
         if found.failed:
             failed = int(np.count_nonzero(self.group.values("status") != DONE))
             words = f"{failed:,} of {self._cases} fail, which hurts more than any {search.metric}"
-            return [f"hardest: {case} fails", f"  {words}"]
+            return [f"{worst}: {case} fails", f"  {words}"]
         if np.isnan(found.value):
-            return [f"hardest: {case}, in which {search.metric} has no value", f"  of {self._cases}"]
+            return [f"{worst}: {case}, in which {search.metric} has no value", f"  of {self._cases}"]
         which = "largest" if search.largest else "least"
-        return [f"hardest: {search.metric} = {self.value()}, {case}", f"  the {which} {search.metric} of {self._cases}"]
+        return [f"{worst}: {search.metric} = {self.value()}, {case}", f"  the {which} {search.metric} of {self._cases}"]
 
     def as_data(self) -> dict[str, Any]:
         """The answer for programs, SI."""

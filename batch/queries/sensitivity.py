@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from batch.archive.read import ArchiveGroup
+from batch.archive.searched import is_search
 from batch.archive.stored import Stored
 from batch.queries.signals import deck_unit
 from met.diagnostic import Problem, did_you_mean, error
@@ -85,6 +86,10 @@ def sensitivities(
     before  another group, with the positions in it and in this one of the cases in both: then of the change since
     Raises Problem E361 where it cannot be had, E362 for a name that is no metric's.
     """
+    if is_search(group):
+        message = f"the cases of `{group.name}` were chosen by its search, and are no sample of what may be"
+        remedy = "a sweep draws one: `sweep NAME of RUN { sample random(1000) { PATH = uniform(LOW, HIGH) UNIT; } }`"
+        raise Problem(error("E361", message, help=remedy))
     metrics = {variable.name: variable for variable in group.role("metric")}
     if before is not None:
         metrics = {name: each for name, each in metrics.items() if name in before[0].variables}

@@ -11,10 +11,12 @@ import numpy as np
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.archive.stored import Stored
 from batch.archive.summarised import DOUBTFUL, CaseSummary
+from batch.queries.answer_outcome import AnswerOutcome, answer_outcome
 from batch.queries.at_limits import LimitSummary, limit_summaries
 from batch.queries.evidence import EvidenceRow, evidence
 from batch.queries.failures import STATUS, FailureGroup, failures
 from batch.queries.requirements import requirement_texts
+from batch.queries.search_answers import SearchAnswer
 from batch.queries.signals import number_text
 from batch.queries.step_errors import figures
 from batch.queries.step_errors.figures import Verification
@@ -111,6 +113,22 @@ class RequirementSummary:
 
 
 @frozen
+class AnsweredRequirement(RequirementSummary):
+    """A requirement of a search, in the cases of its answer.
+
+    said  how it came out, in words;  elsewhere: a case that a search tried besides its answer misses it
+    """
+
+    said: str = ""
+    elsewhere: bool = False
+
+    @property
+    def ok(self) -> bool:
+        """True if all cases of the answer meet it, and all that a search tried."""
+        return not self.missed and not self.unknown and not self.elsewhere
+
+
+@frozen
 class Summary:
     """One experiment's outcome.
 
@@ -122,6 +140,7 @@ class Summary:
     warnings  of what that, or a limit of a machine, calls in question; of a case alone, none
     limits    of machines and tables, with the share of time at each
     doubts    of cases that are done and doubtful all the same, by what makes them so
+    answer    of a search or a tuning, whose requirements are those of its answer; None of what is none
     """
 
     name: str
@@ -138,10 +157,14 @@ class Summary:
     warnings: tuple[Diagnostic, ...] = ()
     doubts: tuple[FailureGroup, ...] = ()
     limits: tuple[LimitSummary, ...] = ()
+    answer: AnswerOutcome | None = None
 
     @property
     def ok(self) -> bool:
-        """True if every case reached its end and met every requirement, and errors by the step are as required."""
+        """True if every case reached its end and met every requirement, and errors by the step are as required; of a
+        search if its answer serves, whatever else was tried on the way."""
+        if self.answer is not None:
+            return self.answer.ok and not self.untrue
         return self.failed == 0 and all(r.ok for r in self.requirements) and not self.untrue
 
     @property
@@ -167,7 +190,14 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
         rows, ids, causes = (group.at(name, (position or 0) + failed) for name in ("case", "case_id", "cause"))
         found = failures(status[failed], causes, rows, ids)
     requirements: tuple[RequirementSummary, ...] = ()
-    if "met" in group.variables:
+    searched = SearchAnswer.of(group) if position is None else None
+    answer = None if searched is None else answer_outcome(searched)
+    if answer is not None:
+        requirements = tuple(
+            AnsweredRequirement(r.text, r.met, r.missed, r.unknown, r.no_value, said=r.said, elsewhere=r.elsewhere)
+            for r in answer.requirements
+        )
+    elif "met" in group.variables:
         met, done = group.values("met")[here], group.values("status")[here] == 0
         shares = evidence(group) if position is None else []
         requirements = tuple(
@@ -196,6 +226,7 @@ def summary_of(group: ArchiveGroup, position: int | None = None) -> Summary:
         warnings=tuple(warnings(group)) if position is None else (),
         doubts=_doubts(group, position),
         limits=limit_summaries(group, here),
+        answer=answer,
         limited=int((group.values("bed_limited")[here] > 0).sum()) if "bed_limited" in group.variables else 0,
     )
 
@@ -321,7 +352,8 @@ def median_text(values: np.ndarray, *, infinite: str = "inf", none: str = "-") -
 
 def as_json(summary: Summary) -> dict[str, Any]:
     """Plain data for `--format json`; a number that is not finite is null."""
-    plain = asdict(replace(summary, verified=None, warnings=(), step_errors=()))
+    plain = asdict(replace(summary, verified=None, warnings=(), step_errors=(), answer=None))
+    del plain["answer"]  # `met show` and `met run` say all of it
     warned = [{"code": each.code, "message": each.message, "help": each.help} for each in summary.warnings]
     limits = [{"text": each.text, "met": each.met, "said": each.said} for each in summary.step_errors]
     told = {"verified": figures.as_json(summary.verified), "step_errors": limits, "warnings": warned}

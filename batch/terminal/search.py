@@ -42,10 +42,8 @@ def search_result(archive: ArchiveFile, group: ArchiveGroup) -> SearchResult | N
     tunes = answer.search.kind == "tune"
     lines = (*answer.lines(), *(line for said, command in commands for line in _shown(said, command)))
     data = {**answer.as_data(), "commands": [command for _, command in commands]}
-    # of a search the requirements of all cases count, as of any campaign
-    ok = answer.ok if tunes else bool((group.values("status") == 0).all() and (group.values("met") == 1).all())
     of = f"{len(group.values('case')):,} cases"
-    return SearchResult(group.name, lines, tuple(commands), data, ok, tunes, tuple(answer.values()), of)
+    return SearchResult(group.name, lines, tuple(commands), data, answer.ok, tunes, tuple(answer.values()), of)
 
 
 def _shown(said: str, command: str) -> Sequence[str]:

@@ -20,6 +20,7 @@ from batch.queries.failures import failure_lines
 from batch.queries.groups import cases_named, groups_named
 from batch.queries.ordering import CaseOrder
 from batch.queries.pool import Pool, pools
+from batch.queries.search_answers import SearchAnswer
 from batch.queries.selection import CaseSelection
 from batch.queries.signals import case_text, history, number_text, panels, pretty_unit
 from batch.queries.step_errors.words import NONE, about, error_text
@@ -28,6 +29,7 @@ from batch.queries.structures import structures
 from batch.queries.summary import (
     SPREAD_COLUMNS,
     SUMMED_COLUMNS,
+    AnsweredRequirement,
     MetricSummary,
     SpreadColumn,
     Summary,
@@ -123,7 +125,9 @@ def show_evidence(archive: ArchiveFile, experiments: Sequence[str] = (), *, widt
     for name in dict.fromkeys(group.sweep or group.name for group in named):
         groups = [group for group in named if (group.sweep or group.name) == name]
         cases = sum(group.run for group in groups)
-        title = f"{name}: {cases:,} case{'s' * (cases != 1)}"
+        answer = SearchAnswer.of(groups[0])
+        of = "" if answer is None else f"its answer, {count(len(answer.found.cases), 'case')} of "
+        title = f"{name}: {of}{count(cases, 'case')}"
         out += ["", title, *evidence_table_lines(_evidence(archive, groups), width)]
     return "\n".join(out.lines).rstrip() + "\n"
 
@@ -296,7 +300,12 @@ def verdict(summary: Summary, width: int) -> list[str]:
         out += textwrap.wrap(about(summary.verified), width, initial_indent="  ", subsequent_indent="    ")
     texts = [each.text for each in summary.requirements if not each.evidence]
     wide = max(map(len, (*texts, *(each.text for each in summary.step_errors))), default=0)
+    if summary.answer is not None:
+        out += textwrap.wrap(f"{summary.answer.headline}.", width, initial_indent="  ", subsequent_indent="    ")
     for r in summary.requirements:
+        if isinstance(r, AnsweredRequirement):
+            out.append(f"  require {r.text:<{wide}}  {r.said}")
+            continue
         if r.evidence:
             out += [f"  require {r.text}", *(f"    {text}" for text in evidence_lines(r.evidence))]
             continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from batch.archive.searched import is_search
 from batch.queries.evidence_table import NONE, EvidenceTexts, notes_of, requirement_evidence, texts_of
 from batch.queries.pool import Pool, page_number
 from batch.report.contents.parts import EvidenceLine, EvidencePart
@@ -13,7 +14,10 @@ MOST_ROWS = 200
 
 def evidence_part(pool: Pool, archive: str, *, several: bool) -> EvidencePart | None:
     """The rows, those of a requirement together, and notes; None where nothing is required. archive: its name in
-    commands; several: whether these have to name the run or sweep."""
+    commands; several: whether these have to name the run or sweep. None of a search too: the verdict says all that its
+    answer shows."""
+    if any(map(is_search, pool.groups)):
+        return None
     found = requirement_evidence(pool.groups, archive, several=several)
     if not found:
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from batch.archive.read import ArchiveGroup
+from batch.archive.searched import is_search
 from batch.queries.pool import Pool, page_number
 from batch.queries.requirements import group_requirements
 from batch.queries.sensitivity import Sensitivity, notes_of, sensitivities, share_text
@@ -16,8 +17,8 @@ MOST_METRICS, MOST_INPUTS, MOST_CASES = 6, 12, 50_000
 
 def influences(pool: Pool) -> tuple[InfluencePart, ...]:
     """A part for each metric of a sweep of one structure that draws or has cases enough, those that something is
-    required of first; none where one parameter varies."""
-    if len(pool.groups) != 1:
+    required of first; none where one parameter varies, or a search chose the cases, which are no sample."""
+    if len(pool.groups) != 1 or is_search(pool.groups[0]):
         return ()
     [group] = pool.groups
     coordinates = group.role("coordinate")

@@ -50,7 +50,8 @@ class RequirementCounts:
     is furthest beyond the limit, or nearest to it, with its case.
 
     verdict  of one over a share of cases: its worst of all design points, such as "not shown"; "" of one that every
-             case is to meet
+             case is to meet; of one in the cases of a search's answer, how it came out in words
+    ok       of the latter alone: it is met
     """
 
     text: str
@@ -61,6 +62,7 @@ class RequirementCounts:
     furthest: str = ""
     case: int | None = None
     verdict: str = ""
+    ok: bool = True
 
 
 @frozen
@@ -99,10 +101,11 @@ class ReportWarning:
 class Verdict:
     """An answer: yes or no, in one sentence, and what it rests on.
 
-    kind    what was asked: "requirements"; "comparison", with another archive
+    kind    what was asked: "requirements"; "answer", the same of a search, whose other cases an optimiser chose;
+            "comparison", with another archive
     about   the run or sweep, or the other archive
     parts   how the cases came out; they add up to all of them
-    word    of a comparison: "identical", "equivalent", "different" or "incomparable"
+    word    of a comparison: "identical", "equivalent", "different" or "incomparable"; of an answer: what it comes to
     figure  of a comparison: cases with nothing against them, before and now, of how many in both
     """
 
@@ -280,6 +283,9 @@ class DesignAnswer:
     headline, why  which it is, and what it has for it;  table: it and others;  stretches: how far each parameter may go
     said, command  how to run it or confirm it;  map: None where no two parameters with an order are chosen
     title, about   what the table is called, and what its numbers are
+    heading, link  over all of it, and in the page's menu
+    progress       of a search: the cases after each look at it, the best value by then, and the cases of a sweep that
+                   this was tried with; none of what is none
     """
 
     headline: str
@@ -292,6 +298,9 @@ class DesignAnswer:
     map: DesignMap | None
     title: str = "Designs"
     about: str = "Each number is that of the worst case of a design."
+    heading: str = "Which design to use"
+    link: str = "Which design"
+    progress: tuple[tuple[int, float, int], ...] = ()
 
 
 # Plots

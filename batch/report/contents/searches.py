@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.queries.search_answers import SearchAnswer
+from batch.queries.signals import deck_unit
 from batch.report.contents.parts import DesignAnswer, TextTable
 from batch.terminal.search import search_result
 
-MOST_GENERATIONS = 24
-"""Generations that a report shows, spread over all."""
+MOST_LOOKS, MOST_ROWS = 200, 24
+"""Generations after which a report looks at the best, spread over all; and rows of those that changed it."""
 
 
 def search_answer(archive: ArchiveFile, group: ArchiveGroup) -> DesignAnswer | None:
@@ -20,20 +23,29 @@ def search_answer(archive: ArchiveFile, group: ArchiveGroup) -> DesignAnswer | N
     said, command = result.commands[-1]
     tunes = search.kind == "tune"
     heads = ("generation", "cases", search.metric, "", *([f"tried with, of {max(1, len(search.plants))}"] * tunes))
-    rows = []
-    for number, cases, best in answer.progress(MOST_GENERATIONS):
+    rows: list[tuple[str, ...]] = []
+    looks = answer.progress(MOST_LOOKS)
+    for number, cases, best in looks:
         how = "a case fails" if best.failed else f"misses {', '.join(best.missed)}" if best.missed else "meets all"
-        rows.append((str(number), f"{cases:,}", answer.value(best), how, *([str(best.tried)] * tunes)))
+        row = (str(number), f"{cases:,}", answer.value(best), how, *([str(best.tried)] * tunes))
+        if not rows or rows[-1][2:] != row[2:]:
+            rows.append(row)
+    shown = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_ROWS)).astype(int))
+    scale, _ = deck_unit(next(each for each in group.role("metric") if each.path == search.metric))
     headline, *why = (line.strip() for line in answer.lines())
     return DesignAnswer(
         headline=headline[:1].upper() + headline[1:],
         why="; ".join(why),
-        table=TextTable(heads, ("",) * len(heads), tuple(rows), frozenset({0, 1, 2, 4})),
+        table=TextTable(heads, ("",) * len(heads), tuple(rows[n] for n in shown), frozenset({0, 1, 2, 4})),
         stretches=None,
         said=said,
         command=command,
         notes=(),
         map=None,
         title="Progress over generations",
-        about="The best by then, in the worst of the cases that it was tried with." if tunes else "The worst by then.",
+        about=f"The {'best' if tunes else 'worst'} so far, where it changed"
+        + (": in the worst of the cases that it was tried with." if tunes else "."),
+        heading="Which design to use" if tunes else "The worst case found",
+        link="Which design" if tunes else "The worst case",
+        progress=tuple((cases, best.value / scale, best.tried) for _, cases, best in looks),
     )

@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from batch.queries.answer_outcome import answer_outcome
 from batch.queries.at_limits import limit_summaries, reached_texts
 from batch.queries.evidence import evidence
 from batch.queries.failures import failures, ranges
 from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
+from batch.queries.search_answers import SearchAnswer
 from batch.queries.signals import deck_unit
 from batch.queries.step_errors.figures import Verification, figures
 from batch.queries.step_errors.limits import StepErrorVerdict, verdicts
@@ -46,6 +48,8 @@ def verdict(pool: Pool, experiments: Mapping[str, Experiment], *, named: bool) -
 
     experiments  of the plan, by name, for places in the deck;  named: True to say of which run or sweep
     """
+    if (answer := SearchAnswer.of(pool.groups[0])) is not None:
+        return _of_answer(pool, answer, experiments, named=named)
     ended = np.bincount(pool.ended, minlength=len(ENDED))
     parts = tuple(OutcomeCount(word, int(n)) for word, n in zip(ENDED, ended, strict=True) if n)
     good = int(ended[ENDED.index("met")] + ended[ENDED.index("done")])
@@ -65,10 +69,50 @@ def verdict(pool: Pool, experiments: Mapping[str, Experiment], *, named: bool) -
         ),
         failing=_failing(pool),
         notes=(*_notes(pool), *map(_of_step_error, errors)),
-        warnings=tuple(
-            ReportWarning(each.code, each.message, each.help, spot(None if each.at is None else each.at.place))
-            for each in campaign_warnings(pool.groups, experiments)
+        warnings=_report_warnings(pool, experiments),
+    )
+
+
+def _of_answer(pool: Pool, answer: SearchAnswer, experiments: Mapping[str, Experiment], *, named: bool) -> Verdict:
+    """The verdict on the answer of a search, in its cases alone: shares of what an optimiser chose say nothing."""
+    summary, errors = summary_of(pool.groups[0]), verdicts(pool.groups[0], figures(pool.groups[0]))
+    outcome = answer_outcome(answer)
+    tunes = answer.search.kind == "tune"
+    asked = outcome.requirements
+    words = ("Requirements met", "Requirements not met") if tunes else ("No miss found", "A miss was found")
+    if not asked:
+        words = ("Reached its end", "Did not reach its end") if tunes else ("No failure found", "A failure was found")
+    return Verdict(
+        kind="answer",
+        about=pool.name if named else "",
+        ok=summary.ok,
+        headline=outcome.headline,
+        parts=(),
+        demands=tuple(
+            RequirementCounts(
+                each.text,
+                each.met,
+                each.missed,
+                each.unknown,
+                each.met + each.missed + each.unknown,
+                each.worst,
+                each.case,
+                each.outcome,
+                each.ok,
+            )
+            for each in asked
         ),
+        failing=() if tunes and not answer.found.failed else _failing(pool),
+        notes=(*_notes(pool), *map(_of_step_error, errors)),
+        warnings=_report_warnings(pool, experiments),
+        word=words[0] if summary.ok else words[1],
+    )
+
+
+def _report_warnings(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[ReportWarning, ...]:
+    return tuple(
+        ReportWarning(each.code, each.message, each.help, spot(None if each.at is None else each.at.place))
+        for each in campaign_warnings(pool.groups, experiments)
     )
 
 

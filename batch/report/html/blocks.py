@@ -68,7 +68,7 @@ def verdict(found: Verdict, anchors: Anchors) -> Html:
     """The answer, large; beside it what it rests on, and what makes it doubtful."""
     if found.kind == "comparison":
         return _comparison(found)
-    yes, no = _words(found)
+    yes, no = (found.word, found.word) if found.kind == "answer" else _words(found)
     answer = el(
         "div",
         el("p", found.about, cls="about") if found.about else None,
@@ -79,7 +79,7 @@ def verdict(found: Verdict, anchors: Anchors) -> Html:
     )
     evidence = [_parts(found) if found.cases > 1 else None, _demands(found)]
     if found.failing:
-        evidence.append(_failing(found.failing, found.cases))
+        evidence.append(_failing(found.failing, single=found.cases == 1))
     evidence += [_warning(each, anchors) for each in found.warnings]
     evidence += [el("p", note, cls="note") for note in found.notes]
     return el("div", answer, el("div", evidence, cls="evidence"), cls=f"verdict {'yes' if found.ok else 'no'}")
@@ -204,6 +204,8 @@ def _parts(found: Verdict) -> Html:
 def _demands(found: Verdict) -> Html | None:
     if not found.demands:
         return None
+    if found.kind == "answer":
+        return _answered(found.demands)
     single = found.cases == 1
     missed = not single and any(each.missed for each in found.demands)
     unknown = not single and any(each.unknown for each in found.demands)
@@ -222,6 +224,22 @@ def _demands(found: Verdict) -> Html | None:
         "tr",
         [el("th", name, scope="col", cls="right" if flush else None) for name, flush in zip(heads, right, strict=True)],
     )
+    return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "Requirements")
+
+
+def _answered(found: Sequence[RequirementCounts]) -> Html:
+    """The requirements in the cases of a search's answer."""
+    rows = [
+        el(
+            "tr",
+            el("th", el("code", breaking(each.text)), scope="row"),
+            el("td", mark(each.ok), each.verdict, cls="good words" if each.ok else "bad words"),
+            el("td", each.furthest, [" ", case_link(each.case)] if each.case is not None else None, cls="right"),
+        )
+        for each in found
+    ]
+    heads = (("requirement", None), ("outcome", None), ("worst value of the answer", "right"))
+    head = el("tr", [el("th", name, scope="col", cls=cls) for name, cls in heads])
     return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "Requirements")
 
 
@@ -263,7 +281,7 @@ def case_link(case: int) -> Html:
     return el("button", f"#{case}", type="button", cls="case", data_case=case, title=f"Choose case #{case}")
 
 
-def _failing(found: Sequence[FailureRow], of: int) -> Html:
+def _failing(found: Sequence[FailureRow], *, single: bool) -> Html:
     """The causes, the cases of each, and what they have in common once."""
     rows = []
     for each in found:
@@ -271,11 +289,11 @@ def _failing(found: Sequence[FailureRow], of: int) -> Html:
         rows.append(
             el(
                 "li",
-                el("p", el("strong", who if of > 1 else "The case", " ", each.status), " ", el("span", each.cause)),
+                el("p", el("strong", "The case" if single else who, " ", each.status), " ", el("span", each.cause)),
                 el("p", each.cases, cls="cases") if each.count > 1 else None,
             )
         )
-    return join([el("h4", "Did not reach their end" if of > 1 else "Why"), el("ul", rows, cls="failing")])
+    return join([el("h4", "Why" if single else "Did not reach their end"), el("ul", rows, cls="failing")])
 
 
 # What was run

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
+from batch.queries.pool import page_number
 from batch.report.contents.parts import DesignAnswer, DesignMap
 from batch.report.html.markup import Child, Html, el, join
 from batch.report.html.tables import command, table
@@ -24,7 +26,34 @@ def designs(found: DesignAnswer) -> Html:
     words += [el("p", note, cls="note") for note in found.notes]
     head = el("div", el("div", words), _map(found.map) if found.map is not None else None, cls="answered")
     about = el("p", found.about, cls="said")
-    return join([head, about, table(found.table, found.title)])
+    return join([head, about, _progress(found), table(found.table, found.title)])
+
+
+WIDE, HIGH = 640, 120
+"""Units of the drawing of a search's progress."""
+
+
+def _progress(found: DesignAnswer) -> Html | None:
+    """The best value by then over the cases, as steps, with a gap where it has none, or is of more cases of a sweep
+    than before; None where it never changed."""
+    values = [value for _, value, _ in found.progress if math.isfinite(value)]
+    if len(set(values)) < 2:
+        return None
+    low, high, last = min(values), max(values), found.progress[-1][0]
+    path, on = "", 0
+    for cases, value, tried in found.progress:
+        if not math.isfinite(value):
+            on = 0
+            continue
+        x, y = WIDE * cases / last, HIGH - HIGH * (value - low) / (high - low)
+        path += f"H{x:.1f}V{y:.1f}" if on == tried else f"M{x:.1f} {y:.1f}"
+        on = tried
+    floor = el("line", x1=0, x2=WIDE, y1=HIGH + 3, y2=HIGH + 3, cls="floor")
+    ends = f"from {page_number(low)} to {page_number(high)}"
+    words = f"{found.table.heads[2]} over cases, {ends}, after {last:,} cases {page_number(found.progress[-1][1])}"
+    drawn = el("svg", floor, el("path", d=path), viewBox=f"-2 -4 {WIDE + 4} {HIGH + 8}", role="img", aria_label=words)
+    caption = [el("code", found.table.heads[2]), f" {ends}, over {last:,} cases"]
+    return el("figure", el("p", caption, cls="under"), drawn, cls="progress")
 
 
 def _map(found: DesignMap) -> Html:

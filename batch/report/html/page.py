@@ -89,7 +89,7 @@ def _links(number: int, section: ReportSection, report: Report) -> list[tuple[st
     if len(report.sections) > 1:
         return [(f"s{number}", section.name)]
     found = [
-        ("designs", "Which design", section.designs is not None),
+        ("designs", "" if section.designs is None else section.designs.link, section.designs is not None),
         ("run", "What was run", True),
         ("overview", "Cases", section.overview is not None),
         ("evidence", "Evidence", section.evidence is not None),
@@ -144,7 +144,7 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
             )
         )
     if section.designs is not None:
-        out.append(part("designs", "Which design to use", designs.designs(section.designs)))
+        out.append(part("designs", section.designs.heading, designs.designs(section.designs)))
     out.append(
         part(
             "run",

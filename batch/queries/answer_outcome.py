@@ -1,0 +1,141 @@
+"""The requirements of a search, judged in the cases of its answer alone: an optimiser chose all others, so that shares
+of them say nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from batch.queries.requirements import GroupRequirement, beyond, outcomes
+from batch.queries.search_answers import SearchAnswer, goal_text
+from batch.queries.signals import deck_unit
+from met.frozen import frozen
+
+
+@frozen
+class AnswerRequirement:
+    """A requirement in the cases of an answer. One over a share of cases is asked of each of them.
+
+    met, missed, unknown  cases of the answer;  no_value: of the unknown ones, those that reached their end
+    worst  the value that is furthest beyond the limit or nearest to it, as text;  case: its number in the case table
+    outcome  how it came out in words, without the value;  said: with it, and with other cases that miss it
+    elsewhere  a case that a search tried besides its answer misses it
+    """
+
+    text: str
+    met: int
+    missed: int
+    unknown: int
+    no_value: int
+    worst: str
+    case: int
+    outcome: str
+    said: str
+    elsewhere: bool = False
+
+    @property
+    def ok(self) -> bool:
+        """True if all cases of the answer meet it, and all that a search tried."""
+        return not self.missed and not self.unknown and not self.elsewhere
+
+
+@frozen
+class AnswerOutcome:
+    """The verdict on the answer of a search or a tuning, with a sentence that says it, and its requirements."""
+
+    headline: str
+    ok: bool
+    requirements: tuple[AnswerRequirement, ...]
+
+
+def answer_outcome(group_answer: SearchAnswer) -> AnswerOutcome:
+    """The verdict on an answer: of a tuning in the cases of the sweep that it is held against, of a search in the worst
+    case that was found, and in others where one misses what that case meets."""
+    found = tuple(_required(group_answer, each) for each in group_answer.required)
+    headline = _of_tuning if group_answer.search.kind == "tune" else _of_worst
+    return AnswerOutcome(headline(group_answer, found), group_answer.ok, found)
+
+
+def _required(answer: SearchAnswer, each: GroupRequirement) -> AnswerRequirement:
+    group, here = answer.group, np.array(answer.found.cases)
+    variable, values = group.variables[each.metric], group.values(each.metric)
+    met, numbers = outcomes(group)[:, each.place], group.values("case")
+    scale, unit = deck_unit(variable)
+
+    def shown(place: int) -> str:
+        return goal_text(float(values[place]), unit or "1", scale)
+
+    far = beyond(values, each.comparison, each.limit)
+    worst = int(here[np.argmax(far[here])])
+    missed, unknown = (int((met[here] == outcome).sum()) for outcome in (0, -1))
+    if answer.search.kind == "search":
+        came = f"{'met' if met[worst] == 1 else 'missed' if met[worst] == 0 else 'not known'} in the worst case found"
+        said = f"{came}: {shown(worst)}, case #{numbers[worst]}"
+    else:
+        came = _came_out(answer, missed, unknown)
+        said = f"{came}; worst {shown(worst)}, case #{numbers[worst]}"
+    others = np.flatnonzero(met != 1) if answer.search.kind == "search" and met[worst] == 1 else np.array([], int)
+    if len(others):
+        other = int(others[np.argmax(far[others])])
+        more = f"; but missed in another: {shown(other)}, case #{numbers[other]}"
+        came, said = came + more, said + more
+    no_value = int(((met[here] == -1) & (group.values("status")[here] == 0)).sum())
+    counts = int((met[here] == 1).sum()), missed, unknown, no_value
+    return AnswerRequirement(each.text, *counts, shown(worst), int(numbers[worst]), came, said, bool(len(others)))
+
+
+def _came_out(answer: SearchAnswer, missed: int, unknown: int) -> str:
+    """`met in all 32 cases of spread`; `missed in 3 of 32 cases of spread, not known in 1 of 32 cases of spread`."""
+    if not missed and not unknown:
+        return f"met{(of := _cases(answer)) and f' in {of}'}"
+    of = _cases(answer, every=False)
+    found = [("missed", missed), ("not known", unknown)]
+    return ", ".join(f"{word}{of and f' in {count:,} of {of}'}" for word, count in found if count)
+
+
+def _cases(answer: SearchAnswer, *, every: bool = True) -> str:
+    """The cases of a tuning's answer: `all 32 cases of spread`; empty where it is held against no sweep."""
+    found, sweep = answer.found, answer.search.against
+    if found.all == 1:
+        return ""
+    if not found.confirmed:
+        return f"{found.tried:,} cases of {sweep}, of {found.all:,}"
+    return f"{'all ' * every}{found.all:,} cases of {sweep}"
+
+
+def _all(answer: SearchAnswer) -> str:
+    return f"{'meets' if answer.required else 'reaches'} {'all requirements' if answer.required else 'its end'}"
+
+
+def _misses(found: tuple[AnswerRequirement, ...], *, named: bool) -> str:
+    """`misses settle < 5 s in case #2521, over < 10 % in 3 cases`. named: False where the case is known."""
+
+    def where(each: AnswerRequirement) -> str:
+        count = each.missed + each.unknown
+        return f" in case #{each.case}" if count == 1 else f" in {count:,} cases"
+
+    bad = [each for each in found if each.missed or each.unknown]
+    return f"misses {', '.join(f'{each.text}{where(each) * named}' for each in bad)}"
+
+
+def _of_tuning(answer: SearchAnswer, found: tuple[AnswerRequirement, ...]) -> str:
+    best, sweep = answer.found, answer.search.against
+    if best.failed:
+        return f"The answer fails in case #{answer.position}"
+    if best.missed:
+        return f"The answer {_misses(found, named=True)}{f' of {sweep}' if best.all > 1 else ''}"
+    if not best.confirmed:
+        return f"The answer was tried in {best.tried:,} of {best.all:,} cases of {sweep} alone"
+    if not answer.ok:
+        return f"The answer has no {answer.search.metric} in case #{answer.position}"
+    return f"The answer {_all(answer)}{(of := _cases(answer)) and f' in {of}'}"
+
+
+def _of_worst(answer: SearchAnswer, found: tuple[AnswerRequirement, ...]) -> str:
+    worst = f"The worst case found, #{answer.position},"
+    if answer.found.failed:
+        return f"{worst} fails"
+    if answer.found.missed:
+        return f"{worst} {_misses(found, named=False)}"
+    if (others := [each.text for each in found if each.elsewhere]) and not answer.ok:
+        return f"{worst} {_all(answer)}, but another that was tried misses {', '.join(others)}"
+    return f"{worst} {_all(answer)}"
