@@ -11,7 +11,7 @@ import numpy as np
 
 from met.analysis.linear.injected import InputSignal, entries
 from met.analysis.linear.jacobian import PeriodMap, at_instant, period_map
-from met.analysis.linear.margins import STABLE, LoopMargins, ScalarLoop, gain_limits, margins
+from met.analysis.linear.margins import STABLE, LoopMargins, ScalarLoop, comes_back, gain_limits, margins
 from met.analysis.linear.period import PeriodProgram
 from met.analysis.linear.plant import PlantModel, plant
 from met.diagnostic import Problem, error
@@ -74,6 +74,7 @@ class OpenLoop:
     margins  None where it is unstable as it is, or `loop` is None
     gains    times all gains at which it becomes unstable, below 1 and above: None: at none
     stable   as it is
+    returns  False where nothing comes back: the arm is held, or the law is at its limit
     """
 
     paths: tuple[str, ...]
@@ -82,11 +83,12 @@ class OpenLoop:
     margins: LoopMargins | None
     gains: tuple[float | None, float | None]
     stable: bool
+    returns: bool
 
     @property
-    def returns(self) -> bool:
-        """False where nothing comes back: the arm is held, or the law is at its limit."""
-        return self.loop is None or self.loop.returns
+    def unstable(self) -> bool:
+        """True of a loop that grows; of what grows where nothing comes back no gain is the cause."""
+        return self.returns and not self.stable
 
 
 @frozen
@@ -235,7 +237,7 @@ class _Lifted:
         else:
             gains = gain_limits(A, b, c, d, drift)
         stable = bool(np.max(np.abs(np.linalg.eigvals(self.A)), initial=0.0) <= 1.0 + drift)
-        return OpenLoop(paths, len(ticks), one, own, gains, stable)
+        return OpenLoop(paths, len(ticks), one, own, gains, stable, comes_back(A, b, c, d))
 
 
 def _kept(program: PeriodProgram, found: PeriodMap) -> np.ndarray:
