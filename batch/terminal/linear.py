@@ -24,6 +24,8 @@ def linear_lines(found: Linearized) -> Iterator[str]:
     yield f"{found.experiment}{case}: linear at t = {found.time:.6g} s, a period of {_time(found.seconds)}, {states}"
     for name in found.held:
         yield f"  {name} sticks, and is held"
+    for each in found.creeping:
+        yield f"  {each.name} creeps at {abs(each.rate):.3g} {each.unit}: the answer holds for moves slower than that"
     for path in found.at_limit:
         yield f"  at its limit: {path}"
     yield ""
@@ -158,6 +160,7 @@ def as_data(found: Linearized) -> dict[str, Any]:
         "inputs": list(found.inputs),
         "outputs": list(found.outputs),
         "held": list(found.held),
+        "creeping": [{"name": each.name, "rate": each.rate} for each in found.creeping],
         "at_limit": list(found.at_limit),
         "poles": [pole(each) for each in found.poles],
         "natural": [pole(each) for each in found.natural],

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from met.analysis.linear.creeping import CreepingRate, creeping
 from met.analysis.linear.injected import InputSignal, entries
 from met.analysis.linear.jacobian import PeriodMap, at_instant, period_map
 from met.analysis.linear.margins import STABLE, LoopMargins, ScalarLoop, comes_back, gain_limits, margins
@@ -99,7 +100,7 @@ class Linearized:
     states    by name;  inputs, outputs: channels
     A .. D    x+ = A x + B u, y = C x + D u, from period to period, inputs added to at all ticks of one
     plant     the arm without its computers, in continuous time
-    held      what sticks;  at_limit: paths of limits
+    held      what sticks;  creeping: what slides so slowly that it nearly does;  at_limit: paths of limits
     joints    of each state, the joint or body or computer that it belongs to
     """
 
@@ -117,6 +118,7 @@ class Linearized:
     plant: PlantModel
     loops: tuple[OpenLoop, ...]
     held: tuple[str, ...]
+    creeping: tuple[CreepingRate, ...]
     at_limit: tuple[str, ...]
     joints: Mapping[str, str]
 
@@ -175,6 +177,7 @@ class LinearQuestion:
         program, inputs = self.program, self.inputs
         tick = program.begin(self.at)
         flow = at_instant(program, case, tick)
+        slow = creeping(flow)
         found = period_map(program, flow)
         kept = _kept(program, found)
         states = tuple(found.states[place] for place in kept)
@@ -190,7 +193,7 @@ class LinearQuestion:
         return Linearized(
             self.experiment.name, case, tick / program.schedule.base_hz, found.seconds, states, inputs,
             found.outputs, A, summed(B), C, summed(found.D), plant(program, flow, states),
-            tuple(lifted.opened(each) for each in several), found.held, found.at_limit,
+            tuple(lifted.opened(each) for each in several), found.held, slow, found.at_limit,
             {name: program.joint_of(name) for name in program.states},
         )  # fmt: skip
 
