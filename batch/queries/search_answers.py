@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -19,6 +20,9 @@ from met.plan.outputs import metric_units
 from met.plan.searches import Search
 from met.run import DONE
 from met.searches.answer import Answer, answer
+
+WIDTH = 100
+"""Characters of a line."""
 
 NEAREST = 1
 """Requirements that are named of those that are nearest to their limits."""
@@ -125,6 +129,12 @@ class SearchAnswer:
         return f"{self.group.count:,} cases in {generations}"
 
     @property
+    def _cause(self) -> list[str]:
+        """Why the case fails that stands for the answer, in lines."""
+        cause = str(self.group.at("cause", [self.found.case])[0])
+        return textwrap.wrap(cause, WIDTH, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
+
+    @property
     def _chosen(self) -> str:
         return ", ".join(f"{path} = {value}" for path, value in self.shown())
 
@@ -134,7 +144,7 @@ class SearchAnswer:
             f"use {self._chosen}" if found.serves else f"nothing meets all that is required; nearest: {self._chosen}"
         ]
         if found.failed:
-            out.append(f"  a case fails with it; {self._cases}")
+            out += [f"  case #{self.position} of it fails; {self._cases}", *self._cause]
         else:
             among = f" in the worst of {found.tried} cases of {search.against}" if found.all > 1 else ""
             out.append(f"  {search.metric} is {self.value()}{among}; {self._cases}")
@@ -151,7 +161,7 @@ class SearchAnswer:
         if found.failed:
             failed = int(np.count_nonzero(self.group.values("status") != DONE))
             words = f"{failed:,} of {self._cases} fail, which hurts more than any {search.metric}"
-            return [f"hardest: {case} fails", f"  {words}"]
+            return [f"hardest: {case} fails", *self._cause, f"  {words}"]
         if np.isnan(found.value):
             return [f"hardest: {case}, in which {search.metric} has no value", f"  of {self._cases}"]
         which = "largest" if search.largest else "least"

@@ -115,8 +115,8 @@ def answers(path: Path) -> dict[str, Said]:
         for group in file.groups:
             each = SearchAnswer.of(group)
             assert each is not None
-            [(_, exact)], [(_, rounded)] = each.settings(), each.settings(exact=False)
-            found[group.name] = Said(each.found, each.position, exact, rounded)
+            [exact], [(_, rounded)] = each.values(), each.shown()
+            found[group.name] = Said(each.found, each.position, exact.text, rounded)
     return found
 
 
@@ -167,7 +167,9 @@ def test_a_case_that_fails_hurts_most(here: Path, capsys: pytest.CaptureFixture[
     failed = int((data["status"] != 0).sum())
     assert 0 < failed < data.sizes["case"]
     where = f"case #{answer.position} with environment.held.stiffness = {answer.rounded}"
-    assert f"hardest: {where} fails\n  {failed} of {data.sizes['case']} cases in " in said
+    _, _, told = said.partition(f"hardest: {where} fails\n")
+    cause, _, rest = told.partition(f"  {failed} of {data.sizes['case']} cases in ")
+    assert rest and " ".join(cause.split()) == str(data["cause"].values[answer.found.case])
     assert f"run it again: met run w.h5 --case '#{answer.position}'\n" in said
 
 
