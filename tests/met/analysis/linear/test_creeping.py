@@ -65,3 +65,15 @@ def test_one_that_moves_and_one_that_sticks_are_not_said_to_creep(tmp_path: Path
     assert question(tmp_path, 0.1, 0.0).of(0).creeping == ()
     stuck = question(tmp_path, 0.0, 0.0).of(0)
     assert stuck.creeping == () and stuck.held == ("hinge",)
+
+
+@pytest.mark.parametrize(("times", "creeps"), [(1.0 - 1e-9, True), (1.0 + 1e-9, False)])
+def test_a_motor_behind_an_elastic_gear_creeps_by_its_own_friction(tmp_path: Path, times: float, creeps: bool) -> None:
+    """Its friction takes f_c/j_m of its rate in a second, whatever the arm is."""
+    elastic = "model = compliant_gearbox;  stiffness = 1e4 N*m/rad;  damping = 10 N*m*s/rad;  kp"
+    slow = 1e-3 * 0.02 / 6.4e-5 / 50.0
+    text = DECK.replace("kp", elastic, 1).replace("100 Hz", "1 kHz").replace("PULL", "0.0")
+    (tmp_path / "deck.ic").write_text(text.replace("RATE", repr(times * slow)))
+    (experiment,) = ic.compile(tmp_path / "deck.ic").experiments
+    found = creeping(at_instant(LinearQuestion(experiment).program, 0, 0))
+    assert [(each.name, each.unit) for each in found] == [("hinge.servo.motor_rate", "rad/s")] * creeps
