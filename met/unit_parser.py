@@ -91,7 +91,7 @@ def written(si: float, unit: str) -> str:
     """An SI value in a unit, in as few digits as give the same value again: `0.33 V*s/rad`; of a unit that cannot be
     read, as no MET writes, the number alone."""
     try:
-        measure = parse_unit(unit)
+        measure = parse_unit(unit or "1")
     except ValueError:
         return f"{si!r}"
     rough = si / measure.to_si(1.0)

@@ -193,20 +193,27 @@ class ArchiveGroup:
 
     def find_case(self, wanted: str) -> int:
         """Position in this group of a case: `#7`, its row in the case table, or the beginning of its case_id."""
-        ids = self.values("case_id") if row_of(wanted) is None else np.empty(0)
-        return int(found_cases(wanted, self.values("case"), ids, self.name)[0])
+        row = row_of(wanted)
+        ids = self.values("case_id") if row is None else np.empty(0)
+        again = ""
+        if self.summary is not None and row is not None and row < self.run:
+            command = f"met run {shlex.quote(str(self.path))} --case '#{row}'"
+            again = f"rows of few cases are kept: `{command}` runs it again"
+        return int(found_cases(wanted, self.values("case"), ids, self.name, again)[0])
 
 
-def found_cases(wanted: str, rows: np.ndarray, ids: np.ndarray, name: str) -> np.ndarray:
+def found_cases(wanted: str, rows: np.ndarray, ids: np.ndarray, name: str, remedy: str = "") -> np.ndarray:
     """The places, among cases of `name`, of the case that `#7`, its row, or the beginning of its case_id names: one,
-    unless several have this row. ids: not read for a row. Raises Problem E321, E322."""
+    unless several have this row. ids: not read for a row; remedy: what else to do where it is not here. Raises Problem
+    E321, E322."""
     row = row_of(wanted)
     if row is not None:
         found = np.flatnonzero(rows == row)
     else:
         found = np.flatnonzero([case_id.startswith(wanted) for case_id in ids])
     if len(found) == 0:
-        raise Problem(error("E321", f"no case `{wanted}` in `{name}`", help=_cases_here(distinct(rows))))
+        helps = [_cases_here(distinct(rows)), *([remedy] if remedy else [])]
+        raise Problem(error("E321", f"no case `{wanted}` in `{name}`", help=helps))
     if row is None and len(found) > 1:
         some = ", ".join(ids[found[:4]]) + (" ..." if len(found) > 4 else "")
         raise Problem(error("E322", f"case `{wanted}` may be any of {len(found)}: {some}", help="give more of its id"))
@@ -286,7 +293,8 @@ class ArchiveFile:
             if group.summary is not None:
                 message = f"{what} needs a row a case, and {self.path} keeps a summary of `{group.name}`"
                 helps = (
-                    "`met run DECK --rows all` keeps a row a case",
+                    "`met run DECK --rows all` keeps a row a case, and `--rows worst:N:METRIC` a summary with the rows "
+                    "of the N cases that are worst in METRIC",
                     f"`met show {shlex.quote(str(self.path))}` says what the summary holds, and `--evidence` the "
                     "table of requirements",
                 )

@@ -95,11 +95,11 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
         ]
         say(json.dumps(data, indent=1) if form == "json" else "\n".join(case_lines(question, every)))
         loops = [loop for each in every if isinstance(each, Linearized) for loop in each.loops]
-        return YES if all(loop.stable for loop in loops) else NO
+        return NO if any(loop.unstable for loop in loops) else YES
     found = question.of(case)
     if output is not None:
         files.write(found, output)
     if drawn is not None:
         picture.draw(found, drawn)
     say(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(linear_lines(found)))
-    return YES if all(loop.stable for loop in found.loops) else NO
+    return NO if any(loop.unstable for loop in found.loops) else YES

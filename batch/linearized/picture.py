@@ -19,6 +19,9 @@ POINTS = 1500
 DECADES = 5
 """Of a Bode picture, below the highest frequency that a loop sees."""
 
+LEAST_DEGREES, MOST_MARKS = 100.0, 8
+"""Of an axis of phases: its length, and marks on it before they are set wider apart."""
+
 STEPS = 2000
 """Periods of a step's picture, at most."""
 
@@ -27,6 +30,15 @@ def draw(found: Linearized, output: Path) -> None:
     """Draws what there is: of each opened loop its Bode and Nichols curves, with margins marked; of inputs and outputs
     the answers to steps. Raises Problem E450 where there is neither, E305, E326."""
     import matplotlib
+
+    style: Any = STYLE
+    with matplotlib.rc_context(style):
+        places.save(figure(found), output)
+
+
+def figure(found: Linearized) -> Any:
+    """The picture that `draw` writes, a matplotlib Figure. Raises Problem E450."""
+    from matplotlib.figure import Figure
 
     loops = [loop for loop in found.loops if loop.loop is not None and loop.returns]
     steps = bool(found.inputs and found.outputs)
@@ -39,29 +51,21 @@ def draw(found: Linearized, output: Path) -> None:
                 help=helps,
             )
         )
-    style: Any = STYLE
-    with matplotlib.rc_context(style):
-        places.save(_figure(found, loops, steps), output)
-
-
-def _figure(found: Linearized, loops: list[OpenLoop], steps: bool) -> Any:
-    from matplotlib.figure import Figure
-
     rows = [2.0] * bool(loops) + [1.0] * (len(found.outputs) if steps else 0)
-    figure = Figure(figsize=(9.4, 2.1 * sum(rows) + 0.9), dpi=144, layout="constrained")
-    grid = figure.add_gridspec(len(rows), 1, height_ratios=rows)
+    made = Figure(figsize=(9.4, 2.1 * sum(rows) + 0.9), dpi=144, layout="constrained")
+    grid = made.add_gridspec(len(rows), 1, height_ratios=rows)
     if loops:
         inner = grid[0].subgridspec(2, 2)
-        _bode(figure.add_subplot(inner[0, 0]), figure.add_subplot(inner[1, 0]), loops, found)
-        _nichols(figure.add_subplot(inner[:, 1]), loops, found)
+        _bode(made.add_subplot(inner[0, 0]), made.add_subplot(inner[1, 0]), loops, found)
+        _nichols(made.add_subplot(inner[:, 1]), loops, found)
     if steps:
         first = len(rows) - len(found.outputs)
         for row, name in enumerate(found.outputs):
-            _step(figure.add_subplot(grid[first + row]), found, row, name, last=row == len(found.outputs) - 1)
-    figure.suptitle(
+            _step(made.add_subplot(grid[first + row]), found, row, name, last=row == len(found.outputs) - 1)
+    made.suptitle(
         f"{found.experiment} at t = {found.time:.6g} s, a period of {1e3 * found.seconds:g} ms", x=0.01, ha="left"
     )
-    return figure
+    return made
 
 
 def _frequencies(found: Linearized) -> np.ndarray:
@@ -90,7 +94,7 @@ def _bode(size: Any, phase: Any, loops: list[OpenLoop], found: Linearized) -> No
     size.set_ylabel("size of L")
     phase.set_ylabel("phase, deg")
     phase.set_xlabel("frequency, Hz")
-    phase.yaxis.set_major_locator(_every(90.0))
+    phase.set_ylim(*_degrees(phase.yaxis))
     for axis in (size.xaxis, size.yaxis, phase.xaxis):
         _plain_numbers(axis)
     size.tick_params(labelbottom=False)
@@ -111,10 +115,18 @@ def _turned(L: np.ndarray) -> np.ndarray:
     return np.asarray(turned - 2.0 * math.pi * math.ceil(turned[0] / (2.0 * math.pi)))
 
 
-def _every(step: float) -> Any:
+def _degrees(axis: Any) -> tuple[float, float]:
+    """Marks an axis of phases every 45 deg, or 90, or 180 where it is long, and gives its ends: at least two marks are
+    between them."""
     from matplotlib.ticker import MultipleLocator
 
-    return MultipleLocator(step)
+    low, high = sorted(axis.get_view_interval().tolist())
+    if high - low < LEAST_DEGREES:
+        middle = 0.5 * (low + high)
+        low, high = middle - 0.5 * LEAST_DEGREES, middle + 0.5 * LEAST_DEGREES
+    step = next((step for step in (45.0, 90.0) if high - low <= MOST_MARKS * step), 180.0)
+    axis.set_major_locator(MultipleLocator(step))
+    return low, high
 
 
 def _nichols(ax: Any, loops: list[OpenLoop], found: Linearized) -> None:
@@ -130,7 +142,7 @@ def _nichols(ax: Any, loops: list[OpenLoop], found: Linearized) -> None:
         phase = np.degrees(np.angle(around))
         ax.semilogy(np.where(phase > 0.0, phase - 360.0, phase), np.abs(around), style, color=FAINT, linewidth=0.8)
     _plain_numbers(ax.yaxis)
-    ax.xaxis.set_major_locator(_every(90.0))
+    ax.set_xlim(*_degrees(ax.xaxis))
     ax.set_xlabel("phase of L, deg")
     ax.set_ylabel("size of L")
     ax.set_title("Nichols; grey: |S| is 2, and 4", fontsize="small", color=FAINT)

@@ -31,7 +31,7 @@ def number(given: Any, name: str, unit: str) -> float:
         return float(given)
     example = f'such as "0.5{"" if unit in ("", "1") else f" {unit}"}"'
     if not isinstance(given, str):
-        raise _wrong(f"`{name}` = {given!r}: it is a number", f"write a number, or a text {example}")
+        raise _wrong(f"`{name}` = {given!r}: it must be a number", f"write a number, or a text {example}")
     found = QUANTITY.fullmatch(given)
     if found is None:
         raise _wrong(f"`{name}` = {given!r} cannot be read", f"write a number and its unit, {example}")

@@ -149,6 +149,18 @@ class Designs:
         """[design, demand] whether it meets it."""
         return np.asarray(self.met >= self.shares * (1.0 - ROUNDING))
 
+    @cached_property
+    def failing(self) -> np.ndarray:
+        """[design] how many of its cases did not reach their end."""
+        return np.bincount(self.of_case, weights=self.pool.status != DONE, minlength=self.count).astype(np.int64)
+
+    def missed(self, design: int) -> list[str]:
+        """The demands that a design does not meet, without those that it misses by cases that failed alone."""
+        ended = (self.of_case == design) & (self.pool.status == DONE)
+        outcomes = self.pool.outcomes[ended] if self.pool.requirements else np.ones((int(ended.sum()), 1))
+        short = ~self.meets[design] & (outcomes != 1).any(axis=0)
+        return [text for text, each in zip(self.demands, short, strict=True) if each]
+
     def _share(self, holds: np.ndarray) -> np.ndarray:
         """The share of each design's cases in which each of these holds."""
         counts = [np.bincount(self.of_case, weights=column, minlength=self.count) for column in holds.T]

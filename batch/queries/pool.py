@@ -11,7 +11,7 @@ import numpy as np
 from batch.archive.read import ArchiveGroup
 from batch.archive.stored import Stored
 from batch.queries import requirements
-from batch.queries.failures import STATUS
+from batch.queries.failures import STATUS, FailureGroup, failures
 from batch.queries.grids import METRIC_SPAN, is_log, levels, spans
 from batch.queries.requirements import Ranking
 from batch.queries.signals import deck_unit, number_text
@@ -126,6 +126,13 @@ class Pool:
                 word = STATUS.get(status, "failed")
                 out[self.status == status] = next(n for n, each in enumerate(ENDED) if each in (word, "lost"))
         return out
+
+    @cached_property
+    def failures(self) -> tuple[FailureGroup, ...]:
+        """The cases that did not reach their end, by cause."""
+        failed = np.flatnonzero(self.status != DONE)
+        causes, ids = (np.array(self.texts(name, failed), dtype=object) for name in ("cause", "case_id"))
+        return failures(self.status[failed], causes, self.cases[failed], ids)
 
     @cached_property
     def limits(self) -> dict[str, tuple[RequirementLimit, ...]]:

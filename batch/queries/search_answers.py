@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -24,6 +25,9 @@ from met.searches.answer import Answer, answer
 
 OVER_CASES = re.compile(r" in [^<>]* of cases\b[^<>]*$")
 """The words by which a requirement is one over a share of cases."""
+
+WIDTH = 100
+"""Characters of a line."""
 
 NEAREST = 1
 """Requirements that are named of those that are nearest to their limits."""
@@ -141,6 +145,12 @@ class SearchAnswer:
         return f"{self.group.count:,} cases in {generations}"
 
     @property
+    def _cause(self) -> list[str]:
+        """Why the case fails that stands for the answer, in lines."""
+        cause = str(self.group.at("cause", [self.found.case])[0])
+        return textwrap.wrap(cause, WIDTH, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
+
+    @property
     def _chosen(self) -> str:
         return ", ".join(f"{path} = {value}" for path, value in self.shown())
 
@@ -150,7 +160,7 @@ class SearchAnswer:
             f"use {self._chosen}" if found.serves else f"nothing meets all that is required; nearest: {self._chosen}"
         ]
         if found.failed:
-            out.append(f"  a case fails with it; {self._cases}")
+            out += [f"  case #{self.position} of it fails; {self._cases}", *self._cause]
         else:
             among = f" in the worst of {found.tried} cases of {search.against}" if found.all > 1 else ""
             out.append(f"  {search.metric} is {self.value()}{among}; {self._cases}")
@@ -167,7 +177,7 @@ class SearchAnswer:
         if found.failed:
             failed = int(np.count_nonzero(self.group.values("status") != DONE))
             words = f"{failed:,} of {self._cases} fail, which hurts more than any {search.metric}"
-            return [f"{worst}: {case} fails", f"  {words}"]
+            return [f"{worst}: {case} fails", *self._cause, f"  {words}"]
         if np.isnan(found.value):
             return [f"{worst}: {case}, in which {search.metric} has no value", f"  of {self._cases}"]
         which = "largest" if search.largest else "least"

@@ -212,4 +212,4 @@ def _no_number(path: str, value: Any, unit: str) -> Problem:
             f'`batch.Simulation(..., set={{"{path}": {str(value)!r}}})`',
         )
         return Problem(error("E434", message, help=f"what decides the program is set once: {helps}"))
-    return Problem(error("E431", f"`{path}` = {value!r}: it is a number"))
+    return Problem(error("E431", f"`{path}` = {value!r}: it must be a number"))

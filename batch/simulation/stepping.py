@@ -31,6 +31,9 @@ from met.program.system import PARAMETER
 LANES = 4
 """Cases of the kernel's block, of which one is stepped: the narrowest are not the fastest."""
 
+MOST_SHOWN = 7
+"""Commands of an example, at most."""
+
 ALWAYS_SEEN = ("q", "qd")
 """Signals that are seen whatever a run records."""
 
@@ -187,7 +190,10 @@ class SteppedRun:
             good = False
         if not good:
             message = f"commands are a finite number for each of {', '.join(self.joints)}, and not {commands!r}"
-            raise Problem(error("E436", message, help="in SI, in this order: `state.step([0.1, 0.2])`"))
+            order = ", in this order" if len(self.joints) > 1 else ""
+            example = ", ".join(f"0.{place}" for place in range(1, 1 + min(len(self.joints), MOST_SHOWN)))
+            more = ", ..." if len(self.joints) > MOST_SHOWN else ""
+            raise Problem(error("E436", message, help=f"in SI{order}: `state.step([{example}{more}])`"))
         return values
 
     def _over(self) -> Problem:

@@ -12,6 +12,7 @@ import numpy as np
 from batch.archive.read import ArchiveFile
 from batch.archive.stored import Stored
 from batch.queries.best import ENDS, Designs, Goal, Stretch
+from batch.queries.failures import failure_lines
 from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import number_text, pretty_unit
 from batch.queries.summary import finite
@@ -100,7 +101,7 @@ class BestAnswer:
     # Text
 
     def lines(self, width: int) -> list[str]:
-        out = self._none() if self.best is None else self._use(self.best, width)
+        out = self._none(width) if self.best is None else self._use(self.best, width)
         if self.front and self.best is not None:
             out += ["", *self._trade_off()]
         return out
@@ -170,7 +171,7 @@ class BestAnswer:
         so = f"So {'does' if good == 1 else 'do'} {good:,} of {designs.count:,} designs."
         return f"{what}{where}{steps}{room_said}. {so}"
 
-    def _none(self) -> list[str]:
+    def _none(self, width: int) -> list[str]:
         """Where no design is good: those that are nearest."""
         designs = self.designs
         out = [self.headline]
@@ -180,14 +181,27 @@ class BestAnswer:
                 if designs.pool.requirements
                 else f"  {text}"
             )
-        return [*out, "", "those that come nearest:", *self.table(self.nearest())]
+        out += ["", "those that come nearest:", *self.table(self.nearest())]
+        if failed := int(designs.failing.sum()):
+            out += ["", f"{failed:,} of {count(designs.pool.count, 'case')} failed:"]
+            out += failure_lines(designs.pool.failures, width)
+        return out
 
     def nearest(self) -> list[BestRow]:
         """The designs that miss least, with what they miss."""
         designs = self.designs
         order = np.lexsort((-designs.room, (~designs.meets).sum(axis=1)))[:NEAREST].tolist()
-        missed = [[text for text, met in zip(designs.demands, designs.meets[i], strict=True) if not met] for i in order]
-        return [BestRow(i, f"misses {', '.join(texts)}") for i, texts in zip(order, missed, strict=True)]
+        return [BestRow(design, self._short(design)) for design in order]
+
+    def _short(self, design: int) -> str:
+        """The faults of a design that is not good, in words: `fails in 2 of 4 cases, misses settle < 4 s`."""
+        failing, cases = int(self.designs.failing[design]), int(self.designs.cases[design])
+        faults = []
+        if failing:
+            faults.append("fails" if cases == 1 else f"fails in {failing:,} of {cases:,} cases")
+        if missed := self.designs.missed(design):
+            faults.append(f"misses {', '.join(missed)}")
+        return ", ".join(faults)
 
     def _trade_off(self) -> list[str]:
         found = self.designs.front(self.front)

@@ -24,6 +24,8 @@ def linear_lines(found: Linearized) -> Iterator[str]:
     yield f"{found.experiment}{case}: linear at t = {found.time:.6g} s, a period of {_time(found.seconds)}, {states}"
     for name in found.held:
         yield f"  {name} sticks, and is held"
+    for each in found.creeping:
+        yield f"  {each.name} creeps at {abs(each.rate):.3g} {each.unit}: the answer holds for moves slower than that"
     for path in found.at_limit:
         yield f"  at its limit: {path}"
     yield ""
@@ -36,7 +38,7 @@ def linear_lines(found: Linearized) -> Iterator[str]:
         yield from _table([_HEAD], [_row(found, each) for each in natural])
     for loop in found.loops:
         yield ""
-        yield from _loop_lines(loop, found.seconds)
+        yield from _loop_lines(loop, found)
 
 
 _HEAD = ("Hz", "damping", "by e in", "who takes part")
@@ -81,14 +83,18 @@ def _table(head: Sequence[tuple[str, ...]], rows: Sequence[tuple[str, ...]]) -> 
         yield f"  and {len(rows) - MOST_POLES} more, faster: `--format json` has them all"
 
 
-def _loop_lines(loop: OpenLoop, period: float) -> Iterator[str]:
-    several = len(loop.paths) > 1
+def _loop_lines(loop: OpenLoop, answers: Linearized) -> Iterator[str]:
+    period, several = answers.seconds, len(loop.paths) > 1
     yield f"loops of {', '.join(loop.paths)}, all at once" if several else f"loop of {loop.paths[0]}"
-    if not loop.stable:
-        yield "  unstable as it is: a pole above grows"
-        return
+    limits = ", ".join(answers.at_limit)
     if not loop.returns:
-        yield "  nothing comes back here: what it would move is held, or the law is at its limit"
+        servos = {path.rpartition(".")[0] for path in loop.paths}
+        own = ", ".join(path for path in answers.at_limit if path.rpartition(".")[0] in servos)
+        why = f" while at its limit: {own}" if own else ": what it would move is held, or the law is at its limit"
+        yield f"  nothing comes back here{why}"
+        return
+    if not loop.stable:
+        yield "  unstable as it is: a pole above grows" + (f", while at its limit: {limits}" if limits else "")
         return
     down, up = loop.gains
     most = "no limit found" if up is None else f"{up:.4g} times{_at(loop.margins, 'at_gain_up')}"
@@ -137,7 +143,7 @@ def as_data(found: Linearized) -> dict[str, Any]:
 
     def loop(each: OpenLoop) -> dict[str, Any]:
         found = each.margins
-        told: dict[str, Any] = {"opened": list(each.paths), "stable": each.stable}
+        told: dict[str, Any] = {"opened": list(each.paths), "stable": each.stable, "returns": each.returns}
         told |= {"gain_down": each.gains[0], "gain_up": each.gains[1]}
         if found is not None:
             told |= {"phase": found.phase, "delay": found.delay, "disk": found.disk}
@@ -154,6 +160,7 @@ def as_data(found: Linearized) -> dict[str, Any]:
         "inputs": list(found.inputs),
         "outputs": list(found.outputs),
         "held": list(found.held),
+        "creeping": [{"name": each.name, "rate": each.rate} for each in found.creeping],
         "at_limit": list(found.at_limit),
         "poles": [pole(each) for each in found.poles],
         "natural": [pole(each) for each in found.natural],

@@ -72,10 +72,10 @@ def _table(
 def _of_loop(place: int, found: Linearized) -> tuple[str, ...]:
     """The cells of a case's loop at this place among those that are asked for."""
     loop = found.loops[place]
-    if not loop.stable:
-        return ("unstable",)
     if not loop.returns:
         return ("nothing comes back",)
+    if not loop.stable:
+        return ("unstable",)
     gain = "no limit" if loop.gains[1] is None else f"{loop.gains[1]:.4g}"
     own = loop.margins
     if own is None:
@@ -87,11 +87,15 @@ def _of_loop(place: int, found: Linearized) -> tuple[str, ...]:
 
 def _tightest(loops: dict[int, OpenLoop]) -> Iterator[str]:
     """The cases with the least of each margin."""
-    unstable = [case for case, loop in loops.items() if not loop.stable]
+    unstable = [case for case, loop in loops.items() if loop.unstable]
     if unstable:
         some = ", ".join(f"#{case}" for case in unstable[:5]) + (" ..." if len(unstable) > 5 else "")
         yield f"  unstable in {len(unstable)} of {len(loops)} cases: {some}"
-    gains = {case: loop.gains[1] for case, loop in loops.items() if loop.stable and loop.gains[1] is not None}
+    gains = {
+        case: loop.gains[1]
+        for case, loop in loops.items()
+        if loop.returns and loop.stable and loop.gains[1] is not None
+    }
     margins = {case: loop.margins for case, loop in loops.items() if loop.margins is not None and loop.returns}
     phases = {case: each.phase for case, each in margins.items() if each.phase is not None}
     told = []

@@ -6,6 +6,7 @@ the same program runs any others, whose values are checked by `VariedRun.errors`
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
@@ -28,6 +29,9 @@ from met.plan.columns import CaseValues
 
 GIVEN = "(given)"
 """The name of the text, in messages, that varies what is given."""
+
+VARY = "vary "
+"""What stands before a path in it."""
 
 
 @frozen
@@ -96,21 +100,19 @@ class GivenRun:
         name = f"{self.name}_given"
         while name in _names(self.deck):
             name += "_"
-        lines = [
-            f"vary {path} = [{value if isinstance(value, str) else repr(value)}]{f' {unit}' if unit != '1' else ''};"
-            for path, (value, unit) in values.items()
+        varied = [
+            *((path, word, "1") for path, word in words.items()),
+            *((path, *each) for path, each in values.items()),
         ]
-        lines = [*(f"vary {path} = [{word}];" for path, word in words.items()), *lines]
-        lines += [f"repeat {repeat};"] if repeat > 1 else []
-        text = "\n".join([f"sweep {name} of {self.name} {{", *(f"    {line}" for line in lines), "}", ""])
+        text = _sweep(f"{name} of {self.name}", varied, repeat)
         deck = replace(
             self.deck,
             entries=(*self.deck.entries, *_entries(text)),
-            sources=(*self.deck.sources, SourceFile(GIVEN, text, "")),
+            sources=(*self.deck.sources, SourceFile(GIVEN, _shown(text), "")),
         )
         compiled = compile_deck(deck, select=name, defines=self.defines, settings=settings)
         if compiled.plan is None:
-            raise Problem(_errors(compiled), compiled.sources)
+            raise Problem(_without_parts(_errors(compiled), words, text), compiled.sources)
         (experiment,) = compiled.plan.experiments
         chosen = [choice.path for choice in experiment.cases.choices if choice.path not in words]
         if chosen:
@@ -203,11 +205,39 @@ def _names(deck: Deck) -> set[str]:
     return {word.text for entry in deck.entries for word in (*getattr(entry, "words", ()), *getattr(entry, "path", ()))}
 
 
+def _sweep(head: str, varied: Iterable[tuple[str, float | str, str]], repeat: int) -> str:
+    """The text of a sweep over paths with these values and units. What a caller gave stands in lines of its own, as
+    messages show lines; `VARY`, which is not his, `_shown` takes out."""
+    lines = [f"sweep {head} {{"]
+    for path, value, unit in varied:
+        shown = value if isinstance(value, str) else repr(value)
+        lines += [f"{VARY}{path}", "= [", shown, f"]{f' {unit}' if unit != '1' else ''};"]
+    lines += ["repeat", str(repeat), ";"] if repeat > 1 else []
+    return "\n".join([*lines, "}", ""])
+
+
+def _shown(text: str) -> str:
+    """The text of such a sweep as messages show it, each word at its place."""
+    return re.sub(f"^{VARY}", " " * len(VARY), text, flags=re.MULTILINE)
+
+
+def _without_parts(errors: Sequence[Diagnostic], words: Mapping[str, str], text: str) -> list[Diagnostic]:
+    """The errors without those of values that are parts of a word that has one itself: they follow from it."""
+    lines = _shown(text).split("\n")
+
+    def line(found: Diagnostic) -> str:
+        at = found.at
+        return lines[at.place.line - 1].strip() if at is not None and at.place.file == GIVEN else ""
+
+    wrong = tuple(f"{path}." for path, word in words.items() if any(line(each) == word for each in errors))
+    return [each for each in errors if not line(each).startswith(wrong)]
+
+
 def _entries(text: str) -> tuple[Entry, ...]:
     """The entries of a text that needs no preprocessor. Raises Problem."""
     source = Text(GIVEN, text)
     tokens = [token for line in logical_lines(source) for token in line if token.kind != SPACE]
     entries, found = parse([*tokens, Token(END, "", source, len(text.rstrip()), 1)])
     if found:
-        raise Problem(found, {GIVEN: text})
+        raise Problem(found, {GIVEN: _shown(text)})
     return entries

@@ -141,9 +141,12 @@ def _meaning(compiled: Compiled, run: str) -> object:
 
 
 def _written_in(copy: _Copy, text: str, value: WrittenValue, run: str, remark: str) -> str:
-    """The text with one value more."""
+    """The text with one value more; as it is where the run has that value already."""
     compiled = copy.compiled(text, (run,))
-    places = {each.place for each in explanations_of(compiled, value.path)}
+    found = list(explanations_of(compiled, value.path))
+    places = {each.place for each in found}
+    if found and all(each.value == value.si for each in found):
+        return text  # it has it, in its author's words
     if not places:
         raise _by_hand(value, f"`{run}` has no such parameter")
     place = places.pop() if len(places) == 1 else None

@@ -61,6 +61,8 @@ def test_help_lists_the_commands_in_the_order_of_work(capsys: pytest.CaptureFixt
     lines = capsys.readouterr().out.split("order of work:")[1].splitlines()
     listed = [line.split()[0] for line in lines if line.startswith("  ")]
     assert [word for word in listed if word in cli.ORDER] == [word for word in cli.ORDER if word in listed]
+    own = {point.name for point in cli.met.table().values() if point.package == "met_arm"}
+    assert own <= {*cli.ORDER, "bench"} and listed.index("best") < listed.index("diff")
     assert {"check", "plan", "cases", "explain", "run", "show", "plot", "doc", "dump"} <= set(listed)
 
 

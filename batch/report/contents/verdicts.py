@@ -152,16 +152,11 @@ def _demand(pool: Pool, place: int, text: str) -> RequirementCounts:
 
 
 def _failing(pool: Pool) -> tuple[FailureRow, ...]:
-    failed = np.flatnonzero(pool.status != DONE)
-    if not len(failed):
-        return ()
-    causes, ids = (np.array(pool.texts(name, failed), dtype=object) for name in ("cause", "case_id"))
-    found = failures(pool.status[failed], causes, pool.cases[failed], ids)
     return tuple(
         FailureRow(
             each.status, each.cause.removeprefix(f"{each.status}: "), len(each.cases), ranges(each.cases), each.row
         )
-        for each in found
+        for each in pool.failures
     )
 
 

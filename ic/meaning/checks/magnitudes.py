@@ -150,7 +150,7 @@ def _observe(scope: Scope, kind: Magnitude, those: list[tuple[str, Settled]]) ->
         row, column = np.unravel_index(int(worst.argmax()), worst.shape)
         path, settled, _ = numbers[column]
         value, several = float(rows[row, column]), len({numbers[at][0] for at in np.flatnonzero(beyond.any(axis=0))})
-        unit, small = settled.unit, abs(value) < kind.low
+        unit, small, where = settled.unit, abs(value) < kind.low, scope.checks.where(int(row), [numbers[column][2]])
         helps = [
             f"{times:,.0f} times {'more' if small else 'less'} would be {value * factor:.6g} {unit}: "
             "is a unit another, or missing?"
@@ -162,7 +162,7 @@ def _observe(scope: Scope, kind: Magnitude, those: list[tuple[str, Settled]]) ->
             helps.append("a link without mass is a frame: `mass = 0 kg`")
         scope.complaints.remark(
             "D297",
-            f"`{path}` is {value:.6g} {unit}{_others(several)}, and {kind.known}",
+            f"`{path}` is {value:.6g} {unit}{where}{_others(several)}, and {kind.known}",
             settled.origin.place or place,
             help=[*helps, MEANT.format("D297")],
         )
@@ -261,17 +261,18 @@ def _observe_densities(scope: Scope, bodies: Sequence[WeighedBody]) -> None:
             fine = ~(_beyond(MASSES, mass) | _beyond(LENGTHS, sizes).any(axis=1))  # else that is told
             bad = fine & np.isfinite(densities) & (mass > 0.0) & ((densities < thin) | (densities > dense))
             if bad.any():
-                found.append((body, float(densities[bad][np.abs(np.log(densities[bad])).argmax()])))
+                row = int(np.flatnonzero(bad)[np.abs(np.log(densities[bad])).argmax()])
+                found.append((body, float(densities[row]), _where(scope, body, row, float(mass[row]))))
         if not found or scope.complaints.error_count:
             return
-        body, density = max(found, key=lambda each: abs(math.log(each[1])))
+        body, density, where = max(found, key=lambda each: abs(math.log(each[1])))
         cures = MORE if density < 1.0 else LESS
         unit, known, least, most = SOLIDS[body.is_rod]
         changed = [(words, density * times * across ** (1 if body.is_rod else 3)) for words, times, across in cures]
         helps = [f"{words} it would be {x:.4g} {unit}: is a unit another?" for words, x in changed if least < x < most]
         scope.complaints.remark(
             "D298",
-            f"{body.name} would be of {density:.4g} {unit}{_others(len(found))}, and {known}",
+            f"{body.name} would be of {density:.4g} {unit}{where}{_others(len(found))}, and {known}",
             body.place,
             help=[*helps[:1], "look at the units of its mass and of its shape", MEANT.format("D298")],
         )
@@ -302,10 +303,11 @@ def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[Weigh
             bad = (length > 0.0) & (radius > least)
             if bad.any():
                 row = int(np.where(bad, radius / np.where(bad, least, 1.0), 0.0).argmax())
-                found.append((body, float(radius[row]), float(length[row]), float(largest[row])))
+                where = _where(scope, body, row, float(mass[row]))
+                found.append((body, float(radius[row]), float(length[row]), float(largest[row]), where))
         if not found or scope.complaints.error_count:
             return
-        body, radius, length, largest = max(found, key=lambda each: each[1] / each[2])
+        body, radius, length, largest, where = max(found, key=lambda each: each[1] / each[2])
         helps = [
             f"it would be of {radius / math.sqrt(times):.4g} m, were it in {unit}: "
             f"`{largest:.6g} {unit}` is {largest / times:.4g} kg*m^2"
@@ -315,13 +317,20 @@ def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[Weigh
         beside = f"its shape is {length:.4g} m large" if body.sizes else f"its arm is {length:.4g} m long"
         scope.complaints.remark(
             "D298",
-            f"{body.name} has the inertia of a body of {radius:.4g} m (its radius of gyration){_others(len(found))}, "
-            f"and {beside}",
+            f"{body.name} has the inertia of a body of {radius:.4g} m (its radius of gyration){where}"
+            f"{_others(len(found))}, and {beside}",
             next((each.origin.place for each in body.moments if each.origin.place), body.place),
             help=[*helps[:1], "look at the units of its mass and of its inertia", MEANT.format("D298")],
         )
 
     _together(scope, [*settled, *(each for each in vectors if each is not None)], warn, bodies)
+
+
+def _where(scope: Scope, body: WeighedBody, row: int, mass: float) -> str:
+    """A remark in words on the case in which a body is so, with its mass; none where it is so in all."""
+    numbers = [each.value for each in (body.mass, *body.moments, *body.sizes.values())]
+    case = scope.checks.where(row, numbers)
+    return f"{case} ({mass:.4g} kg)" if case else ""
 
 
 def _others(count: int) -> str:

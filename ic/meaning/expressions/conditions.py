@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -174,6 +174,15 @@ class Checks:
             return row
         return int(self._rows[row]) if len(self._rows) else None
 
+    def where(self, row: int, values: Iterable[object]) -> str:
+        """Words for the case in this row of what a warning looks at, ` in case #7`, where one of these values varies;
+        else none."""
+        case = self.case_of(row) if any(isinstance(value, Scalar) for value in values) else None
+        return "" if case is None else f" in {self._case(case)}"
+
+    def _case(self, row: int) -> str:
+        return f"case #{row}" if row < self._listed else "a case that may be chosen"
+
     def run(self, cases: Mapping[str, CaseValues], count: int, listed: int | None = None) -> None:
         """Every check that waited for the cases, over all of them; names the first case that fails one.
 
@@ -235,7 +244,7 @@ class Checks:
         self.fail(check.path)
         where = ", ".join(f"{path} = {self.shown(path, cases[path][row])}" for path in cases)
         more = f", and {count - 1} more" if count > 1 else ""
-        case = f"case #{row}" if row < self._listed else "a case that may be chosen"
+        case = self._case(row)
         self.complaints.error(
             check.code,
             f"{check.message}; {case} breaks it{more}",

@@ -9,9 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
+from met.analysis.linear.creeping import CreepingRate, creeping
 from met.analysis.linear.injected import InputSignal, entries
 from met.analysis.linear.jacobian import PeriodMap, at_instant, period_map
-from met.analysis.linear.margins import STABLE, LoopMargins, ScalarLoop, gain_limits, margins
+from met.analysis.linear.margins import STABLE, LoopMargins, ScalarLoop, comes_back, gain_limits, margins
 from met.analysis.linear.period import PeriodProgram
 from met.analysis.linear.plant import PlantModel, plant
 from met.diagnostic import Problem, error
@@ -74,6 +75,7 @@ class OpenLoop:
     margins  None where it is unstable as it is, or `loop` is None
     gains    times all gains at which it becomes unstable, below 1 and above: None: at none
     stable   as it is
+    returns  False where nothing comes back: the arm is held, or the law is at its limit
     """
 
     paths: tuple[str, ...]
@@ -82,11 +84,12 @@ class OpenLoop:
     margins: LoopMargins | None
     gains: tuple[float | None, float | None]
     stable: bool
+    returns: bool
 
     @property
-    def returns(self) -> bool:
-        """False where nothing comes back: the arm is held, or the law is at its limit."""
-        return self.loop is None or self.loop.returns
+    def unstable(self) -> bool:
+        """True of a loop that grows; of what grows where nothing comes back no gain is the cause."""
+        return self.returns and not self.stable
 
 
 @frozen
@@ -97,7 +100,7 @@ class Linearized:
     states    by name;  inputs, outputs: channels
     A .. D    x+ = A x + B u, y = C x + D u, from period to period, inputs added to at all ticks of one
     plant     the arm without its computers, in continuous time
-    held      what sticks;  at_limit: paths of limits
+    held      what sticks;  creeping: what slides so slowly that it nearly does;  at_limit: paths of limits
     joints    of each state, the joint or body or computer that it belongs to
     """
 
@@ -115,6 +118,7 @@ class Linearized:
     plant: PlantModel
     loops: tuple[OpenLoop, ...]
     held: tuple[str, ...]
+    creeping: tuple[CreepingRate, ...]
     at_limit: tuple[str, ...]
     joints: Mapping[str, str]
 
@@ -173,6 +177,7 @@ class LinearQuestion:
         program, inputs = self.program, self.inputs
         tick = program.begin(self.at)
         flow = at_instant(program, case, tick)
+        slow = creeping(flow)
         found = period_map(program, flow)
         kept = _kept(program, found)
         states = tuple(found.states[place] for place in kept)
@@ -188,7 +193,7 @@ class LinearQuestion:
         return Linearized(
             self.experiment.name, case, tick / program.schedule.base_hz, found.seconds, states, inputs,
             found.outputs, A, summed(B), C, summed(found.D), plant(program, flow, states),
-            tuple(lifted.opened(each) for each in several), found.held, found.at_limit,
+            tuple(lifted.opened(each) for each in several), found.held, slow, found.at_limit,
             {name: program.joint_of(name) for name in program.states},
         )  # fmt: skip
 
@@ -235,7 +240,7 @@ class _Lifted:
         else:
             gains = gain_limits(A, b, c, d, drift)
         stable = bool(np.max(np.abs(np.linalg.eigvals(self.A)), initial=0.0) <= 1.0 + drift)
-        return OpenLoop(paths, len(ticks), one, own, gains, stable)
+        return OpenLoop(paths, len(ticks), one, own, gains, stable, comes_back(A, b, c, d))
 
 
 def _kept(program: PeriodProgram, found: PeriodMap) -> np.ndarray:

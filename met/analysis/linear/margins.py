@@ -55,15 +55,6 @@ class ScalarLoop:
         """L at angular frequencies, rad/s: [frequency]."""
         return np.array([self.at(cmath.exp(1j * each * self.period)) for each in w])
 
-    @property
-    def returns(self) -> bool:
-        """False where nothing comes back of what stands at the open place: L is 0."""
-        moved, largest = self.B, abs(self.D)
-        for _ in range(len(self.A)):
-            largest = max(largest, abs(float(self.C @ moved)))
-            moved = self.A @ moved
-        return largest > 0.0
-
     def closed(self, gain: float = 1.0) -> np.ndarray:
         """A of the loop closed with this times its gain."""
         return self.A + gain / (1.0 - gain * self.D) * np.outer(self.B, self.C)
@@ -258,6 +249,15 @@ def _disk(loop: ScalarLoop) -> tuple[float, float]:
             break
         size, at = best, where
     return 1.0 / size, at
+
+
+def comes_back(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> bool:
+    """False where nothing comes back of what stands at the open places: P is 0. Arrays as `gain_limits` has them."""
+    moved, largest = B, np.max(np.abs(D), initial=0.0)
+    for _ in range(len(A)):
+        largest = max(largest, np.max(np.abs(C @ moved), initial=0.0))
+        moved = A @ moved
+    return bool(largest > 0.0)
 
 
 FARTHEST, STRIDE = 1e4, 1.05

@@ -167,7 +167,9 @@ def test_a_case_that_fails_hurts_most(here: Path, capsys: pytest.CaptureFixture[
     failed = int((data["status"] != 0).sum())
     assert 0 < failed < data.sizes["case"]
     where = f"case #{answer.position} with environment.held.stiffness = {answer.rounded}"
-    assert f"the worst of search `wild`: {where} fails\n  {failed} of {data.sizes['case']} cases in " in said
+    _, _, told = said.partition(f"the worst of search `wild`: {where} fails\n")
+    cause, _, rest = told.partition(f"  {failed} of {data.sizes['case']} cases in ")
+    assert rest and " ".join(cause.split()) == str(data["cause"].values[answer.found.case])
     assert f"run it again: met run w.h5 --case '#{answer.position}'\n" in said
 
 

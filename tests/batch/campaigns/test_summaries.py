@@ -223,6 +223,17 @@ def test_any_other_case_is_computed_from_its_plan(here: Path) -> None:
         assert one.groups[0].values("volts")[0] == rows.groups[0].values("volts")[other]
 
 
+def test_a_case_without_a_row_is_told_with_the_command_that_runs_it(here: Path) -> None:
+    with ArchiveFile("many.summary.h5") as file:
+        other = next(case for case in range(600) if case not in file.groups[0].values("case"))
+    said = met("show", "many.summary.h5", "--case", f"#{other}")
+    remedy = f" = help: rows of few cases are kept: `met run many.summary.h5 --case '#{other}'` runs it again\n"
+    assert said.status == 2 and f"error[E321]: no case `#{other}` in `many`\n = help: cases here: " in said.text
+    assert remedy in said.text
+    assert "runs it again" not in met("show", "many.summary.h5", "--case", "#600").text
+    assert "runs it again" not in met("show", "many.rows.h5", "--case", "#600").text
+
+
 def test_met_show_says_that_it_is_a_summary(here: Path) -> None:
     archives("wild")
     said = met("show", "wild.summary.h5", "--no-plots").text
@@ -251,7 +262,7 @@ def test_what_needs_a_row_a_case_is_refused_with_the_remedy(here: Path, what: st
     said = met(*command)
     assert said.status == 2
     assert f"{what} needs a row a case, and many.summary.h5 keeps a summary of `many`" in said.text
-    assert "`met run DECK --rows all` keeps a row a case" in said.text
+    assert "`met run DECK --rows all` keeps a row a case, and `--rows worst:N:METRIC` a summary" in said.text
 
 
 @pytest.mark.parametrize("name", ["many", pytest.param("ways", marks=pytest.mark.slow)])

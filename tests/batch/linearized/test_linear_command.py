@@ -104,3 +104,26 @@ def test_of_a_joint_that_sticks_nothing_comes_back(folder: Path) -> None:
         "loop of hinge.servo.voltage\n"
         "  nothing comes back here: what it would move is held, or the law is at its limit\n"
     )
+
+
+@pytest.mark.parametrize(
+    ("weak", "limits"),
+    [
+        ("v_max = 0.001 V", "hinge.servo.v_max"),
+        ("tau_max = 0.001 N*m", "hinge.servo.tau_max"),
+    ],
+)
+def test_a_loop_at_its_limit_is_open_and_is_not_called_unstable(folder: Path, weak: str, limits: str) -> None:
+    """An arm that falls from upright grows by itself, whatever the gains are."""
+    text = DECK.replace("command = rate", f"ratio = 50;  f_c = 0 N*m;  {weak};  command = rate")
+    upright = "environment { gravity = gravity(g = [-9.81, 0, 0] m/s^2); }"
+    (folder / "deck.ic").write_text(
+        text.replace("duration", f"{upright}  duration") + "sweep same of hold { vary links.bar.mass = [2, 3] kg; }\n"
+    )
+    said = met(folder, "linear", "deck.ic", "hold", *OPEN, "--at", "0.1 s", status=0)
+    assert " grows  " in said
+    assert said.endswith(
+        f"loop of hinge.servo.voltage\n  nothing comes back here while at its limit: {limits}\n"
+    )  # fmt: skip
+    every = met(folder, "linear", "deck.ic", "same", "--all-cases", *OPEN, "--at", "0.1 s", status=0)
+    assert every.count("nothing comes back") == 2 and "unstable" not in every

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import csv
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import batch
 import ic
-from batch.linearized import LinearAnswer
+from batch.linearized import LinearAnswer, picture
 from met.diagnostic import Problem
 
 DECK = """\
@@ -130,3 +132,29 @@ def test_a_picture_is_drawn_alike_each_time(answer: LinearAnswer, tmp_path: Path
         answer.draw(tmp_path / name)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert (tmp_path / "a.svg").stat().st_size > 10_000
+
+
+def marks(axis: Any) -> list[float]:
+    """The marks of an axis that are in view."""
+    low, high = sorted(axis.get_view_interval())
+    return [float(each) for each in axis.get_majorticklocs() if low <= each <= high]
+
+
+def test_a_picture_has_a_mark_of_phase_every_45_degrees(answer: LinearAnswer) -> None:
+    _, phase, nichols, *_ = picture.figure(answer.found).axes
+    assert marks(phase.yaxis) == [-180.0, -135.0, -90.0, -45.0]
+    assert set(marks(nichols.xaxis)) >= {-180.0, -135.0, -90.0}
+
+
+@pytest.mark.parametrize("times", [0.001, 1.0, 1000.0])
+def test_phases_have_several_marks_however_little_a_loop_turns(answer: LinearAnswer, times: float) -> None:
+    """A double integral whose phase is -180 deg nearly everywhere, at several gains."""
+    found = answer.found
+    one = np.array([[1.0, found.seconds], [0.0, 1.0]])
+    (loop,) = found.loops
+    assert loop.loop is not None
+    flat = replace(loop.loop, A=one, B=np.array([0.0, -times]), C=np.array([1.0, 0.5 * found.seconds]), D=0.0)
+    made = replace(found, inputs=(), loops=(replace(loop, loop=flat, margins=None),))
+    _, phase, nichols = picture.figure(made).axes
+    for axis in (phase.yaxis, nichols.xaxis):
+        assert 2 <= len(marks(axis)) <= 9 and -180.0 in marks(axis)

@@ -208,7 +208,7 @@ class TestMessages:
                 "`gearbox.kp`: unit `Vs`: `Vs` is not a unit; `V*s`?\n  units are those of decks: `met doc units`",
             ),
             ("much", "`gearbox.kp` = 'much' cannot be read\n  write a number and its unit, such as \"0.5 V*s/rad\""),
-            (True, '`gearbox.kp` = True: it is a number\n  write a number, or a text such as "0.5 V*s/rad"'),
+            (True, '`gearbox.kp` = True: it must be a number\n  write a number, or a text such as "0.5 V*s/rad"'),
             (slice(0.01, 0.02, 2), "`gearbox.kp`: a range of values has no step\n  `slice(first, last)`"),
         ],
     )

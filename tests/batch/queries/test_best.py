@@ -336,3 +336,34 @@ def test_a_single_run_has_no_designs(tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_what_varies_in_no_case_is_no_design() -> None:
     with pytest.raises(Problem, match="E395"):
         Designs(made({"a": np.zeros(3)}, np.ones(3, bool)))
+
+
+@pytest.mark.parametrize(
+    ("start", "limit", "label"),
+    [
+        ("[0, 1e300]", "10 rad", "fails in 1 of 2 cases"),
+        ("[0, 1e300]", "-10 rad", "fails in 1 of 2 cases, misses far < -10 rad"),
+        ("[1e299, 1e300]", "10 rad", "fails in 2 of 2 cases"),
+    ],
+)
+def test_designs_that_fail_are_said_to_fail_and_why(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], start: str, limit: str, label: str
+) -> None:
+    text = DECK.replace("REQUIRED", f"remove settle;  metric far = max {{ of = shoulder.q; }}  require far < {limit};")
+    text = text.replace("duration = 6 s", "duration = 0.2 s")
+    sweep = (
+        f"sweep falls of arm {{ vary gearbox.kp = [0.02, 0.03] V*s/rad;  vary initial.shoulder.qd = {start} rad/s; }}"
+    )
+    (tmp_path / "arm.ic").write_text(text + sweep)
+    out = tmp_path / "falls.h5"
+    main(["run", str(tmp_path / "arm.ic"), "falls", "-o", str(out), "-q", "--histories", "none"])
+    capsys.readouterr()
+    assert main(["best", str(out)]) == 1
+    said = capsys.readouterr().out
+    assert said.count(f"  {label}  ") == 2
+    with ArchiveFile(out) as file:
+        (pool,) = pools(file.groups)
+        failed = np.flatnonzero(pool.status != 0)
+        cause = pool.texts("cause", failed)[0]
+    _, _, why = said.partition(f"\n\n{len(failed)} of 4 cases failed:\n")
+    assert " ".join(why.split()).startswith(f"{len(failed)} cases {cause} (#{failed[0]})")

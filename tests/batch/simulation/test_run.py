@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 from pathlib import Path
 from typing import Any, cast
 
@@ -183,7 +184,7 @@ class TestValues:
             ({"load": [[1, 2]]}, "E430", "`load` has a list inside a list\n  one value a case: a list of numbers"),
             ({"load": np.ones((2, 2))}, "E430", "`load` has 2 dimensions\n  one value a case: `.ravel()` lists them"),
             ({"load": [1.0, np.nan]}, "E431", "value 1 of `load` is not a finite number: nan"),
-            ({"load": True}, "E431", "`load` = True: it is a number"),
+            ({"load": True}, "E431", "`load` = True: it must be a number"),
             ({"load": "25 m"}, "E386", "`load` = '25 m' is in m; it is in kg\n  write one such as \"0.5 kg\""),
             (
                 {"load": Measured(25, "furlong")},
@@ -220,15 +221,25 @@ class TestValues:
             [
                 "",
                 "error[D128]: no parameter `gearbox.kpp` in this run",
-                " --> (given):2:10",
+                " --> (given):2:6",
                 "  |",
-                "2 |     vary gearbox.kpp = [0.0];",
-                "  |          ^^^^^^^^^^^",
+                "2 |      gearbox.kpp",
+                "  |      ^^^^^^^^^^^",
                 "  = help: did you mean `gearbox.kp`?",
                 "",
                 "1 error",
             ]
         )
+
+    def test_messages_show_no_text_that_was_not_given(self, arm: batch.Simulation) -> None:
+        shown = []
+        for values, repeat in (({"gearbox.kt": -1.0}, 1), ({"shoulder.servo": "nobody"}, 1), ({"load": 1.0}, 2)):
+            with pytest.raises(Problem) as caught:
+                arm.run(values, repeat=repeat)
+            shown.append(
+                [line.partition(" | ")[2] for line in str(caught.value).splitlines() if re.match(r"\d+ [|]", line)]
+            )
+        assert shown == [["     gearbox.kt"], ["nobody"], ["repeat"]]
 
     @pytest.mark.parametrize("calls_before", [0, 1])
     def test_a_value_out_of_range_is_refused_in_every_call(self, arm: batch.Simulation, calls_before: int) -> None:

@@ -180,7 +180,13 @@ class TestBeginningsAndEnds:
         (found,) = caught.value.diagnostics
         assert found.code == "E436"
         assert found.message.startswith("commands are a finite number for each of shoulder, elbow, and not ")
+        assert found.help == ("in SI, in this order: `state.step([0.1, 0.2])`",)
         assert state.seen.time == 0.0
+
+    def test_the_example_has_as_many_commands_as_joints(self, arm: batch.Simulation) -> None:
+        with pytest.raises(Problem) as caught:
+            arm.start(commands="elbow").step([0.1, 0.2])
+        assert caught.value.diagnostics[0].help == ("in SI: `state.step([0.1])`",)
 
     @pytest.mark.slow
     def test_a_thousand_cases_leak_nothing(self, arm: batch.Simulation) -> None:
@@ -224,6 +230,12 @@ class TestWhatIsRefused:
                 sim.start(**asked)  # type: ignore[arg-type]
             found = caught.value.diagnostics[0]
             assert (found.code, found.message) == (code, said)
+
+    def test_a_command_that_a_model_does_not_take_is_told_once(self) -> None:
+        with pytest.raises(Problem) as caught:
+            batch.Simulation(text=TABLES, run="swing").start(commands={"elbow": "acceleration"})
+        (found,) = caught.value.diagnostics
+        assert found.code == "D152" and found.message.endswith("takes no command `acceleration`")
 
     def test_a_continuous_law_takes_commands_once_it_has_a_rate(self) -> None:
         sim = batch.Simulation(text=TABLES, run="smooth", set={"shoulder.servo.rate": "100 Hz"})

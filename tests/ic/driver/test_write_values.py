@@ -102,12 +102,12 @@ def test_what_comes_through_a_macro_is_left_to_its_author(tmp_path: Path) -> Non
 
 
 def test_a_let_a_link_and_a_start_are_replaced(tmp_path: Path) -> None:
-    values = ("slow", 0.05, "rad/s"), ("links.rod.mass", 3.5, "kg"), ("initial.hinge.q", 0.17453292519943295, "rad")
+    values = ("slow", 0.05, "rad/s"), ("links.rod.mass", 3.5, "kg"), ("initial.hinge.q", 0.3490658503988659, "rad")
     found = made(tmp_path, *values)
     assert [line.split("//")[0].strip() for line in changed(ARM, found.text)] == [
         "let slow = 0.05 rad/s;",
         "link rod { mass = 3.5 kg;  shape = rod(length = 1 m, along = x); }",
-        "initial  { hinge.q = 10 deg; }",
+        "initial  { hinge.q = 20 deg; }",
     ]
 
 
@@ -146,3 +146,18 @@ def test_the_deck_written_means_what_set_does_to_the_bit(si: float, tmp_path: Pa
     (tmp_path / "new.ic").write_text(found.text)
     plan = ic.compile(tmp_path / "new.ic", select="hold")
     assert plan.experiments[0].parameters["hinge.servo.kp"].value == si
+
+
+def test_a_value_that_does_not_change_keeps_its_text(tmp_path: Path) -> None:
+    text = ARM.replace("let slow = 0.03 rad/s;", "let slow = 30e-3 rad/s;\nlet soft = 1;\nlet whole = 3;")
+    text = text.replace("mass = 2 kg", "mass = 2 kg * soft * whole")
+    values = [("slow", 0.03, "rad/s"), ("soft", 1.0, ""), ("drive.ki", 0.1, "V/rad"), ("whole", 4.0, "1")]
+    found = made(tmp_path, *values, text=text)
+    assert changed(text, found.text) == ["let whole = 4;    // chosen of 9: many, a.h5"]
+
+
+@pytest.mark.parametrize(("si", "text"), [(4.0, "4"), (0.0, "0"), (2.5, "2.5"), (1e9, "1000000000.0")])
+def test_whole_numbers_are_written_as_a_deck_would(si: float, text: str, tmp_path: Path) -> None:
+    deck = ARM.replace("let slow", "let soft = 1;\nlet slow").replace("mass = 2 kg", "mass = 2 kg + 1 kg * soft")
+    found = made(tmp_path, ("soft", si, ""), text=deck)
+    assert changed(deck, found.text) == [f"let soft = {text};    // chosen of 9: many, a.h5"]

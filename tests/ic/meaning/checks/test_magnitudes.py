@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, messages
@@ -91,6 +93,38 @@ def test_one_row_of_a_sweep_is_told(tmp_path: Path) -> None:
     sweep = "sweep s of hold { vary swing.links.bar.mass = [1, 2, 1e-8, 3] kg; }\n"
     assert codes(tmp_path, ARM, SERVO, RUN, sweep, select="s") == ["D297"]
     assert codes(tmp_path, ARM, SERVO, RUN, sweep.replace("1e-8", "1e-3"), select="s") == []
+
+
+@pytest.mark.parametrize(
+    ("body", "code", "said"),
+    [
+        ("mass = 5 kg; shape = sphere(radius = 0.3 m);", "D298",
+         "link `bar` would be of 0.001768 kg/m^3 in case #2 (0.0002 kg), and solids have 1 to 22,600"),
+        ("mass = 5 kg; com = [0.3, 0, 0] m; inertia = [0.1, 0.2, 0.2] kg*m^2;", "D298",
+         "link `bar` has the inertia of a body of 31.62 m (its radius of gyration) in case #2 (0.0002 kg), and its arm "
+         "is 0.3 m long"),
+        ("mass = 5 kg; shape = rod(length = 1 m, along = x);", "D297",
+         "`links.bar.mass` is 2e-07 kg in case #2, and links weigh a milligram and more, and the largest some 400 t"),
+    ],
+)  # fmt: skip
+def test_a_remark_on_a_sweep_names_the_case(tmp_path: Path, body: str, code: str, said: str) -> None:
+    small = "2e-7" if code == "D297" else "2e-4"
+    sweep = f"sweep s of hold {{ vary swing.links.bar.mass = [1, 2, {small}, 3] kg; }}\n"
+    [found] = check(tmp_path, arm(body), SERVO, RUN, sweep, select="s").diagnostics
+    assert found.code == code and found.message == said
+
+
+@pytest.mark.parametrize("count", [50, 20000])
+def test_the_case_that_is_named_is_the_one_that_was_drawn(tmp_path: Path, count: int) -> None:
+    """Also of more cases than are looked at as one table."""
+    body = "mass = 5 kg; shape = sphere(radius = 3 m);"
+    drawn = f"sweep s of hold {{ sample random({count}) {{ swing.links.bar.mass = uniform(0, 500) kg; }} }}\n"
+    found = check(tmp_path, arm(body), SERVO, RUN, drawn, select="s")
+    [told] = [each for each in found.diagnostics if each.code == "D298"]
+    case, mass = re.findall(r" in case #(\d+) \((.*) kg\), and", told.message)[0]
+    assert found.plan is not None
+    values = np.asarray(found.plan.experiments[0].cases.coordinates[0].values)
+    assert values[int(case)] == values.min() and f"{values.min():.4g}" == mass
 
 
 def test_a_torque_constant_in_milli_is_told(tmp_path: Path) -> None:
