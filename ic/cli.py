@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import fields, is_dataclass
 from functools import partial
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, Literal
@@ -122,20 +123,32 @@ def _complain_together(found: Iterable[_Checked], form: str) -> None:
     """Print the messages of several files as one, for programs: what decks have in common is told once."""
     from ic.printing.codes import titles
 
-    diagnostics: dict[Diagnostic, None] = {}
-    allowed: dict[Diagnostic, str] = {}
+    diagnostics: dict[object, Diagnostic] = {}
+    allowed: dict[object, tuple[Diagnostic, str]] = {}
     sources: dict[str, str] = {}
     for each in found:
-        diagnostics |= dict.fromkeys(each.diagnostics)
-        allowed |= {warning: allowance.because for warning, allowance in each.allowed}
+        for one in each.diagnostics:
+            diagnostics.setdefault(_whoever_includes(one), one)
+        for warning, allowance in each.allowed:
+            allowed.setdefault(_whoever_includes(warning), (warning, allowance.because))
         sources |= each.sources
     complain(
-        tuple(diagnostics),
+        tuple(diagnostics.values()),
         sources,
         form=form,
-        allowed=[each for each in allowed.items() if each[0] not in diagnostics],
+        allowed=[each for key, each in allowed.items() if key not in diagnostics],
         titles=titles() if form == "sarif" else None,
     )
+
+
+def _whoever_includes(part: object) -> object:
+    """What a message says, and where, but for the files that include the one that it is in: two that are equal are the
+    same mistake, found by way of two decks."""
+    if isinstance(part, tuple):
+        return tuple(map(_whoever_includes, part))
+    if is_dataclass(part):
+        return tuple(_whoever_includes(getattr(part, each.name)) for each in fields(part) if each.name != "included")
+    return part
 
 
 @click.command()

@@ -41,10 +41,8 @@ def filter_range(
     path = f"{joint}.bed.f_cut"
 
     def tightest(one: Experiment) -> Margin:
-        found = [each for case in margins(one, rows) for each in case if each.joint == joint]
-        if alone:
-            found = [replace(each, least=ratio[0], together=ratio[1]) for each in found]
-        return min(found, key=lambda each: each.room)
+        cases = margins(one, rows, span=ratio if alone else None, reach=margin)
+        return min((each for case in cases for each in case if each.joint == joint), key=lambda each: each.room)
 
     own = tightest(experiment)
     value = experiment.parameters[path].value

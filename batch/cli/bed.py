@@ -47,6 +47,17 @@ class Amount(click.ParamType):
         return found
 
 
+class FiniteRange(click.FloatRange):
+    """A number of a closed range; `nan`, which no comparison refuses, is none."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Read the number, as `click.FloatRange` does. Raises a usage error for one that is not in the range."""
+        found = super().convert(value, param, ctx)
+        if not math.isfinite(found):
+            self.fail(f"{value} is not in the range {self._describe_range()}.", param, ctx)
+        return float(found)
+
+
 PORT = click.option("--port", "word", metavar="[JOINT=]PORT", required=True, help="Where the bed is.")
 BAUD = click.option(
     "--baud",
@@ -165,7 +176,7 @@ def _check(source: str | None, names: tuple[str, ...], options: dict[str, Any]) 
 )
 @click.option(
     "--kt-load-error",
-    type=click.FloatRange(0.0, 50.0),
+    type=FiniteRange(0.0, 50.0),
     metavar="PERCENT",
     default=0.0,
     show_default=True,
@@ -198,7 +209,7 @@ def identify(word: str, source: str, names: tuple[str, ...], **options: Any) -> 
 @click.option("--joint", metavar="JOINT", help="That is to be on the bed [the one that is on one in the deck].")
 @click.option(
     "--margin",
-    type=click.FloatRange(1.0, 100.0),
+    type=FiniteRange(1.0, 100.0),
     metavar="FACTOR",
     default=1.5,
     show_default=True,

@@ -109,7 +109,12 @@ def remedy(one: Margin) -> str:
 
 
 def margins(
-    experiment: Experiment, cases: Sequence[int] | None = None, progress: Callable[[int], None] | None = None
+    experiment: Experiment,
+    cases: Sequence[int] | None = None,
+    progress: Callable[[int], None] | None = None,
+    *,
+    span: tuple[float, float] | None = None,
+    reach: float = 1.0,
 ) -> tuple[tuple[Margin, ...], ...]:
     """Every substituted joint of an experiment: one tuple a case (all by default).
 
@@ -118,13 +123,16 @@ def margins(
 
     progress  called with the number of cases done so far. Limits are looked for once for all cases that share the
               parameters of servo, bed and law
+    span      least and largest r to hold each loop against, such as those of a whole run, in place of the r that the
+              arm has at the start of the case
+    reach     the search goes on to arms so many times heavier, and lighter, than those, and twice that
     """
     plain = _faultless(experiment)
     known: dict[tuple[Any, ...], _Known] = {}
     found = []
     for done, case in enumerate(range(experiment.cases.count) if cases is None else cases, start=1):
         with np.errstate(all="ignore"):  # a bed with no inertia has no finite loop
-            found.append(tuple(_margins(plain, case, known)))
+            found.append(tuple(_margins(plain, case, known, span, reach)))
         if progress is not None:
             progress(done)
     return tuple(found)
@@ -166,7 +174,13 @@ class _Known:
         return cls(loop.stretches(looked_at, growing[:STEPS]), dict(zip(own, growing[STEPS:], strict=True)))
 
 
-def _margins(experiment: Experiment, case: int, known: dict[tuple[Any, ...], _Known]) -> Iterator[Margin]:
+def _margins(
+    experiment: Experiment,
+    case: int,
+    known: dict[tuple[Any, ...], _Known],
+    span: tuple[float, float] | None,
+    reach: float,
+) -> Iterator[Margin]:
     builder, tape = _begun(experiment, case)
     beds = builder.step.beds
     # All of them first: a loop is taken round over the same cells, with loads of its own.
@@ -174,14 +188,14 @@ def _margins(experiment: Experiment, case: int, known: dict[tuple[Any, ...], _Kn
     Lambda = np.array([[float(tape.read(cell_names.ARM_INERTIA(a, b))) for b in names] for a in names])
     loops = [_Loop(builder, tape, each) for each in beds.mounted]
     rotors = np.array([loop.rotor for loop in loops])
-    least, together = ends_of_motion(Lambda, rotors)
+    least, together = ends_of_motion(Lambda, rotors) if span is None else span
     for each, loop, r in zip(beds.mounted, loops, (Lambda.diagonal() / rotors).tolist(), strict=True):
         heads = (f"{each.joint}.servo.", f"{each.joint}.bed.", f"{each.joint}.law.")
         own = [path for path in experiment.parameters if path.startswith(heads) and ".command." not in path]
         # Its own r is always among those searched. Where a loop grows, or not, beyond them is not known.
         lightest, heaviest = LIGHTEST, HEAVIEST
         if least > 0.0 and together < np.inf:
-            lightest, heaviest = min(lightest, 0.5 * least), max(heaviest, 2.0 * together)
+            lightest, heaviest = min(lightest, 0.5 * least / reach), max(heaviest, 2.0 * reach * together)
         key = (each.joint, lightest, heaviest, *(builder.system.value(path, tape.read) for path in own))
         if key not in known:
             known[key] = _Known.of(loop, lightest, heaviest, _finite(least, together))

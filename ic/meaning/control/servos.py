@@ -14,7 +14,7 @@ from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, 
 from ic.meaning.control.schedule import CONTINUOUS, Rate
 from ic.meaning.control.sensors import use_sensor, without_sensors
 from ic.meaning.control.trajectories import use_file, with_file_named
-from ic.meaning.definitions.merge import Item, MergedBlock, open_call, overlay
+from ic.meaning.definitions.merge import Item, MergedBlock, no_block, open_call, overlay, refuse_block
 from ic.meaning.expressions.quantity import measure_of
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters import not_sweepable
@@ -353,6 +353,9 @@ def fixed_rate(
     """A rate in Hz, which no sweep can vary; `CONTINUOUS` Hz where it may be `continuous`, and is."""
     if word_of(item.value) == "continuous" and not isinstance(item.value, Call):
         place = place_of(item.value or Name((), item.place))
+        if item.upon is not None:
+            scope.complaints.add(no_block(item.name, item.upon, item.place))
+            return None
         if continuous:
             return Rate(label, CONTINUOUS, place)
         scope.complaints.error(
@@ -402,7 +405,7 @@ def _command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Pl
         scope.complaints.error(
             "D151",
             "a command is its kind and one value or course in time",
-            place,
+            item.upon or place,
             help=f"{servo.name} takes {known}: `{first}({EXAMPLE_SETPOINTS[owner.joint][first]})` or "
             f"`{first}(step(to = ...))`",
         )
@@ -563,6 +566,8 @@ def check_servo_definition(scope: Scope, name: str) -> None:
                 if not isinstance(inner, Call) and not _is_guide(scope, inner):
                     scope.names.evaluate(inner)
             words = {p.name: p for p in servo.parameters if p.shape == "word"}
+            for entry in filter(None, map(block.get, ("rate", "command"))):
+                refuse_block(entry)
             for key, item in block.items.items():
                 if key in NOT_PARAMETERS or key not in known or item.value is None:
                     continue
@@ -572,5 +577,5 @@ def check_servo_definition(scope: Scope, name: str) -> None:
                 try:
                     scope.evaluate(item)
                 except Problem as problem:
-                    if not (isinstance(item.value, Name) and servo.parameters):
+                    if item.upon is not None or not (isinstance(item.value, Name) and servo.parameters):
                         scope.complaints.add(*problem.diagnostics)

@@ -9,7 +9,7 @@ from typing import Any
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Name, String, Word
 from ic.meaning.definitions.csv_files import missing_column
-from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.definitions.merge import Item, MergedBlock, refuse_block
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.models import check_keys, use_model
 from ic.meaning.parameters.owner import Owner
@@ -103,6 +103,7 @@ def _columns(
 def _column_name(owner: Owner, item: Item | None, joint: str) -> str:
     if item is None:
         return joint
+    refuse_block(item)
     if isinstance(item.value, String):
         return item.value.value
     if isinstance(item.value, Name) and len(item.value.path) == 1:

@@ -25,6 +25,8 @@ class Item:
     kind       the word that added it ("link", "metric"); "" for a plain key
     detail     words after the name (`revolute`)
     value      what stands after `=`; None for a block. A call's named arguments and body are in `body`
+    upon       place of the block that was written upon its value, such as `j = drive;` and then `j { kp = 3; }`; the
+               latest of several, None where there is none
     overrides  places of what it replaced, latest first
     homes      definitions under whose names this entry is reached: the one that wrote it and those that took it over
     """
@@ -38,6 +40,7 @@ class Item:
     overrides: tuple[Place, ...] = ()
     appended: tuple[Expression, ...] = ()
     homes: tuple[str, ...] = ()
+    upon: Place | None = None
 
     @property
     def key(self) -> str:
@@ -207,15 +210,7 @@ class _Merger:
                 homes=self.home,
             )
         if earlier is not None and earlier.body is None and not isinstance(earlier.value, (Call, Name)):
-            raise Problem(
-                error(
-                    "D054",
-                    f"`{name}` is a value, not a block",
-                    entry.place,
-                    also=[Label(earlier.place, "written here")],
-                    help=f"write `{name} = ...;`",
-                )
-            )
+            raise Problem(no_block(name, entry.place, earlier.place))
         body = merge(
             earlier.body if earlier else None,
             entry.body,
@@ -226,7 +221,8 @@ class _Merger:
         )
         if earlier is None:
             return Item(kind, name, detail, None, body, entry.place, homes=self.home)
-        return replace(earlier, body=body, detail=detail or earlier.detail)
+        upon = entry.place if earlier.value is not None else None
+        return replace(earlier, body=body, detail=detail or earlier.detail, upon=upon)
 
     def _earlier(self, kind: str, name: str, place: Place) -> Item | None:
         if kind:
@@ -331,7 +327,9 @@ def overlay(base: MergedBlock, over: MergedBlock, complaints: Complaints) -> Mer
         if earlier is None:
             items[item.key] = replace(item, homes=())
         elif item.value is None and item.body is not None:
-            items[earlier.key] = replace(earlier, body=overlay(earlier.body or MergedBlock(), item.body, complaints))
+            body = overlay(earlier.body or MergedBlock(), item.body, complaints)
+            upon = item.place if earlier.value is not None else None
+            items[earlier.key] = replace(earlier, body=body, upon=upon)
         else:
             overrides = (*item.overrides, earlier.place, *earlier.overrides)
             items[earlier.key] = replace(item, kind=earlier.kind, homes=(), overrides=overrides)
@@ -372,6 +370,19 @@ def refuse_pending(block: MergedBlock, complaints: Complaints) -> None:
     """Report each `remove` of a block upon a name that turned out to have no entries of its own, such as a model's."""
     for entry in block.pending:
         complaints.add(_nothing(entry, block.items.values()))
+
+
+def no_block(name: str, place: Place, written: Place | None = None) -> Diagnostic:
+    """Says of a block, at this place, that an entry takes none. written: the value that it has, where it has one."""
+    also = [Label(written, "written here")] if written is not None else []
+    return error("D054", f"`{name}` is a value, not a block", place, also=also, help=f"write `{name} = ...;`")
+
+
+def refuse_block(item: Item) -> None:
+    """Raises Problem where a block is written upon the value of an entry that takes none: one that is a number or a
+    word, not the name of something with entries of its own."""
+    if item.upon is not None:
+        raise Problem(no_block(item.name, item.upon, item.place))
 
 
 def open_call(value: Expression, home: str | None, complaints: Complaints) -> tuple[Expression, MergedBlock | None]:

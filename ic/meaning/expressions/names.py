@@ -147,12 +147,15 @@ class Names:
             item = items.get(".".join(rest))
             if item is not None and item.value is not None:
                 return item.value
+            let = self.definitions.lets.get(first)
+            hidden = [f"it hides the components of `let {first}`: give one of the two another name"] if let else []
             raise Problem(
                 error(
                     "D065",
                     f"servo `{first}` writes no `{'.'.join(rest)}`",
                     name.place,
-                    help=[*did_you_mean(".".join(rest), items), known_words("it writes", items)],
+                    also=[Label(let.name.place, f"`let {first}`")] if let else [],
+                    help=[*hidden, *did_you_mean(".".join(rest), items), known_words("it writes", items)],
                 )
             )
         helps = list(did_you_mean(name.text, (*self.definitions.lets, *CONSTANTS)))

@@ -9,7 +9,7 @@ from dataclasses import replace
 from ic.grammar.syntax import Call, Expression, Name, Unary
 from ic.language import HEADS
 from ic.language.bodies import ARM, AT, AXIS, JOINT, JOINT_KINDS, JOINT_LIMITS, LINK, Q_MIN, RPY
-from ic.meaning.definitions.merge import Item, MergedBlock, with_meant_names
+from ic.meaning.definitions.merge import Item, MergedBlock, no_block, with_meant_names
 from ic.meaning.definitions.resolve import Definition
 from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.dh import use_dh
@@ -226,6 +226,9 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping
             owner.place, (key,), "D092", f"{owner.label} has no {key}", help=f"write `{key} = LINK;`"
         )
         return None
+    if item.upon is not None:
+        scope.complaints.add(no_block(item.name, item.upon, item.place))
+        return None
     name = None if isinstance(item.value, Call) else word_of(item.value)
     if name in known:
         return name
@@ -264,6 +267,10 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
             f"{owner.label} has no axis",
             help="write `axis = z;`, or x, y, -x, ... or [0, 0.6, 0.8]",
         )
+        return
+    if item.upon is not None:
+        scope.complaints.add(no_block(item.name, item.upon, item.place))
+        scope.checks.fail(owner.join("axis"))
         return
     named = _named_axis(item.value)
     value = item.value.operand if isinstance(item.value, Unary) else item.value

@@ -9,7 +9,7 @@ import numpy as np
 
 from ic.grammar.syntax import Name
 from ic.language.bodies import ATTITUDE, GRAPPLE, PAYLOAD, PAYLOAD_AT, PAYLOAD_RPY, POSITION, RATE, RELEASE, VELOCITY
-from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.definitions.merge import Item, MergedBlock, no_block
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.mechanics.matter import use_matter
 from ic.meaning.parameters import not_sweepable
@@ -112,6 +112,9 @@ def _link(scope: Scope, owner: Owner, item: Item | None, arm: ResolvedArm) -> st
             f"{owner.label} is on no link",
             help=["write `on = LINK;`, the link that carries or grapples it", known_words("links", known)],
         )
+        return None
+    if item.upon is not None:
+        scope.complaints.add(no_block(item.name, item.upon, item.place))
         return None
     name = item.value.text if isinstance(item.value, Name) else None
     if name in known or name in arm.failed:

@@ -35,8 +35,9 @@ def value_place(item: Item) -> Place:
 
 
 def overriding_place(item: Item) -> Place | None:
-    """The place of the first entry of a block put upon an entry's value; None where there is none."""
-    return next((each.place for each in item.body.items.values()), None) if item.body is not None else None
+    """The place of the first entry of a block put upon an entry's value, of the block where it is empty; None where
+    there is none."""
+    return next((each.place for each in item.body.items.values()), item.upon) if item.body is not None else None
 
 
 def words_chosen(parameters: Sequence[Parameter], body: MergedBlock) -> tuple[tuple[str, str], ...]:

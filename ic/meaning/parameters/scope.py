@@ -14,7 +14,7 @@ from typing import Any
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression, Name, Setting, String
-from ic.meaning.definitions.merge import Item
+from ic.meaning.definitions.merge import Item, no_block, refuse_block
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.command_line import (
     ON_COMMAND_LINE,
@@ -269,6 +269,10 @@ class Scope:
                 return None
             word, origin = wanted.default, Origin("default")
         else:
+            if item.upon is not None and isinstance(item.value, Name):
+                self.complaints.add(no_block(item.name, item.upon, item.place))
+                self.checks.fail(path)
+                return None
             named = item.value.text if isinstance(item.value, Name) else None
             if named is None or (wanted.words and not wanted.names and named not in wanted.words):
                 place = place_of(item.value) if item.value is not None else item.place
@@ -356,10 +360,11 @@ class Scope:
     def evaluate(self, item: Item, expression: Expression | None = None) -> Value | ValueList:
         """The value of the item's expression, lists with what `+=` appended. Raises Problem."""
         expression = item.value if expression is None else expression
+        refuse_block(item)
         if expression is None or (item.body is not None and not isinstance(expression, Call)):
-            raise Problem(
-                error("D054", f"`{item.name}` is a value, not a block", item.place, help=f"write `{item.name} = ...;`")
-            )
+            raise Problem(no_block(item.name, item.place))
+        if isinstance(expression, Call) and item.body is not None:
+            expression = replace(expression, body=())  # with names, which no function takes
         found = self.names.evaluate(expression)
         if not item.appended:
             return found

@@ -62,7 +62,7 @@ def resolve_base(scope: Scope, item: Item | None, arm: ResolvedArm) -> tuple[Bas
             help = "leave the block out"
             if kind == "free":
                 help = f"its state at the start stands in `initial`: {', '.join(INITIAL_OF_BASE)}"
-            scope.complaints.error("D250", f"a {kind} base takes no block", item.place, help=help)
+            scope.complaints.error("D250", f"a {kind} base takes no block", item.upon or item.place, help=help)
         return (Base("free", (), item.place), _standing(scope, item, arm)) if kind == "free" else (None, arm)
     courses = () if refuse_values(scope, item.value, COMPONENTS) else _courses(scope, item, body)
     return Base("prescribed", courses, item.place), _standing(scope, item, arm)

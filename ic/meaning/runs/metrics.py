@@ -64,7 +64,7 @@ def _metric(scope: Scope, item: Item, signals: ChannelTable, made: dict[str, Sig
             help=_write(metric),
         )
     elif of.value is None or of.body is not None:
-        scope.complaints.error("D125", "a channel is needed here", of.place, help=_write(metric))
+        scope.complaints.error("D125", "a channel is needed here", of.upon or of.place, help=_write(metric))
     else:
         channel = _watched(scope, of.value, metric, signals, made)
     if channel is None or of is None:

@@ -16,6 +16,7 @@ from batch.beds.filter_range import filter_range
 from batch.beds.sizing import Candidate, MotorFigures, PartVerdict, corners, gather, hottest, judge_part
 from hw.motor_parts import MotorPart
 from met import cli
+from met.analysis.margin import margins
 from met.analysis.shaft_work import ShaftWork
 from tests.met.analysis.test_shaft_work import PUSHED, compiled, work
 
@@ -229,6 +230,19 @@ def test_a_loop_that_is_not_stable_is_said_to_be_so(met_bed: Bed, here: Path) ->
     assert "stable with a margin of 1.5 of r at none of 10 to 500 Hz\n" in out
 
 
+@pytest.mark.parametrize("margin", ["nan", "inf", "-inf"])
+def test_a_margin_that_is_no_number_of_its_range_is_refused(met_bed: Bed, margin: str) -> None:
+    status, out, err = met_bed("size", "deck.ic", "push", "--joint", "swing", f"--margin={margin}")
+    assert (status, out) == (2, "")
+    assert f"Invalid value for '--margin': {margin} is not in the range 1.0<=x<=100.0.\n" in err
+
+
+def test_the_error_of_a_torque_constant_is_a_number(met_bed: Bed) -> None:
+    status, out, err = met_bed("identify", "deck.ic", "--port", "none", "--kt-load-error", "nan")
+    assert (status, out) == (2, "")
+    assert "Invalid value for '--kt-load-error': nan is not in the range 0.0<=x<=50.0.\n" in err
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -333,6 +347,24 @@ def test_the_range_of_filters_ends_where_the_law_is_unstable(tmp_path: Path) -> 
     assert len(found.good) == 5
     # the arm of another instant counts, too: 5 times 1.5 is beyond 5.35
     assert max(filter_range(at_two, "swing", [0], (2.0, 5.0), 1.5).good) < 50.0
+
+
+def test_an_arm_that_grows_beyond_all_that_is_searched_of_decks_is_looked_at(tmp_path: Path) -> None:
+    """`velocity_tracking` has no limit here: up to 2000 for the arm at the start, and as far as the run's arm asks."""
+    deck = compiled(tmp_path, ON_BED.format(mass=2 * 157.26062, law="velocity_tracking"), "bench")
+    [[at_start]] = margins(deck, [0])
+    own = filter_range(deck, "swing", [0], (2.0, 6365.0), 1.5).own
+    assert (at_start.limit, at_start.searched, at_start.stable) == (None, 2000.0, True)
+    assert (own.limit, own.least, own.together, own.searched, own.stable) == (None, 2.0, 6365.0, 3.0 * 6365.0, True)
+    [[alone]] = margins(compiled(tmp_path, ON_BED.format(mass=6365 * 157.26062, law="velocity_tracking"), "bench"), [0])
+    assert alone.stable and alone.together == pytest.approx(6365.0, rel=1e-6)
+
+
+def test_the_search_goes_as_far_as_the_margin_that_is_asked(tmp_path: Path) -> None:
+    deck = compiled(tmp_path, ON_BED.format(mass=2 * 157.26062, law="velocity_tracking"), "bench")
+    found = filter_range(deck, "swing", [0], (100.0, 100.0), 50.0)
+    assert found.own.limit is None and found.own.room >= 50.0
+    assert max(found.good) == found.tried[-1][0]
 
 
 def test_what_is_printed_is_laid_out_so(met_bed: Bed) -> None:

@@ -44,10 +44,26 @@ def test_a_deck_that_is_not_there_hides_nothing_of_the_others(capsys: pytest.Cap
 def test_programs_are_told_what_several_decks_have_in_common_once(capsys: pytest.CaptureFixture[str]) -> None:
     status, out, err = asked(capsys, "bad.ic", "worse.ic", "--format", "json")
     found = json.loads(out)
-    assert (status, err, found["errors"]) == (cli.BAD_INPUT, "", 4)
-    assert [each["shown"]["file"] for each in found["diagnostics"]] == ["bad.ic", "part.ic", "worse.ic", "part.ic"]
+    assert (status, err, found["errors"]) == (cli.BAD_INPUT, "", 3)
+    assert [each["shown"]["file"] for each in found["diagnostics"]] == ["bad.ic", "part.ic", "worse.ic"]
     _, out, _ = asked(capsys, "bad.ic", "bad.ic", "--format", "json")
     assert json.loads(out)["errors"] == 2
+
+
+def test_a_mistake_of_an_include_is_told_once_whatever_line_includes_it(capsys: pytest.CaptureFixture[str]) -> None:
+    """Also through one more file, and in every form for programs; its place in a macro is the same mistake's, too."""
+    part = PART.replace("recrod = [q];", "BAD").replace("#include <", "#define BAD recrod = [q];\n#include <")
+    Path("part.ic").write_text(part, encoding="utf-8")
+    Path("one.ic").write_text('#include "part.ic"\n', encoding="utf-8")
+    Path("two.ic").write_text('// the part\n#include "part.ic"\n', encoding="utf-8")
+    Path("three.ic").write_text('#include "one.ic"\n', encoding="utf-8")
+    decks = ("one.ic", "two.ic", "three.ic")
+    _, out, _ = asked(capsys, *decks, "--format", "json")
+    assert [each["code"] for each in json.loads(out)["diagnostics"]] == ["D109"]
+    _, out, _ = asked(capsys, *decks, "--format", "github")
+    assert out.count("::error ") == 1
+    _, out, _ = asked(capsys, *decks, "--format", "sarif")
+    assert len(json.loads(out)["runs"][0]["results"]) == 1
 
 
 def test_the_edits_of_the_json_mend_the_deck(capsys: pytest.CaptureFixture[str]) -> None:

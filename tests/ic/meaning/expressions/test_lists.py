@@ -108,6 +108,25 @@ def test_a_servo_of_the_name_comes_before_a_component(tmp_path: Path) -> None:
     assert number(tmp_path, "v.x", servo + V) == 3.0
 
 
+def test_that_a_servo_hides_the_components_of_a_vector_is_said(tmp_path: Path) -> None:
+    deck = "let v = [1, 2, 3] m;\nservo v { model = ideal; bandwidth = 4 1/s; }\nlet far = v.x;\n"
+    assert (
+        messages(check(tmp_path, deck))
+        == """\
+error[D065]: servo `v` writes no `x`
+ --> deck.ic:3:11
+  |
+3 | let far = v.x;
+  |           ^^^
+ ::: deck.ic:1:5  `let v`
+  = help: it hides the components of `let v`: give one of the two another name
+  = help: it writes: model, bandwidth
+
+1 error
+"""
+    )
+
+
 @pytest.mark.parametrize(
     ("expression", "wanted"),
     [
