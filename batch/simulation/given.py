@@ -2,47 +2,60 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
 from batch.notebook.quantities import number
+from batch.simulation.arguments import shown
+from ic.printing.columns import size as size_text
 from met.diagnostic import Problem, error
+from met.host.files import memory
 
 
 def values_in_si(given: Any, path: str, unit: str) -> np.ndarray:
     """The values given for a path in its SI unit: an array without dimensions for one, with one dimension for many.
 
-    given  a number, which is in SI; a text with a unit, "25 kg"; what has `magnitude` and `units`, as pint's quantities
-           do, or an xarray.DataArray with the attribute `units`; or a list or array of these
+    given  a real finite number, which is in SI; a text with a unit, "25 kg"; what has `magnitude` and `units`, as
+           pint's quantities do, or an xarray.DataArray with the attribute `units`; or a list or array of these
 
-    Raises Problem E386, E430.
+    Raises Problem E386 for a unit or a text that is wrong, E430 for a list inside a list, E431 for all else.
     """
-    if isinstance(given, str):
-        return np.array(number(given, path, unit))
-    magnitude, units = _measured(given)
-    if units is not None:
-        found = np.asarray(magnitude, dtype=np.float64)
-        scale = number(f"1 {units}", path, unit)
-        if found.ndim == 0:
-            return np.array(number(f"{float(found)!r} {units}", path, unit))
-        if scale == 1.0:
-            return _flat(found, path)
-        return np.array([number(f"{value!r} {units}", path, unit) for value in _flat(found, path).tolist()])
-    if isinstance(given, np.ndarray | list | tuple | range) or hasattr(given, "__array__"):
-        items = given if isinstance(given, list | tuple) else np.asarray(given)
-        if isinstance(items, np.ndarray) and items.dtype.kind in "iuf":
-            return _finite(_flat(items.astype(np.float64), path), path)
-        if all(type(each) in (float, int) for each in items):
-            return _finite(np.array(items, dtype=np.float64), path)
-        parts = [values_in_si(each, path, unit) for each in items]
-        if any(part.ndim for part in parts):
+    magnitude, units = measured(given)
+    items = magnitude if isinstance(magnitude, list | tuple | range) else None
+    if items is None and hasattr(magnitude, "__array__"):
+        array = np.asanyarray(magnitude)
+        if array.ndim > 1:
             raise Problem(
-                error("E430", f"`{path}` has a list inside a list", help="one value a case: a list of numbers")
+                error("E430", f"`{path}` has {array.ndim} dimensions", help="one value a case: `.ravel()` lists them")
             )
-        return np.array(parts)
-    return _finite(np.array(number(given, path, unit)), path)
+        plain = array.dtype.kind in "iuf" and not isinstance(array, np.ma.MaskedArray) and np.isfinite(array).all()
+        if array.ndim and plain and (units is None or number(f"1 {units}", path, unit) == 1.0):
+            return array.astype(np.float64)
+        items = list(array) if array.ndim else None
+    if items is None:
+        return np.array(_in_si(magnitude, units, path, unit, f"`{path}`"))
+    values = [_in_si(each, units, path, unit, f"value {at} of `{path}`") for at, each in enumerate(items)]
+    return np.array(values, dtype=np.float64)
+
+
+def real(given: Any) -> float | None:
+    """A real finite number, of Python or in an array without dimensions; None for all else: truth values, what is
+    masked, complex, or has a unit, and numbers beyond the largest of 64 bits."""
+    if not isinstance(given, float):
+        given, units = measured(given)
+        if hasattr(given, "__array__"):
+            given = np.asanyarray(given).tolist()
+        if units is not None or isinstance(given, bool) or not isinstance(given, Real):
+            return None
+    try:
+        found = float(given)
+    except OverflowError:
+        return None
+    return found if math.isfinite(found) else None
 
 
 def columns(given: Mapping[str, np.ndarray], *, product: bool) -> tuple[dict[str, np.ndarray], int]:
@@ -51,13 +64,14 @@ def columns(given: Mapping[str, np.ndarray], *, product: bool) -> tuple[dict[str
     product  False: several lists go in step, so all have one length; True: each value of one with each of the others,
              the last fastest, as the axes of a sweep
 
-    Raises Problem E430 where lengths differ, or a list is empty.
+    Raises Problem E430 where lengths differ, a list is empty, or a product has no room in memory.
     """
     lists = {path: values for path, values in given.items() if values.ndim}
     for path, values in lists.items():
         if not len(values):
             raise Problem(error("E430", f"`{path}` has no value", help="one at least, or leave it out"))
     if product:
+        check_room(math.prod(map(len, lists.values())), len(given))
         grid = np.meshgrid(*lists.values(), indexing="ij")
         lists = {path: values.reshape(-1) for path, values in zip(lists, grid, strict=True)}
     sizes = {path: len(values) for path, values in lists.items()}
@@ -77,8 +91,35 @@ def columns(given: Mapping[str, np.ndarray], *, product: bool) -> tuple[dict[str
     }, count
 
 
-def _measured(given: Any) -> tuple[Any, str | None]:
-    """The magnitude of a quantity, and its unit as MET reads one; the unit is None where it is no quantity."""
+def check_room(count: int, numbers: int) -> None:
+    """Raise Problem E430 where so many cases of so many numbers have no room in memory."""
+    needed = 8 * count * numbers
+    if needed > memory():
+        message = f"{count:,} cases take {size_text(needed)} of memory"
+        raise Problem(error("E430", message, help="run fewer at once, or `batch.run` a sweep into an archive"))
+
+
+def _in_si(given: Any, units: str | None, path: str, unit: str, where: str) -> float:
+    """One value in the SI unit of its path. units: those of the list that it is in; where: its name in a message."""
+    if isinstance(given, str) and units is None:
+        found: float | None = number(str(given), path, unit)
+    else:
+        magnitude, own = (given, None) if units is not None else measured(given)
+        if isinstance(magnitude, list | tuple | range) or (isinstance(magnitude, np.ndarray) and magnitude.ndim):
+            raise Problem(
+                error("E430", f"`{path}` has a list inside a list", help="one value a case: a list of numbers")
+            )
+        found, units = real(magnitude), own if units is None else units
+        if found is not None and units is not None:
+            found = number(f"{found!r} {units}", path, unit)
+    if found is None or not math.isfinite(found):
+        helps = 'a value is a number in SI, a text such as "25 kg", a quantity with its unit, or a list of these'
+        raise Problem(error("E431", f"{where} is not a finite number: {shown(given)}", help=helps))
+    return found
+
+
+def measured(given: Any) -> tuple[Any, str | None]:
+    """The magnitude of a quantity, and its unit as MET reads one; the unit is None where it has none."""
     units = getattr(given, "units", None)
     if units is not None and hasattr(given, "magnitude"):
         try:
@@ -87,22 +128,6 @@ def _measured(given: Any) -> tuple[Any, str | None]:
             text = str(units)
         return given.magnitude, text.replace("**", "^").replace(" ", "") or "1"
     attributes = getattr(given, "attrs", None)
-    if isinstance(attributes, Mapping) and "units" in attributes and hasattr(given, "values"):
-        return given.values, str(attributes["units"])
-    return None, None
-
-
-def _flat(values: np.ndarray, path: str) -> np.ndarray:
-    if values.ndim > 1:
-        raise Problem(
-            error("E430", f"`{path}` has {values.ndim} dimensions", help="one value a case: `.ravel()` lists them")
-        )
-    return _finite(values, path)
-
-
-def _finite(values: np.ndarray, path: str) -> np.ndarray:
-    if not np.isfinite(values).all():
-        at = int(np.flatnonzero(~np.isfinite(np.atleast_1d(values)))[0])
-        where = f"value {at} of `{path}`" if values.ndim else f"`{path}`"
-        raise Problem(error("E431", f"{where} is not a finite number: {float(np.atleast_1d(values)[at])}"))
-    return values
+    if isinstance(attributes, Mapping) and hasattr(given, "values"):
+        return given.values, str(attributes["units"]) if "units" in attributes else None
+    return given, None

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from batch.archive.in_memory import DatasetMaker
-from batch.simulation.given import columns, values_in_si
+from batch.simulation.arguments import PATHS, settings, shown, text_or_none, texts, whole
+from batch.simulation.given import check_room, columns, values_in_si
 from ic.driver.given_values import VariedRun, given_run
 from ic.printing.columns import size as size_text
 from ic.text.complaints import known_words
@@ -62,14 +63,13 @@ class Simulation:
     ) -> None:
         if (path is None) == (text is None):
             raise TypeError("a deck is given by its path or by its text")
-        settings = [f"{path}={value}" for path, value in set.items()] if isinstance(set, Mapping) else set
         self._given = given_run(
-            path or "",
-            run,
-            text=text,
-            include_dirs=tuple(include_dirs),
-            defines=tuple(defines),
-            settings=tuple(settings),
+            text_or_none(path, "path", PATHS) or "",
+            text_or_none(run, "run"),
+            text=text_or_none(text, "text"),
+            include_dirs=texts(include_dirs, "include_dirs", "E431", '["arms"]', PATHS),
+            defines=texts(defines, "defines", "E431", '["FAST=1"]'),
+            settings=settings(set),
         )
         self._programs: dict[tuple[tuple[str, ...], bool], SimulationProgram] = {}
         self._stepped: dict[object, SteppedProgram] = {}
@@ -102,11 +102,11 @@ class Simulation:
         histories  signals that are kept: False for none, True for all that the run records, or their names
         threads    None: as many as there are cores
         """
-        given = self._in_si(values or {})
-        table, count = columns(given, product=product)
-        if repeat != 1 and not (isinstance(repeat, int) and repeat > 1):
-            raise Problem(error("E431", f"`repeat` is a whole number, at least 1, and not {repeat!r}"))
+        repeat = whole(repeat, "repeat", least=1)
+        threads = None if threads is None else whole(threads, "threads", least=1)
+        table, count = columns(self._in_si(values), product=product)
         program = self._program({path: float(column[0]) for path, column in table.items()}, repeat > 1)
+        check_room(count * repeat, len(program.prepared.program.inputs) + len(program.prepared.program.outputs))
         program.varied.check(table, count)
         if repeat > 1:
             table = {path: np.repeat(column, repeat) for path, column in table.items()}
@@ -135,11 +135,12 @@ class Simulation:
         """
         from batch.simulation.stepping import SteppedRun, program
 
-        table, count = columns(self._in_si(values or {}), product=False)
+        repeat = whole(repeat, "repeat", least=0)
+        table, count = columns(self._in_si(values), product=False)
         if count > 1:
             raise Problem(error("E430", f"one case is stepped, and these values make {count}", help="give one each"))
-        kinds = dict(commands) if isinstance(commands, Mapping) else dict.fromkeys(_listed(commands), "")
-        seen = None if record is None else _listed(record)
+        kinds = _commanded(commands, table)
+        seen = None if record is None else texts(record, "record", "E432", '["tau"]')
         key = tuple(table), tuple(kinds.items()), seen, repeat > 0
         if key not in self._stepped:
             first = {path: (float(column[0]), self._units[path] or "1") for path, column in table.items()}
@@ -149,16 +150,20 @@ class Simulation:
         found.varied.check({**table, **zeros}, 1)
         return SteppedRun(found, {**table, **zeros}, repeat)
 
-    def _in_si(self, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        found = {}
+    def _in_si(self, values: Mapping[str, Any] | None) -> dict[str, np.ndarray]:
+        found: dict[str, np.ndarray] = {}
+        values = {} if values is None else values
+        if not isinstance(values, Mapping) or not all(isinstance(path, str) for path in values):
+            message = f"values are given by the paths of parameters, and not as {shown(values)}"
+            raise Problem(error("E431", message, help='by path: `{"gearbox.kp": 0.02}`'))
         for path, value in values.items():
             if path not in self._units:
                 self._units[path] = self._given.unit(path)
             unit = self._units[path]
             if unit is None:  # then this says what is wrong with the path
                 self._given.vary({path: (value if isinstance(value, str) and value.isidentifier() else 0.0, "1")})
-            elif unit == "" or isinstance(value, bool | np.bool_):
-                raise _no_number(path, value, unit)
+            elif unit == "":
+                raise _no_number(path, value)
             found[path] = values_in_si(value, path, unit or "1")
         return found
 
@@ -177,7 +182,7 @@ class Simulation:
         if histories is False:
             return ()
         known = [recorded.name for recorded in self.experiment.structure.record]
-        names = tuple(known) if histories is True else _listed(histories)
+        names = tuple(known) if histories is True else texts(histories, "histories", "E432", 'True`, or `["q"]')
         for name in names:
             if name not in known:
                 helps = [
@@ -193,9 +198,22 @@ class Simulation:
         return names
 
 
-def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
-    """Names, of which one may stand by itself."""
-    return (names,) if isinstance(names, str) else tuple(names)
+def _commanded(commands: Any, given: Iterable[str]) -> dict[str, str]:
+    """The kinds of commands by joint, "" for that of the deck. given: paths of values. Raises Problem E435."""
+    example = '["shoulder"]'
+    joints = texts(list(commands) if isinstance(commands, Mapping) else commands, "commands", "E435", example)
+    kinds = [""] * len(joints)
+    if isinstance(commands, Mapping):
+        kinds = list(texts(list(commands.values()), "commands", "E435", '{"shoulder": "torque"}'))
+    for at, joint in enumerate(joints):
+        if joint in joints[:at]:
+            raise Problem(error("E435", f"`commands` has joint `{joint}` twice", help="name each joint once"))
+        path = next((path for path in given if f"{path}.".startswith(f"{joint}.servo.command.")), None)
+        if path is not None:
+            message = f"`{path}` is given, and joint `{joint}` is commanded from outside"
+            helps = [f"leave `{path}` out, and tell `step` its command", f"or leave `{joint}` out of `commands`"]
+            raise Problem(error("E435", message, help=helps))
+    return dict(zip(joints, kinds, strict=True))
 
 
 def _cases(template: Cases, table: Mapping[str, np.ndarray], count: int, repeat: int) -> Cases:
@@ -205,11 +223,8 @@ def _cases(template: Cases, table: Mapping[str, np.ndarray], count: int, repeat:
     return replace(template, count=count * repeat, coordinates=tuple(made), repeats=repeats)
 
 
-def _no_number(path: str, value: Any, unit: str) -> Problem:
-    if unit == "":
-        message, helps = (
-            f"`{path}` is a word, not a number",
-            f'`batch.Simulation(..., set={{"{path}": {str(value)!r}}})`',
-        )
-        return Problem(error("E434", message, help=f"what decides the program is set once: {helps}"))
-    return Problem(error("E431", f"`{path}` = {value!r}: it must be a number"))
+def _no_number(path: str, value: Any) -> Problem:
+    helps = f'`batch.Simulation(..., set={{"{path}": {str(value)!r}}})`'
+    return Problem(
+        error("E434", f"`{path}` is a word, not a number", help=f"what decides the program is set once: {helps}")
+    )

@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from batch.simulation.arguments import shown
+from batch.simulation.given import measured, real
 from ic.driver.given_values import GivenRun, VariedRun
 from ic.text.complaints import known_words
 from met import run as engine
@@ -181,15 +183,17 @@ class SteppedRun:
             self.done = True
         return Observation(tick / self._base_hz, row[0, 0], self._program.columns)
 
-    def _checked(self, commands: Any) -> Any:
+    def _checked(self, commands: Any) -> list[float]:
         """The commands in a row, one for each joint. Raises Problem E436."""
-        try:
-            values = commands if hasattr(commands, "__len__") else (commands,)
-            good = len(values) == len(self._given) and all(map(math.isfinite, values))
-        except TypeError:
-            good = False
-        if not good:
-            message = f"commands are a finite number for each of {', '.join(self.joints)}, and not {commands!r}"
+        listed, units = measured(commands)
+        if hasattr(listed, "__array__"):
+            listed = np.atleast_1d(np.asanyarray(listed))
+        elif not isinstance(listed, list | tuple):
+            listed = [listed]
+        found = [real(each) for each in listed]
+        values = [value for value in found if value is not None]
+        if units is not None or not len(found) == len(values) == len(self._given):
+            message = f"commands are a finite number for each of {', '.join(self.joints)}, and not {shown(commands)}"
             order = ", in this order" if len(self.joints) > 1 else ""
             example = ", ".join(f"0.{place}" for place in range(1, 1 + min(len(self.joints), MOST_SHOWN)))
             more = ", ..." if len(self.joints) > MOST_SHOWN else ""

@@ -137,6 +137,18 @@ class Measured:
         self.magnitude, self.units = magnitude, units
 
 
+VALUES = 'a value is a number in SI, a text such as "25 kg", a quantity with its unit, or a list of these'
+"""What E431 says a value may be."""
+
+
+def nested(depth: int) -> list[object]:
+    """A list in a list in a list, so deep."""
+    found: list[object] = [1.0]
+    for _ in range(depth):
+        found = [found]
+    return found
+
+
 class TestValues:
     @pytest.mark.parametrize(
         "given",
@@ -183,8 +195,8 @@ class TestValues:
             ({"load": []}, "E430", "`load` has no value\n  one at least, or leave it out"),
             ({"load": [[1, 2]]}, "E430", "`load` has a list inside a list\n  one value a case: a list of numbers"),
             ({"load": np.ones((2, 2))}, "E430", "`load` has 2 dimensions\n  one value a case: `.ravel()` lists them"),
-            ({"load": [1.0, np.nan]}, "E431", "value 1 of `load` is not a finite number: nan"),
-            ({"load": True}, "E431", "`load` = True: it must be a number"),
+            ({"load": [1.0, np.nan]}, "E431", f"value 1 of `load` is not a finite number: nan\n  {VALUES}"),
+            ({"load": True}, "E431", f"`load` is not a finite number: True\n  {VALUES}"),
             ({"load": "25 m"}, "E386", "`load` = '25 m' is in m; it is in kg\n  write one such as \"0.5 kg\""),
             (
                 {"load": Measured(25, "furlong")},
@@ -213,6 +225,82 @@ class TestValues:
         with pytest.raises(Problem) as caught:
             arm.run(values)
         assert str(caught.value) == f"{code}: {said}"
+
+    @pytest.mark.parametrize(
+        ("given", "where", "shown"),
+        [
+            (10**400, "`load`", f"1{'0' * 17}...{'0' * 19}"),
+            ([1, 10**400], "value 1 of `load`", f"1{'0' * 17}...{'0' * 19}"),
+            pytest.param(10**5000, "`load`", "<int>", id="beyond what Python prints"),
+            ("1e999 kg", "`load`", "'1e999 kg'"),
+            (np.ma.array([1.0, 2.0], mask=[False, True]), "value 1 of `load`", "masked"),
+            (Measured(np.ma.array([1.0, 2.0], mask=[False, True]), "kg"), "value 1 of `load`", "masked"),
+            (np.array([True]), "value 0 of `load`", "np.True_"),
+            (np.array([1j]), "value 0 of `load`", "np.complex128(1j)"),
+            (np.array(["2020-01-01"], "M8[D]"), "value 0 of `load`", "np.datetime64('2020-01-01')"),
+            (np.timedelta64(5, "s"), "`load`", "np.timedelta64(5,'s')"),
+            (np.zeros(2, [("a", float)]), "value 0 of `load`", "np.void((0.0,...('a', '<f8')])"),
+            (Measured("x", "kg"), "`load`", "'x'"),
+            (Measured(1j, "kg"), "`load`", "1j"),
+            (Measured(10**400, "kg"), "`load`", f"1{'0' * 17}...{'0' * 19}"),
+            (xarray.DataArray(["a"], attrs={"units": "kg"}), "value 0 of `load`", "np.str_('a')"),
+            (None, "`load`", "None"),
+            ({"a": 1}, "`load`", "{'a': 1}"),
+            ({1}, "`load`", "{1}"),
+            (b"12", "`load`", "b'12'"),
+        ],
+    )
+    def test_what_is_no_real_finite_number_is_refused(
+        self, arm: batch.Simulation, given: object, where: str, shown: str
+    ) -> None:
+        with pytest.raises(Problem) as caught:
+            arm.run({"load": given})
+        assert str(caught.value) == f"E431: {where} is not a finite number: {shown}\n  {VALUES}"
+
+    @pytest.mark.parametrize("given", [nested(3000), [1, [2]], [Measured([1, 2], "kg")], Measured([[1]], "kg")])
+    def test_a_list_inside_a_list_is_refused(self, arm: batch.Simulation, given: object) -> None:
+        with pytest.raises(Problem) as caught:
+            arm.run({"load": given})
+        assert str(caught.value) == "E430: `load` has a list inside a list\n  one value a case: a list of numbers"
+
+    @pytest.mark.parametrize("values", [[1], "abc", 0, {1: 2}, {None: 1}, [("load", 1)]])
+    def test_values_are_given_by_path(self, arm: batch.Simulation, values: Any) -> None:
+        for call in (arm.run, lambda given: arm.start(given, commands="elbow")):
+            with pytest.raises(Problem) as caught:
+                call(values)
+            assert str(caught.value) == (
+                f"E431: values are given by the paths of parameters, and not as {values!r}\n"
+                '  by path: `{"gearbox.kp": 0.02}`'
+            )
+
+    def test_a_product_that_memory_has_no_room_for_is_refused_before_it_is_made(self, arm: batch.Simulation) -> None:
+        many = np.full(1_000_000, 0.1)
+        with pytest.raises(Problem) as caught:
+            arm.run({"load": many, "gearbox.kp": many}, product=True)
+        assert str(caught.value) == (
+            "E430: 1,000,000,000,000 cases take 14.6 TiB of memory\n"
+            "  run fewer at once, or `batch.run` a sweep into an archive"
+        )
+
+    def test_repeats_that_memory_has_no_room_for_are_refused(self) -> None:
+        with pytest.raises(Problem) as caught:
+            batch.Simulation(text=NOISY, run="noisy").run(repeat=10**12)
+        assert str(caught.value).startswith("E430: 1,000,000,000,000 cases take ")
+
+    @pytest.mark.parametrize("name", ["repeat", "threads"])
+    @pytest.mark.parametrize("given", [True, 0, -1, 1.5, float("nan"), "a", 10**400])
+    def test_repeats_and_threads_are_whole_numbers(self, arm: batch.Simulation, name: str, given: object) -> None:
+        with pytest.raises(Problem) as caught:
+            arm.run({"load": 1}, **{name: given})  # type: ignore[arg-type]
+        assert str(caught.value).startswith(f"E431: `{name}` is a whole number, at least 1 and below 2^53, and not ")
+
+    @pytest.mark.parametrize("given", [None, 1, [None], b"q", {"q": 1}])
+    def test_histories_are_names(self, arm: batch.Simulation, given: Any) -> None:
+        with pytest.raises(Problem) as caught:
+            arm.run({"load": 1}, histories=given)
+        assert str(caught.value) == (
+            f'E432: `histories` is one text or a list of texts, and not {given!r}\n  write `histories=True`, or `["q"]`'
+        )
 
     def test_a_wrong_name_is_told_with_the_right_one(self, arm: batch.Simulation) -> None:
         with pytest.raises(Problem) as caught:
@@ -307,6 +395,29 @@ class TestWhichRun:
         for given in ({}, {"path": "two_link.ic", "text": "x"}):
             with pytest.raises(TypeError, match="a deck is given by its path or by its text"):
                 batch.Simulation(**given)  # type: ignore[arg-type]
+
+    @pytest.mark.parametrize(
+        ("given", "said"),
+        [
+            ({"text": b"x"}, "`text` is a text, and not b'x'"),
+            ({"path": 5}, "`path` is a text, and not 5"),
+            ({"path": "two_link.ic", "run": 5}, "`run` is a text, and not 5"),
+            ({"path": "two_link.ic", "set": 5}, "`set` is one text or a list of texts, and not 5"),
+            ({"path": "two_link.ic", "set": {5: 1}}, "`set` is one text or a list of texts, and not [5]"),
+            ({"path": "two_link.ic", "set": b"a=1"}, "`set` is one text or a list of texts, and not b'a=1'"),
+            ({"path": "two_link.ic", "defines": 5}, "`defines` is one text or a list of texts, and not 5"),
+            ({"path": "two_link.ic", "include_dirs": 5}, "`include_dirs` is one text or a list of texts, and not 5"),
+        ],
+    )
+    def test_what_is_no_text_is_refused(self, given: dict[str, Any], said: str) -> None:
+        with pytest.raises(Problem) as caught:
+            batch.Simulation(**given)
+        (found,) = caught.value.diagnostics
+        assert (found.code, found.message) == ("E431", said)
+
+    def test_one_text_is_one_setting(self) -> None:
+        sim = batch.Simulation("two_link.ic", set="duration=1 s")
+        assert sim.experiment.structure.schedule.duration == 1.0
 
     def test_what_is_given_comes_before_what_is_set(self) -> None:
         sim = batch.Simulation(text=ARM, run="reach", set={"gearbox.kp": "0.03 V*s/rad", "load": "5 kg"})

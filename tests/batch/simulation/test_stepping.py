@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import gc
 import os
+from typing import Any
 
 import numpy as np
 import pytest
+import xarray
 
 import batch
 from met.diagnostic import Problem
 from tests.batch.simulation.arms import ARM, NOISY
-from tests.batch.simulation.test_run import resident
+from tests.batch.simulation.test_run import Measured, resident
 
 BOTH = ("shoulder", "elbow")
 
@@ -171,6 +173,16 @@ class TestBeginningsAndEnds:
             "ab",
             ["0", "1"],
             None,
+            [10**400, 1],
+            np.ma.array([1.0, 2.0], mask=[False, True]),
+            np.array([1j, 0.0]),
+            [True, False],
+            {0.1: 1, 0.2: 2},
+            {0.1, 0.2},
+            b"ab",
+            [[0.1], [0.2]],
+            Measured([0.1, 0.2], "deg/s"),
+            xarray.DataArray([0.1, 0.2], attrs={"units": "deg/s"}),
         ],
     )
     def test_commands_are_one_finite_number_each(self, arm: batch.Simulation, commands: object) -> None:
@@ -236,6 +248,48 @@ class TestWhatIsRefused:
             batch.Simulation(text=TABLES, run="swing").start(commands={"elbow": "acceleration"})
         (found,) = caught.value.diagnostics
         assert found.code == "D152" and found.message.endswith("takes no command `acceleration`")
+
+    @pytest.mark.parametrize("kinds", [["shoulder"], {"shoulder": "torque"}])
+    def test_a_given_command_of_a_joint_that_is_commanded_from_outside(self, arm: batch.Simulation, kinds: Any) -> None:
+        with pytest.raises(Problem) as caught:
+            arm.start({"shoulder.servo.command.value": 0.3}, commands=kinds)
+        assert str(caught.value) == (
+            "E435: `shoulder.servo.command.value` is given, and joint `shoulder` is commanded from outside\n"
+            "  leave `shoulder.servo.command.value` out, and tell `step` its command\n"
+            "  or leave `shoulder` out of `commands`"
+        )
+        arm.start({"elbow.servo.command.value": 0.3}, commands="shoulder").step(0.1)
+
+    @pytest.mark.parametrize(
+        ("asked", "code", "said"),
+        [
+            ({"commands": ["shoulder", "shoulder"]}, "E435", "`commands` has joint `shoulder` twice"),
+            *(
+                ({"commands": given}, "E435", f"`commands` is one text or a list of texts, and not {shown}")
+                for given, shown in [
+                    (None, "None"),
+                    (5, "5"),
+                    ([1], "[1]"),
+                    ({"shoulder"}, "{'shoulder'}"),
+                    ({1: "rate"}, "[1]"),
+                    ({"shoulder": 5}, "[5]"),
+                ]
+            ),
+            *(
+                ({"record": given}, "E432", f"`record` is one text or a list of texts, and not {given!r}")
+                for given in (5, [None], b"q")
+            ),
+            *(
+                ({"repeat": given}, "E431", f"`repeat` is a whole number, at least 0 and below 2^53, and not {given!r}")
+                for given in ("a", -1, float("nan"), True, 1.0, 2**53)
+            ),
+        ],
+    )
+    def test_arguments_that_are_none(self, arm: batch.Simulation, asked: dict[str, Any], code: str, said: str) -> None:
+        with pytest.raises(Problem) as caught:
+            arm.start(**{"commands": "elbow", **asked})
+        (found,) = caught.value.diagnostics
+        assert (found.code, found.message) == (code, said)
 
     def test_a_continuous_law_takes_commands_once_it_has_a_rate(self) -> None:
         sim = batch.Simulation(text=TABLES, run="smooth", set={"shoulder.servo.rate": "100 Hz"})
