@@ -115,8 +115,8 @@ def answers(path: Path) -> dict[str, Said]:
         for group in file.groups:
             each = SearchAnswer.of(group)
             assert each is not None
-            [(_, exact)], [(_, rounded)] = each.settings(), each.settings(exact=False)
-            found[group.name] = Said(each.found, each.position, exact, rounded)
+            [chosen], [(_, rounded)] = each.values(), each.shown()
+            found[group.name] = Said(each.found, each.position, chosen.text, rounded)
     return found
 
 
@@ -404,6 +404,8 @@ def test_results_that_cannot_be_read_back_stop_it(here: Path, plan: Plan, monkey
     [
         ("search", "guess"), ("search_goal", "minimise nothing"), ("search_goal", "far"), ("search_at_most", 0),
         ("search_at_most", "many"), ("search_plants", -1), ("search_margin", 1.5), ("search_seed", -1),
+        ("search_at_most", 20), ("search_plants", 4), ("search_plants", 10_000), ("search_against", ""),
+        ("search", "search"),
     ],
 )  # fmt: skip
 def test_an_archive_that_says_of_a_search_what_none_is_is_no_archive(
@@ -414,6 +416,41 @@ def test_an_archive_that_says_of_a_search_what_none_is_is_no_archive(
     (here / "a.h5").write_bytes(undisturbed)
     with h5py.File(here / "a.h5", "r+") as file:
         file["still"].attrs[name] = value
+    with pytest.raises(Problem) as refused, ArchiveFile(here / "a.h5") as file:
+        [SearchAnswer.of(group) for group in file.groups]
+    assert [each.code for each in refused.value.diagnostics] == ["E302"]
+
+
+COORDINATE = "environment.held.stiffness"
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "value"),
+    [
+        (COORDINATE, 3, math.nan), (COORDINATE, 3, math.inf), (COORDINATE, 0, 1.99), (COORDINATE, -1, 9.01),
+        ("generation", 0, 1), ("generation", -1, 0), ("generation", -1, 1 << 62), ("generation", 1, -1),
+    ],
+)  # fmt: skip
+def test_an_archive_whose_cases_no_search_asks_for_is_no_archive(
+    here: Path, undisturbed: bytes, name: str, at: int, value: float
+) -> None:
+    import h5py
+
+    (here / "a.h5").write_bytes(undisturbed)
+    with h5py.File(here / "a.h5", "r+") as file:
+        file["still"][name][at] = value
+    with pytest.raises(Problem) as refused, ArchiveFile(here / "a.h5") as file:
+        [SearchAnswer.of(group) for group in file.groups]
+    assert [each.code for each in refused.value.diagnostics] == ["E302"]
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 9.0), (-1.0, 9.0), (-9.0, 0.0), (math.nan, 9.0), (2.0, math.inf)])
+def test_ends_without_a_ratio_are_none_of_equal_ratios(here: Path, undisturbed: bytes, low: float, high: float) -> None:
+    import h5py
+
+    (here / "a.h5").write_bytes(undisturbed)
+    with h5py.File(here / "a.h5", "r+") as file:
+        file["still"][COORDINATE].attrs.update({"low": low, "high": high, "steps": "ratios"})
     with pytest.raises(Problem) as refused, ArchiveFile(here / "a.h5") as file:
         [SearchAnswer.of(group) for group in file.groups]
     assert [each.code for each in refused.value.diagnostics] == ["E302"]
