@@ -341,6 +341,15 @@ def test_it_is_said_beforehand_and_afterwards(here: Path, capsys: pytest.Capture
     assert told["serves"] and told["tried"] == told["against"] == 5 and told["case"] == answer.position
 
 
+def test_a_search_of_one_case_has_an_answer(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "d.ic").write_text(DECK.replace(f"at_most = {AT_MOST};", "at_most = 1;"))
+    assert main(["run", "d.ic", "back", "--no-picture", "-q"]) == 0
+    capsys.readouterr()
+    assert main(["best", "d.back.h5"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("hardest: far = ") and "\n  the least far of 1 case in 1 generation\n" in said
+
+
 def test_progress_tells_the_best_so_far(here: Path, plan: Plan) -> None:
     class Heard:
         def __init__(self) -> None:
