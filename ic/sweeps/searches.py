@@ -216,7 +216,7 @@ class _SearchReader:
             self.margin = float(number)
             return
         if not plain or not float(number).is_integer() or not 1 <= float(number) <= MOST_SEARCHED:
-            message = f"`at_most` is a whole number of cases from 1 to {MOST_SEARCHED}"
+            message = f"`at_most` is a whole number of cases from 1 to {MOST_SEARCHED:,}"
             raise Problem(error("D363", message, found.place, help="write `at_most = 2000;`"))
         self.at_most, self.at_most_place = int(number), found.place
 
@@ -369,7 +369,7 @@ def _against(
                                 help="leave it out of `--set`"))  # fmt: skip
     count = int(np.prod([axis.size for axis in sweep.axes]))
     if count > MOST_PLANTS:
-        message = f"sweep `{name.text}` has {count} cases, and a tuning is held against {MOST_PLANTS} at most"
+        message = f"sweep `{name.text}` has {count:,} cases, and a tuning is held against {MOST_PLANTS:,} at most"
         raise Problem(error("D364", message, place, also=also, help="a hundred drawn at random tell most: draw fewer"))
     return sweep
 

@@ -350,6 +350,22 @@ def test_a_search_of_one_case_has_an_answer(here: Path, capsys: pytest.CaptureFi
     assert said.startswith("hardest: far = ") and "\n  the least far of 1 case in 1 generation\n" in said
 
 
+def test_a_case_behind_the_first_generation_is_one_of_its_archive(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "d.ic").write_text(DECK)
+    assert main(["run", "d.ic", "back", "--case", "#150"]) == 2
+    assert capsys.readouterr().err == (
+        "error[E311]: no case `#150`\n"
+        " = help: each case of the search `back` follows from those before: run one again from its archive: "
+        "`met run ARCHIVE.h5 --case '#150'`\n"
+        "\n1 error\n"
+    )
+    assert main(["run", "d.ic", "back", "loads", "--case", "#150"]) == 2
+    said = capsys.readouterr().err
+    assert "`back` follows" in said and " = help: `loads` has #0 to #4\n" in said
+
+
 def test_progress_tells_the_best_so_far(here: Path, plan: Plan) -> None:
     class Heard:
         def __init__(self) -> None:

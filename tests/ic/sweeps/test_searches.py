@@ -182,7 +182,8 @@ def lines(text: str) -> list[str]:
             "error[D363]: search `most` does not say how many cases it may run",
             "= help: write `at_most = 2000;`: it never runs more"]),
         ("at_most = 100;", "at_most = 0;", [
-            "error[D363]: `at_most` is a whole number of cases from 1 to 1000000", "= help: write `at_most = 2000;`"]),
+            "error[D363]: `at_most` is a whole number of cases from 1 to 1,000,000",
+            "= help: write `at_most = 2000;`"]),
         ("at_most = 100;", "at_most = 100;  at_most = 90;", [
             "error[D040]: `at_most` is written twice", "= help: leave one out"]),
         ("drive.kp = between(0.01, 0.02) V*s/rad;", "", [
