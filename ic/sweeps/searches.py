@@ -273,9 +273,12 @@ class _SearchReader:
             message = f"`{name}` goes from a lower to a higher value"
             remedy = "change the two about, or leave the parameter out where they are equal"
             raise Problem(error("D361", message, high.place, help=remedy))
-        if RANGES[name] and not ends[0] * ends[1] > 0.0:
+        if RANGES[name] and not (ends[0] > 0.0 or ends[1] < 0.0):
             message = "the ends of a `logbetween` are both above or both below zero"
             raise Problem(error("D361", message, low.place, help="`between` has no such limit"))
+        if not np.isfinite(ends[1] - ends[0]):
+            message = f"the ends of this `{name}` are too far apart: their difference is no number"
+            raise Problem(error("D361", message, high.place, help="take ends that a machine could have"))
         shown = unit or low.unit or high.unit
         text = shown.text if shown is not None and measure_of(shown).dimension == low.dimension else ""
         parameter = SearchedParameter(path, *ends, RANGES[name], text)

@@ -194,6 +194,9 @@ def lines(text: str) -> list[str]:
         ("between(0.01, 0.02)", "logbetween(0, 0.02)", [
             "error[D361]: the ends of a `logbetween` are both above or both below zero",
             "= help: `between` has no such limit"]),
+        ("between(0.01, 0.02)", "between(-1e308, 1e308)", [
+            "error[D361]: the ends of this `between` are too far apart: their difference is no number",
+            "= help: take ends that a machine could have"]),
         ("between(0.01, 0.02)", "between(0.01)", [
             "error[D361]: `between` takes two numbers, the lower end and the higher",
             "= help: write `between(LOW, HIGH) UNIT`"]),
