@@ -14,11 +14,13 @@ A coordinate that is chosen has its ends in SI, `low` and `high`, and `steps`, `
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from batch.archive.stored import Stored, StoredGroup
-from met.plan.searches import MOST_PLANTS, MOST_SEARCHED, Search, SearchedParameter
+from met.plan.searches import MOST_PLANTS, MOST_SEARCHED, SHORTEST, Search, SearchedParameter
 
 GENERATION = "generation"
 """The variable that says which generation asked for each case."""
@@ -57,7 +59,8 @@ def of_coordinate(search: Search | None, path: str) -> dict[str, Any]:
 
 
 def why_unsound(group: StoredGroup) -> str:
-    """Why a group says of a search what none is; empty where it is one, or says nothing."""
+    """Why a group says of a search what none is; empty where it is one, or says nothing. Its cases
+    rise, and it has some."""
     told = group.attributes
     if "search" not in told:
         return ""
@@ -78,11 +81,55 @@ def why_unsound(group: StoredGroup) -> str:
     margin = told.get("search_margin", 0.0)
     if not isinstance(margin, float) or not 0.0 <= margin < 1.0:
         return "attribute `search_margin` is no share"
-    chosen = [each for each in group.role("coordinate") if "low" in each.attributes]
-    if not chosen or not all(map(_is_range, chosen)) or list(group.role("coordinate"))[: len(chosen)] != chosen:
+    coordinates = list(group.role("coordinate"))
+    chosen = [each for each in coordinates if "low" in each.attributes]
+    if not chosen or not all(map(_is_range, chosen)) or coordinates[: len(chosen)] != chosen:
         return "its search chooses nothing that it could"
-    if GENERATION not in group.variables or group.type(GENERATION) != "<i8" or group.values(GENERATION).min() < 0:
+    if GENERATION not in group.variables or group.type(GENERATION) != "<i8":
         return f"variable `{GENERATION}` is missing or of another type"
+    if group.variables[GENERATION].dims != ("case",):
+        return f"variable `{GENERATION}` is not over cases"
+    return (
+        _why_not_against(told, more=len(coordinates) - len(chosen))
+        or _why_not_asked(group)
+        or _why_not_in(group, chosen)
+    )
+
+
+def _why_not_against(told: Mapping[str, Any], *, more: int) -> str:
+    """Why a search cannot be held against the plants that are told. more: coordinates that are not chosen."""
+    against, plants, tunes = told.get("search_against", ""), told.get("search_plants", 0), told["search"] == "tune"
+    if not bool(against) == bool(plants) == (more > 0):
+        return "attribute `search_plants` is not of its coordinates"
+    if not tunes and (plants or told.get("search_margin", 0.0)):
+        return "a tuning alone is held against something"
+    least = max(plants + SHORTEST if tunes else 1, told["cases_in_table"])
+    return "" if told["search_at_most"] >= least else "attribute `search_at_most` is less than its cases"
+
+
+def _why_not_asked(group: StoredGroup) -> str:
+    """Why its cases were not asked for in these generations: they rise from 0, and each has a case."""
+    generation, case = (group.values(name).astype(np.int64) for name in (GENERATION, "case"))
+    if case[-1] >= group.attributes["cases_in_table"]:
+        return "its cases are more than its table has"
+    later = np.diff(generation, prepend=0)
+    if generation.min() < 0 or later.min() < 0 or (later > np.diff(case, prepend=0)).any():
+        return f"variable `{GENERATION}` has a value that it cannot have"
+    return ""
+
+
+def _why_not_in(group: StoredGroup, chosen: Sequence[Stored]) -> str:
+    """Why a coordinate that is chosen cannot have its values, or be tried so often."""
+    columns = [group.values(each.name) for each in chosen]
+    for each, values in zip(chosen, columns, strict=True):
+        if not ((values >= each.attributes["low"]) & (values <= each.attributes["high"])).all():
+            return f"variable `{each.name}` has a value that it cannot have"
+    if plants := group.attributes.get("search_plants", 0):
+        order = np.lexsort(columns)
+        new = np.any([np.diff(values[order]) != 0.0 for values in columns], axis=0)
+        tried = np.diff(np.concatenate([[0], np.flatnonzero(new) + 1, [len(order)]]))
+        if tried.max() > plants:
+            return "attribute `search_plants` is less than it was tried with"
     return ""
 
 
@@ -91,7 +138,7 @@ def _is_range(variable: Stored) -> bool:
     if not isinstance(low, float) or not isinstance(high, float) or not -math.inf < low < high < math.inf:
         return False
     steps = variable.attributes.get("steps")
-    return steps == "equal" or (steps == "ratios" and low * high > 0.0)
+    return high - low < math.inf if steps == "equal" else steps == "ratios" and (low > 0.0 or high < 0.0)
 
 
 def is_search(group: StoredGroup) -> bool:

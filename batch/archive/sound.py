@@ -94,10 +94,10 @@ def check(group: StoredGroup) -> None:
             raise Unlike(f"variable `{name}` is not of the size of its dimensions")
         _of_its_role(variable, types)
     _names(group)
-    if why := searched.why_unsound(group):
-        raise Unlike(why)
     _requirements(group)
     _values(group)
+    if why := searched.why_unsound(group):
+        raise Unlike(why)
 
 
 def _names(group: StoredGroup) -> None:

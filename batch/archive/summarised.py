@@ -76,6 +76,9 @@ COUNTS = ("finite", "infinite", "unknown", "cause_cases", "judged_cases", "judge
           "judged_no_value")  # fmt: skip
 """Variables that are numbers of cases."""
 
+ROUNDING = 1e-9
+"""A mean may lie outside the extremes by this share of the larger one."""
+
 
 @frozen
 class CaseSummary:
@@ -151,17 +154,70 @@ def _check(found: CaseSummary, group: StoredGroup) -> None:
         if not are_cases(group, some).all():
             raise Unlike(f"variable `{NAME}/{name}` names a case that it does not have")
     _within("cause_status", values["cause_status"], DOUBTFUL, LOST)
-    required = group.shape("requirement")[0] if "requirement" in group.variables else 0
-    _within("judged_requirement", values["judged_requirement"], 0, required - 1)
-    _within("judged_point", values["judged_point"], -1, len(values["point"]) - 1)
+    for name in ("point", "judged"):
+        _need(name, values[name] == np.arange(len(values[name])))
     for name, role in (("summed_metric", "metric"), ("chosen", "coordinate")):
         if not {variable.name for variable in group.role(role)}.issuperset(values[name].tolist()):
             raise Unlike(f"variable `{NAME}/{name}` names what it does not have")
+    doubtful = values["cause_status"] == DOUBTFUL
+    for some in (doubtful, ~doubtful):
+        _need("cause_cases", values["cause_cases"][some].sum() <= found.cases)
+    overflows = _check_metrics(found)
+    _check_judged(found, group, overflows=overflows)
+
+
+def _check_metrics(found: CaseSummary) -> bool:
+    """Check that every case has its place in the counts of each metric, and that its moments go with its extremes; True
+    where values are so far apart that their moments overflow. Raises Unlike."""
+    values = found.values
+    finite, least, most = values["finite"], values["least"], values["most"]
+    _need("finite", finite + values["infinite"] + values["unknown"] == found.cases)
+    some = finite > 0
+    for name in ("least", "most", "mean", "variance"):
+        _need(name, np.isnan(values[name][finite < (2 if name == "variance" else 1)]))
+    for name in ("least", "most"):
+        _need(name, np.isfinite(values[name][some]))
+    _need("least", least[some] <= most[some])
+    with np.errstate(over="ignore"):
+        span, near = most - least, ROUNDING * np.maximum(np.abs(least), np.abs(most))
+        sums, squares = (np.isfinite(power * found.cases) for power in (span, span * (span * found.cases)))
+        _need("mean", ((least - near <= values["mean"]) & (values["mean"] <= most + near))[some & sums])
+        _need("variance", ((values["variance"] >= 0.0) & (values["variance"] <= span * span))[(finite > 1) & squares])
+    _need("variance", ~(values["variance"] < 0.0))
+    return not squares[some].all()
+
+
+def _check_judged(found: CaseSummary, group: StoredGroup, *, overflows: bool) -> None:
+    """Check that each requirement has a row of all cases, and of a share of cases one for each design point as well.
+    Raises Unlike."""
+    values = found.values
+    required = group.shape("requirement")[0] if "requirement" in group.variables else 0
+    of, at, cases = (values[f"judged_{name}"] for name in ("requirement", "point", "cases"))
+    _within("judged_requirement", of, 0, required - 1)
+    _within("judged_point", at, -1, len(values["point"]) - 1)
+    _within("judged_cases", cases, 1, found.cases)
+    _need("judged_missed", values["judged_missed"] + values["judged_unknown"] <= cases)
+    _need("judged_no_value", values["judged_no_value"] <= values["judged_unknown"])
+    _need("judged_deviation", ~(values["judged_deviation"] < 0.0))
+    if not overflows:
+        for name in ("judged_mean", "judged_deviation"):
+            _need(name, ~np.isinf(values[name]))
+    _need("judged_point", len(set(zip(of.tolist(), at.tolist(), strict=True))) == len(of))
+    _need("judged_requirement", np.bincount(of[at < 0], minlength=required) == 1)
+    _need("judged_cases", cases[at < 0] == found.cases)
+    if required:
+        shares = np.atleast_1d(group.variables["requirement"].attributes.get("share", np.full(required, np.nan)))
+        parts = [int(cases[(of == number) & (at >= 0)].sum()) for number in range(required)]
+        _need("judged_cases", np.array(parts) == np.where(np.isnan(shares), 0, found.cases))
+
+
+def _need(name: str, sound: np.ndarray | bool) -> None:
+    if not np.all(sound):
+        raise Unlike(f"variable `{NAME}/{name}` has a value that it cannot have")
 
 
 def _within(name: str, values: np.ndarray, low: int, high: int) -> None:
-    if values.size and not (values.min() >= low and values.max() <= high):
-        raise Unlike(f"variable `{NAME}/{name}` has a value that it cannot have")
+    _need(name, (values >= low) & (values <= high))
 
 
 def _values(inside: Any, name: str) -> np.ndarray:

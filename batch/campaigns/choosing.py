@@ -9,6 +9,7 @@ import numpy as np
 
 from batch.archive.rows import row_of
 from met.diagnostic import Problem, error
+from met.outputs import quoted
 from met.plan import Experiment, Plan, keys
 from met.plan.columns import CaseValues, all_rows, row_at
 from met.plan.swept import blocks
@@ -49,9 +50,12 @@ def select_rows(
             last: dict[str, int] = {}
             for e in experiments:
                 last[e.name_in_deck] = max(last.get(e.name_in_deck, 0), int(e.cases.table[-1]))
-            counts = ", ".join(f"`{name}` has #0 {f'to #{row}' if row else 'alone'}" for name, row in last.items())
+            begun = [e.name_in_deck for e in experiments if e.search is not None and not e.search.complete]
+            listed = {name: row for name, row in last.items() if name not in begun}
+            counts = ", ".join(f"`{name}` has #0 {f'to #{row}' if row else 'alone'}" for name, row in listed.items())
             meant = [f"a position is written `'#{case}'`"] if isinstance(case, str) and case.isdecimal() else []
-            helps = [*meant, counts, "`met cases DECK` lists them"]
+            of_decks = [counts, "`met cases DECK` lists them"] if listed else []
+            helps = [*meant, *(_of_search(name, case) for name in begun), *of_decks]
             raise Problem(error("E311", f"no case `{_case_text(case)}`", help=helps))
         if len(matches) > 1 and not _is_row(case):
             some = ", ".join(f"#{e.cases.table[row]} of `{e.name_in_deck}`" for e, row in matches[:4])
@@ -62,6 +66,12 @@ def select_rows(
         for experiment, row in matches:
             found[experiment.name].add(row)
     return [(e, np.array(sorted(found[e.name]), dtype=np.int64)) for e in experiments if found[e.name]]
+
+
+def _of_search(name: str, case: int | str) -> str:
+    """What to do instead, where a case may be one of a search that is yet to run."""
+    again = f"`met run ARCHIVE.h5 --case {quoted(_case_text(case))}`"
+    return f"each case of the search `{name}` follows from those before: run one again from its archive: {again}"
 
 
 def _id_of(experiment: Experiment, row: int) -> str:

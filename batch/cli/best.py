@@ -58,6 +58,7 @@ def best(
     import shutil
 
     from batch.archive.read import ArchiveFile
+    from batch.archive.searched import search_of
     from batch.queries.best import Designs
     from batch.queries.groups import groups_named
     from batch.queries.pool import pools
@@ -70,7 +71,8 @@ def best(
 
     with ArchiveFile(archive) as file:
         file.need_every_row("choosing among designs")
-        found = [each for each in pools(groups_named(file, [experiment] if experiment else [])) if each.count > 1]
+        found = pools(groups_named(file, [experiment] if experiment else []))
+        found = [each for each in found if each.count > 1 or search_of(each.groups[0]) is not None]
         if not found:
             helps = "a sweep has several: `vary`, `sample`"
             raise Problem(error("E395", f"{archive} has no designs to choose among: each run is one case", help=helps))

@@ -142,7 +142,7 @@ class SearchAnswer:
     @property
     def _cases(self) -> str:
         generations = f"{self.generations:,} generation{'s' * (self.generations != 1)}"
-        return f"{self.group.count:,} cases in {generations}"
+        return f"{self.group.count:,} case{'s' * (self.group.count != 1)} in {generations}"
 
     @property
     def _cause(self) -> list[str]:

@@ -216,7 +216,7 @@ class _SearchReader:
             self.margin = float(number)
             return
         if not plain or not float(number).is_integer() or not 1 <= float(number) <= MOST_SEARCHED:
-            message = f"`at_most` is a whole number of cases from 1 to {MOST_SEARCHED}"
+            message = f"`at_most` is a whole number of cases from 1 to {MOST_SEARCHED:,}"
             raise Problem(error("D363", message, found.place, help="write `at_most = 2000;`"))
         self.at_most, self.at_most_place = int(number), found.place
 
@@ -273,9 +273,12 @@ class _SearchReader:
             message = f"`{name}` goes from a lower to a higher value"
             remedy = "change the two about, or leave the parameter out where they are equal"
             raise Problem(error("D361", message, high.place, help=remedy))
-        if RANGES[name] and not ends[0] * ends[1] > 0.0:
+        if RANGES[name] and not (ends[0] > 0.0 or ends[1] < 0.0):
             message = "the ends of a `logbetween` are both above or both below zero"
             raise Problem(error("D361", message, low.place, help="`between` has no such limit"))
+        if not np.isfinite(ends[1] - ends[0]):
+            message = f"the ends of this `{name}` are too far apart: their difference is no number"
+            raise Problem(error("D361", message, high.place, help="take ends that a machine could have"))
         shown = unit or low.unit or high.unit
         text = shown.text if shown is not None and measure_of(shown).dimension == low.dimension else ""
         parameter = SearchedParameter(path, *ends, RANGES[name], text)
@@ -369,7 +372,7 @@ def _against(
                                 help="leave it out of `--set`"))  # fmt: skip
     count = int(np.prod([axis.size for axis in sweep.axes]))
     if count > MOST_PLANTS:
-        message = f"sweep `{name.text}` has {count} cases, and a tuning is held against {MOST_PLANTS} at most"
+        message = f"sweep `{name.text}` has {count:,} cases, and a tuning is held against {MOST_PLANTS:,} at most"
         raise Problem(error("D364", message, place, also=also, help="a hundred drawn at random tell most: draw fewer"))
     return sweep
 

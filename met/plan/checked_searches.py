@@ -46,7 +46,9 @@ def _check_parameters(experiment: Experiment, search: Search, where: str) -> Non
             raise Damaged(f"{where}[{index}].path", f"`{each.path}` is not coordinate {index} of the cases")
         if not -math.inf < each.low < each.high < math.inf:
             raise Damaged(f"{where}[{index}].low", "the ends should be finite, and rise")
-        if each.logarithmic and not each.low * each.high > 0.0:
+        if each.high - each.low == math.inf:
+            raise Damaged(f"{where}[{index}].low", "the ends are too far apart")
+        if each.logarithmic and not (each.low > 0.0 or each.high < 0.0):
             raise Damaged(f"{where}[{index}].low", "both ends should be above or below 0")
         try:
             if each.unit:

@@ -211,12 +211,22 @@ def _normal(at: np.ndarray, mean: float, deviation: float) -> np.ndarray:
     return np.asarray(mean + deviation * ndtri(at), dtype=float)
 
 
+def _loguniform(at: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Quantiles by equal ratios, of ends on one side of 0; by their logarithms where no double holds their ratio."""
+    with np.errstate(over="ignore", under="ignore"):
+        ratio = np.float64(high) / low
+    if np.finfo(float).tiny <= ratio < np.inf:
+        return np.asarray(low * np.exp(np.log(ratio) * at))
+    first, last = np.log(np.abs([low, high]))
+    return np.asarray(np.sign(low) * np.exp(first + (last - first) * at))
+
+
 ARGUMENTS: Mapping[str, int] = {"uniform": 2, "loguniform": 2, "normal": 2, "truncated": 4}
 """How many arguments each distribution has."""
 
 QUANTILES: Mapping[str, Callable[..., np.ndarray]] = {
     "uniform": lambda at, low, high: low + (high - low) * at,
-    "loguniform": lambda at, low, high: low * np.exp(np.log(high / low) * at),
+    "loguniform": _loguniform,
     "normal": _normal,
     "truncated": _truncated,
 }

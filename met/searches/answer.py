@@ -119,7 +119,8 @@ def _ends(search: Search, case: np.ndarray) -> list[tuple[str, str]]:
     for each, value in zip(search.parameters, case.tolist(), strict=False):
         share = (value - each.low) / (each.high - each.low)
         if each.logarithmic:
-            share = np.log(value / each.low) / np.log(each.high / each.low)
+            at, low, high = np.log(np.abs([value, each.low, each.high]))
+            share = (at - low) / (high - low)
         if not NEAR < share < 1.0 - NEAR:
             found.append((each.path, "lower" if share < 0.5 else "upper"))
     return found

@@ -361,6 +361,31 @@ def test_it_is_said_beforehand_and_afterwards(here: Path, capsys: pytest.Capture
     assert told["serves"] and told["tried"] == told["against"] == 5 and told["case"] == answer.position
 
 
+def test_a_search_of_one_case_has_an_answer(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (here / "d.ic").write_text(DECK.replace(f"at_most = {AT_MOST};", "at_most = 1;"))
+    assert main(["run", "d.ic", "back", "--no-picture", "-q"]) == 0
+    capsys.readouterr()
+    assert main(["best", "d.back.h5"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("hardest: far = ") and "\n  the least far of 1 case in 1 generation\n" in said
+
+
+def test_a_case_behind_the_first_generation_is_one_of_its_archive(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "d.ic").write_text(DECK)
+    assert main(["run", "d.ic", "back", "--case", "#150"]) == 2
+    assert capsys.readouterr().err == (
+        "error[E311]: no case `#150`\n"
+        " = help: each case of the search `back` follows from those before: run one again from its archive: "
+        "`met run ARCHIVE.h5 --case '#150'`\n"
+        "\n1 error\n"
+    )
+    assert main(["run", "d.ic", "back", "loads", "--case", "#150"]) == 2
+    said = capsys.readouterr().err
+    assert "`back` follows" in said and " = help: `loads` has #0 to #4\n" in said
+
+
 def test_progress_tells_the_best_so_far(here: Path, plan: Plan) -> None:
     class Heard:
         def __init__(self) -> None:
@@ -424,6 +449,8 @@ def test_results_that_cannot_be_read_back_stop_it(here: Path, plan: Plan, monkey
     [
         ("search", "guess"), ("search_goal", "minimise nothing"), ("search_goal", "far"), ("search_at_most", 0),
         ("search_at_most", "many"), ("search_plants", -1), ("search_margin", 1.5), ("search_seed", -1),
+        ("search_at_most", 20), ("search_plants", 4), ("search_plants", 10_000), ("search_against", ""),
+        ("search", "search"),
     ],
 )  # fmt: skip
 def test_an_archive_that_says_of_a_search_what_none_is_is_no_archive(
@@ -434,6 +461,41 @@ def test_an_archive_that_says_of_a_search_what_none_is_is_no_archive(
     (here / "a.h5").write_bytes(undisturbed)
     with h5py.File(here / "a.h5", "r+") as file:
         file["still"].attrs[name] = value
+    with pytest.raises(Problem) as refused, ArchiveFile(here / "a.h5") as file:
+        [SearchAnswer.of(group) for group in file.groups]
+    assert [each.code for each in refused.value.diagnostics] == ["E302"]
+
+
+COORDINATE = "environment.held.stiffness"
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "value"),
+    [
+        (COORDINATE, 3, math.nan), (COORDINATE, 3, math.inf), (COORDINATE, 0, 1.99), (COORDINATE, -1, 9.01),
+        ("generation", 0, 1), ("generation", -1, 0), ("generation", -1, 1 << 62), ("generation", 1, -1),
+    ],
+)  # fmt: skip
+def test_an_archive_whose_cases_no_search_asks_for_is_no_archive(
+    here: Path, undisturbed: bytes, name: str, at: int, value: float
+) -> None:
+    import h5py
+
+    (here / "a.h5").write_bytes(undisturbed)
+    with h5py.File(here / "a.h5", "r+") as file:
+        file["still"][name][at] = value
+    with pytest.raises(Problem) as refused, ArchiveFile(here / "a.h5") as file:
+        [SearchAnswer.of(group) for group in file.groups]
+    assert [each.code for each in refused.value.diagnostics] == ["E302"]
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 9.0), (-1.0, 9.0), (-9.0, 0.0), (math.nan, 9.0), (2.0, math.inf)])
+def test_ends_without_a_ratio_are_none_of_equal_ratios(here: Path, undisturbed: bytes, low: float, high: float) -> None:
+    import h5py
+
+    (here / "a.h5").write_bytes(undisturbed)
+    with h5py.File(here / "a.h5", "r+") as file:
+        file["still"][COORDINATE].attrs.update({"low": low, "high": high, "steps": "ratios"})
     with pytest.raises(Problem) as refused, ArchiveFile(here / "a.h5") as file:
         [SearchAnswer.of(group) for group in file.groups]
     assert [each.code for each in refused.value.diagnostics] == ["E302"]

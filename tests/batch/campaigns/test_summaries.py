@@ -334,6 +334,24 @@ UNSOUND = {
     "a case without a row": ("judged_worst_case", 0, 7),
     "a requirement that is none": ("judged_requirement", 0, 99),
     "a design point that is none": ("judged_point", 3, 4),
+    "a row of no case": ("judged_cases", 0, 0),
+    "more that miss or are unknown than a row has": ("judged_unknown", 0, 600),
+    "more without a value than are unknown": ("judged_no_value", 0, 600),
+    "a requirement with two rows of all cases": ("judged_requirement", 0, 1),
+    "a row of a design point with other cases": ("judged_cases", -1, 149),
+    "numbers of rows that are not theirs": ("judged", 0, 1 << 62),
+    "numbers of points that are not theirs": ("point", 0, -1),
+    "cases that a metric does not count": ("finite", 0, 0),
+    "a mean that is no number": ("mean", 0, math.nan),
+    "a mean that is infinite": ("mean", 0, math.inf),
+    "a mean beyond the largest value": ("mean", 0, 1e9),
+    "a variance that is no number": ("variance", 0, math.nan),
+    "a variance that is infinite": ("variance", 0, math.inf),
+    "a variance below 0": ("variance", 0, -1.0),
+    "a least value above the largest": ("least", 0, 1e9),
+    "a largest value that is no number": ("most", 0, math.nan),
+    "a mean of a requirement that is infinite": ("judged_mean", 0, math.inf),
+    "a deviation of a requirement below 0": ("judged_deviation", 0, -1.0),
 }
 
 
@@ -350,8 +368,7 @@ def test_a_forged_summary_is_told(here: Path, tmp_path: Path, what: str) -> None
 
 def test_numbers_that_are_forged_are_only_shown(here: Path, tmp_path: Path) -> None:
     with changed(Path("many.summary.h5"), tmp_path) as (copy, file):
-        file[f"{NAME}/judged_mean"][:] = math.inf
+        file[f"{NAME}/judged_mean"][:] = 1e300
         file[f"{NAME}/judged_bound"][:] = -math.inf
-        file[f"{NAME}/variance"][:] = -1.0
     for words in (("--no-plots",), ("--evidence",), ("--format", "json")):
         assert met("show", str(copy), *words).status == 0

@@ -182,7 +182,8 @@ def lines(text: str) -> list[str]:
             "error[D363]: search `most` does not say how many cases it may run",
             "= help: write `at_most = 2000;`: it never runs more"]),
         ("at_most = 100;", "at_most = 0;", [
-            "error[D363]: `at_most` is a whole number of cases from 1 to 1000000", "= help: write `at_most = 2000;`"]),
+            "error[D363]: `at_most` is a whole number of cases from 1 to 1,000,000",
+            "= help: write `at_most = 2000;`"]),
         ("at_most = 100;", "at_most = 100;  at_most = 90;", [
             "error[D040]: `at_most` is written twice", "= help: leave one out"]),
         ("drive.kp = between(0.01, 0.02) V*s/rad;", "", [
@@ -193,6 +194,9 @@ def lines(text: str) -> list[str]:
         ("between(0.01, 0.02)", "logbetween(0, 0.02)", [
             "error[D361]: the ends of a `logbetween` are both above or both below zero",
             "= help: `between` has no such limit"]),
+        ("between(0.01, 0.02)", "between(-1e308, 1e308)", [
+            "error[D361]: the ends of this `between` are too far apart: their difference is no number",
+            "= help: take ends that a machine could have"]),
         ("between(0.01, 0.02)", "between(0.01)", [
             "error[D361]: `between` takes two numbers, the lower end and the higher",
             "= help: write `between(LOW, HIGH) UNIT`"]),

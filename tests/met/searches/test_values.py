@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
+from met.plan.searches import SearchedParameter
 from met.searches.values import MET, MISSED, UNKNOWN, hurt, missed, served, short
 
 
@@ -77,3 +80,16 @@ def test_without_requirements_the_goal_alone_decides() -> None:
     goal = np.array([3.0, -1.0, np.nan, np.inf])
     found = served(goal, True, np.ones(4, bool), [], {"goal": goal}, 0.0)
     assert np.argsort(found).tolist() == [3, 0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(1e-300, 1e300), (-1e300, -1e-300), (1e-200, 1e-190), (5e-324, 1.7e308), (0.02, 3.0)]
+)
+def test_equal_ratios_are_equal_steps_however_far_apart_the_ends_are(low: float, high: float) -> None:
+    at = np.linspace(0.0, 1.0, 21)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        values = SearchedParameter("kp", low, high, logarithmic=True).values(at)
+    assert (np.diff(values) > 0.0).all() and values[0] == low and values[-1] == high
+    exact = [math.log(abs(low)) * (1.0 - share) + math.log(abs(high)) * share for share in at.tolist()]
+    assert np.log(np.abs(values))[1:-1] == pytest.approx(exact[1:-1], abs=1e-9)
