@@ -12,8 +12,8 @@ import numpy as np
 
 from met.diagnostic import Problem, error
 
-BELOW = 2**53
-"""Whole numbers below this are exact in the kernel's 64-bit numbers."""
+BELOW = 2**32
+"""Numbers of repeats are below this, as in a plan (met/plan/check.py)."""
 
 
 def shown(given: Any) -> str:
@@ -27,7 +27,7 @@ def shown(given: Any) -> str:
 def whole(given: Any, name: str, *, least: int) -> int:
     """An argument that is a whole number. Raises Problem E431."""
     if not isinstance(given, Integral) or isinstance(given, bool) or not least <= int(given) < BELOW:
-        said = f"`{name}` is a whole number, at least {least} and below 2^53, and not {shown(given)}"
+        said = f"`{name}` is a whole number, at least {least} and below 2^32, and not {shown(given)}"
         raise Problem(error("E431", said, help=f"write `{name}={max(least, 1)}`, or leave it out"))
     return int(given)
 

@@ -187,7 +187,7 @@ class SteppedRun:
         """The commands in a row, one for each joint. Raises Problem E436."""
         listed, units = measured(commands)
         if hasattr(listed, "__array__"):
-            listed = np.atleast_1d(np.asanyarray(listed))
+            listed = np.atleast_1d(np.asanyarray(listed)).tolist()
         elif not isinstance(listed, list | tuple):
             listed = [listed]
         found = [real(each) for each in listed]
