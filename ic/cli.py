@@ -80,7 +80,7 @@ def check(
 
 @frozen
 class _Checked:
-    """What `met check` found in one file: its plan, None where it has none, and messages.
+    """The findings of `met check` in one file: its plan, None where it has none, and messages.
 
     allowed  warnings that runs allow, each with how and why they do
     """
@@ -142,8 +142,8 @@ def _complain_together(found: Iterable[_Checked], form: str) -> None:
 
 
 def _whoever_includes(part: object) -> object:
-    """What a message says, and where, but for the files that include the one that it is in: two that are equal are the
-    same mistake, found by way of two decks."""
+    """The words of a message and its place, but for the files that include the one that it is in: two that are equal
+    are the same mistake, found by way of two decks."""
     if isinstance(part, tuple):
         return tuple(map(_whoever_includes, part))
     if is_dataclass(part):

@@ -11,20 +11,19 @@ from collections.abc import Iterable, Mapping
 
 from met.messages.alike import did_you_mean, meant, nearest
 from met.messages.message import (
-    Change,
     Diagnostic,
     Expansion,
     Help,
     Label,
     Place,
     Severity,
+    TextChange,
     leave_out,
     write,
     write_either,
 )
 
 __all__ = [
-    "Change",
     "Diagnostic",
     "Expansion",
     "Help",
@@ -32,6 +31,7 @@ __all__ = [
     "Place",
     "Problem",
     "Severity",
+    "TextChange",
     "did_you_mean",
     "error",
     "leave_out",

@@ -142,7 +142,7 @@ def _fits(verdict: PartVerdict) -> str:
 
 
 def _binding(verdict: PartVerdict) -> str:
-    """What binds, or what its source leaves out."""
+    """The figure that binds, or those that its source leaves out."""
     if verdict.fits is None or verdict.binds is None:
         return f"not given: {', '.join(verdict.missing)}"
     return _check(verdict.binds)

@@ -191,7 +191,7 @@ def corners(points: np.ndarray) -> np.ndarray:
 
 @frozen
 class BedFigures:
-    """What a bed must do for one joint over all cases of an experiment.
+    """The demands on a bed of one joint over all cases of an experiment.
 
     drive, load  the motors, on the deck's shaft
     both         of both together, what a common supply has: `returned_peak`, W, and `returned_energy`, J

@@ -69,7 +69,7 @@ def select_rows(
 
 
 def _of_search(name: str, case: int | str) -> str:
-    """What to do instead, where a case may be one of a search that is yet to run."""
+    """Remedies where a case may be one of a search that is yet to run."""
     again = f"`met run ARCHIVE.h5 --case {quoted(_case_text(case))}`"
     return f"each case of the search `{name}` follows from those before: run one again from its archive: {again}"
 

@@ -47,7 +47,7 @@ def campaign_key(values: Sequence[CampaignSection]) -> str:
 
 
 def _search_of(section: CampaignSection) -> list[Any]:
-    """What decides which cases a search asks for, besides its first ones, of a tuning also the limits that its cases
+    """All that decides which cases a search asks for besides its first ones; of a tuning also the limits that its cases
     are worth more or less by; nothing of what is no search."""
     experiment = section.prepared.experiment
     search = experiment.search

@@ -12,7 +12,7 @@ from met.frozen import frozen
 
 @frozen
 class LinearAnswer:
-    """What `batch.linear` gives: the answers as they are found (`found.poles`, `.natural`, `.loops`), and as data."""
+    """The answer of `batch.linear`, as it is found (`found.poles`, `.natural`, `.loops`) and as data."""
 
     found: Linearized
 

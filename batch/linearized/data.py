@@ -24,7 +24,7 @@ def arrays(found: Linearized) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
 
 
 def axes(found: Linearized) -> dict[str, tuple[str, ...]]:
-    """What stands along each axis."""
+    """The names along each axis."""
     plant = found.plant
     return {
         "state": found.states,

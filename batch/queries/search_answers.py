@@ -100,7 +100,7 @@ class SearchAnswer:
         return bool((self.group.values("status") == DONE).all() and (outcomes(self.group) == 1).all())
 
     def values(self) -> list[WrittenValue]:
-        """What is chosen, for a deck's text or `--set`."""
+        """The chosen values, for a deck's text or `--set`."""
         found = []
         for each, variable in zip(self.search.parameters, self.group.role("coordinate"), strict=False):
             value = float(self.group.at(variable.name, [self.found.case])[0])
@@ -108,7 +108,7 @@ class SearchAnswer:
         return found
 
     def shown(self) -> list[tuple[str, str]]:
-        """What is chosen, to four digits: each path, and its value as a deck would write it."""
+        """The chosen values, to four digits: each path, and its value as a deck would write it."""
         found = []
         for each, variable in zip(self.values(), self.group.role("coordinate"), strict=False):
             scale = float(variable.attributes.get("deck_scale", 1.0))

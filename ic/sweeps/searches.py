@@ -146,7 +146,7 @@ class _SearchReader:
 
     @property
     def usage(self) -> str:
-        """How a parameter that is chosen is written."""
+        """An example of a parameter that is chosen, as a deck writes it."""
         return f"{f'{CHOOSE} ' * self.tunes}PATH = between(LOW, HIGH) UNIT;"
 
     def enter(self, entry: object) -> None:

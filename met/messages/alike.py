@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from met.messages.message import Change, Help
+from met.messages.message import Help, TextChange
 
 
 def nearest(word: str, known: Iterable[str], cutoff: float = 0.6) -> str | None:
@@ -25,4 +25,4 @@ def meant(word: str, known: Iterable[str]) -> str | None:
 def did_you_mean(word: str, known: Iterable[str]) -> tuple[str, ...]:
     """The help line that offers the word that may have been meant, with the change that writes it; or none."""
     close = meant(word, known)
-    return (Help(f"did you mean `{close}`?", Change(close, word)),) if close is not None else ()
+    return (Help(f"did you mean `{close}`?", TextChange(close, word)),) if close is not None else ()

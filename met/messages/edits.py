@@ -1,8 +1,8 @@
 """Edits of a deck's text that do what a message's help says: a file, a stretch of it, and what to write there.
 
-A help carries a `Change`, which knows a place and a word. Here the text itself is looked at, and an edit is given only
-where that word stands there, in a file that is the user's own, and as no part of a macro's body: an edit in a macro
-would change all its uses, and one of the library's decks those of everyone.
+A help carries a `TextChange`, which knows a place and a word. Here the text itself is looked at, and an edit is given
+only where that word stands there, in a file that is the user's own, and as no part of a macro's body: an edit in a
+macro would change all its uses, and one of the library's decks those of everyone.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from met.frozen import frozen
-from met.messages.message import Change, Diagnostic, Help, Place, shown_place
+from met.messages.message import Diagnostic, Help, Place, TextChange, shown_place
 
 
 @frozen
@@ -49,7 +49,7 @@ def apply(edit: Edit, text: str) -> str:
     return text[:first] + edit.text + text[last:]
 
 
-def _edit(change: Change, place: Place, sources: Mapping[str, str]) -> Edit | None:
+def _edit(change: TextChange, place: Place, sources: Mapping[str, str]) -> Edit | None:
     text = sources.get(place.file)
     if text is None or place.file.startswith("<") or shown_place(place) is not place:
         return None
@@ -66,7 +66,9 @@ def _edit(change: Change, place: Place, sources: Mapping[str, str]) -> Edit | No
     return _between(place.file, starts, *found)
 
 
-def _stretch(change: Change, text: str, line: tuple[int, int], first: int, last: int) -> tuple[int, int, str] | None:
+def _stretch(
+    change: TextChange, text: str, line: tuple[int, int], first: int, last: int
+) -> tuple[int, int, str] | None:
     """The first offset and the last of what is replaced, and the text that is put there; None where there is no such.
 
     line         where the place's line begins and ends

@@ -49,8 +49,8 @@ class Label:
 
 
 @frozen
-class Change:
-    """What a line of help says to write, as a change of the deck's text (`met.messages.edits` finds its stretch).
+class TextChange:
+    """The change that a line of help asks for in the deck's text (`met.messages.edits` finds its stretch).
 
     new    the text to write; "" where something is left out
     old    the words in whose place it stands, of which one at least is at the place; None: all of the place
@@ -75,9 +75,9 @@ class Help(str):
 
     __slots__ = ("changes",)
 
-    changes: tuple[Change, ...]
+    changes: tuple[TextChange, ...]
 
-    def __new__(cls, text: str, *changes: Change) -> Help:
+    def __new__(cls, text: str, *changes: TextChange) -> Help:
         made = super().__new__(cls, text)
         made.changes = changes
         return made
@@ -86,20 +86,20 @@ class Help(str):
 def write(
     new: str, text: str = "", *, old: str | None = None, at: Place | None = None, where: Where = "instead"
 ) -> Help:
-    """The help which says to write this, "write `2 m`" or the text given, with its change; see `Change`."""
-    return Help(text or f"write `{new}`", Change(new, old, at, where))
+    """The help which says to write this, "write `2 m`" or the text given, with its change; see `TextChange`."""
+    return Help(text or f"write `{new}`", TextChange(new, old, at, where))
 
 
 def write_either(news: Iterable[str], text: str = "", *, old: str | None = None, where: Where = "instead") -> Help:
     """The help which says to write one of these, "write `30 deg` or `30 rad`", or a text that ends so."""
     texts = tuple(news)
     said = f"{text}write {' or '.join(f'`{each}`' for each in texts)}"
-    return Help(said, *(Change(each, old, None, where) for each in texts))
+    return Help(said, *(TextChange(each, old, None, where) for each in texts))
 
 
 def leave_out(text: str, at: Place | None = None) -> Help:
     """The help which says to leave an entry of a block out, with its change: the entry that the place stands in."""
-    return Help(text, Change("", None, at, "entry"))
+    return Help(text, TextChange("", None, at, "entry"))
 
 
 @frozen

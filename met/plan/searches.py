@@ -47,7 +47,7 @@ class SearchedParameter:
 
 @frozen
 class Search:
-    """What is searched for, and within which bounds.
+    """A search or a tuning: its goal, and the bounds of what it chooses.
 
     kind         "search": the case that hurts most; "tune": the parameters that serve best;  of: the run's name
     metric       the goal, and `largest`: whether it is to be that

@@ -17,8 +17,8 @@ from met.searches.robust import RobustTuning
 
 
 class SearchMethod(Protocol):
-    """How a search goes on: it asks for cases, a generation at a time, each of them once. What it asks for depends on
-    the search and on what it was told alone, to the bit."""
+    """The way in which a search goes on: it asks for cases, a generation at a time, each of them once. The cases follow
+    from the search and from what it was told alone, to the bit."""
 
     def ask(self) -> np.ndarray:
         """Coordinates of the next generation's cases, SI, [case, coordinate]; none, when it has ended."""

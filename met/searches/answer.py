@@ -21,7 +21,7 @@ class NamedLimit(MetricLimit, Protocol):
 
 @frozen
 class Room:
-    """How far a value is inside a limit, as a share of it; beyond it where that is below 0. text: the requirement."""
+    """The distance of a value inside a limit, as a share of it; below 0 where it is beyond. text: the requirement."""
 
     text: str
     share: float
@@ -109,7 +109,7 @@ def _met(limit: MetricLimit, values: np.ndarray, done: np.ndarray) -> np.ndarray
 
 
 def _room(limit: MetricLimit, values: np.ndarray) -> float:
-    """How far the worst of these values is inside a limit, as a share of it, or in SI where it is 0."""
+    """The distance of the worst of these values inside a limit, as a share of it, or in SI where it is 0."""
     inside = limit.limit - values if limit.comparison.startswith("<") else values - limit.limit
     return float(np.min(inside)) / (abs(limit.limit) or 1.0)
 

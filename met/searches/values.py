@@ -45,7 +45,7 @@ def hurt(goal: np.ndarray, largest: bool, done: np.ndarray) -> np.ndarray:
 
 
 def missed(limit: MetricLimit, values: np.ndarray) -> np.ndarray:
-    """How far the values of its metric are beyond a limit, as a share of it, or in SI where that is 0; 0 within;
+    """The distance of the values of its metric beyond a limit, as a share of it, or in SI where that is 0; 0 within;
     not-a-number stays so."""
     return np.maximum(0.0, -_inside(limit, values) / (abs(limit.limit) or 1.0))
 

@@ -142,7 +142,7 @@ PRODUCTS: Mapping[str, Callable[..., Any]] = {**PLAIN, "fma": lambda a, b, c: a 
 def values(
     section: TangentSection, leaf: Callable[[Node], Any], opposite: Collection[int] = ()
 ) -> Callable[[int], Any]:
-    """What each reference of a section is worth: numbers are floats, tangents floats or arrays.
+    """The worth of each reference of a section: numbers are floats, tangents floats or arrays.
 
     leaf      gives what a cell, an input, the tick and the time are
     opposite  positions of nodes of kinks that take the other side

@@ -17,7 +17,7 @@ from ic.meaning.expressions.remedies import unit_remedy
 from ic.meaning.parameters.owner import Owner
 from ic.text.complaints import Complaints
 from met import units
-from met.diagnostic import Change, Help, Place, Problem, error, write, write_either
+from met.diagnostic import Help, Place, Problem, TextChange, error, write, write_either
 from met.parameter import Parameter
 from met.plan import JointKind
 from met.trace import Real, Scalar
@@ -264,5 +264,5 @@ class ValueChecks:
 def _one_unit_for_all(written: Iterable[str]) -> Help:
     """The help for a list of bare numbers, which a unit behind its bracket is for."""
     shown = either(f"[...] {each}" for each in written)
-    changes = (Change(f" {each}", where="behind") for each in written)
+    changes = (TextChange(f" {each}", where="behind") for each in written)
     return Help(f"write {shown}: a unit after the bracket is for all of them", *changes)

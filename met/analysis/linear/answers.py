@@ -130,12 +130,12 @@ class Linearized:
 
     @property
     def natural(self) -> tuple[Pole, ...]:
-        """What swings of the arm on its gears and springs while its computers hold, the slowest first."""
+        """Natural modes of the arm on its gears and springs while its computers hold, the slowest first."""
         made = [Pole(0j, s, shares) for s, shares in _modes(self.plant.A, self.plant.states) if s.imag > 0.0]
         return tuple(sorted(made, key=lambda pole: pole.hz))
 
     def by_joint(self, pole: Pole) -> tuple[tuple[str, float], ...]:
-        """How much each joint takes part in a mode, largest first."""
+        """The share of each joint that takes part in a mode, largest first."""
         found: dict[str, float] = {}
         for state, share in pole.shares:
             found[self.joints[state]] = found.get(self.joints[state], 0.0) + share
@@ -144,7 +144,7 @@ class Linearized:
 
 @frozen
 class LinearQuestion:
-    """What is asked of the cases of an experiment, at the last begin of a period up to `at`, s.
+    """A question to the cases of an experiment, at the last begin of a period up to `at`, s.
 
     inputs   channels of servos that tick: commands, outputs of laws
     outputs  channels, or what records several (`q`, `links.tip.position`)
@@ -255,7 +255,7 @@ def _kept(program: PeriodProgram, found: PeriodMap) -> np.ndarray:
 
 
 def _closed(links: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """What can be reached from the first ones. links: [to, from]"""
+    """All that can be reached from the first ones. links: [to, from]"""
     found = first.copy()
     while True:
         more = found | np.any(links[:, found], axis=1)

@@ -24,7 +24,7 @@ class CreepingRate:
 
 
 def creeping(flow: Flow) -> tuple[CreepingRate, ...]:
-    """What creeps where a flow stands, before its computers tick there."""
+    """Joints that creep where a flow stands, before its computers tick there."""
     now = flow.copy()
     now.ticks()
     program = now.program

@@ -41,7 +41,7 @@ class Edge:
 
     @property
     def subject(self) -> str:
-        """What is just there, in words."""
+        """The part that is just there, in words."""
         if 0 < len(self.cells) <= MOST_CELLS:
             return listed(list(self.cells))
         return f"a number of `{self.phase}`"
@@ -162,7 +162,7 @@ class Flow:
         return next(self.cells[each.cell] for each in self.program.builder.step.sticking if each.name == name)
 
     def breaking_away(self) -> list[str]:
-        """What is at rest and has dry friction, and begins to slide."""
+        """Joints at rest with dry friction that begin to slide."""
         return [name for name, mode in self.modes().items() if mode != 0.0 and self._rate(name) == 0.0]
 
     def limits(self) -> dict[str, float]:
