@@ -367,7 +367,10 @@ def test_a_search_of_one_case_has_an_answer(here: Path, capsys: pytest.CaptureFi
     capsys.readouterr()
     assert main(["best", "d.back.h5"]) == 0
     said = capsys.readouterr().out
-    assert said.startswith("hardest: far = ") and "\n  the least far of 1 case in 1 generation\n" in said
+    assert (
+        said.startswith("the worst of search `back`: far = ")
+        and "\n  the least far of 1 case in 1 generation\n" in said
+    )
 
 
 def test_a_case_behind_the_first_generation_is_one_of_its_archive(
