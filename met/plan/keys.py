@@ -48,7 +48,7 @@ def case_keys(experiment: Experiment, rows: Sequence[int] | np.ndarray | None = 
     """case_key of every case, or of some rows of the case table, in their order."""
     if rows is None:
         return [key for piece in blocks(experiment.cases.count) for key in case_keys(experiment, _rows(piece))]
-    return _words(_case_key_digests(experiment, np.asarray(rows)))
+    return _words(_case_key_digests(experiment, np.asarray(rows, np.int64)))
 
 
 def case_names(experiment: Experiment, rows: np.ndarray, head: bytes | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -74,14 +74,14 @@ def _case_key_digests(experiment: Experiment, rows: np.ndarray) -> np.ndarray:
     table[np.isnan(table)] = np.nan  # and so are all that are not numbers
     chosen = [[[choice.path, choice.value] for choice in sorted(cases.choices, key=lambda choice: choice.path)]]
     head = _bytes(["case_key", [coordinate.path for coordinate in coordinates], *(chosen if chosen[0] else [])])
-    return _row_digests(head, table.view(np.uint8).reshape(count, -1))
+    return _row_digests(head, table.view(np.uint8).reshape(count, 8 * table.shape[1]))
 
 
 def case_ids(experiment: Experiment, rows: Sequence[int] | np.ndarray | None = None) -> list[str]:
     """case_id of every case, or of some rows of the case table, in their order."""
     if rows is None:
         return [name for piece in blocks(experiment.cases.count) for name in case_ids(experiment, _rows(piece))]
-    return _words(_case_id_digests(experiment, _case_key_digests(experiment, np.asarray(rows))))
+    return _words(_case_id_digests(experiment, _case_key_digests(experiment, np.asarray(rows, np.int64))))
 
 
 def _case_id_digests(experiment: Experiment, names: np.ndarray, head: bytes | None = None) -> np.ndarray:
@@ -125,6 +125,8 @@ def _rows(piece: slice) -> np.ndarray:
 
 def _row_digests(head: bytes, rows: np.ndarray) -> np.ndarray:
     """One digest a row of bytes, each begun with the same head, as bytes of text; half a microsecond a row."""
+    if not len(rows):
+        return np.zeros(0, f"S{2 * DIGEST_BYTES}")
     begun = hashlib.blake2b(hashlib.sha256(head).digest(), digest_size=DIGEST_BYTES).copy
     found = []
     for row in np.ascontiguousarray(rows).view(f"V{rows.shape[1]}").ravel().tolist():

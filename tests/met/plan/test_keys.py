@@ -70,6 +70,7 @@ def test_rows_can_be_asked_for_alone() -> None:
     experiment = plans.gains(50)
     whole = keys.case_ids(experiment)
     assert keys.case_ids(experiment, [48, 3]) == [whole[48], whole[3]]
+    assert keys.case_ids(experiment, []) == keys.case_keys(experiment, []) == []
 
 
 def test_zero_has_one_key() -> None:
