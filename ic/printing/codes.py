@@ -19,7 +19,7 @@ def is_code(word: str) -> bool:
 
 
 def titles() -> dict[str, str]:
-    """What each code is about, in a line, as the page's headings have it; empty where the page is not installed."""
+    """The subject of each code in a line, as the page's headings have it; empty where the page is not installed."""
     if not PAGE.is_file():
         return {}
     page = PAGE.read_text(encoding="utf-8")
