@@ -82,7 +82,7 @@ def _rest(size: BedSize, several: bool) -> Iterator[Sequence[str]]:
     of_both = f"{_with(peak.value, 'W')}{_in(peak, several)}" if peak.value else "0 W"
     yield "", f"on one supply at most {of_both}, and {_with(energy.value, 'J')} in a case, less what windings take"
     bare, all_of_them = size.bauds
-    yield "line", f"{size.exchanges.hz:g} exchanges a second, for a servo of {size.exchanges.servo_hz:g} Hz:"
+    yield "line", f"{size.exchanges.hz:,g} exchanges a second, for a servo of {size.exchanges.servo_hz:g} Hz:"
     yield "", f"at least {bare} baud, with all sensors {all_of_them}"
     bed = "the deck's bed" if size.in_deck else f"a bed by itself, delay = {own.delay:g}"
     yield "loop", f"{in_words(own)};"

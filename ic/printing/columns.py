@@ -43,8 +43,8 @@ def vector(values: Iterable[float], unit: str) -> str:
 
 
 def count(n: int, thing: str, things: str = "") -> str:
-    """`1 case`, `37 cases`."""
-    return f"{n} {thing if n == 1 else things or thing + 's'}"
+    """`1 case`, `37 cases`, `1,200 cases`."""
+    return f"{n:,} {thing if n == 1 else things or thing + 's'}"
 
 
 def size(n: int) -> str:

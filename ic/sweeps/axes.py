@@ -162,9 +162,9 @@ def read_sweep(
         more = "more than " if len(sweep.axes) >= MOST_COUNTED else ""
         complaints.error(
             "D134",
-            f"sweep `{definition.name}` has {more}{math.prod(sweep.sizes)} cases",
+            f"sweep `{definition.name}` has {more}{math.prod(sweep.sizes):,} cases",
             definition.place,
-            help=f"{MOST_SWEPT} are possible: {' x '.join(sizes)} is more",
+            help=f"{MOST_SWEPT:,} are possible: {' x '.join(sizes)} is more",
         )
     return sweep
 

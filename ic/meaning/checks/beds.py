@@ -34,7 +34,7 @@ def check_beds(complaints: Complaints, experiment: Experiment) -> None:
         if not each.stable and each.joint not in told:
             told.add(each.joint)
             where = f"reckoned with the arm as it stands {at_the_start(experiment, each.case)}"
-            where += f"; {left} of {experiment.cases.count} cases were not looked at" if left else ""
+            where += f"; {left:,} of {experiment.cases.count:,} cases were not looked at" if left else ""
             complaints.pass_on(bed_warning(experiment, each, where))
 
 

@@ -96,7 +96,7 @@ def _where(experiment: Experiment, fault: StepFault, found: StepSize) -> str:
         where = f"in the pose {where.removeprefix('at ')}".replace("pose the", "pose of the")
         where += ", at rest, with no drive and nothing held by friction"
     left = cases.count - len(found.cases)
-    return f"reckoned {where}" + (f"; {left} of {cases.count} cases were not looked at" if left > 0 else "")
+    return f"reckoned {where}" + (f"; {left:,} of {cases.count:,} cases were not looked at" if left > 0 else "")
 
 
 def _note(experiment: Experiment, found: StepSize) -> Iterator[str]:

@@ -157,7 +157,7 @@ def _table(file: str, text: str) -> CsvTable:
         raise Problem(
             error(
                 "D018",
-                f"a CSV file has at most {MOST_CSV_ROWS} rows",
+                f"a CSV file has at most {MOST_CSV_ROWS:,} rows",
                 Place(file, rows[MOST_CSV_ROWS + 1][0], 1),
                 help="thin them out, or split the file",
             )

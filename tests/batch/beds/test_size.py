@@ -373,7 +373,7 @@ def test_what_is_printed_is_laid_out_so(met_bed: Bed) -> None:
     assert out == PRINTED
 
 
-PRINTED = """heavier: a bed for joint `swing`, 3 cases of 2 s, 2001 instants each
+PRINTED = """heavier: a bed for joint `swing`, 3 cases of 2 s, 2,001 instants each
 
   drive motor            at most  order, x 1.5          where
   torque, continuous    0.04 N*m  0.06 N*m              #0
@@ -427,7 +427,7 @@ PRINTED = """heavier: a bed for joint `swing`, 3 cases of 2 s, 2001 instants eac
   shaft             0.0001 kg*m^2, the joint's rotor alone: a load's adds to it
   returned          on a supply each, what is said above, into its brake resistor or capacitors;
                     on one supply at most 0 W, and 0 J in a case, less what windings take
-  line              1000 exchanges a second, for a servo of 1000 Hz:
+  line              1,000 exchanges a second, for a servo of 1000 Hz:
                     at least 412500 baud, with all sensors 562500
   loop              swing: r = 2.4, stable to more than 2e+03 with velocity_tracking at 1000 Hz;
                     a bed by itself, delay = 1

@@ -429,8 +429,8 @@ def test_a_case_is_drawn_whichever_structure_it_is_of(here: Path) -> None:
 @pytest.mark.slow
 def test_the_next_step_is_of_a_case_that_was_run(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     deck(here, DECK, "kinds")
-    assert cli.main(["run", "a.ic", "kinds", "--case", "#2", "--histories", "none", "--no-picture"]) == 1
-    assert "met run a.ic kinds --case '#2'" in capsys.readouterr().out
+    assert cli.main(["run", "a.ic", "kinds", "--case", "#2", "--histories", "none", "--no-picture"]) == 1  # it misses
+    assert "met run a.kinds.case2.h5 --case '#2'\n" in capsys.readouterr().out
 
 
 def test_a_replay_that_would_write_over_its_archive_by_a_link(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -67,10 +67,10 @@ Arm swing: 4 links, 3 joints that move
      │  └─ rail  prismatic along [0, 0.6, 0.8]  [1, 0, 0] m      slider  3 kg    passive
      └─ mount    fixed                          [0.5, 0, 0.1] m  camera  0.5 kg
 
-Schedule: 2 s, 2000 ticks of the base rate, 1000 Hz
-  servo motor of pivot   500 Hz  every 2 ticks   1001 ticks
+Schedule: 2 s, 2,000 ticks of the base rate, 1000 Hz
+  servo motor of pivot   500 Hz  every 2 ticks   1,001 ticks
   servo slow of knee     100 Hz  every 10 ticks  201 ticks
-  dynamics              1000 Hz  every tick      2000 steps of 1 ms, modified_euler
+  dynamics              1000 Hz  every tick      2,000 steps of 1 ms, modified_euler
   record                 100 Hz  every 10 ticks  201 rows
 Step size: joint `knee` decays with 15.6 1/s: h * lambda = 0.0156, and a step makes 0.985 of it, in truth 0.985 (swing.ic:23)
 

@@ -297,10 +297,10 @@ def test_the_cases_of_a_sweep_that_is_too_large_are_all_counted(tmp_path: Path) 
         for path, unit in (("drive.kp", "V*s/rad"), ("drive.ki", "V/rad"), ("drive.ratio", ""))
     )
     compiled = check(tmp_path, ARM, SERVO, RUN, f"sweep all of hold {{ {axes}}}\n", select="all")
-    assert [each.message for each in compiled.diagnostics] == ["sweep `all` has 1000000000000 cases"]
+    assert [each.message for each in compiled.diagnostics] == ["sweep `all` has 1,000,000,000,000 cases"]
 
 
 def test_a_sweep_of_very_many_axes_is_read_no_further_than_it_takes(tmp_path: Path) -> None:
     axes = "".join(f"vary hinge.axis.a{n} = [1, 2, 3, 4]; " for n in range(200))
     compiled = check(tmp_path, ARM, SERVO, RUN, f"sweep all of hold {{ {axes}}}\n", select="all")
-    assert compiled.diagnostics[0].message == f"sweep `all` has more than {4**16} cases"
+    assert compiled.diagnostics[0].message == f"sweep `all` has more than {4**16:,} cases"

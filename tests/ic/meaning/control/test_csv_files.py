@@ -586,7 +586,7 @@ def test_a_file_of_too_many_rows(tmp_path: Path) -> None:
     assert (
         shown(tmp_path, "time [s], hinge [rad]\n" + rows)
         == """\
-error[D018]: a CSV file has at most 100000 rows
+error[D018]: a CSV file has at most 100,000 rows
       --> moves.csv:100002:1
        |
 100002 | 100000,0
