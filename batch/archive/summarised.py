@@ -24,9 +24,11 @@ from typing import Any
 
 import numpy as np
 
+from batch.archive import tables
 from batch.archive.hdf5 import h5py
 from batch.archive.sound import MOST, are_cases
 from batch.archive.stored import StoredGroup, Unlike
+from batch.archive.tables import COUNT, NUMBER, WORDS
 from met.frozen import frozen
 from met.run import LOST
 
@@ -35,9 +37,7 @@ NAME = "summary-of-cases"
 DOUBTFUL = -1
 """The status of a cause that makes cases doubtful which reached their end."""
 
-COUNT, NUMBER, WORDS = "<i8", "<f8", "|O"
-
-VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
+VARIABLES: tables.Declared = {
     "cause": (("cause",), WORDS, "why cases failed or are doubtful"),
     "cause_status": (("cause",), COUNT, "how they ended; -1: doubtful"),
     "cause_cases": (("cause",), COUNT, "cases of this cause"),
@@ -69,8 +69,6 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "judged_bound": (("judged",), NUMBER, "bound of the percentile, an order statistic, SI"),
 }
 """Dimensions, type and meaning of each variable."""
-
-DIMENSIONS = ("cause", "summed_metric", "point", "chosen", "judged")
 
 COUNTS = ("finite", "infinite", "unknown", "cause_cases", "judged_cases", "judged_missed", "judged_unknown",
           "judged_no_value")  # fmt: skip
@@ -107,16 +105,7 @@ def write(parent: Any, found: CaseSummary) -> None:
     node = parent.create_group(NAME, track_order=True)
     node.attrs["cases"], node.attrs["limited"] = found.cases, found.limited
     node.attrs["rows"], node.attrs["drawn"] = found.rows, found.drawn
-    for name, (_, kind, words) in VARIABLES.items():
-        dtype = h5py().string_dtype("utf-8") if kind == WORDS else kind
-        dataset = node.create_dataset(name, data=found.values[name], dtype=dtype, track_order=True)
-        dataset.attrs["long_name"] = words
-    for name in DIMENSIONS:
-        node[name].make_scale(name)
-    for name, (dims, _, _) in VARIABLES.items():
-        if name not in DIMENSIONS:
-            for axis, dim in enumerate(dims):
-                node[name].dims[axis].attach_scale(node[dim])
+    tables.write(node, VARIABLES, found.values)
 
 
 def read(node: Any, group: StoredGroup) -> CaseSummary | None:
@@ -126,11 +115,7 @@ def read(node: Any, group: StoredGroup) -> CaseSummary | None:
         return None
     if not isinstance(inside, h5py().Group):
         raise Unlike(f"`{NAME}` is no group")
-    values = {name: _values(inside, name) for name in VARIABLES}
-    sizes = {dim: len(values[dim]) for dim in DIMENSIONS}
-    for name, (dims, _, _) in VARIABLES.items():
-        if values[name].shape != tuple(sizes[dim] for dim in dims):
-            raise Unlike(f"variable `{NAME}/{name}` is not of the size of its dimensions")
+    values = tables.read(inside, VARIABLES, NAME)
     cases, limited, rows, drawn = (inside.attrs.get(name) for name in ("cases", "limited", "rows", "drawn"))
     if not isinstance(cases, np.integer) or not 0 < cases < MOST:
         raise Unlike(f"attribute `cases` of `{NAME}` is missing or of another type")
@@ -218,16 +203,3 @@ def _need(name: str, sound: np.ndarray | bool) -> None:
 
 def _within(name: str, values: np.ndarray, low: int, high: int) -> None:
     _need(name, (values >= low) & (values <= high))
-
-
-def _values(inside: Any, name: str) -> np.ndarray:
-    dataset = inside.get(name)
-    if not isinstance(dataset, h5py().Dataset) or str(dataset.dtype.str) != VARIABLES[name][1]:
-        raise Unlike(f"variable `{NAME}/{name}` is missing or of another type")
-    if len(dataset.shape) != len(VARIABLES[name][0]):
-        raise Unlike(f"variable `{NAME}/{name}` is not of the size of its dimensions")
-    if VARIABLES[name][1] == WORDS:
-        if h5py().check_string_dtype(dataset.dtype) is None:
-            raise Unlike(f"variable `{NAME}/{name}` is missing or of another type")
-        return np.asarray(dataset.asstr()[...], dtype=object)
-    return np.asarray(dataset[...])

@@ -15,9 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from batch.archive import tables
 from batch.archive.hdf5 import h5py
 from batch.archive.sound import MOST, are_cases
 from batch.archive.stored import StoredGroup, Unlike
+from batch.archive.tables import COUNT, NUMBER, WORDS
 from met.frozen import frozen
 
 NAME = "verification"
@@ -27,12 +29,12 @@ MOST_ORDER = 100
 
 DIMENSIONS = ("verified_case", "verified_metric")
 
-VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "verified_case": (("verified_case",), "<i8", "cases that were run with shorter steps, by position in the table"),
-    "verified_metric": (("verified_metric",), "|O", "their metrics"),
-    "half": (DIMENSIONS, "<f8", "metrics with the dynamics at half of the step, SI"),
-    "quarter": (DIMENSIONS, "<f8", "metrics with the dynamics at a quarter of the step, SI"),
-    "instant": (("verified_metric",), "<f8", "s between instants at which an instant is seen; 0 for other metrics"),
+VARIABLES: tables.Declared = {
+    "verified_case": (("verified_case",), COUNT, "cases that were run with shorter steps, by position in the table"),
+    "verified_metric": (("verified_metric",), WORDS, "their metrics"),
+    "half": (DIMENSIONS, NUMBER, "metrics with the dynamics at half of the step, SI"),
+    "quarter": (DIMENSIONS, NUMBER, "metrics with the dynamics at a quarter of the step, SI"),
+    "instant": (("verified_metric",), NUMBER, "s between instants at which an instant is seen; 0 for other metrics"),
 }
 """Dimensions, type and meaning of each variable."""
 
@@ -69,16 +71,7 @@ def write(parent: Any, found: Verified) -> None:
         "quarter": found.quarter,
         "instant": found.instant,
     }
-    for name, (_, kind, words) in VARIABLES.items():
-        dtype = h5py().string_dtype("utf-8") if kind == "|O" else kind
-        dataset = node.create_dataset(name, data=values[name], dtype=dtype, track_order=True)
-        dataset.attrs["long_name"] = words
-    for name in DIMENSIONS:
-        node[name].make_scale(name)
-    for name, (dims, _, _) in VARIABLES.items():
-        if name not in DIMENSIONS:
-            for axis, dim in enumerate(dims):
-                node[name].dims[axis].attach_scale(node[dim])
+    tables.write(node, VARIABLES, values)
 
 
 def read(node: Any, group: StoredGroup) -> Verified | None:
@@ -86,11 +79,7 @@ def read(node: Any, group: StoredGroup) -> Verified | None:
     inside = node.get(NAME)
     if not isinstance(inside, h5py().Group):  # a metric of an older archive may be called so
         return None
-    values = {name: _values(inside, name) for name in VARIABLES}
-    sizes = {dim: len(values[dim]) for dim in DIMENSIONS}
-    for name, (dims, _, _) in VARIABLES.items():
-        if values[name].shape != tuple(sizes[dim] for dim in dims):
-            raise Unlike(f"variable `{NAME}/{name}` is not of the size of its dimensions")
+    values = tables.read(inside, VARIABLES, NAME)
     cases, metrics = values["verified_case"], tuple(map(str, values["verified_metric"].tolist()))
     if not len(cases) or not (np.diff(cases) > 0).all() or not are_cases(group, cases).all():
         raise Unlike("its verified cases are none of its cases")
@@ -106,16 +95,3 @@ def read(node: Any, group: StoredGroup) -> Verified | None:
     if not isinstance(step, np.floating) or not 1 / MOST < step < MOST:
         raise Unlike(f"attribute `step_s` of `{NAME}` is missing or of another type")
     return Verified(cases, metrics, values["half"], values["quarter"], instant, int(order), float(step))
-
-
-def _values(inside: Any, name: str) -> np.ndarray:
-    dataset = inside.get(name)
-    if not isinstance(dataset, h5py().Dataset) or str(dataset.dtype.str) != VARIABLES[name][1]:
-        raise Unlike(f"variable `{NAME}/{name}` is missing or of another type")
-    if len(dataset.shape) != len(VARIABLES[name][0]):
-        raise Unlike(f"variable `{NAME}/{name}` is not of the size of its dimensions")
-    if VARIABLES[name][1] == "|O":
-        if h5py().check_string_dtype(dataset.dtype) is None:
-            raise Unlike(f"variable `{NAME}/{name}` is missing or of another type")
-        return np.asarray(dataset.asstr()[...], dtype=object)
-    return np.asarray(dataset[...])
