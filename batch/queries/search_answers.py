@@ -29,6 +29,9 @@ OVER_CASES = re.compile(r" in [^<>]* of cases\b[^<>]*$")
 WIDTH = 100
 """Characters of a line."""
 
+KEPT = "\N{NO-BREAK SPACE}"
+"""A space at which no line is broken, while lines are made."""
+
 NEAREST = 1
 """Requirements that are named of those that are nearest to their limits."""
 
@@ -99,18 +102,19 @@ class SearchAnswer:
             return self.found.serves
         return bool((self.group.values("status") == DONE).all() and (outcomes(self.group) == 1).all())
 
-    def values(self) -> list[WrittenValue]:
-        """The chosen values, for a deck's text or `--set`."""
+    def values(self, case: int | None = None) -> list[WrittenValue]:
+        """The chosen values, for a deck's text or `--set`; of another case, by its place, where one is named."""
         found = []
         for each, variable in zip(self.search.parameters, self.group.role("coordinate"), strict=False):
-            value = float(self.group.at(variable.name, [self.found.case])[0])
+            value = float(self.group.at(variable.name, [self.found.case if case is None else case])[0])
             found.append(WrittenValue(each.path, value, str(variable.attributes.get("deck_unit", variable.unit))))
         return found
 
-    def shown(self) -> list[tuple[str, str]]:
-        """The chosen values, to four digits: each path, and its value as a deck would write it."""
+    def shown(self, case: int | None = None) -> list[tuple[str, str]]:
+        """The chosen values, to four digits, of the answer or of a case: each path, and its value as a deck would
+        write it."""
         found = []
-        for each, variable in zip(self.values(), self.group.role("coordinate"), strict=False):
+        for each, variable in zip(self.values(case), self.group.role("coordinate"), strict=False):
             scale = float(variable.attributes.get("deck_scale", 1.0))
             found.append((each.path, f"{number_text(each.si / scale)} {each.unit}".removesuffix(" 1")))
         return found
@@ -137,7 +141,23 @@ class SearchAnswer:
             out.append(f"  nearest to its limit: {found.rooms[0].text}, {100.0 * found.rooms[0].share:.3g} % inside")
         beyond = "worse" if search.kind == "search" else "better"
         out += [f"  {path} is at the {end} end of its range: beyond it may be {beyond}" for path, end in found.ends]
-        return out
+        return out + (self._border() if found.serves and search.kind == "tune" else [])
+
+    def _border(self) -> list[str]:
+        """How near a candidate was tried that does not serve, in lines."""
+        miss = self.found.miss
+        if miss is None:
+            return ["  none of the candidates that were tried misses a requirement"] if self.required else []
+        case = int(self.group.values("case")[miss.case])
+        values = ", ".join(f"{path} = {value}".replace(" ", KEPT) for path, value in self.shown(miss.case))
+        misses = f"misses {miss.text}" if miss.text else "fails"
+        text = f"nearest tried that {misses}: {100.0 * miss.distance:.2g} % of a range away, case #{case} with {values}"
+        return [
+            line.replace(KEPT, " ")
+            for line in textwrap.wrap(
+                text, WIDTH, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False
+            )
+        ]
 
     @property
     def _cases(self) -> str:
@@ -201,6 +221,13 @@ class SearchAnswer:
             "missed": list(found.missed),
             "nearest": [{"requirement": room.text, "inside": room.share} for room in found.rooms],
             "at_ends": [{"path": path, "end": end} for path, end in found.ends],
+            "nearest_miss": None
+            if (miss := found.miss) is None
+            else {
+                "case": int(self.group.values("case")[miss.case]),
+                "requirement": miss.text,
+                "distance": miss.distance,
+            },
         }
 
 

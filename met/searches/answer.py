@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from met.frozen import frozen
-from met.plan.searches import Search
+from met.plan.searches import Search, SearchedParameter
 from met.searches.values import MetricLimit, hurt, served
 
 
@@ -28,6 +28,19 @@ class Room:
 
 
 @frozen
+class NearestMiss:
+    """Of the candidates that were tried, and miss a requirement, the one that is nearest to the answer.
+
+    case      the place of the first of its cases that does;  text: the requirement, empty where the case failed
+    distance  from the answer, as a share of the parameter's range, by the parameter that is farthest
+    """
+
+    case: int
+    text: str
+    distance: float
+
+
+@frozen
 class Answer:
     """The case that hurts most; or the candidate that serves best, with the worst of its cases.
 
@@ -38,6 +51,7 @@ class Answer:
     missed   texts of the requirements that are missed in any of its cases
     rooms    how far it is inside each limit in its worst case, the nearest first; those without a value are not there
     ends     paths of what is chosen that stand at an end of their range, with `lower` or `upper`
+    miss     of a tuning: the nearest candidate that misses a requirement; None where none that was tried does
     """
 
     search: Search
@@ -50,6 +64,7 @@ class Answer:
     missed: tuple[str, ...]
     rooms: tuple[Room, ...]
     ends: tuple[tuple[str, str], ...]
+    miss: NearestMiss | None
 
     @property
     def confirmed(self) -> bool:
@@ -100,7 +115,38 @@ def answer(
         tuple(missed),
         tuple(sorted((room for room in rooms if room.share == room.share), key=lambda room: room.share)),
         tuple(_ends(search, table[case])),
+        _nearest_miss(search, table, case, done, metrics, requirements) if search.kind == "tune" else None,
     )
+
+
+def _nearest_miss(
+    search: Search,
+    table: np.ndarray,
+    case: int,
+    done: np.ndarray,
+    metrics: Mapping[str, np.ndarray],
+    requirements: Sequence[NamedLimit],
+) -> NearestMiss | None:
+    """The nearest candidate to that of a case of which a case fails, or misses a requirement; None where none does."""
+    met = np.array([_met(each, metrics[each.metric], done) for each in requirements]).reshape(-1, len(done))
+    bad = np.flatnonzero(~(done & met.all(axis=0)))
+    if not len(bad):
+        return None
+    shares = np.stack([shares_of_range(each, table[:, at]) for at, each in enumerate(search.parameters)])
+    distances = np.abs(shares[:, bad] - shares[:, [case]]).max(axis=0)
+    first = int(np.argmin(distances))
+    found = int(bad[first])
+    missed = [each.text for each, row in zip(requirements, met, strict=True) if not row[found]]
+    return NearestMiss(found, missed[0] if done[found] else "", float(distances[first]))
+
+
+def shares_of_range(parameter: SearchedParameter, values: np.ndarray) -> np.ndarray:
+    """Where values of a parameter stand in its range: 0 at the lower end, 1 at the upper one, equal ratios as equal
+    steps where the parameter is searched so."""
+    low, high = parameter.low, parameter.high
+    if parameter.logarithmic:
+        values, low, high = np.log(np.abs(values)), float(np.log(abs(low))), float(np.log(abs(high)))
+    return np.asarray((values - low) / (high - low))
 
 
 def _met(limit: MetricLimit, values: np.ndarray, done: np.ndarray) -> np.ndarray:
@@ -116,11 +162,8 @@ def _room(limit: MetricLimit, values: np.ndarray) -> float:
 
 def _ends(search: Search, case: np.ndarray) -> list[tuple[str, str]]:
     found = []
-    for each, value in zip(search.parameters, case.tolist(), strict=False):
-        share = (value - each.low) / (each.high - each.low)
-        if each.logarithmic:
-            at, low, high = np.log(np.abs([value, each.low, each.high]))
-            share = (at - low) / (high - low)
+    for each, value in zip(search.parameters, case, strict=False):
+        share = float(shares_of_range(each, value))
         if not NEAR < share < 1.0 - NEAR:
             found.append((each.path, "lower" if share < 0.5 else "upper"))
     return found
