@@ -73,7 +73,7 @@ class _Passed:
             self._passed.add(report.nodeid)
 
     def pytest_sessionfinish(self) -> None:
-        if self._config.cache is not None and self._files == files_digest():  # else: of which files did they pass?
+        if hasattr(self._config, "cache") and self._files == files_digest():  # else: of which files did they pass?
             tests = sorted(self._passed - self._not_wholly)
             self._config.cache.set(PASSED, {"files": self._files, "tests": tests})
 
@@ -88,7 +88,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def passed_on_these_files(config: pytest.Config) -> set[str]:
     """The names of the tests that passed when `scripts/test` last ran; none where a file has changed since."""
-    kept = config.cache.get(PASSED, None) if config.cache is not None else None
+    kept = config.cache.get(PASSED, None) if hasattr(config, "cache") else None
     return set(kept["tests"]) if kept is not None and kept["files"] == files_digest() else set()
 
 
