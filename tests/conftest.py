@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import signal
+import sys
 from collections.abc import Generator
+from pathlib import Path
 
 import pytest
 
+ROOT = Path(__file__).parents[1]
+PASSED = "met/passed"
+"""Where pytest's cache keeps which of the default tests passed last, and the digest of the files that they tested."""
 
-def pytest_configure() -> None:
+
+def pytest_configure(config: pytest.Config) -> None:
     """Signals as a terminal's: who starts the tests in the background, or by nohup, has some ignored."""
+    if "MET_TEST_ALL" not in os.environ and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(_Passed(config))
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
@@ -18,11 +27,15 @@ def pytest_configure() -> None:
     os.environ.pop("COLUMNS", None)  # what is printed is not as wide as the window in which tests run
 
 
-def pytest_report_header() -> str:
-    """What machine code is made for, and which instruction sets this processor lacks, so that a log tells."""
+def pytest_report_header(config: pytest.Config) -> list[str]:
+    """What machine code is made for, which instruction sets this processor lacks and what is left out: a log tells."""
     from tests import instruction_sets  # not before what it imports may be
 
-    return instruction_sets.header()
+    lines = [instruction_sets.header()]
+    if "MET_TEST_REST" in os.environ:
+        count = len(passed_on_these_files(config))
+        lines.append(f"left out: {count} tests that have passed on these files" if count else "nothing is left out")
+    return lines
 
 
 @pytest.hookimpl(wrapper=True)
@@ -35,3 +48,66 @@ def pytest_runtest_makereport(
         report.outcome = "failed"
         report.longrepr = f"skipped, which is a failure with --all: {report.longrepr}"
     return report
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """With `-m alone`, no file is imported that has no such mark: that would be half a minute of one core."""
+    if config.option.markexpr != "alone" or collection_path.suffix != ".py":
+        return None
+    return b"mark.alone" not in collection_path.read_bytes() or None
+
+
+class _Passed:
+    """Keeps which tests passed, for `scripts/test --all --rest`."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        self._config = config
+        self._files = files_digest()
+        self._passed: set[str] = set()
+        self._not_wholly: set[str] = set()
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if not report.passed:
+            self._not_wholly.add(report.nodeid)
+        elif report.when == "call":
+            self._passed.add(report.nodeid)
+
+    def pytest_sessionfinish(self) -> None:
+        if hasattr(self._config, "cache") and self._files == files_digest():  # else: of which files did they pass?
+            tests = sorted(self._passed - self._not_wholly)
+            self._config.cache.set(PASSED, {"files": self._files, "tests": tests})
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """With `scripts/test --all --rest`, leave out what passed when the same files were tested by `scripts/test`."""
+    passed = passed_on_these_files(config) if "MET_TEST_REST" in os.environ else set()
+    left_out = [item for item in items if item.nodeid in passed]
+    items[:] = [item for item in items if item.nodeid not in passed]
+    config.hook.pytest_deselected(items=left_out)
+
+
+def passed_on_these_files(config: pytest.Config) -> set[str]:
+    """The names of the tests that passed when `scripts/test` last ran; none where a file has changed since."""
+    kept = config.cache.get(PASSED, None) if hasattr(config, "cache") else None
+    return set(kept["tests"]) if kept is not None and kept["files"] == files_digest() else set()
+
+
+def files_digest() -> str:
+    """SHA-256, in hex, of Python's version and of the names and bytes of the checkout's files, as far as git has them.
+
+    Left out is what an environment, Python and the tools of the tests leave behind.
+    """
+    digest = hashlib.sha256(sys.version.encode())
+    for folder, folders, names in os.walk(ROOT):
+        folders[:] = sorted(
+            name
+            for name in folders
+            if not (name.startswith(".") and name not in (".ci", ".github"))
+            and name not in ("__pycache__", "build", "dist")
+            and not name.endswith(".egg-info")
+        )
+        for name in sorted(names):
+            path = Path(folder, name)
+            digest.update(f"\0{path.relative_to(ROOT)}\0".encode(errors="surrogateescape"))
+            digest.update(hashlib.sha256(path.read_bytes()).digest() if path.is_file() else b"")
+    return digest.hexdigest()

@@ -70,12 +70,13 @@ def shared(page: str) -> dict[str, str]:
 
 def all_shown(page: str) -> Iterator[Shown]:
     """All that the page says is printed, with what was there before."""
+    of_section = shared(page)
     for code, (start, end) in entries(page).items():
-        files, given, name, spent = shared(page), list[str](), "", False
+        files, given, name, spent = dict(of_section), list[str](), "", False
         for piece in _PIECE.finditer(page, start, end):
             comment, hidden, kind, text = piece.group("name", "hidden", "kind", "text")
             if spent:
-                files, given, spent = shared(page), [], False
+                files, given, spent = dict(of_section), [], False
             if comment is not None and comment.startswith("given: "):
                 given.append(comment.removeprefix("given: "))
             elif comment is not None and hidden is not None:

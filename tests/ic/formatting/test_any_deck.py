@@ -100,8 +100,8 @@ def test_a_mutilated_deck_is_laid_out_or_told_where_it_is_broken(tmp_path: Path)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", range(1000, 6000, 500))
-def test_thousands_of_ruffled_decks_keep_their_tokens(tmp_path: Path, first: int) -> None:
+@pytest.mark.parametrize("first", range(1000, 2000, 500))
+def test_a_thousand_ruffled_decks_keep_their_tokens(tmp_path: Path, first: int) -> None:
     for seed in range(first, first + 500):
         check(tmp_path, ruffled(seed), seed)
 

@@ -1,4 +1,4 @@
-"""The fuzzer for a minute, and the smallest decks of what it has found."""
+"""The fuzzer for half a minute, and the smallest decks of what it has found."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ def _seed() -> int:
 
 
 @pytest.mark.slow
-def test_a_minute_of_decks_that_nobody_would_write_shows_no_fault() -> None:
+def test_half_a_minute_of_decks_that_nobody_would_write_shows_no_fault() -> None:
     seed = _seed()
-    found = fuzz(seed, 60.0)
+    found = fuzz(seed, 30.0)
     assert not found.faults, told(found, seed)
-    assert found.decks > 100
+    assert found.decks > 50
 
 
 def test_what_was_found_stays_mended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -137,4 +137,4 @@ def test_some_random_sweeps_show_no_fault(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_hundreds_of_random_sweeps_show_no_fault(tmp_path: Path) -> None:
-    assert sweeps.main(f"{_seed()}", 500, tmp_path) == 0
+    assert sweeps.main(f"{_seed()}", 200, tmp_path) == 0

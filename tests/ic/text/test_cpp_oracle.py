@@ -157,9 +157,10 @@ def compare_random_programs(desk: Desk, seed: int, count: int, circles: bool) ->
     for _ in range(count):
         # of macros that use each other in circles C does not say all, and some uses outgrow our limits
         text = program(rng, rng.randint(1, 3) if circles else 6, circles)
-        expected, made = theirs(desk, text, {}), ours(desk, text)
+        made = ours(desk, text)
         if made is None and any(d.code == "D019" for d in desk.tokens(text).diagnostics):
             continue  # tokens that `##` makes are not C's: a number ends where its unit begins
+        expected = theirs(desk, text, {})
         if ", ## __VA_ARGS__" in text:
             made, expected = _without_gccs_blanks(made), _without_gccs_blanks(expected)
         assert made == expected, f"seed {seed}\n{text}"
@@ -184,8 +185,9 @@ def test_random_macros_expand_as_gcc_expands_them(desk: Desk, seed: int, circles
 
 @pytest.mark.slow
 @pytest.mark.parametrize("circles", [True, False])
-def test_thousands_of_random_macros_expand_as_gcc_expands_them(desk: Desk, circles: bool) -> None:
-    assert compare_random_programs(desk, 20_261_121, 2_000, circles) >= 500
+def test_hundreds_of_random_macros_expand_as_gcc_expands_them(desk: Desk, circles: bool) -> None:
+    """gcc takes 20 times as long to start as a program takes to expand; 2,000 of this seed were the same too."""
+    assert compare_random_programs(desk, 20_261_121, 300, circles) >= 75
 
 
 DEFERRED = TEXTS.joinpath("deferred.txt").read_text().split("%%\n")
@@ -202,10 +204,10 @@ OWN_LIMITS = {"D013", "D018", "D019", "D020"}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "least"), [("program", 1_800), ("optional_program", 1_000)])
-def test_thousands_of_calls_that_are_put_off_expand_as_gcc_expands_them(desk: Desk, kind: str, least: int) -> None:
+@pytest.mark.parametrize(("kind", "least"), [("program", 270), ("optional_program", 150)])
+def test_hundreds_of_calls_that_are_put_off_expand_as_gcc_expands_them(desk: Desk, kind: str, least: int) -> None:
     rng, compared = random.Random(20_261_122), 0
-    for _ in range(2_000):
+    for _ in range(300):
         text = getattr(deferred_macros, kind)(rng)
         made = ours(desk, text)
         if made is None and OWN_LIMITS & {d.code for d in desk.tokens(text).diagnostics}:

@@ -34,7 +34,7 @@ def mapped(made: Experiment, time: float = 0.0, inputs: bool = False) -> PeriodM
 
 
 @pytest.mark.parametrize(
-    "count", [2, pytest.param(110, marks=pytest.mark.slow, id="of 110 states")]
+    "count", [2, pytest.param(30, marks=pytest.mark.slow, id="of 30 states")]
 )  # fmt: skip
 @pytest.mark.parametrize(("deck", "name"), shipped())
 def test_it_is_that_of_shipped_decks(deck: str, name: str, count: int) -> None:
