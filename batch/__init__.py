@@ -151,6 +151,7 @@ def linear(
     experiment: str | None = None,
     *,
     case: int | str = 0,
+    of: str | None = None,
     at: float = 0.0,
     inputs: Sequence[str] = (),
     outputs: Sequence[str] = (),
@@ -160,23 +161,23 @@ def linear(
 
     experiment  name of a run or sweep; None: the plan's first
     case        row of the case table, `"#7"`, or the beginning of a case_id
+    of          what the run's `linear` block of this name asks, in place of what follows
     at          s; the answers are of the last begin of a period up to it
     inputs      columns of B: commands of servos that tick, outputs of their laws
     outputs     rows of C: whatever can be recorded
     opened      outputs of laws, at which loops are opened: each alone, and all at once
 
-    Raises Problem D370 where an event is on the way, D371 where the run has failed before, D372 and D373 for an instant
-    or a name that is not there.
+    Raises Problem D370 where an event is on the way, D371 where the run has failed before, D372, D373 and D376 for
+    an instant or a name that is not there.
     """
     from batch.campaigns.choosing import experiments_named, select_rows
     from batch.linearized import LinearAnswer
-    from met.analysis.linear.answers import linear as linearised
+    from met.analysis.linear.answers import LinearQuestion, of_deck
 
     asked = experiments_named(_plan(plan, None), None if experiment is None else (experiment,))[:1]
     ((found, rows),) = select_rows(asked, [case])
-    return LinearAnswer(
-        linearised(found, case=int(rows[0]), at=at, inputs=inputs, outputs=outputs, opened=opened)
-    )  # fmt: skip
+    question = LinearQuestion(found, at, tuple(inputs), tuple(outputs), tuple(opened))
+    return LinearAnswer((question if of is None else of_deck(found, of)).of(int(rows[0])))
 
 
 def _plan(given: object, experiments: Sequence[str] | None) -> Plan:

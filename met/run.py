@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from met.judging import judge
 from met.passing import Memories, run_past
 from met.plan import REPEAT, Cases, Experiment, keys
 from met.plan.limits import LimitUse, extremes, limits
+from met.plan.linear_uses import ANSWERED, NOT_ASKED, WHY_ANSWER, WHY_NONE
 from met.plan.outputs import GRAPPLE_FIGURES, grappled_payloads
 from met.program import cell_names, plausible
 from met.program.build import COORDINATE, METRIC, build
@@ -99,6 +101,22 @@ class Prepared:
         return record(self.program)
 
     @cached_property
+    def outputs(self) -> tuple[str, ...]:
+        """The names of all that a case gives: the outputs of its program; then metrics of linear answers, and why there
+        is none, by the name of each answer."""
+        answers = dict.fromkeys(use.of for use in self.experiment.linear_metrics)
+        more = (
+            *(METRIC + use.name for use in self.experiment.linear_metrics),
+            *(WHY_ANSWER + name for name in answers),
+        )
+        return (*self.program.outputs, *more)
+
+    @cached_property
+    def companions(self) -> dict[str, Any]:
+        """Other programs of this experiment that are kept with it, by whoever makes them (`met.analysis`)."""
+        return {}
+
+    @cached_property
     def kernel(self) -> Kernel:
         return backends.load(self.recording, self.lanes)
 
@@ -118,7 +136,18 @@ class Prepared:
             first += len(recorded.channels)
         outputs = {f"metrics.{use.name}": METRIC + use.name for use in structure.metrics}
         keys = result_keys(self.recording, {**columns, **outputs})
-        return {name: _code_key(key) for name, key in keys.items()}
+        return {name: _code_key(key) for name, key in keys.items()} | self._linear_keys
+
+    @property
+    def _linear_keys(self) -> dict[str, str]:
+        """Keys of the metrics of linear answers: of the motion, which they are derived of, and of what is asked."""
+        asked = {use.name: (use.at, use.inputs, use.outputs, use.opened) for use in self.experiment.linear}
+        return {
+            f"metrics.{use.name}": _code_key(
+                hashlib.sha256(f"{self.code_key} {LINEAR_VERSION} {use.model} {asked[use.of]}".encode()).hexdigest()
+            )
+            for use in self.experiment.linear_metrics
+        }
 
     @cached_property
     def work_key(self) -> str:
@@ -142,7 +171,7 @@ class Prepared:
     def of_cases(self, experiment: Experiment) -> Prepared:
         """The same program, ready to run the cases of an experiment that differs in its case table alone."""
         made = Prepared(experiment, self.lanes, self.wire, self.late)
-        ready = ("program", "recording", "kernel", "code_key", "result_keys", "work_key", "old_code_key")
+        ready = (*_OF_ANY_CASES, "kernel", "work_key", "old_code_key")
         made.__dict__.update({name: self.__dict__[name] for name in ready if name in self.__dict__})
         return made
 
@@ -167,8 +196,12 @@ class Prepared:
         return made
 
 
-_OF_PROGRAM = ("program", "recording", "kernel", "code_key", "result_keys", "limits", "extremes")
+_OF_ANY_CASES = ("program", "recording", "outputs", "companions", "code_key", "result_keys")
+_OF_PROGRAM = (*_OF_ANY_CASES, "kernel", "limits", "extremes")
 """The parts of a `Prepared` that are the same whatever values its cases have."""
+
+LINEAR_VERSION = 1
+"""Raised where linear answers of the same program become other numbers."""
 
 
 KEY_VERSION = 2
@@ -242,7 +275,17 @@ def compute(
             if history is not None and others is not None:
                 history = _together(watched, history, others)
     judge(prepared.program.outputs, outputs)
-    return history, outputs
+    return history, with_linear(prepared, outputs)
+
+
+def with_linear(prepared: Prepared, outputs: np.ndarray) -> np.ndarray:
+    """The outputs of a program, [case, output], with columns for metrics of linear answers that nobody has computed
+    yet (`met.analysis.linear.metrics`)."""
+    more = prepared.outputs[len(prepared.program.outputs) :]
+    if not more:
+        return outputs
+    pending = [float(NOT_ASKED) if name.startswith(WHY_ANSWER) else math.nan for name in more]
+    return np.hstack([outputs, np.tile(pending, (len(outputs), 1))])
 
 
 def _together(first: np.ndarray, of_first: np.ndarray, of_others: np.ndarray) -> np.ndarray:
@@ -279,10 +322,10 @@ def results(
     fates  of rows (by their place in `rows`) for which nothing was computed: TIMED_OUT or LOST, and why; or FAILED,
            where something else than the engine ended them at the tick that `failure.tick` says
     """
-    experiment, program = prepared.experiment, prepared.program
+    experiment = prepared.experiment
     schedule = experiment.structure.schedule
     steps, watched = schedule.ticks // schedule.dynamics, prepared.limits
-    out = {name: outputs[:, column] for column, name in enumerate(program.outputs)}
+    out = {name: outputs[:, column] for column, name in enumerate(prepared.outputs)}
     failed = out["failure"] != 0.0
     n_valid = np.where(failed, np.ceil(out["failure.tick"] / schedule.record), schedule.rows).astype(np.int64)
     causes = [""] * len(rows)
@@ -304,6 +347,8 @@ def results(
     warnings = [""] * len(rows)
     for case in np.flatnonzero(~failed & (out.get(plausible.DOUBTFUL_TICK, failed) != 0.0)).tolist():
         warnings[case] = doubt_of(experiment, {name: float(of[case]) for name, of in out.items()})
+    for case, why in _unanswered(experiment, out, failed).items():
+        warnings[case] = "; ".join([*([warnings[case]] if warnings[case] else []), why])
     signals: dict[str, np.ndarray] = {}
     if history is not None:
         for case in np.flatnonzero(failed).tolist():
@@ -314,7 +359,7 @@ def results(
             block = history[:, :, column : column + width]
             signals[recorded.name] = block.reshape(*block.shape[:2], *recorded.shape)
             column += width
-    metrics = {use.name: np.where(failed, math.nan, out[METRIC + use.name]) for use in experiment.structure.metrics}
+    metrics = {use.name: np.where(failed, math.nan, out[METRIC + use.name]) for use in experiment.metrics}
     return Run(
         case=rows,
         status=status,
@@ -345,6 +390,17 @@ def _grapples(experiment: Experiment, out: Mapping[str, np.ndarray], failed: np.
         for name in GRAPPLE_FIGURES:
             found[f"{payload}.{name}"] = np.where(never, math.nan, out[cell_names.GRAPPLED(payload, name)])
     return found
+
+
+def _unanswered(experiment: Experiment, out: Mapping[str, np.ndarray], failed: np.ndarray) -> dict[int, str]:
+    """Cases without one of their linear answers, and why, in words."""
+    found: dict[int, list[str]] = {}
+    for use in experiment.linear:
+        why = out.get(WHY_ANSWER + use.name)
+        for case in np.flatnonzero(~failed & (why != ANSWERED)).tolist() if why is not None else ():
+            reason = WHY_NONE.get(int(why[case]), "") if why is not None else ""
+            found.setdefault(case, []).append(f"no answer of `{use.name}` at {use.at:.9g} s: {reason}")
+    return {case: "; ".join(each) for case, each in found.items()}
 
 
 def _misapplied(experiment: Experiment, rows: np.ndarray, out: Mapping[str, np.ndarray]) -> dict[int, str]:

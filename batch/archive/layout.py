@@ -270,9 +270,9 @@ def _case_variables(experiment: Experiment) -> list[Variable]:
         name = _apart(each.name, "limits", taken, ())
         taken.add(name)
         out.append(replace(each, name=name, source=each.name))
-    units = metric_units(experiment.structure)
+    units = metric_units(experiment.structure, experiment.linear_metrics)
     named: dict[str, str] = {}
-    for use in experiment.structure.metrics:
+    for use in experiment.metrics:
         name = _apart(use.name, "metrics", taken, list(units))
         unit = units[use.name]
         words = f"{use.model} of {use.of}"

@@ -26,6 +26,7 @@ from hw import records
 from hw.case import CaseRequest, pace_of
 from hw.drivers import same_bed
 from hw.process import talk
+from met import run as engine
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import new_file, read_json
@@ -126,7 +127,7 @@ class OnBeds:
         fates = {place: (FAILED, why) for place, (_, why) in enumerate(found) if why}
         computed = shard.Shard(
             section.key(task.first, task.last),
-            np.stack([each.outputs for each in results]),
+            engine.with_linear(section.prepared, np.stack([each.outputs for each in results])),
             history,
             sum(each.seconds for each in results),
             fates,

@@ -109,7 +109,7 @@ class CampaignPart:
     @property
     def shard_bytes(self) -> int:
         """About what its shards take."""
-        numbers = OUTPUTS + len(self.experiment.cases.coordinates) + len(self.experiment.structure.metrics)
+        numbers = OUTPUTS + len(self.experiment.cases.coordinates) + len(self.experiment.metrics)
         histories = self.recorded * self.experiment.structure.history_bytes // (2 if self.single else 1)
         return 8 * numbers * self.most + histories
 
@@ -262,7 +262,7 @@ def _summarised(part: CampaignPart, rows: KeptRows) -> CampaignPart:
         message = f"`{experiment.name_in_deck}` {does}, which takes a row a case"
         raise Problem(error("E351", message, help="leave `--rows` away: its cases are few"))
     points = len(point_sizes(experiment, part.rows))
-    named = 2 * len(experiment.structure.metrics) + (points + 1) * len(experiment.requirements)
+    named = 2 * len(experiment.metrics) + (points + 1) * len(experiment.requirements)
     return replace(part, written=rows.worst + named)
 
 

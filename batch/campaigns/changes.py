@@ -73,12 +73,33 @@ def between(before: Experiment, now: Experiment, *, ordered: bool) -> list[Chang
         cases = [Change(text) for text in _searches(before.search, now.search)]
         cases += [Change(text) for text in _tuned_limits(before, now)]
     cases += [Change(text) for text in _stops(before, now)]
+    cases += [Change(text) for text in _linear(before, now)]
     out += [*_parameters(before, now, new), *cases]
     if before.formulas != now.formulas and not out:
         out.append(Change("what follows from the varied parameters is computed otherwise"))
     if not out and structure_key(before.structure, inputs(before)) != structure_key(now.structure, inputs(now)):
         out.append(Change("the structure"))  # no words for it here
     return out
+
+
+def _linear(before: Experiment, now: Experiment) -> Iterator[str]:
+    """Changes of linear answers, and of metrics of them."""
+    for word, of in (("linear", _answers), ("metric", _figures)):
+        old, new = of(before), of(now)
+        for name in dict.fromkeys((*old, *new)):
+            if old.get(name) != new.get(name):
+                yield f"{word} {name}: {old.get(name, 'none')} -> {new.get(name, 'none')}"
+
+
+def _answers(experiment: Experiment) -> dict[str, str]:
+    return {
+        use.name: ", ".join((f"at {use.at:.9g} s", *use.inputs, *use.outputs, *(f"open {path}" for path in use.opened)))
+        for use in experiment.linear
+    }
+
+
+def _figures(experiment: Experiment) -> dict[str, str]:
+    return {use.name: f"{use.model} of {use.of}" for use in experiment.linear_metrics}
 
 
 # Parameters

@@ -430,15 +430,14 @@ def _rise(rows: np.ndarray, count: int) -> bool:
 
 def _bytes_of_case(section: CampaignSection) -> int:
     """The size of one case of a section in a shard."""
-    program = section.prepared.program
     rows = section.prepared.experiment.structure.schedule.rows if section.recorded else 0
-    return np.dtype(float).itemsize * (len(program.outputs) + rows * program.columns)
+    return np.dtype(float).itemsize * (len(section.prepared.outputs) + rows * section.prepared.program.columns)
 
 
 def _fits(section: CampaignSection, found: shard.Shard) -> bool:
     """True if the arrays of a shard are of the program's size, and its failures such as there are."""
     program, structure = section.prepared.program, section.prepared.experiment.structure
-    if found.outputs.shape[1] != len(program.outputs):
+    if found.outputs.shape[1] != len(section.prepared.outputs):
         return False
     shape = (len(found.outputs), structure.schedule.rows, program.columns)
     wanted = shape if section.recorded and program.columns else None

@@ -80,7 +80,7 @@ def kept_rows(word: str, experiments: Sequence[Experiment]) -> KeptRows:
     if name == "worst" and 1 <= len(rest) <= 2 and rest[0].isdecimal() and 0 < int(rest[0]) <= MOST_WORST:
         metric = rest[1] if len(rest) == 2 else ""
         _check_metric(metric, experiments)
-        first = experiments[0].structure.metrics
+        first = experiments[0].metrics
         return KeptRows(word, int(rest[0]), metric or (first[0].name if first else ""))
     near = difflib.get_close_matches(name, ROW_WORDS, n=1)
     helps = [*(f"did you mean `{each}`?" for each in near if each != name), ROWS_HELP]
@@ -136,7 +136,7 @@ def _with(found: Keep, word: str | int, experiments: Sequence[Experiment]) -> Ke
 
 
 def _check_metric(metric: str, experiments: Sequence[Experiment]) -> None:
-    known = list(dict.fromkeys(use.name for each in experiments for use in each.structure.metrics))
+    known = list(dict.fromkeys(use.name for each in experiments for use in each.metrics))
     if not known:
         remedy = "a run has them by `metric NAME = MODEL { of = ...; }`"
         raise Problem(error("E351", "there is no metric by which cases could be the worst", help=remedy))
@@ -161,9 +161,9 @@ def worst_wanted(found: Keep, experiment: Experiment) -> dict[str, int]:
     """How many of the worst by each metric have their histories kept, the most of what was asked for."""
     wanted: dict[str, int] = {}
     for count, by in found.worst:
-        metric = by or (experiment.structure.metrics[0].name if experiment.structure.metrics else "")
+        metric = by or (experiment.metrics[0].name if experiment.metrics else "")
         wanted[metric] = max(count, wanted.get(metric, 0))
-    return {use.name: wanted[use.name] for use in experiment.structure.metrics if use.name in wanted}
+    return {use.name: wanted[use.name] for use in experiment.metrics if use.name in wanted}
 
 
 def kept_by_outcome(found: Keep, experiment: Experiment, results: CaseOutcomes) -> np.ndarray:

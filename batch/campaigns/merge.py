@@ -261,6 +261,8 @@ def _results(
 
 def _check_bits(section: CampaignSection, at: int, now: np.ndarray, before: np.ndarray, fates: Iterable[int]) -> None:
     """A case that was run again for its history gave the numbers that it gave before; those of `fates` gave none."""
+    own = len(section.prepared.program.outputs)  # linear answers hang on the processor in their last bits
+    now, before = np.ascontiguousarray(now[:, :own]), np.ascontiguousarray(before[:, :own])
     alike = ((now.view(np.int64) == before.view(np.int64)) | (np.isnan(now) & np.isnan(before))).all(axis=1)
     alike[list(fates)] = True
     if not alike.all():

@@ -30,6 +30,7 @@ from batch.campaigns.summarising import Summarised, summarise
 from batch.campaigns.tasks import CampaignSection
 from batch.campaigns.until_shown import StoppingPoints, run_until_shown, without_dropped
 from batch.campaigns.verification import when
+from met.analysis.linear import metrics as linear_metrics
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 from met.outputs import quoted
@@ -103,6 +104,8 @@ def perform(
         each if part.open_ended else now
         for part, each, now in zip(campaign.parts, values, instants.with_memories(values), strict=True)
     ]
+    for each in values:
+        linear_metrics.check(each.prepared)
     values[0].prepared.kernel  # noqa: B018 - what a model's mistake stops is stopped before anything is written
     folder = Folder(beside(campaign.output))
     try:
@@ -410,7 +413,9 @@ class _CampaignWork:
         done = outcomes.done
         places = done.select(np.arange(done.set)) if way == "all" else chosen(experiment, outcomes)
         if len(places):
-            names = {each.key: each.name for each in writer.groups[number].layout.role("metric")}
+            own = {use.name for use in experiment.structure.metrics}
+            named = writer.groups[number].layout.role("metric")
+            names = {each.key: each.name for each in named if each.key in own}
             self.reporter.begin(f"{section.name}, with shorter steps", len(FACTORS) * len(places), 0, 0, "")
             found = verify(
                 experiment, section.rows[places], names, self._threads, lambda runs: self.reporter.advance(runs, 0)

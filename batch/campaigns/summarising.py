@@ -76,7 +76,7 @@ def summarise(
     named = {each.key: each.name for role in ("coordinate", "metric") for each in layout.role(role)}
     chosen, points = _chosen(experiment), PointNumbers()
     tallies = CaseTallies(
-        [use.name for use in experiment.structure.metrics],
+        [use.name for use in experiment.metrics],
         experiment.requirements,
         point_sizes(experiment, section.rows),
     )

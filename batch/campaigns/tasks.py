@@ -15,6 +15,7 @@ import numpy as np
 
 from batch.campaigns import shard
 from met import run as engine
+from met.analysis.linear import metrics as linear_metrics
 from met.frozen import frozen
 from met.passing import Memories
 from met.plan.columns import CaseValues
@@ -149,7 +150,7 @@ def compute(
     section.prepared.kernel  # noqa: B018 - compiling is not computing
     began = time.perf_counter()
     rows = section.rows[task.first : task.last]
-    history, outputs = engine.compute(
+    history, outputs = linear_metrics.compute(
         section.prepared,
         rows,
         threads=threads,
@@ -167,7 +168,7 @@ def compute(
 
 def not_run(section: CampaignSection, task: Task, ended: int, why: str) -> shard.Shard:
     """The shard of cases that could not be run: `met.run.TIMED_OUT` or `LOST`, and why."""
-    width = len(section.prepared.program.outputs)
+    width = len(section.prepared.outputs)
     history = None
     if section.recorded and section.prepared.program.columns:
         shape = (task.cases, section.prepared.experiment.structure.schedule.rows, section.prepared.program.columns)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from batch.cli.run import measured
 from met.cli import NO, YES, check_options, deck_options, format_option
 from met.messages.visible import say
+
+if TYPE_CHECKING:
+    from met.analysis.linear.answers import LinearQuestion
+    from met.plan import Experiment
 
 
 class Instant(click.ParamType):
@@ -28,7 +32,8 @@ class Instant(click.ParamType):
 @click.command(short_help="Linearise the program that runs: poles, modes, margins of loops, A B C D.")
 @click.argument("source", metavar="DECK|PLAN.json")
 @click.argument("name", metavar="[NAME]", required=False)
-@click.option("--at", type=Instant(), default="0", metavar="TIME", help="The instant of the run, `2 s`. [0 s]")
+@click.option("--of", metavar="LINEAR", help="Ask what a `linear` block of the run does. [its only one]")
+@click.option("--at", type=Instant(), metavar="TIME", help="The instant of the run, `2 s`. [0 s]")
 @click.option("--case", metavar="ID", help="The case of a sweep: the beginning of its id, or '#7'. [#0]")
 @click.option(
     "--all-cases", is_flag=True, help="All cases of a sweep, a row each: margins of opened loops, else damping."
@@ -54,7 +59,8 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
     """Linearise a deck's only run or sweep, the one marked `default`, or NAME, where it is at an instant.
 
     The derivative is exact, and of the program that runs: sampling, held values and delays are in it. What sticks is
-    held. Exit status: 0; 1 an opened loop is unstable as it is; 2 the input is wrong, or an event is on the way.
+    held. Without a question of its own, what the run's only `linear` block asks. Exit status: 0; 1 an opened loop is
+    unstable as it is; 2 the input is wrong, or an event is on the way.
     """
     import json
 
@@ -64,8 +70,12 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
     from batch.plotting import output as places
     from batch.terminal.linear import as_data, linear_lines
     from batch.terminal.linear_cases import answered, case_lines
-    from met.analysis.linear.answers import Linearized, LinearQuestion
+    from met.analysis.linear.answers import Linearized
 
+    if options["of"] is not None:
+        for option, key in (("--at", "at"), ("--input", "inputs"), ("--output", "outputs"), ("--open", "opened")):
+            if options[key] not in (None, ()):
+                raise click.UsageError(f"{option} asks, and so does --of {options['of']}: leave one of them out")
     if options["all_cases"]:
         for option, key in (("--case", "case"), ("-o", "output"), ("--picture", "picture")):
             if options[key] is not None:
@@ -85,8 +95,7 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
         case = int(rows[0])
     else:
         experiment, case = asked[0], 0
-    signals = (tuple(options[key]) for key in ("inputs", "outputs", "opened"))
-    question = LinearQuestion(experiment, options["at"], *signals)
+    question = _question(experiment, options)
     if options["all_cases"]:
         every = answered(question)
         data = [
@@ -103,3 +112,15 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
         picture.draw(found, drawn)
     say(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(linear_lines(found)))
     return NO if any(loop.unstable for loop in found.loops) else YES
+
+
+def _question(experiment: Experiment, options: dict[str, Any]) -> LinearQuestion:
+    """The question of a `linear` block where that is asked, or nothing is; else that of the options. Raises Problem
+    D376."""
+    from met.analysis.linear.answers import LinearQuestion, of_deck
+
+    asked = {key: options[key] for key in ("at", "inputs", "outputs", "opened")}
+    if options["of"] is not None or (experiment.linear and not any(asked.values()) and asked["at"] is None):
+        return of_deck(experiment, options["of"])
+    signals = (tuple(asked[key]) for key in ("inputs", "outputs", "opened"))
+    return LinearQuestion(experiment, asked["at"] or 0.0, *signals)

@@ -255,7 +255,11 @@ def progress(found: Answer, experiment: Experiment) -> str:
     if found.failed:
         best = "a case fails" if search.kind == "search" else "every candidate fails so far"
         return best
-    unit, scale = deck_unit(search.metric, metric_units(experiment.structure)[search.metric], experiment.requirements)
+    unit, scale = deck_unit(
+        search.metric,
+        metric_units(experiment.structure, experiment.linear_metrics)[search.metric],
+        experiment.requirements,
+    )
     word = "worst" if search.kind == "search" else "best"
     return f"{word} {search.metric} {goal_text(found.value, unit, scale)}{_binding(found)}"
 

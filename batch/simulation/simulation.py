@@ -16,6 +16,7 @@ from ic.driver.given_values import VariedRun, given_run
 from ic.printing.columns import size as size_text
 from ic.text.complaints import known_words
 from met import run as engine
+from met.analysis.linear import metrics as linear_metrics
 from met.diagnostic import Problem, did_you_mean, error
 from met.host.files import memory
 from met.plan import Cases, Experiment
@@ -106,14 +107,14 @@ class Simulation:
         threads = None if threads is None else whole(threads, "threads", least=1)
         table, count = columns(self._in_si(values), product=product)
         program = self._program({path: float(column[0]) for path, column in table.items()}, repeat > 1)
-        check_room(count * repeat, len(program.prepared.program.inputs) + len(program.prepared.program.outputs))
+        check_room(count * repeat, len(program.prepared.program.inputs) + len(program.prepared.outputs))
         program.varied.check(table, count)
         if repeat > 1:
             table = {path: np.repeat(column, repeat) for path, column in table.items()}
         prepared = program.prepared.with_cases(_cases(program.varied.experiment.cases, table, count, repeat))
         signals = self._signals(histories, count * repeat)
         rows = np.arange(count * repeat)
-        history, outputs = engine.compute(prepared, rows, threads=threads, record=bool(signals))
+        history, outputs = linear_metrics.compute(prepared, rows, threads=threads, record=bool(signals))
         return program.datasets.dataset(prepared.experiment, engine.results(prepared, rows, history, outputs), signals)
 
     def start(

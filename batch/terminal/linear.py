@@ -47,7 +47,7 @@ _HEAD = ("Hz", "damping", "by e in", "who takes part")
 def _row(found: Linearized, pole: Pole) -> tuple[str, ...]:
     if math.isinf(pole.hz):
         return "-", "-", "at once", _parts(found, pole)
-    stays = pole.seconds > 1e6 * found.seconds
+    stays = pole.stays(found.seconds)
     way = " grows" if pole.s.real > 0.0 and not stays else ""
     return (
         f"{0.0 if stays and pole.hz * found.seconds < 1e-6 else pole.hz:.4g}",

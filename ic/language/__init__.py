@@ -8,14 +8,26 @@ from __future__ import annotations
 
 from ic.language.bodies import ARM, JOINT, LINK, PAYLOAD
 from ic.language.declaration import BlockDeclaration, Entry
-from ic.language.runs import ENVIRONMENT, INITIAL, METRIC, RATES, RUN, SEARCH, SUBSTITUTE, SWEEP, TOLERANCES, TUNE
+from ic.language.runs import (
+    ENVIRONMENT,
+    INITIAL,
+    LINEAR,
+    METRIC,
+    RATES,
+    RUN,
+    SEARCH,
+    SUBSTITUTE,
+    SWEEP,
+    TOLERANCES,
+    TUNE,
+)
 from ic.language.servos import SERVO
 
 BLOCKS = {
     block.name: block
     for block in (
-        ARM, LINK, JOINT, SERVO, RUN, RATES, INITIAL, ENVIRONMENT, PAYLOAD, SUBSTITUTE, METRIC, TOLERANCES, SWEEP,
-        SEARCH, TUNE,
+        ARM, LINK, JOINT, SERVO, RUN, RATES, INITIAL, ENVIRONMENT, PAYLOAD, SUBSTITUTE, METRIC, LINEAR, TOLERANCES,
+        SWEEP,        SEARCH, TUNE,
     )
 }  # fmt: skip
 """All blocks, by name, in the order in which a reader meets them."""

@@ -8,6 +8,7 @@ from met.plan import BALANCED, VELOCITY_PRODUCTS
 
 DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
 SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")
+LINEAR_AT = Parameter(name="at", unit="s", at_least=0.0, doc="the instant of linear answers")
 AT_MOST = Parameter(name="at_most", at_least=1.0, at_most=1e6, doc="cases of a search at most")
 SEARCH_SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of a search's own choices")
 MARGIN = Parameter(
@@ -103,8 +104,28 @@ METRIC = BlockDeclaration(
             "`*.q` is that of every joint; of `always` and its like a condition",
         ),
     ),
-    free="parameters of the model: `met doc metric` lists the models",
+    free="parameters of the model: `met doc metric` lists the models; a figure of linear answers is `of` a "
+    "`linear` block: `met doc linear`",
 )
+
+LINEAR = BlockDeclaration(
+    name="linear",
+    written="linear NAME { at = TIME;  open = SIGNAL; ... }",
+    within="run",
+    called="linear answers",
+    doc="Linear answers about the program that runs, at an instant: `met linear` gives them, and metrics are figures "
+    "of them.",
+    entries=(
+        Entry(name="at", written="at = 2 s;", default="0 s", parameter=LINEAR_AT,
+              doc="the instant: the last begin of a period up to it counts"),
+        Entry(name="inputs", written="inputs = pan.servo.command;", default="none",
+              doc="columns of B: commands of servos that tick, and what their laws put out; one, or a list"),
+        Entry(name="outputs", written="outputs = [pan.q, tau];", default="none",
+              doc="rows of C: whatever a record takes"),
+        Entry(name="open", written="open = pan.servo.voltage;", default="none",
+              doc="where loops are opened, at what laws put out: each by itself, and all at once"),
+    ),
+)  # fmt: skip
 
 TOLERANCES = BlockDeclaration(
     name="tolerances",
@@ -154,6 +175,8 @@ RUN = BlockDeclaration(
               doc="a number computed of channels; a record and a metric call it `signals.NAME`"),
         Entry(name="metric", form="named", written="metric NAME = MODEL { ... }", default="none",
               path="metrics.NAME", doc="one number of a case"),
+        Entry(name="linear", form="named", written="linear NAME { ... }", default="none",
+              doc="linear answers at an instant, by name: `require phase_margin(NAME) > 30 deg;`"),
         Entry(name="require", form="statement", written="require METRIC < LIMIT;", default="none",
               doc="a limit that counts for the exit code; also `<=`, `>`, `>=`; of a share of cases: "
                   "`in 99 % of cases with 90 % confidence`; "

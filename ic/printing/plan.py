@@ -110,7 +110,10 @@ def print_experiment(deck: str, experiment: Experiment, *, verbose: bool = False
         yield from columns(rows)
     yield ""
     yield from _channels(structure)
-    if structure.metrics:
+    if experiment.linear:
+        yield ""
+        yield from _linear(experiment)
+    if experiment.metrics:
         yield ""
         yield from _metrics(experiment)
     if experiment.tolerances:
@@ -377,10 +380,20 @@ def _channels(structure: Structure) -> Iterator[str]:
     yield from columns(rows)
 
 
+def _linear(experiment: Experiment) -> Iterator[str]:
+    yield "Linear answers: `met linear` gives them"
+    rows = []
+    for use in experiment.linear:
+        parts = [("of", use.inputs), ("to", use.outputs), ("open at", use.opened)]
+        told = "; ".join(f"{word} {', '.join(paths)}" for word, paths in parts if paths)
+        rows.append((use.name, f"at {use.at:.9g} s", told))
+    yield from columns(rows)
+
+
 def _metrics(experiment: Experiment) -> Iterator[str]:
     yield "Metrics and what is required of them"
     rows = []
-    for use in experiment.structure.metrics:
+    for use in experiment.metrics:
         required = [each.text for each in experiment.requirements if each.metric == use.name]
         required += [each.text for each in experiment.step_errors if each.metric == use.name]
         rows.append((use.name, f"{use.model} of {use.of}", ", ".join(f"require {text}" for text in required)))

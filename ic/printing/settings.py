@@ -66,7 +66,12 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
     number("duration", schedule.duration, "s", f"{schedule.ticks} base ticks")
     word("record", ", ".join(recorded.name for recorded in structure.record) or "none")
     number("seed", float(experiment.cases.seed), "1")
-    for metric in structure.metrics:
+    for use in experiment.linear:
+        number(f"linear.{use.name}.at", use.at, "s")
+        for key, paths in (("inputs", use.inputs), ("outputs", use.outputs), ("open", use.opened)):
+            if paths:
+                word(f"linear.{use.name}.{key}", ", ".join(paths), use.place)
+    for metric in experiment.metrics:
         word(f"metrics.{metric.name}.model", metric.model, metric.place)
         word(f"metrics.{metric.name}.of", metric.of, metric.place)
     return made

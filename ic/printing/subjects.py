@@ -18,6 +18,7 @@ from ic.printing.models import FIELDS, OF_LANGUAGE, UNIT_WORDS, default, rows, s
 from ic.printing.sweeps import print_words, words_json
 from met import models, units
 from met.plan import channel
+from met.plan.linear_uses import FIGURES
 
 OF_ANY = (
     ("JOINT.servo.NAME", "what a servo holds, integrates and shows: `met doc` and the name of its model"),
@@ -142,6 +143,21 @@ def print_substitute() -> Iterator[str]:
     yield "`met doc emulated`, and so for every bed and law, says what it takes and what of it can be recorded."
 
 
+def print_linear() -> Iterator[str]:
+    yield from print_block(BLOCKS["linear"])
+    yield ""
+    yield "Figures, as metrics: metric NAME = FIGURE { of = LINEAR; }, or require FIGURE(LINEAR) > LIMIT;"
+    yield from columns([(each.name, each.unit, each.doc) for each in FIGURES.values()])
+
+
+def figures_json() -> list[dict[str, Any]]:
+    """The block's entries, then the figures."""
+    return [
+        *block_json(BLOCKS["linear"]),
+        *({"figure": each.name, "unit": each.unit, "doc": each.doc} for each in FIGURES.values()),
+    ]
+
+
 def unit_table() -> list[dict[str, Any]]:
     """Every unit: its name, its word, and what one of it is in SI."""
     return [
@@ -175,6 +191,7 @@ SUBJECTS: Mapping[str, Subject] = MappingProxyType(
         "shapes": (print_shapes, shapes_json),
         "units": (print_units, unit_table),
         **{name: (partial(print_block, BLOCKS[name]), partial(block_json, BLOCKS[name])) for name in OF_LANGUAGE},
+        "linear": (print_linear, figures_json),
         "substitute": (print_substitute, partial(block_json, BLOCKS["substitute"])),
     }
 )

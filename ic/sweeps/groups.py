@@ -212,7 +212,9 @@ class _Sweep:
             scope.checks.run(values, count)
         else:
             scope.checks.run(*with_corners(there.search, values), listed=count)
-            check_goal(self.complaints, there.name, there.search, resolved.structure)
+            check_goal(
+                self.complaints, there.name, there.search, (*resolved.structure.metrics, *resolved.linear_metrics)
+            )
         cases = Cases(
             count,
             plan_coordinates(scope, there, values, _dependents(scope)),

@@ -7,7 +7,7 @@ follows from what that gives.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from ic.text.complaints import Complaints, known_words
 from met import units
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
-from met.plan import Requirement, Structure
+from met.plan import MetricUse, Requirement
 from met.plan.columns import AxisColumn, CaseValues
 from met.plan.searches import MOST_PLANTS, MOST_SEARCHED, SHORTEST, Search, SearchedParameter
 from met.plan.swept import SweptRows
@@ -416,9 +416,9 @@ def with_corners(search: Search, columns: Mapping[str, CaseValues]) -> tuple[dic
     return table, len(next(iter(table.values())))
 
 
-def check_goal(complaints: Complaints, name: str, search: Search, structure: Structure) -> None:
+def check_goal(complaints: Complaints, name: str, search: Search, metrics: Sequence[MetricUse]) -> None:
     """Report a goal that is no metric of the run."""
-    known = [use.name for use in structure.metrics]
+    known = [use.name for use in metrics]
     if search.metric not in known:
         missing = ["a run has one by `metric NAME = MODEL { of = ...; }`"] if not known else []
         helps = [

@@ -50,6 +50,7 @@ from met.diagnostic import Place
 from met.frozen import frozen, keyed
 from met.parameter import BASE, Parameter
 from met.plan.columns import CaseValues, FormulaColumn, ShiftedColumn, all_rows, listed
+from met.plan.linear_uses import LinearUse
 from met.plan.run_keys import RunKey, run_key
 from met.plan.searches import Search
 from met.trace.graph import Formulas
@@ -291,7 +292,7 @@ CHANNEL_INPUT = "channel:"
 
 @frozen
 class MetricUse:
-    """A metric under a name of the deck's, watching one channel (`Channel.path`)."""
+    """A metric under a name of the deck's, watching one channel (`Channel.path`), or one of linear answers."""
 
     name: str
     model: str
@@ -573,6 +574,8 @@ class Experiment:
     sweep      what a group is of; "" where the experiment is the whole of its run or sweep
     allowances  warnings that are not given of it
     search     what chooses its cases, where these are not listed beforehand
+    linear     answers that are asked for by name;  linear_metrics: figures of them, computed of each case after it has
+               run: the model is the figure, `of` the name
     """
 
     name: str
@@ -588,6 +591,13 @@ class Experiment:
     step_errors: tuple[StepErrorLimit, ...] = ()
     allowances: tuple[Allowance, ...] = ()
     search: Search | None = None
+    linear: tuple[LinearUse, ...] = ()
+    linear_metrics: tuple[MetricUse, ...] = ()
+
+    @property
+    def metrics(self) -> tuple[MetricUse, ...]:
+        """All its metrics: those that its program gathers, then those of linear answers."""
+        return (*self.structure.metrics, *self.linear_metrics)
 
     def allows(self, code: str) -> bool:
         """Return True if a warning with this code is not to be given of this experiment, at a check or at a run."""

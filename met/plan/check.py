@@ -29,6 +29,7 @@ from met.plan import guides as guides
 from met.plan import relations as relations
 from met.plan import rest as rest
 from met.plan import structure as plan_structure
+from met.plan.checked_linear import check_linear
 from met.plan.checked_searches import check_search
 from met.plan.codec import Damaged
 from met.plan.columns import CaseValues
@@ -66,6 +67,7 @@ def check(experiments: Iterable[Experiment]) -> None:
         _group_name(experiment, f"{where}.name", names)
         names.append(experiment.name)
         plan_structure.check(experiment.structure, f"{where}.structure")
+        check_linear(experiment, where)
         _check_requirements(experiment, f"{where}.requirements")
         _check_step_errors(experiment, f"{where}.step_errors")
         _check_tolerances(experiment, f"{where}.tolerances")
@@ -110,7 +112,7 @@ def _group_name(experiment: Experiment, where: str, before: Collection[str]) -> 
 
 
 def _check_requirements(experiment: Experiment, where: str) -> None:
-    metrics = {use.name for use in experiment.structure.metrics}
+    metrics = {use.name for use in experiment.metrics}
     said: dict[str, Requirement] = {}
     for index, requirement in enumerate(experiment.requirements):
         if requirement.metric not in metrics:
@@ -143,7 +145,7 @@ def _check_step_errors(experiment: Experiment, where: str) -> None:
 
 
 def _check_tolerances(experiment: Experiment, where: str) -> None:
-    known = tolerable(experiment.structure) if experiment.tolerances else {}
+    known = tolerable(experiment.structure, experiment.linear_metrics) if experiment.tolerances else {}
     for index, tolerance in enumerate(experiment.tolerances):
         if tolerance.of not in known:
             raise Damaged(f"{where}[{index}].of", f"there is no signal or metric `{tolerance.of}`")

@@ -16,7 +16,7 @@ MOST_SEED = 2**53
 def check_search(experiment: Experiment, search: Search, where: str) -> None:
     """A search fits its run: its goal is a metric, what it chooses and what it is against are the coordinates, and its
     generations are the case table."""
-    if search.metric not in {use.name for use in experiment.structure.metrics}:
+    if search.metric not in {use.name for use in experiment.metrics}:
         raise Damaged(f"{where}.metric", f"there is no metric `{search.metric}`")
     check_whole(search.at_most, 1, MOST_SEARCHED, f"{where}.at_most")
     check_whole(search.seed, 0, MOST_SEED, f"{where}.seed")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from met import models
 from met.plan import MetricUse, Recorded, Structure
 from met.plan.channel import channel_paths, channels, watched_unit
+from met.plan.linear_uses import FIGURES
 
 OF_ALL = {"rel": "1", "time": "s"}
 """Tolerances of everything, with units: a share of the value; how much earlier or later."""
@@ -26,10 +27,12 @@ def grappled_payloads(structure: Structure) -> tuple[str, ...]:
     return tuple(payload.name for payload in structure.payloads if payload.grappled)
 
 
-def metric_units(structure: Structure) -> dict[str, str]:
-    """SI unit of each metric's result; `of` in its declaration stands for the channel's unit."""
+def metric_units(structure: Structure, linear: Sequence[MetricUse] = ()) -> dict[str, str]:
+    """SI unit of each metric's result; `of` in its declaration stands for the channel's unit. linear: those
+    of linear answers."""
     watched = channels(structure, [use.of for use in structure.metrics])
-    return {use.name: _metric_unit(use, watched[use.of].unit) for use in structure.metrics}
+    own = {use.name: _metric_unit(use, watched[use.of].unit) for use in structure.metrics}
+    return own | {use.name: FIGURES[use.model].unit for use in linear}
 
 
 def _metric_unit(use: MetricUse, of: str) -> str:
@@ -41,11 +44,11 @@ def joint_parts(name: str, joints: tuple[str, ...]) -> tuple[str, ...]:
     return channel_paths(name, joints, ()) if joints else ()
 
 
-def tolerable(structure: Structure) -> dict[str, tuple[str, ...]]:
+def tolerable(structure: Structure, linear: Sequence[MetricUse] = ()) -> dict[str, tuple[str, ...]]:
     """Names that a tolerance may have, with the unit, or units where a signal's joints have several: signals, a joint's
     part of one, metrics (`metrics.<name>` where a signal has the name too), `rel` and `time`."""
     out = {name: units for recorded in structure.record for name, units in _signal(recorded)}
-    for name, unit in metric_units(structure).items():
+    for name, unit in metric_units(structure, linear).items():
         out[f"metrics.{name}" if name in out else name] = (unit,)
     return out | {name: (unit,) for name, unit in OF_ALL.items()}
 

@@ -171,6 +171,7 @@ class Answering:
         columns = sum(len(recorded.channels) for recorded in experiment.structure.record)
         self.recording = SimpleNamespace(sections=())
         self.program = SimpleNamespace(outputs=("failure",), columns=columns)
+        self.outputs = self.program.outputs
 
     def is_work(self, key: str) -> bool:
         return key == self.work_key

@@ -30,11 +30,11 @@ def without_size(text: str) -> str:
 
 @pytest.mark.slow
 def test_the_page_shows_what_is_printed(tmp_path: Path) -> None:
-    deck = re.search(r"<!-- hand\.ic -->\n```c\n(.*?)```", PAGE, re.DOTALL)
-    assert deck is not None
-    (tmp_path / "hand.ic").write_text(deck[1])
+    decks = re.findall(r"<!-- (\w+\.ic) -->\n```c\n(.*?)```", PAGE, re.DOTALL)
+    for name, text in decks:
+        (tmp_path / name).write_text(text)
     consoles = re.findall(r"```console\n(.*?)```", PAGE, re.DOTALL)
-    assert len(consoles) == 6
+    assert [name for name, _ in decks] == ["hand.ic", "firm.ic"] and len(consoles) == 8
     for console in consoles:
         lines = console.splitlines(keepends=True)
         commands = [line.removeprefix("$ met ") for line in lines if line.startswith("$ met ")]

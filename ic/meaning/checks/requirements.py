@@ -15,6 +15,7 @@ from met.diagnostic import Label, Place, leave_out
 from met.metrics.metric import Metric
 from met.metrics.window import ROUNDING
 from met.plan import MetricUse, Requirement, Structure
+from met.plan.linear_uses import FIGURES, LinearFigure
 from met.trace import Scalar
 
 NEAR = 0.02
@@ -24,12 +25,20 @@ FOLLOWED = {"q": "position", "qd": "rate"}
 """The kind of command that a joint's channel is to follow."""
 
 
-def check_requirements(scope: Scope, requirements: Sequence[Requirement], structure: Structure) -> None:
-    """Warn of requirements that are decided before the run, and of metrics that this run cannot show."""
+def check_requirements(
+    scope: Scope, requirements: Sequence[Requirement], structure: Structure, linear: Sequence[MetricUse] = ()
+) -> None:
+    """Warn of requirements that are decided before the run, and of metrics that this run cannot show. linear: the
+    metrics of linear answers."""
     if scope.complaints.error_count:
         return
     uses = {use.name: use for use in structure.metrics}
+    figures = {use.name: FIGURES[use.model] for use in linear}
     for requirement in requirements:
+        if requirement.metric in figures:
+            if requirement.place is not None:
+                _remark_bound(scope, requirement, figures[requirement.metric], requirement.place)
+            continue
         use = uses[requirement.metric]
         metric: Metric = models.find("metric", use.model, use.place)
         place, duration = requirement.place, structure.schedule.duration
@@ -44,7 +53,7 @@ def check_requirements(scope: Scope, requirements: Sequence[Requirement], struct
     _remark_contradictions(scope, requirements)
 
 
-def _remark_bound(scope: Scope, requirement: Requirement, metric: Metric, place: Place) -> bool:
+def _remark_bound(scope: Scope, requirement: Requirement, metric: Metric | LinearFigure, place: Place) -> bool:
     """Return True, with a warning, if the limit is where the metric cannot be."""
     upper, strict = requirement.comparison.startswith("<"), not requirement.comparison.endswith("=")
     beyond = requirement.limit < metric.least or (requirement.limit == metric.least and strict is upper)

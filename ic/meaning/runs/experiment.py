@@ -27,5 +27,7 @@ def experiment(
         tolerances=resolved.tolerances,
         allowances=allowances,
         step_errors=resolved.step_errors,
+        linear=resolved.linear,
+        linear_metrics=resolved.linear_metrics,
         **resolved.settings,
     )

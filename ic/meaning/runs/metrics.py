@@ -11,20 +11,25 @@ from ic.meaning.parameters.models import check_keys, find_model, refuse_values, 
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.expressions import ChannelTable
+from ic.meaning.runs.linear import is_figure_metric
 from ic.meaning.runs.record import not_one, of_lost
 from ic.text.complaints import known_words
 from met import models
+from met.diagnostic import did_you_mean
 from met.metrics.metric import Metric
 from met.plan import MetricUse, SignalExpression
 from met.plan.channel import Channel
+from met.plan.linear_uses import FIGURES
 
 
 def resolve_metrics(
     scope: Scope, block: MergedBlock, signals: ChannelTable
 ) -> tuple[tuple[MetricUse, ...], tuple[SignalExpression, ...]]:
-    """The metrics, and the expressions that they watch, which are no channels of the run so far."""
+    """The metrics that are gathered as the run goes, and the expressions that they watch, which are no channels of the
+    run so far."""
     made: dict[str, SignalExpression] = {}
-    found = (_metric(scope, item, signals, made) for item in block.of_kind("metric"))
+    own = (item for item in block.of_kind("metric") if not is_figure_metric(item))
+    found = (_metric(scope, item, signals, made) for item in own)
     return tuple(use for use in found if use is not None), tuple(made.values())
 
 
@@ -43,11 +48,16 @@ def _metric(scope: Scope, item: Item, signals: ChannelTable, made: dict[str, Sig
             item.place,
             help=[
                 f"write `metric {item.name} = MODEL {{ of = CHANNEL; }}`",
-                known_words("metric models", sorted(models.available("metric"))),
+                known_words("metric models", sorted({**models.available("metric"), **FIGURES})),
             ],
         )
         return None
-    metric = find_model(scope, "metric", word_of(item.value), place_of(item.value))
+    word = word_of(item.value)
+    figure = did_you_mean(word, FIGURES) if word is not None and word not in models.available("metric") else []
+    if figure and not did_you_mean(word or "", models.available("metric")):
+        scope.complaints.error("D140", f"no metric model `{word}`", place_of(item.value), help=figure)
+        return None
+    metric = find_model(scope, "metric", word, place_of(item.value))
     if metric is None or refuse_values(scope, item.value, ["of", *(p.name for p in metric.parameters)]):
         return None
     body = item.body or MergedBlock()

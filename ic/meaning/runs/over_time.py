@@ -1,4 +1,5 @@
-"""Requirements over time, `require always(CONDITION, after = 1 s);`: each is a metric of its own, and a limit on it."""
+"""Requirements with a call in them, each a metric of its own and a limit on it: over time, `require always(CONDITION,
+after = 1 s);`, and of linear answers, `require phase_margin(hand_loop) > 30 deg;`."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ from ic.grammar.syntax import Call, Expression, Name, Statement, Word, mapped
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.expressions import is_over_time
+from ic.meaning.runs.linear import is_figure
 from met import models
 from met.diagnostic import Label, Problem, error
 from met.metrics.metric import Metric
@@ -22,7 +24,8 @@ def metrics_over_time(scope: Scope, block: MergedBlock) -> tuple[MergedBlock, Ma
     """The run with a metric for each requirement over time; and by position of the statement, what it requires with
     the metric's name in the place of its call.
 
-    A metric is called after its requirement, or where that has no name as its model, `always`, `always_2`.
+    A metric is called after its requirement, or where that has no name as its model, `always`, `always_2`; of linear
+    answers after both, `hand_loop_phase_margin`.
     """
     items = dict(block.items)
     required: dict[int, Expression] = {}
@@ -35,12 +38,14 @@ def metrics_over_time(scope: Scope, block: MergedBlock) -> tuple[MergedBlock, Ma
         name = statement.name.text if statement.name is not None else unnamed.get(text, "")
         if not name:
             model, number = call.name.text, 2
+            model = f"{_of_figure(call)}_{model}" if is_figure(call) else model
             name = model
             while name in taken:
                 name, number = f"{model}_{number}", number + 1
             unnamed[text] = name
             taken.add(name)
-        items[f"metric {name}"] = _metric(name, call, statement)
+        made = _figure_metric if is_figure(call) else _metric
+        items[f"metric {name}"] = made(name, call, statement)
         return Name((Word(name, call.place),), call.place)
 
     for position, statement in enumerate(block.statements):
@@ -65,10 +70,28 @@ def _check_name(block: MergedBlock, statement: Statement) -> None:
 
 def _with_metrics(expression: Expression, statement: Statement, metric_of: MetricOf) -> Expression:
     """The expression with names in the place of calls of metrics; itself where there is none."""
-    if isinstance(expression, Call) and is_over_time(expression):
+    if isinstance(expression, Call) and (is_over_time(expression) or is_figure(expression)):
         return metric_of(statement, expression)
     made = mapped(expression, lambda part: _with_metrics(part, statement, metric_of))
     return expression if made == expression else made
+
+
+def _of_figure(call: Call) -> str:
+    """The name of the linear answers that a figure is of. Raises D376 where it is not written as it has to be."""
+    of = call.positional[0] if len(call.positional) == 1 else None
+    if not isinstance(of, Name) or len(of.path) > 1 or call.named or call.body is not None:
+        message = f"`{call.name.text}` takes the name of a `linear` block"
+        raise Problem(error("D376", message, call.place, help=f"write `{call.name.text}(NAME)`"))
+    return of.text
+
+
+def _figure_metric(name: str, call: Call, statement: Statement) -> Item:
+    """The metric of a figure of linear answers. Raises D376."""
+    _of_figure(call)
+    of = Item("", "of", (), call.positional[0], None, place_of(call.positional[0]))
+    return Item(
+        "metric", name, (), Name((call.name.path[0],), call.name.place), MergedBlock({"of": of}), statement.place
+    )
 
 
 def _metric(name: str, call: Call, statement: Statement) -> Item:

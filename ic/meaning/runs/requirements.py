@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal
@@ -15,13 +15,14 @@ from ic.meaning.parameters.models import word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.expressions import is_over_time
+from ic.meaning.runs.linear import is_figure
 from ic.meaning.runs.step_errors import FLIPPED, is_step_error
 from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import Help, did_you_mean, write
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import Requirement, Structure
+from met.plan import MetricUse, Requirement, Structure
 from met.plan.outputs import metric_units
 from met.statistics.confidence import can_be_shown
 from met.trace import Scalar
@@ -65,7 +66,7 @@ def read_requirements(
         if [word.text for word in statement.words] != ["require"]:
             continue
         comparison, share, confidence = _over_cases(required.get(position, statement.value))
-        if position in required and isinstance(comparison, Name):
+        if position in required and isinstance(comparison, Name) and not is_figure(_over_cases(statement.value)[0]):
             model = models.find("metric", word_of(block.items[f"metric {comparison.text}"].value) or "")
             if model.share:
                 scope.complaints.error(
@@ -178,9 +179,11 @@ def share_metrics(structure: Structure) -> set[str]:
     return {use.name for use in structure.metrics if models.find("metric", use.model, use.place).share}
 
 
-def resolve_requirements(scope: Scope, read: list[WrittenRequirement], structure: Structure) -> tuple[Requirement, ...]:
-    """The requirements with their limits in SI."""
-    metrics = metric_units(structure)
+def resolve_requirements(
+    scope: Scope, read: list[WrittenRequirement], structure: Structure, linear: Sequence[MetricUse] = ()
+) -> tuple[Requirement, ...]:
+    """The requirements with their limits in SI. linear: the metrics of linear answers."""
+    metrics = metric_units(structure, linear)
     shares = share_metrics(structure)
     found = []
     for each in read:

@@ -40,6 +40,7 @@ from ic.meaning.runs.environment import resolve_environment
 from ic.meaning.runs.expressions import resolve_signals
 from ic.meaning.runs.initial import check_balanced, resolve_initial
 from ic.meaning.runs.keys import resolve_run_keys
+from ic.meaning.runs.linear import resolve_linear, resolve_linear_metrics
 from ic.meaning.runs.metrics import resolve_metrics
 from ic.meaning.runs.over_time import metrics_over_time
 from ic.meaning.runs.rates import resolve_rates, resolve_schedule
@@ -51,7 +52,8 @@ from ic.text.complaints import known_words, where_it_belongs
 from met import models
 from met.diagnostic import Place, did_you_mean, write
 from met.frozen import frozen
-from met.plan import Experiment, Requirement, Schedule, ServoUse, StepErrorLimit, Structure, Tolerance
+from met.plan import Experiment, MetricUse, Requirement, Schedule, ServoUse, StepErrorLimit, Structure, Tolerance
+from met.plan.linear_uses import LinearUse
 
 BLOCKS = ("servos", *(block.name for block in (INITIAL, ENVIRONMENT, RATES, TOLERANCES)))
 """Keys of a run that have a block."""
@@ -62,6 +64,7 @@ class Resolved:
     """A run's structure, requirements and tolerances; its parameters are in the scope.
 
     settings   keys of the run that the experiment keeps beside its structure, by field
+    linear     answers that it asks for, and metrics of them
     """
 
     structure: Structure
@@ -71,6 +74,8 @@ class Resolved:
     seed: int
     place: Place
     settings: Mapping[str, Any]
+    linear: tuple[LinearUse, ...] = ()
+    linear_metrics: tuple[MetricUse, ...] = ()
 
 
 def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
@@ -170,18 +175,22 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     record = resolve_record(scope, run, block.get("record"), structure)
     metrics, watched = resolve_metrics(scope, block, signals)
     structure = replace(structure, metrics=metrics, record=record, expressions=(*structure.expressions, *watched))
+    linear = resolve_linear(scope, block, structure)
+    linear_metrics = resolve_linear_metrics(scope, block, linear)
     remark_unread(scope, uses, structure)
     check_sampling(scope, structure)
     check_together(scope, uses, structure)
     check_reach(scope, block, structure)
     check_magnitudes(scope, structure)
     scope.keep_setting("record", ", ".join(each.name for each in record) or "none", item=block.get("record"))
-    requirements = resolve_requirements(scope, comparisons, structure)
-    step_errors = resolve_step_errors(scope, block, structure)
-    check_requirements(scope, requirements, structure)
-    tolerances = resolve_tolerances(scope, body_of(scope, block.get("tolerances")), structure)
+    requirements = resolve_requirements(scope, comparisons, structure, linear_metrics)
+    step_errors = resolve_step_errors(scope, block, structure, linear_metrics)
+    check_requirements(scope, requirements, structure, linear_metrics)
+    tolerances = resolve_tolerances(scope, body_of(scope, block.get("tolerances")), structure, linear_metrics)
     settings = resolve_run_keys(scope, run, block, Experiment)
-    return Resolved(structure, requirements, step_errors, tolerances, seed, definition.place, settings)
+    return Resolved(
+        structure, requirements, step_errors, tolerances, seed, definition.place, settings, linear, linear_metrics
+    )
 
 
 def _check_steps(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Binary, Call, Expression, Name
@@ -12,7 +14,7 @@ from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met.diagnostic import did_you_mean
 from met.parameter import Parameter
-from met.plan import StepErrorLimit, Structure
+from met.plan import MetricUse, StepErrorLimit, Structure
 from met.plan.outputs import metric_units
 from met.trace import Scalar
 from met.units import PURE
@@ -34,8 +36,11 @@ def _is_call(side: Expression) -> bool:
     return isinstance(side, Call) and side.name.text == STEP_ERROR
 
 
-def resolve_step_errors(scope: Scope, block: MergedBlock, structure: Structure) -> tuple[StepErrorLimit, ...]:
-    """The limits in SI, or as shares, in the order in which they are written. structure: with its metrics."""
+def resolve_step_errors(
+    scope: Scope, block: MergedBlock, structure: Structure, linear: Sequence[MetricUse] = ()
+) -> tuple[StepErrorLimit, ...]:
+    """The limits in SI, or as shares, in the order in which they are written. structure: with its metrics; linear:
+    those of linear answers."""
     found: list[StepErrorLimit] = []
     written = {item.name for item in block.of_kind("metric")}
     units = metric_units(structure)
@@ -63,6 +68,11 @@ def resolve_step_errors(scope: Scope, block: MergedBlock, structure: Structure) 
         elif name not in written:
             helps = [*did_you_mean(name, written), known_words("metrics of this run", sorted(written))]
             scope.complaints.error("D132", f"no metric `{name}`", metric.place, help=helps)
+        elif any(name == each.name for each in linear):
+            message = f"`{name}` is of linear answers, of which no error by the step is computed"
+            scope.complaints.error(
+                "D313", message, metric.place, help="leave it out: it is of metrics of the run itself"
+            )
         elif name in units:  # else the metric failed (already reported)
             called = f"the limit on the error by the step of `{name}`"
             owner = Owner("", statement.place, "require", called=called)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.meaning.definitions.merge import Item, MergedBlock
@@ -11,7 +13,7 @@ from ic.meaning.runs.requirements import share_metrics
 from ic.text.complaints import known_words
 from met.diagnostic import did_you_mean
 from met.parameter import Parameter
-from met.plan import Structure, Tolerance
+from met.plan import MetricUse, Structure, Tolerance
 from met.plan.channel import recordable
 from met.plan.outputs import OF_ALL, joint_parts, tolerable
 from met.trace import Scalar
@@ -19,8 +21,11 @@ from met.trace import Scalar
 WRITE = "write `NAME = SIZE;`: `qd = 1e-6 rad/s;`, `elbow.q = 0.01 deg;`, `rel = 1e-9;`, `time = 1 ms;`"
 
 
-def resolve_tolerances(scope: Scope, body: MergedBlock, structure: Structure) -> tuple[Tolerance, ...]:
-    """The tolerances in SI, in the order in which they are written. structure: with its metrics and record."""
+def resolve_tolerances(
+    scope: Scope, body: MergedBlock, structure: Structure, linear: Sequence[MetricUse] = ()
+) -> tuple[Tolerance, ...]:
+    """The tolerances in SI, in the order in which they are written. structure: with its metrics and record; linear: the
+    metrics of linear answers."""
     for statement in body.statements:
         scope.complaints.error(
             "D239",
@@ -28,7 +33,7 @@ def resolve_tolerances(scope: Scope, body: MergedBlock, structure: Structure) ->
             statement.place,
             help="it belongs to a run or a sweep",
         )
-    known = tolerable(structure)
+    known = tolerable(structure, linear)
     found = (_tolerance(scope, item, structure, known) for item in body.items.values())
     return tuple(each for each in found if each is not None)
 

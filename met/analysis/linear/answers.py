@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from met.analysis.linear.creeping import CreepingRate, creeping
-from met.analysis.linear.injected import InputSignal, entries
+from met.analysis.linear.flow import Flow
 from met.analysis.linear.jacobian import PeriodMap, at_instant, period_map
 from met.analysis.linear.margins import STABLE, LoopMargins, ScalarLoop, comes_back, gain_limits, margins
 from met.analysis.linear.period import PeriodProgram
@@ -20,13 +20,16 @@ from met.frozen import frozen
 from met.messages.alike import nearest
 from met.plan import Experiment, Recorded
 from met.plan.channel import recordable
-from met.program.system import System
+from met.plan.linear_signals import InputSignal, input_signals
 
 MOST_TICKS = 5000
 """Ticks of the base rate in a period, at most: each takes some 10 ms."""
 
 SETTLED = 1e-12
 """Size of a pole, of a period, up to which nothing is left of it after one."""
+
+STAYS = 1e6
+"""Periods in which a pole hardly decays or grows that is said to stay."""
 
 GROWS = 0.01
 """Growth over the length of a run up to which an arm is not called unstable: as it moves, its poles move too."""
@@ -59,6 +62,10 @@ class Pole:
         if not math.isfinite(self.s.real):
             return 1.0
         return -self.s.real / abs(self.s) if self.s else 0.0
+
+    def stays(self, seconds: float) -> bool:
+        """True of what neither decays nor grows, of periods so long: a place with a loop of rate."""
+        return self.seconds > STAYS * seconds
 
     @property
     def seconds(self) -> float:
@@ -164,36 +171,46 @@ class LinearQuestion:
         experiment = self.experiment
         if not 0.0 <= self.at <= experiment.structure.schedule.duration:
             raise _outside(experiment, self.at)
-        every = entries(System(experiment))
+        every = input_signals(experiment.structure)
         named = _named(every, tuple(dict.fromkeys((*self.inputs, *self.opened))), self.opened)
         program = PeriodProgram(experiment, named, _records(experiment, self.outputs))
         if program.ticks > MOST_TICKS:
             raise _too_long(program)
         return program
 
+    @property
+    def loops(self) -> list[tuple[str, ...]]:
+        """The loops that are opened, each by the signals at which it is: those of `opened`, and all of them at once."""
+        return [(path,) for path in self.opened] + ([self.opened] if len(self.opened) > 1 else [])
+
+    def lifted(self, flow: Flow) -> LiftedPeriod:
+        """The map of the period that begins where a flow of `program` stands. Raises Problem D370."""
+        found = period_map(self.program, flow)
+        kept = _kept(self.program, found)
+        states = tuple(found.states[place] for place in kept)
+        return LiftedPeriod(
+            found.A[np.ix_(kept, kept)], found.B[kept], found.C[:, kept], found.Wx[:, kept], found.Wu, states,
+            self.program, found,
+        )  # fmt: skip
+
     def of(self, case: int) -> Linearized:
         """The answers about a row of the case table. Raises Problem D370 where an event is in the period, D371 where
         the run has failed before, and as `program` does."""
         program, inputs = self.program, self.inputs
-        tick = program.begin(self.at)
-        flow = at_instant(program, case, tick)
-        slow = creeping(flow)
-        found = period_map(program, flow)
-        kept = _kept(program, found)
-        states = tuple(found.states[place] for place in kept)
-        A, C, Wx, B = found.A[np.ix_(kept, kept)], found.C[:, kept], found.Wx[:, kept], found.B[kept]
+        flow = at_instant(program, case, program.begin(self.at))
+        slow, tick = creeping(flow), flow.tick
+        lifted = self.lifted(flow)
+        found, states = lifted.found, lifted.states
         paths = [program.inputs[each.entry].path for each in found.ticks]
 
         def summed(columns: np.ndarray) -> np.ndarray:
             own = [columns[:, [k for k, each in enumerate(paths) if each == path]].sum(1) for path in inputs]
             return np.array(own).T.reshape(len(columns), len(inputs))
 
-        lifted = _Lifted(A, B, Wx, found.Wu, program, found)
-        several = [(path,) for path in self.opened] + ([self.opened] if len(self.opened) > 1 else [])
         return Linearized(
             self.experiment.name, case, tick / program.schedule.base_hz, found.seconds, states, inputs,
-            found.outputs, A, summed(B), C, summed(found.D), plant(program, flow, states),
-            tuple(lifted.opened(each) for each in several), found.held, slow, found.at_limit,
+            found.outputs, lifted.A, summed(lifted.B), lifted.C, summed(found.D), plant(program, flow, states),
+            tuple(lifted.opened(each) for each in self.loops), found.held, slow, found.at_limit,
             {name: program.joint_of(name) for name in program.states},
         )  # fmt: skip
 
@@ -211,14 +228,36 @@ def linear(
     return LinearQuestion(experiment, at, tuple(inputs), tuple(outputs), tuple(opened)).of(case)
 
 
+def of_deck(experiment: Experiment, name: str | None = None) -> LinearQuestion:
+    """The question of a `linear` block of a run; None: of its only one. Raises Problem D376."""
+    known = {use.name: use for use in experiment.linear}
+    if name is None and len(known) == 1:
+        (name,) = known
+    if name is None or name not in known:
+        message = f"there is no `linear {name}` in `{experiment.name}`"
+        if name is None:
+            message = f"`{experiment.name}` has {len(known) or 'no'} `linear` blocks, and none is named"
+        near = nearest(name, known) if name is not None else None
+        helps = [f"did you mean `{near}`?"] if near else []
+        helps += ["there are " + ", ".join(f"`{each}`" for each in known)] if known else []
+        raise Problem(error("D376", message, experiment.place, help=tuple(helps)))
+    use = known[name]
+    return LinearQuestion(experiment, use.at, use.inputs, use.outputs, use.opened)
+
+
 @frozen
-class _Lifted:
-    """A period's map with each tick of each input by itself."""
+class LiftedPeriod:
+    """A period's map with each tick of each input by itself, of those states that act on something.
+
+    A, B, C, Wx, Wu  as `PeriodMap` has them, of these states
+    """
 
     A: np.ndarray
     B: np.ndarray
+    C: np.ndarray
     Wx: np.ndarray
     Wu: np.ndarray
+    states: tuple[str, ...]
     program: PeriodProgram
     found: PeriodMap
 
@@ -226,6 +265,12 @@ class _Lifted:
     def drift(self) -> float:
         """Growth of a period that is none."""
         return max(STABLE, GROWS * self.found.seconds / self.program.schedule.duration)
+
+    @property
+    def poles(self) -> list[Pole]:
+        """Its modes, without who takes part, in no order."""
+        roots = np.linalg.eigvals(self.A).tolist() if len(self.A) else []
+        return [_of_period(complex(z), (), self.found.seconds) for z in roots]
 
     def opened(self, paths: tuple[str, ...]) -> OpenLoop:
         """Opened at these signals: what stands there is given, and what comes back is asked for."""

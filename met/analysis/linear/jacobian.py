@@ -7,7 +7,7 @@ where the memory stands on a kink whose other side has another derivative.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -20,6 +20,9 @@ from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.passing import run_past
 from met.plan import Experiment
+
+ABREAST = 256
+"""Cases that are run up to an instant side by side, so that their memory fits beside all else."""
 
 SAME = 1e-9
 """Share of the largest number of its row by which the derivatives of two sides may differ and be one."""
@@ -63,18 +66,40 @@ class PeriodMap:
 
 
 def at_instant(program: PeriodProgram, case: int, tick: int) -> Flow:
-    """A case at an instant, from which a period goes on: as the run has it there."""
-    prepared = program.prepared
-    given = engine.inputs(program.experiment, np.array([case]))
-    inputs = dict(zip(prepared.program.inputs, given[0].tolist(), strict=True))
-    if tick == 0:
-        flow = Flow(program, inputs, {}, 0)
-        flow.begin()
-        return flow
-    _, outputs, memory = run_past(prepared.kernel, given, tick - 1, [tick - 1], record=False)
-    if outputs[0, prepared.program.outputs.index("failure")] != 0.0:
+    """A case at an instant, from which a period goes on: as the run has it there. Raises Problem D371."""
+    (flow,) = at_instants(program, engine.inputs(program.experiment, np.array([case])), tick)
+    if flow is None:
         raise failed(program.experiment, tick)
-    cells = dict(zip(prepared.recording.cells, memory[0, 0].tolist(), strict=True))
+    return flow
+
+
+def at_instants(
+    program: PeriodProgram, given: np.ndarray, tick: int, threads: int | None = None
+) -> Iterator[Flow | None]:
+    """Cases at an instant, one after the other; None for one that has failed before. given: the program's inputs,
+    [case, input]."""
+    prepared = program.prepared
+    failure, cells = prepared.program.outputs.index("failure"), prepared.recording.cells
+    for at in range(0, len(given), ABREAST):
+        some = given[at : at + ABREAST]
+        if tick:
+            _, outputs, memory = run_past(
+                prepared.kernel, some, tick - 1, [tick - 1], record=False, threads=threads
+            )  # fmt: skip
+        for place, row in enumerate(some):
+            inputs = dict(zip(prepared.program.inputs, row.tolist(), strict=True))
+            if not tick:
+                flow = Flow(program, inputs, {}, 0)
+                flow.begin()
+                yield flow
+            elif outputs[place, failure] != 0.0:
+                yield None
+            else:
+                yield _gone_on(program, inputs, dict(zip(cells, memory[place, 0].tolist(), strict=True)), tick)
+
+
+def _gone_on(program: PeriodProgram, inputs: Mapping[str, float], cells: Mapping[str, float], tick: int) -> Flow:
+    """The flow from a memory at the end of the tick before, to where the step is finished that ends at this one."""
     if lost := program.remembered - cells.keys():
         raise ValueError(f"the run keeps no {sorted(lost)}, which a period begins with")
     flow = Flow(program, inputs, cells, tick - 1)

@@ -15,8 +15,9 @@ from dataclasses import replace
 from functools import cached_property
 
 from met import run as engine
-from met.analysis.linear.injected import ADDED, InjectedBuilder, InputSignal
+from met.analysis.linear.injected import ADDED, InjectedBuilder
 from met.plan import Experiment, Recorded
+from met.plan.linear_signals import InputSignal
 from met.program.control import guiding
 from met.program.control.sensing import READING
 from met.program.motion import bodies

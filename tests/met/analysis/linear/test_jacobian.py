@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from met import models
-from met.analysis.linear.injected import entries
 from met.analysis.linear.jacobian import PeriodMap, at_instant, period_map
 from met.analysis.linear.period import PeriodProgram
 from met.diagnostic import Problem
 from met.plan import Experiment
-from met.program.system import System
+from met.plan.linear_signals import input_signals
 from tests.ic.small_decks import experiment
 from tests.met.analysis.linear.oracles import (
     by_complex_step,
@@ -28,7 +27,7 @@ from tests.met.small_models import EVERY, smallest
 
 
 def mapped(made: Experiment, time: float = 0.0, inputs: bool = False) -> PeriodMap:
-    program = PeriodProgram(made, entries(System(made)) if inputs else ())
+    program = PeriodProgram(made, input_signals(made.structure) if inputs else ())
     tick = round(time * program.schedule.base_hz) // program.ticks * program.ticks
     return period_map(program, at_instant(program, 0, tick))
 

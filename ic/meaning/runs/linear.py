@@ -1,0 +1,150 @@
+"""Linear answers that a run asks for, `linear hand_loop { at = 2 s; open = pan.servo.voltage; }`, and metrics of
+them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from ic.grammar.places import place_of
+from ic.grammar.syntax import Call, Expression, List, Name
+from ic.language.runs import LINEAR, LINEAR_AT
+from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.parameters.models import check_keys, refuse_values, word_of
+from ic.meaning.parameters.not_sweepable import NotSweepable
+from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.record import nearest_channels, of_lost
+from ic.text.complaints import known_words
+from met.diagnostic import Place, did_you_mean, write
+from met.plan import MetricUse, Structure
+from met.plan.channel import recordable
+from met.plan.linear_signals import InputSignal, input_signals
+from met.plan.linear_uses import FIGURES, LinearUse
+
+ONE_INSTANT = NotSweepable("is one for the whole sweep", "write a `linear` block for each instant")
+
+LISTS = {"inputs": "inputs", "outputs": "outputs", "open": "opened"}
+"""Keys of a block that are lists of signals, and the fields that hold them."""
+
+
+def is_figure(expression: Expression | None) -> bool:
+    """Return True if this is a figure of linear answers, `phase_margin(hand_loop)`."""
+    return isinstance(expression, Call) and expression.name.text in FIGURES
+
+
+def is_figure_metric(item: Item) -> bool:
+    """Return True if a metric of a run is a figure of linear answers."""
+    return word_of(item.value) in FIGURES
+
+
+def resolve_linear(scope: Scope, block: MergedBlock, structure: Structure) -> tuple[LinearUse, ...]:
+    """The linear answers that a run asks for."""
+    known = {each.path: each for each in input_signals(structure)} if any(block.of_kind("linear")) else {}
+    found = (_answer(scope, item, structure, known) for item in block.of_kind("linear"))
+    return tuple(use for use in found if use is not None)
+
+
+def _answer(scope: Scope, item: Item, structure: Structure, known: Mapping[str, InputSignal]) -> LinearUse | None:
+    if item.body is None or item.value is not None or item.detail:
+        message = f"`linear {item.name}` is a block"
+        scope.complaints.error("D375", message, item.place, help=f"write `{LINEAR.written}`")
+        return None
+    before, body = scope.complaints.error_count, item.body
+    owner = Owner(f"`linear {item.name}`", item.place, f"linear.{item.name}")
+    check_keys(scope, body, list(LINEAR.keys), owner)
+    at, duration = body.get("at"), structure.schedule.duration
+    time = 0.0 if at is None else scope.constant(owner, LINEAR_AT, at)
+    for path in owner.paths(LINEAR_AT.name, () if at is None else at.homes):
+        scope.not_sweepable[path] = ONE_INSTANT
+    if at is not None and time is not None and time > duration:
+        message = f"t = {time:.6g} s is not in the run, which ends at {duration:.6g} s"
+        helps = "ask at an instant of the run, or let it last longer"
+        scope.complaints.error("D375", message, place_of(at.value) if at.value else at.place, help=helps)
+    signals: dict[str, tuple[str, ...]] = {}
+    for key, field in LISTS.items():
+        entry = body.get(key)
+        names = [] if entry is None else list(_names(scope, entry, key))
+        good = [name for name in names if _is_known(scope, name, key, structure, known)]
+        for name in [name for place, name in enumerate(good) if name.text in {one.text for one in good[:place]}]:
+            scope.complaints.error("D040", f"`{name.text}` is there twice", name.place, help="leave one out")
+        signals[field] = tuple(name.text for name in good)
+        if entry is not None and signals[field]:
+            scope.keep_setting(f"{owner.path}.{key}", ", ".join(signals[field]), item=entry)
+    if time is None or scope.complaints.error_count > before:
+        return None
+    return LinearUse(item.name, time, place=item.place, **signals)
+
+
+def _names(scope: Scope, item: Item, key: str) -> Iterator[Name]:
+    """The names that an entry lists: one, or several in brackets, and those that `+=` adds."""
+    for expression in (item.value, *item.appended):
+        for each in expression.items if isinstance(expression, List) else (expression,):
+            if isinstance(each, Name):
+                yield each
+            else:
+                place = item.place if each is None else place_of(each)
+                helps = f"write `{LINEAR[key].written}`, or several in brackets"
+                scope.complaints.error("D375", f"`{key}` is a list of signals", place, help=helps)
+
+
+def _is_known(scope: Scope, name: Name, key: str, structure: Structure, known: Mapping[str, InputSignal]) -> bool:
+    """Return True if this is a signal of the kind that a key takes; report it otherwise."""
+    failed = scope.failed_servos | scope.failed_parts
+    if failed and (name.path[0].text in failed or "servo" in (word.text for word in name.path)):
+        return False
+    if key == "outputs":
+        channels = recordable(structure, [name.text])
+        if name.text not in channels and not of_lost(scope, name, structure):
+            helps = nearest_channels(name, channels, structure)
+            scope.complaints.error("D125", f"no channel `{name.text}`", name.place, help=helps)
+        return name.text in channels
+    places = [path for path, each in known.items() if each.is_output or key == "inputs"]
+    if name.text in places:
+        return True
+    what = "place to open a loop" if key == "open" else "input"
+    helps = [*did_you_mean(name.text, places), known_words("there are", places)]
+    if not places:
+        helps = ["no servo here has a computer that ticks: a law that is continuous is a part of the arm"]
+    scope.complaints.error("D375", f"there is no {what} `{name.text}`", name.place, help=helps)
+    return False
+
+
+def resolve_linear_metrics(scope: Scope, block: MergedBlock, answers: Sequence[LinearUse]) -> tuple[MetricUse, ...]:
+    """The metrics of a run that are figures of linear answers."""
+    found = (_metric(scope, item, block, answers) for item in block.of_kind("metric") if is_figure_metric(item))
+    return tuple(use for use in found if use is not None)
+
+
+def _metric(scope: Scope, item: Item, block: MergedBlock, answers: Sequence[LinearUse]) -> MetricUse | None:
+    figure = FIGURES[word_of(item.value) or ""]
+    body = item.body or MergedBlock()
+    if item.value is None or refuse_values(scope, item.value, ["of"]):
+        return None
+    check_keys(scope, body, ["of"], Owner(f"metric `{item.name}`", item.place, f"metrics.{item.name}"))
+    of = body.get("of")
+    names = {each.name: each for each in block.of_kind("linear")}
+    if of is None or not isinstance(of.value, Name) or of.value.text not in names:
+        named = of.value.text if of is not None and isinstance(of.value, Name) else ""
+        message = f"no `linear {named}` in this run" if named else f"a `{figure.name}` is of a `linear` block"
+        helps = [*did_you_mean(named, names), known_words("linear blocks of this run", sorted(names))]
+        if not names:
+            helps = [write(f"linear {named or 'NAME'} {{ open = JOINT.servo.voltage; }}", where="inside")]
+        scope.complaints.error("D376", message, _place(item, of), help=helps)
+        return None
+    use = next((each for each in answers if each.name == of.value.text), None)
+    if use is None:
+        return None  # it failed (already reported)
+    if figure.of_loops and not use.opened:
+        message = f"`linear {use.name}` opens no loop, so it has no `{figure.name}`"
+        helps = f"write `{LINEAR['open'].written}` in it"
+        scope.complaints.error("D376", message, _place(item, of), help=helps)
+        return None
+    scope.keep_setting(f"metrics.{item.name}.model", figure.name, item=item)
+    scope.keep_setting(f"metrics.{item.name}.of", use.name, item=of)
+    return MetricUse(item.name, figure.name, use.name, item.place)
+
+
+def _place(item: Item, of: Item | None) -> Place:
+    if of is None:
+        return item.place
+    return of.place if of.value is None else place_of(of.value)

@@ -1,0 +1,143 @@
+"""Metrics of linear answers: of each case, after it has run, its loops and poles at the instant that the run names.
+
+A case's numbers follow from the case alone: it is run up to the instant by the same machine code, and linearised by
+itself. What a loop has no limit of is infinite; one that is unstable as it is has no margin at all.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from met import run as engine
+from met.analysis.linear.answers import LiftedPeriod, LinearQuestion, OpenLoop, of_deck
+from met.analysis.linear.flow import Flow
+from met.analysis.linear.jacobian import at_instants
+from met.diagnostic import Problem
+from met.passing import Memories
+from met.plan import MetricUse
+from met.plan.linear_uses import (
+    ANSWERED,
+    EVENT,
+    FIGURES,
+    OPEN,
+    SEVERAL_TICKS,
+    WHY_ANSWER,
+    LinearFigure,
+    LinearUse,
+)
+from met.program.build import METRIC
+
+QUESTION = "linear question: "
+"""Before the name of a `LinearUse`: the question to it, among the companions of a prepared experiment."""
+
+
+def compute(
+    prepared: engine.Prepared,
+    rows: np.ndarray,
+    *,
+    threads: int | None = None,
+    record: bool = True,
+    progress: Callable[[int], None] | None = None,
+    memories: Memories | None = None,
+) -> tuple[np.ndarray | None, np.ndarray]:
+    """The answer of `met.run.compute`, with the metrics of linear answers in it. Raises Problem where such a question
+    is wrong for all cases (`check`).
+
+    progress  where there are such metrics, the first half of the cases counts as done when all have run
+    """
+    uses = _asked(prepared)
+    told = progress if not uses or progress is None else partial(_half, progress)
+    history, outputs = engine.compute(
+        prepared, rows, threads=threads, record=record, progress=told, memories=memories
+    )  # fmt: skip
+    for number, use in enumerate(uses):
+        share = None if progress is None else partial(_rest, progress, number, len(uses), len(rows))
+        _answer(prepared, use, rows, outputs, threads, share)
+    return history, outputs
+
+
+def _half(progress: Callable[[int], None], done: int) -> None:
+    progress(done // 2)
+
+
+def _rest(progress: Callable[[int], None], number: int, uses: int, cases: int, done: int) -> None:
+    progress(cases // 2 + (cases - cases // 2) * (number * cases + done) // (uses * cases))
+
+
+def check(prepared: engine.Prepared) -> None:
+    """Raise Problem where a question of an experiment's metrics is wrong for all its cases: D372 to D374."""
+    for use in _asked(prepared):
+        question(prepared, use).program  # noqa: B018 - making it is what finds it
+
+
+def _asked(prepared: engine.Prepared) -> list[LinearUse]:
+    """The linear answers of which an experiment has metrics; none of one that is driven on beds."""
+    named = {each.of for each in prepared.experiment.linear_metrics}
+    return [use for use in prepared.experiment.linear if use.name in named and not prepared.wire]
+
+
+def question(prepared: engine.Prepared, use: LinearUse) -> LinearQuestion:
+    """The question of a deck to an experiment, kept with what is prepared of it."""
+    key = QUESTION + use.name
+    if key not in prepared.companions:
+        made = of_deck(prepared.experiment, use.name)
+        made.program.prepared = prepared
+        prepared.companions[key] = made
+    found: LinearQuestion = prepared.companions[key]
+    return found
+
+
+def _answer(
+    prepared: engine.Prepared,
+    use: LinearUse,
+    rows: np.ndarray,
+    outputs: np.ndarray,
+    threads: int | None,
+    progress: Callable[[int], None] | None,
+) -> None:
+    """Write the metrics of one question into the outputs of these cases."""
+    asked, names = question(prepared, use), prepared.outputs
+    wanted = [each for each in prepared.experiment.linear_metrics if each.of == use.name]
+    columns, why = [names.index(METRIC + each.name) for each in wanted], names.index(WHY_ANSWER + use.name)
+    done = np.flatnonzero(outputs[:, names.index("failure")] == 0.0)
+    tick, given = asked.program.begin(use.at), engine.inputs(prepared.experiment, rows[done])
+    for place, flow in zip(done.tolist(), at_instants(asked.program, given, tick, threads), strict=True):
+        if flow is not None:
+            outputs[place, columns], outputs[place, why] = _figures(asked, wanted, flow)
+        if progress is not None:
+            progress(place + 1)
+
+
+def _figures(asked: LinearQuestion, wanted: Sequence[MetricUse], flow: Flow) -> tuple[list[float], float]:
+    """The figures of a case, and why one or all of them are none: `ANSWERED` where they all are."""
+    try:
+        lifted = asked.lifted(flow)
+    except Problem:
+        return [math.nan] * len(wanted), float(EVENT)
+    loops = [lifted.opened(each) for each in asked.loops] if any(FIGURES[e.model].of_loops for e in wanted) else []
+    found = [_figure(FIGURES[each.model], lifted, loops) for each in wanted]
+    return [value for value, _ in found], float(max(why for _, why in found))
+
+
+def _figure(figure: LinearFigure, lifted: LiftedPeriod, loops: Sequence[OpenLoop]) -> tuple[float, int]:
+    if not figure.of_loops:
+        poles = [each for each in lifted.poles if not each.stays(lifted.found.seconds)]
+        if figure.name == "damping":
+            return min((each.damping for each in poles), default=1.0), ANSWERED
+        return max((math.inf if each.s.real > 0.0 else each.seconds for each in poles), default=0.0), ANSWERED
+    if any(loop.unstable for loop in loops):
+        return figure.unstable, ANSWERED
+    if not all(loop.returns for loop in loops):
+        return math.nan, OPEN
+    if figure.name == "gain_margin":
+        room = [1.0 / down for down, _ in (loop.gains for loop in loops) if down]
+        return min([*room, *(up for _, up in (loop.gains for loop in loops) if up is not None)], default=math.inf), 0
+    single = [loop for loop in loops if len(loop.paths) == 1]
+    if any(loop.margins is None for loop in single):
+        return math.nan, SEVERAL_TICKS
+    values = [getattr(loop.margins, figure.name.removesuffix("_margin")) for loop in single]
+    return min((math.inf if value is None else value for value in values), default=math.inf), ANSWERED

@@ -1,0 +1,47 @@
+"""Checks of the linear answers of a plan, and of metrics of them, that its types cannot make. Raise `Damaged`."""
+
+from __future__ import annotations
+
+from met.plan import Experiment
+from met.plan.channel import recordable
+from met.plan.codec import Damaged
+from met.plan.linear_signals import input_signals
+from met.plan.linear_uses import FIGURES
+from met.plan.structure import check_name
+
+MOST_SIGNALS = 1000
+"""Inputs, outputs and opened places of one answer, of each kind at most."""
+
+
+def check_linear(experiment: Experiment, where: str) -> None:
+    """Every answer is of signals of the run, at an instant of it; every metric is a figure of one of them."""
+    structure, names = experiment.structure, list[str]()
+    known = {each.path: each for each in input_signals(structure)} if experiment.linear else {}
+    for index, use in enumerate(experiment.linear):
+        place = f"{where}.linear[{index}]"
+        check_name(use.name, f"{place}.name", names)
+        names.append(use.name)
+        if not 0.0 <= use.at <= structure.schedule.duration:
+            raise Damaged(f"{place}.at", f"it should be between 0 and {structure.schedule.duration:g} s")
+        for field, paths in (("inputs", use.inputs), ("opened", use.opened), ("outputs", use.outputs)):
+            if len(paths) > MOST_SIGNALS or len(set(paths)) < len(paths):
+                raise Damaged(f"{place}.{field}", "something is there twice, or too much")
+        recorded = recordable(structure, use.outputs)
+        for path in use.outputs:
+            if path not in recorded:
+                raise Damaged(f"{place}.outputs", f"there is no channel `{path}`")
+        for path in (*use.inputs, *use.opened):
+            if path not in known or (path in use.opened and not known[path].is_output):
+                raise Damaged(f"{place}.{'opened' if path in use.opened else 'inputs'}", f"`{path}` is none")
+    of = {use.name: use for use in experiment.linear}
+    taken = [use.name for use in structure.metrics]
+    for index, metric in enumerate(experiment.linear_metrics):
+        place = f"{where}.linear_metrics[{index}]"
+        check_name(metric.name, f"{place}.name", taken)
+        taken.append(metric.name)
+        if metric.model not in FIGURES:
+            raise Damaged(f"{place}.model", f"there is no figure `{metric.model}`")
+        if metric.of not in of:
+            raise Damaged(f"{place}.of", f"there is no `{metric.of}` among the linear answers")
+        if FIGURES[metric.model].of_loops and not of[metric.of].opened:
+            raise Damaged(f"{place}.of", f"`{metric.of}` opens no loop")

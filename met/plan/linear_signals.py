@@ -1,0 +1,39 @@
+"""Signals of which linear answers are made, by the structure alone: what may be an input, and where a loop opens."""
+
+from __future__ import annotations
+
+from met import models
+from met.frozen import frozen
+from met.plan import ServoUse, Structure
+from met.plan.uses import servo_parts
+
+
+@frozen
+class InputSignal:
+    """A signal that may be an input: of a servo that ticks, its command or an output of its law.
+
+    path      of its channel: `pan.servo.command`, `pan.servo.voltage`
+    divisor   ticks of the base rate from one to the next
+    is_output whether a law puts it out, so that its loop may be opened there
+    """
+
+    path: str
+    joint: str
+    divisor: int
+    is_output: bool
+
+
+def input_signals(structure: Structure) -> tuple[InputSignal, ...]:
+    """The signals of a structure that may be inputs, joint by joint: commands, then outputs of laws."""
+    uses = {use.joint: use for use in structure.servos}
+    return tuple(signal for joint in structure.moving if joint.name in uses for signal in _of_servo(uses[joint.name]))
+
+
+def _of_servo(use: ServoUse) -> list[InputSignal]:
+    parts = servo_parts(use)
+    if models.find("servo", use.model, use.place).control is None or parts.continuous:
+        return []
+    asked = [InputSignal(f"{use.joint}.servo.command", use.joint, use.divisor, False)] if use.command else []
+    return asked + [
+        InputSignal(f"{use.joint}.servo.{each.name}", use.joint, use.divisor, True) for each in parts.outputs
+    ]

@@ -1,0 +1,87 @@
+"""Linear answers that a run asks for by name, and the figures of them that are metrics.
+
+    linear hand_loop { at = 2 s; open = pan.servo.voltage; }
+    require phase_margin(hand_loop) > 30 deg;
+
+They are computed of each case after it has run (`met.analysis.linear.metrics`). They are in no program, so they move no
+bit of a run and are in no key of a structure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from met.diagnostic import Place
+from met.frozen import frozen, keyed
+
+
+@frozen
+class LinearUse:
+    """A question for linear answers, under a name of the deck's.
+
+    at       s; they are of the last begin of a period up to it
+    inputs   channels of servos that tick: commands, outputs of laws
+    outputs  what can be recorded
+    opened   outputs of laws, at which loops are opened: each by itself, and all at once
+    """
+
+    name: str
+    at: float = 0.0
+    inputs: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
+    opened: tuple[str, ...] = ()
+    place: Place | None = keyed("never", default=None)
+
+
+@frozen
+class LinearFigure:
+    """A number of linear answers that may be a metric.
+
+    unit      SI;  least: bound below which it never is
+    of_loops  whether it is of opened loops: the least of all of them
+    one_rate  whether a loop has it whose law ticks once in a period alone
+    unstable  its value where the loop is unstable as it is
+    """
+
+    name: str
+    unit: str
+    doc: str
+    least: float = -math.inf
+    of_loops: bool = True
+    one_rate: bool = True
+    unstable: float = 0.0
+
+
+FIGURES: Mapping[str, LinearFigure] = {
+    each.name: each
+    for each in (
+        LinearFigure("gain_margin", "1", "times by which the gain may rise or fall; 1 of a loop that is unstable",
+                     least=1.0, one_rate=False, unstable=1.0),
+        LinearFigure("phase_margin", "rad", "by which the loop may turn, either way; 0 of one that is unstable",
+                     least=0.0),
+        LinearFigure("delay_margin", "s", "by which what the law puts out may come later; 0 of one that is unstable",
+                     least=0.0),
+        LinearFigure("disk_margin", "1", "alpha of the disk of gain and phase at once; 0 of one that is unstable",
+                     least=0.0),
+        LinearFigure("damping", "1", "the least damping of all poles that do not stay; below 0 of one that grows",
+                     least=-1.0, of_loops=False, one_rate=False),
+        LinearFigure("decay_time", "s", "time in which the slowest mode decays by e; infinite where one grows",
+                     least=0.0, of_loops=False, one_rate=False),
+    )
+}  # fmt: skip
+"""Figures of linear answers, by name."""
+
+WHY_ANSWER = "linear:"
+"""Before the name of a `LinearUse`: the output that says why a case has no answer, a key of `WHY_NONE`; 0 where it
+has one."""
+
+ANSWERED, NOT_ASKED, EVENT, OPEN, SEVERAL_TICKS = range(5)
+
+WHY_NONE: Mapping[int, str] = {
+    NOT_ASKED: "it is not computed of a case that is driven on beds, or run by itself",
+    EVENT: "an event is in the period there",
+    OPEN: "nothing comes back where the loop is opened, as its joint is held, or its law at its limit",
+    SEVERAL_TICKS: "its law ticks several times in a period, and has no phase, delay or disk of one rate",
+}
+"""Reasons for which a case has no answer, in words."""
