@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Any
 from met.frozen import frozen
 
 if TYPE_CHECKING:
+    import xarray
+
     from batch.campaigns.drive import Progress
     from batch.campaigns.executor import Executor
     from batch.campaigns.verification.when import Verify
@@ -178,6 +180,34 @@ def linear(
     ((found, rows),) = select_rows(asked, [case])
     question = LinearQuestion(found, at, tuple(inputs), tuple(outputs), tuple(opened))
     return LinearAnswer((question if of is None else of_deck(found, of)).of(int(rows[0])))
+
+
+def gradient(
+    plan: Plan | str | os.PathLike[str],
+    experiment: str | None = None,
+    *,
+    cases: Sequence[int | str] | None = None,
+    metrics: Sequence[str] = (),
+) -> xarray.Dataset:
+    """How metrics of a sweep's cases move with the numbers that it varies: exact, of the program that runs.
+
+    experiment  name of a sweep; None: the plan's first
+    cases       rows of the case table, `"#7"`, beginnings of case_ids; None: all
+    metrics     names; none: all
+
+    The Dataset has `value` (case, metric) and `slope` (case, metric, number) in SI, and `why_not`: where there is no
+    slope, the reason. `Simulation.gradient` takes any number of a deck; docs/linear.md has more of both.
+
+    Raises Problem D379 where no number varies, or a name is no metric's.
+    """
+    from batch.campaigns.choosing import experiments_named, select_rows
+    from batch.linearized.gradients import to_dataset
+    from met.analysis.linear.gradient import GradientProgram
+
+    names = None if experiment is None else (experiment,)
+    found = experiments_named(_plan(plan, names), names)[0]
+    ((found, rows),) = select_rows([found], cases)
+    return to_dataset(found, GradientProgram(found).of([int(row) for row in rows], metrics))
 
 
 def _plan(given: object, experiments: Sequence[str] | None) -> Plan:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import xarray
 
     from batch.simulation.stepping import SteppedProgram, SteppedRun
+    from met.analysis.linear.gradient import GradientProgram
 
 
 @dataclass
@@ -74,6 +75,7 @@ class Simulation:
         )
         self._programs: dict[tuple[tuple[str, ...], bool], SimulationProgram] = {}
         self._stepped: dict[object, SteppedProgram] = {}
+        self._gradients: dict[tuple[str, ...], GradientProgram] = {}
         self._units: dict[str, str | None] = {}
 
     def __repr__(self) -> str:
@@ -116,6 +118,34 @@ class Simulation:
         rows = np.arange(count * repeat)
         history, outputs = linear_metrics.compute(prepared, rows, threads=threads, record=bool(signals))
         return program.datasets.dataset(prepared.experiment, engine.results(prepared, rows, history, outputs), signals)
+
+    def gradient(
+        self, values: Mapping[str, Any], *, metrics: str | Sequence[str] = (), threads: int | None = None
+    ) -> xarray.Dataset:
+        """How the run's metrics move with each of these numbers, where they have these values; any number of the deck.
+
+        values   as `run` takes them; a list makes a case for each of its values
+        metrics  names; none: all
+        threads  None: as many as there are cores
+
+        The Dataset has `value` (case, metric) and `slope` (case, metric, number) in SI, and `why_not`: where there is
+        no slope, the reason (docs/linear.md).
+        """
+        from batch.linearized.gradients import to_dataset
+        from met.analysis.linear.gradient import GradientProgram
+
+        threads = None if threads is None else whole(threads, "threads", least=1)
+        table, count = columns(self._in_si(values), product=False)
+        check_room(count, len(table))
+        program = self._program({path: float(column[0]) for path, column in table.items()}, False)
+        program.varied.check(table, count)
+        of, key = program.varied.experiment, tuple(table)
+        if key not in self._gradients:
+            self._gradients[key] = GradientProgram(of)
+        experiment = replace(of, cases=_cases(of.cases, table, count, 1))
+        names = texts(metrics, "metrics", "D379", '["settle"]')
+        found = self._gradients[key].of(range(count), names, experiment=experiment, threads=threads)
+        return to_dataset(experiment, found)
 
     def start(
         self,

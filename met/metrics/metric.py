@@ -44,6 +44,8 @@ class Metric:
     condition    whether it watches the margin of a condition, at least 0 where that holds. Where it is no `share` it is
                  a margin itself: a requirement without a limit is that it is at least 0
     over_joints  what it watches of several joints; None: it watches one channel
+    between  the same metric told between samples, which moves as its channel does and is within a sample of this one;
+             for one that moves in steps of a sample, whose gradient is that one's. None: this one moves by itself
     update  (p, held, x, t, dt) -> new memory: x the channel at time t (s), dt s since the sample before (0 at first)
     result  (p, held, t) -> the metric, at the run's last sample, time t
     """
@@ -59,6 +61,7 @@ class Metric:
     undefined: Callable[[Any, float], str] | None = None
     condition: bool = False
     over_joints: OverJoints | None = None
+    between: Metric | None = None
     parameters: tuple[Parameter, ...] = ()
     memory: tuple[Memory, ...]
     update: Callable[[Any, Any, Real, Real, Real], Mapping[str, Real]]

@@ -23,6 +23,41 @@ def result(p: Any, held: Any, t: Real) -> Real:
     return held.since
 
 
+def update_between(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
+    """The same, from where the straight line between two samples comes into the band."""
+    outside = absolute(x - p.target) - (p.band * absolute(p.target) + p.within)
+    way = held.outside - outside
+    entered = t + where(way > 0.0, dt * outside / where(way > 0.0, way, 1.0), 0.0)
+    inside = absolute(x - p.target) <= p.band * absolute(p.target) + p.within
+    since = where(inside, where(held.since < math.inf, held.since, entered), math.inf)
+    return {"since": since, "outside": outside}
+
+
+PARAMETERS = (
+    Parameter(name="target", unit="of", doc="value to be reached"),
+    Parameter(
+        name="band",
+        unit="1",
+        default=0.02,
+        at_least=0.0,
+        share=True,
+        doc="half width of the band, share of the target",
+    ),
+    Parameter(name="within", unit="of", default=0.0, at_least=0.0, doc="half width of the band, added to it"),
+)
+
+SINCE = Memory(name="since", unit="s", doc="start of the stretch inside the band; infinite outside", start=math.inf)
+
+BETWEEN = Metric(
+    name="settling_time",
+    doc=__doc__,
+    unit="s",
+    parameters=PARAMETERS,
+    memory=(SINCE, Memory(name="outside", unit="of", doc="distance beyond the band at the sample before")),
+    update=update_between,
+    result=result,
+)
+
 METRIC = Metric(
     name="settling_time",
     doc=__doc__,
@@ -30,21 +65,9 @@ METRIC = Metric(
     least=0.0,
     times=True,
     target="target",
-    parameters=(
-        Parameter(name="target", unit="of", doc="value to be reached"),
-        Parameter(
-            name="band",
-            unit="1",
-            default=0.02,
-            at_least=0.0,
-            share=True,
-            doc="half width of the band, share of the target",
-        ),
-        Parameter(name="within", unit="of", default=0.0, at_least=0.0, doc="half width of the band, added to it"),
-    ),
-    memory=(
-        Memory(name="since", unit="s", doc="start of the stretch inside the band; infinite outside", start=math.inf),
-    ),
+    between=BETWEEN,
+    parameters=PARAMETERS,
+    memory=(SINCE,),
     update=update,
     result=result,
 )

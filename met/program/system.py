@@ -112,9 +112,13 @@ class Actuator:
 
 @frozen
 class System:
-    """The models of one experiment, looked up, and its parameters, to be read by path."""
+    """The models of one experiment, looked up, and its parameters, to be read by path.
+
+    between_samples  whether metrics that move in steps of a sample are told between samples (`Metric.between`)
+    """
 
     experiment: Experiment
+    between_samples: bool = False
 
     @property
     def structure(self) -> Structure:
@@ -158,8 +162,10 @@ class System:
 
     @cached_property
     def metrics(self) -> tuple[tuple[str, Metric, Channel], ...]:
+        found = [(use, models.find("metric", use.model)) for use in self.structure.metrics]
         return tuple(
-            (use.name, models.find("metric", use.model), self.channels[use.of]) for use in self.structure.metrics
+            (use.name, (metric.between or metric) if self.between_samples else metric, self.channels[use.of])
+            for use, metric in found
         )
 
     @cached_property

@@ -34,6 +34,14 @@ def fused(nodes: Sequence[Node], roots: Iterable[int], leading: Iterable[int] | 
     return result
 
 
+def fused_from(nodes: Sequence[Node], roots: Iterable[int], first: int) -> list[Node]:
+    """The nodes with products fused into sums among those from position `first` on; what stands before is decided."""
+    result, roots = list(nodes), list(roots)
+    order = live(nodes, roots)
+    _fuse(nodes, order, roots, [i for i in order if i >= first], result)
+    return result
+
+
 def _fuse(
     nodes: Sequence[Node], order: Sequence[int], roots: Sequence[int], sums: Sequence[int], result: list[Node]
 ) -> None:

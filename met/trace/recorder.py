@@ -144,9 +144,9 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
     )
     _check_complete(program, sections)
     asked = {node.cell for node in walk((*program.start, *program.tick, *program.end)) if isinstance(node, WhileAny)}
-    kept = _without_dead_stores(sections, asked)
+    kept = without_dead_stores(sections, asked)
     _check_written(program, kept, asked)
-    cells = _cells(kept, asked)
+    cells = used_cells(kept, asked)
     if check.wanted():
         check.check(Recording(program, tuple(kept), start, tick, end, cells))
     if fuse:
@@ -198,7 +198,7 @@ def _check_written(program: Program, sections: list[CodeSection], asked: set[str
         raise ValueError(f"a loop goes by the cell {cell!r}, which nothing writes")
 
 
-def _without_dead_stores(sections: list[CodeSection], asked: set[str]) -> list[CodeSection]:
+def without_dead_stores(sections: list[CodeSection], asked: set[str]) -> list[CodeSection]:
     """The sections without stores to cells that nothing live reads."""
     read = set(asked)
     kept = [_storing(one, read) for one in sections]
@@ -237,7 +237,7 @@ def _fused(sections: list[CodeSection], program: Program, body: tuple[RecordedCo
     return result
 
 
-def _cells(sections: list[CodeSection], asked: set[str]) -> tuple[str, ...]:
+def used_cells(sections: list[CodeSection], asked: set[str]) -> tuple[str, ...]:
     """Every cell in use, in order of first use over the program, so that neighbours in time are in memory."""
     names: dict[str, None] = {}
     for one in sections:

@@ -43,7 +43,8 @@ class Kink:
 
 @frozen
 class TangentSection:
-    """A section with tangents: `stores` and `records` as `CodeSection` has them, and their tangents by the same names.
+    """A section with tangents: `stores`, `records` and `outputs` as `CodeSection` has them, and their tangents by the
+    same names.
 
     A store whose tangent is always 0 stands in `stores` alone; its tangent's cell is to be forgotten.
     """
@@ -54,47 +55,64 @@ class TangentSection:
     tangents: tuple[tuple[str, int], ...]
     records: tuple[tuple[int, int], ...]
     record_tangents: tuple[tuple[int, int], ...]
+    outputs: tuple[tuple[int, int], ...]
+    output_tangents: tuple[tuple[int, int], ...]
     kinks: tuple[Kink, ...]
 
     @cached_property
     def order(self) -> list[int]:
         """Positions of the live nodes, in order of creation."""
-        several = (self.stores, self.tangents, self.records, self.record_tangents)
+        several = (
+            self.stores, self.tangents, self.records, self.record_tangents, self.outputs, self.output_tangents,
+        )  # fmt: skip
         roots = [ref for pairs in several for _, ref in pairs]
         roots += [ref for kink in self.kinks for ref in (*kink.sides, kink.move)]
         return live(self.nodes, roots)
 
 
-def moved_by(section: CodeSection, moving: Collection[str]) -> frozenset[str]:
-    """The cells that a section stores numbers in that move with these cells."""
-    moves = _moving(section.nodes, section.order, moving)
+Straight = Callable[[CodeSection, int], bool]
+"""Tells of a `floor` or `rint` of a section, by its position, whether it counts as the straight line through its steps,
+as that of a converter; else it has no derivative."""
+
+
+def moved_by(
+    section: CodeSection, moving: Collection[str], inputs: Collection[str] = (), straight: Straight | None = None
+) -> frozenset[str]:
+    """The cells that a section stores numbers in that move with these cells and inputs. straight: None: steps do."""
+    moves = moving_nodes(section, moving, inputs, straight)
     return frozenset(cell for cell, ref in section.stores if moves[ref >> 1])
 
 
-def _moving(nodes: Iterable[Node], order: Iterable[int], moving: Collection[str]) -> bytearray:
-    nodes = list(nodes)
+def moving_nodes(
+    section: CodeSection, moving: Collection[str], inputs: Collection[str] = (), straight: Straight | None = None
+) -> bytearray:
+    """By position, 1 for each live node of a section that moves with these cells and inputs, as `moved_by` has it."""
+    nodes = section.nodes
     found = bytearray(len(nodes))
-    for i in order:
+    for i in section.order:
         op, *rest = nodes[i]
         if op == "cell":
             found[i] = rest[0] in moving
-        elif op in MOVES or op in STEPS:
+        elif op == "input":
+            found[i] = rest[0] in inputs
+        elif op in MOVES or (op in STEPS and (straight is None or straight(section, i))):
             found[i] = any(found[ref >> 1] for ref in rest[: OPERANDS[op]])
     return found
 
 
 def with_tangents(
-    section: CodeSection, moving: Collection[str], straight: Callable[[CodeSection, int], bool]
+    section: CodeSection,
+    moving: Collection[str],
+    straight: Straight,
+    inputs: Collection[str] = (),
 ) -> TangentSection:
-    """The section with the tangents of all that moves with these cells.
-
-    straight  tells of a `floor` or `rint` of a section, by its position, whether it counts as the straight line
-              through its steps, as that of a converter; else it has no derivative
-    """
+    """The section with the tangents of all that moves with these cells and inputs; an input's tangent is another input,
+    by the name with `HEAD` before it, as a cell's is another cell."""
     graph = Nodes.of(section.nodes)
 
     def leaf(node: Node) -> int:
-        return graph.make("cell", HEAD + node[1]) if node[0] == "cell" and node[1] in moving else ZERO
+        moves = node[1] in (moving if node[0] == "cell" else inputs)
+        return graph.make(node[0], HEAD + node[1]) if moves else ZERO
 
     found = slopes(graph, section.order, leaf, lambda i: straight(section, i))
 
@@ -104,11 +122,12 @@ def with_tangents(
     def moved(pairs: Iterable[tuple[Any, int]]) -> tuple[tuple[Any, int], ...]:
         return tuple((name, tangent(ref)) for name, ref in pairs if tangent(ref) & -2 != ZERO)
 
-    tangents, record_tangents = moved(section.stores), moved(section.records)
+    tangents, record_tangents, output_tangents = map(moved, (section.stores, section.records, section.outputs))
     kinks = _kinks(graph, section.order, found, [ref for _, ref in (*tangents, *record_tangents)])
     return TangentSection(
-        section.name, tuple(graph.nodes), section.stores, tangents, section.records, record_tangents, kinks
-    )
+        section.name, tuple(graph.nodes), section.stores, tangents, section.records, record_tangents,
+        section.outputs, output_tangents, kinks,
+    )  # fmt: skip
 
 
 def _kinks(graph: Nodes, order: Iterable[int], found: Mapping[int, int], roots: Iterable[int]) -> tuple[Kink, ...]:

@@ -7,6 +7,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -49,10 +50,12 @@ def test_the_page_shows_what_is_printed(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_lines_of_python_run(tmp_path: Path) -> None:
     deck = re.search(r"<!-- hand\.ic -->\n```c\n(.*?)```", PAGE, re.DOTALL)
-    lines = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    assert deck is not None and lines is not None
+    assert deck is not None
     (tmp_path / "hand.ic").write_text(deck[1])
-    text = lines[1].replace('"hand.ic"', repr(str(tmp_path / "hand.ic")))
-    names: dict[str, object] = {}
-    exec("\n".join(line for line in text.splitlines() if "state_space" not in line), names)
+    names: dict[str, Any] = {}
+    for lines in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL):
+        text = lines.replace('"hand.ic"', repr(str(tmp_path / "hand.ic")))
+        exec("\n".join(line for line in text.splitlines() if "state_space" not in line), names)
     assert "answer" in names
+    shake = names["found"].slope.sel(metric="shake", number="more").values
+    assert [f"{slope:.1e}" for slope in shake] == ["2.5e-05", "1.3e-05"]
