@@ -18,8 +18,8 @@ from tests.hw.firmware.device import HERE, LOCK_STEP, PLAIN, SENSORS, SHAFT
 
 pytestmark = pytest.mark.slow
 
-SECONDS = int(os.environ.get("MET_FUZZ_SECONDS", "30"))
-"""For each of two beds: a minute together. An hour: MET_FUZZ_SECONDS=1800, with `-o faulthandler_timeout=0`."""
+SECONDS = int(os.environ.get("MET_FUZZ_SECONDS", "15"))
+"""For each of two beds: half a minute together. An hour: MET_FUZZ_SECONDS=1800, with `-o faulthandler_timeout=0`."""
 
 HANGS_SECONDS = 60
 """After which an input is one that never ends."""
