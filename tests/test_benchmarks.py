@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from benchmarks import arms, differences, evaluation, long_deck, peer, report, stepping
+from benchmarks import arms, differences, evaluation, jacobians, long_deck, peer, report, stepping
 from benchmarks import machine as measured_on
 from benchmarks.__main__ import SUBJECTS, main
 from benchmarks.benchmark import Benchmark, Derived, Target, Untaken, ratio, take, with_sources
 
 import ic
 from met.backends.llvm import kernel
+from met.dynamics.recursion import solve
+from met.dynamics.tree import Tree
 
 pytestmark = pytest.mark.slow
 
@@ -154,6 +156,24 @@ def test_what_is_timed_is_the_peers_forward_dynamics(arm: arms.Arm, dynamic: boo
         tau = tau - evaluation.ROTOR * found  # what is left for the arm
     theirs = peer.accelerations(arm, q, qd, tau)
     assert np.abs(found - theirs).max() <= 1e-6 * np.abs(theirs).max()
+
+
+@pytest.mark.parametrize("arm", arms.ARMS[:2], ids=lambda arm: arm.name)
+def test_the_jacobian_that_is_timed_is_that_of_the_dynamics(arm: arms.Arm) -> None:
+    """The sum of its entries in two cases, by extrapolated differences of the recursion over plain numbers."""
+    tree, inputs, n = Tree.build(arm.bodies(), arm.joints), evaluation.states(arm, 2), len(arm.joints)
+    _, found = kernel.compile(jacobians.program(arm, jacobian=True)).run(inputs, 0, record=False)
+
+    def total(x: np.ndarray) -> float:
+        q, qd, tau = x.reshape(3, n).tolist()
+        return sum(solve(tree, q, qd, tau=tau, gravity=arms.GRAVITY, rotor=[evaluation.ROTOR] * n).qdd)
+
+    for case, x in enumerate(inputs):
+        entries = 0.0
+        for moved in np.eye(3 * n)[: 2 * n]:
+            once, again = ((total(x + h * moved) - total(x - h * moved)) / (2.0 * h) for h in (1e-3, 5e-4))
+            entries += (4.0 * again - once) / 3.0
+        assert found[case, 0] == pytest.approx(entries, rel=1e-8)
 
 
 def test_a_report_is_written_and_read_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

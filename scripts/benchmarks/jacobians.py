@@ -1,0 +1,151 @@
+"""Derivatives, in compiled kernels: ns per Jacobian and case, and how many times what is differentiated they cost.
+
+    dynamics    all of d(qdd)/d(q, qd) of an arm with a rotor behind each joint, beside the evaluation itself
+    direction   a whole run of the Panda with its seven servos, carried along one direction, beside the plain run: what
+                a gradient costs for each number (`met.analysis.linear.gradient`); a Jacobian of a step is 21 of them
+
+Many cases on one core; time is the core's.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+
+import numpy as np
+
+import ic
+from benchmarks import evaluation
+from benchmarks.arms import ARMS, GRAVITY, Arm
+from benchmarks.benchmark import Benchmark, Derived, Target, ratio
+from met import run as engine
+from met.analysis.linear.period import is_converter
+from met.backends.llvm import kernel
+from met.dynamics.recursion import solve
+from met.dynamics.tree import Tree
+from met.trace.derivative import slopes
+from met.trace.differentiated import differentiated
+from met.trace.program import Phase, Program, RunPhase, Tape
+from met.trace.recorder import record
+from met.trace.scalar import Scalar
+
+TITLE = "derivatives in compiled kernels, one core, many cases"
+
+CASES = evaluation.CASES
+TICKS = 200
+"""Jacobians of a case that are timed together."""
+
+STEPS = 1000
+"""Steps of the Panda's run that are timed together."""
+
+
+def program(arm: Arm, *, jacobian: bool) -> Program:
+    """A program that takes an evaluation a tick, and with it a Jacobian, whose sum over all entries is kept alive; its
+    inputs are each case's q, qd, tau."""
+    tree = Tree.build(arm.bodies(), arm.joints)
+    numbers, names = range(len(tree.joints)), ("q", "qd", "tau")
+
+    def start(tape: Tape) -> None:
+        for name in names:
+            for i in numbers:
+                tape.write(f"{name}.{i}", tape.input(f"{name}.{i}"))
+        tape.write("sum", 0.0)
+
+    def tick(tape: Tape) -> None:
+        q, qd, tau = ([tape.read(f"{name}.{i}") for i in numbers] for name in names)
+        qdd = solve(tree, q, qd, tau=tau, gravity=GRAVITY, rotor=[evaluation.ROTOR] * len(numbers)).qdd
+        for i in numbers:
+            tape.write(f"q.{i}", q[i] + evaluation.STEP * qd[i])
+            tape.write(f"qd.{i}", qd[i] + evaluation.STEP * qdd[i])
+        if jacobian:
+            tape.write("sum", sum((entry for row in _rows(qdd, (*q, *qd)) for entry in row), tape.read("sum")))
+
+    def end(tape: Tape) -> None:
+        tape.output("sum", tape.read("sum"))
+        for i in numbers:
+            tape.output(f"qd.{i}", tape.read(f"qd.{i}"))
+
+    return Program(
+        1.0, (RunPhase(Phase("start", start)),), (RunPhase(Phase("evaluate", tick)),), (RunPhase(Phase("end", end)),),
+        tuple(f"{name}.{i}" for name in names for i in numbers), 0, ("sum", *(f"qd.{i}" for i in numbers)),
+    )  # fmt: skip
+
+
+def _rows(results: tuple[Scalar, ...], leaves: tuple[Scalar, ...]) -> list[list[Scalar]]:
+    """The derivatives of results by each of the leaves of their graph, in the graph; a list a leaf."""
+    graph = results[0].graph
+    order = graph.live([each.ref for each in results])
+    rows = []
+    for leaf in leaves:
+        of = graph.nodes[leaf.ref >> 1]
+        found = slopes(graph, order, lambda node, of=of: graph.constant(float(node == of)))
+        rows.append([Scalar(graph, found[each.ref >> 1] ^ (each.ref & 1)) for each in results])
+    return rows
+
+
+def _dynamics(arm: Arm, jacobian: bool) -> Callable[[], float]:
+    made = kernel.compile(program(arm, jacobian=jacobian))
+    inputs = evaluation.states(arm, CASES)
+
+    def measure() -> float:
+        begun = time.thread_time()
+        made.run(inputs, TICKS - 1, record=False, threads=1)
+        return (time.thread_time() - begun) * 1e9 / (CASES * TICKS)
+
+    return measure
+
+
+def _compiling(arm: Arm) -> Callable[[], float]:
+    """Seconds of the core from the recorded program to machine code, without the cache."""
+    from met.backends.llvm import machine
+
+    recording, here = record(program(arm, jacobian=True)), machine.machine(None)
+
+    def measure() -> float:
+        begun = time.thread_time()
+        machine.assemble(kernel.written(recording, here)[1], here, level=None)
+        return time.thread_time() - begun
+
+    return measure
+
+
+@cache
+def _panda() -> engine.Prepared:
+    text = f'#include "{Path(ic.__file__).parent / "decks" / "panda.ic"}"\n'
+    sweep = "sweep masses of reach { sample lhs(512) { links.link7.mass = uniform(0.5, 1) kg; } }\n"
+    (found,) = ic.compile(text=text + sweep, select=["masses"]).experiments
+    return engine.prepare(found)
+
+
+def _run(tangents: bool) -> Callable[[], float]:
+    prepared = _panda()
+    inputs = engine.inputs(prepared.experiment, np.arange(CASES))
+    made = prepared.kernel
+    if tangents:
+        recording = differentiated(prepared.recording, prepared.program.inputs, is_converter)
+        made = kernel.from_recording(recording)
+        inputs = np.hstack([inputs, np.ones_like(inputs)])
+
+    def measure() -> float:
+        begun = time.thread_time()
+        made.run(inputs, STEPS, record=False, threads=1)
+        return (time.thread_time() - begun) * 1e9 / (CASES * STEPS)
+
+    return measure
+
+
+_ARMS = {arm.name: arm for arm in ARMS}
+
+BENCHMARKS: tuple[Benchmark | Derived, ...] = (
+    Benchmark("dynamics.7R", "torque mode, rotors", "ns", partial(_dynamics, _ARMS["7R"], False)),
+    Benchmark(
+        "jacobian.7R", "its Jacobian by q and qd, with it", "ns", partial(_dynamics, _ARMS["7R"], True), Target(300.0)
+    ),
+    ratio("jacobian.times.7R", "times the evaluation", over="jacobian.7R", under="dynamics.7R"),
+    Benchmark("jacobian.compiling.7R", "machine code of it", "s", partial(_compiling, _ARMS["7R"]), Target(1.0), 3),
+    Benchmark("run.panda", "a step of the Panda's run", "ns", partial(_run, False)),
+    Benchmark("direction.panda", "a step with its tangent along one direction", "ns", partial(_run, True)),
+    ratio("direction.times.panda", "times the plain step", over="direction.panda", under="run.panda"),
+)  # fmt: skip
