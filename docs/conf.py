@@ -23,7 +23,7 @@ PAGES = {
     "Decks": ["deck", "robots", "servos", "environments", "models", "substitution", "reference", "diagnostics",
               "editors"],
     "Campaigns and results": ["cluster", "best", "search", "verification", "evidence", "sensitivity", "linear", "plots",
-                              "report", "diff", "export", "notebooks"],
+                              "report", "diff", "export", "webassembly", "notebooks"],
     "A motor on a bed": ["bed", "bench", "protocol", "../hw/firmware/README"],
     "From Python": ["python", "api"],
     "What it computes": ["physics", "paper", "engine"],

@@ -46,6 +46,7 @@ ORDER = (
     "diff",
     "sensitivity",
     "export",
+    "compile",
     "profile",
     "margin",
     "linear",

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 HOMES = {
     "llvm": "met.backends.llvm",
     "c": "met.backends.c",
+    "wasm": "met.backends.wasm",
     "reference": "met.backends.reference",
 }
 """The module of each back end, by name; its `BACKEND` is the back end."""

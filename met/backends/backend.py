@@ -1,6 +1,7 @@
 """Protocols of a back end (`Backend`) and of what it makes of a recorded program (`Kernel`, `Block`).
 
-Three implement it: `LlvmKernel` and `LlvmBlock`, `Library` and `CBlock` in C, `Interpreter` and `InterpretedBlock`.
+Four implement it: `LlvmKernel` and `LlvmBlock`, `Library` and `CBlock` in C, `WasmKernel` and `WasmBlock`,
+`Interpreter` and `InterpretedBlock`.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ _CALLS = {"sqrt": "llvm.sqrt", "floor": "llvm.floor", "rint": "llvm.roundeven", 
 _ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 # of functions: small, large and seldom called ones; of the entry
 _WIDE = 'nounwind "prefer-vector-width"="512"'
-_ATTRIBUTES = (f"alwaysinline {_WIDE}", f"noinline {_WIDE}", "noinline", _WIDE)
+ATTRIBUTES = (f"alwaysinline {_WIDE}", f"noinline {_WIDE}", "noinline", _WIDE)
 _COMPARE = {"lt": "olt", "le": "ole", "eq": "oeq"}
 
 
@@ -146,7 +146,7 @@ class _LlvmEmitter:
                 *rows,
                 main,
                 *self.declared.values(),
-                *(f"attributes #{n} = {{ {words} }}" for n, words in enumerate(_ATTRIBUTES)),
+                *(f"attributes #{n} = {{ {words} }}" for n, words in enumerate(ATTRIBUTES)),
                 "",
             ]
         )

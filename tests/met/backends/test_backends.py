@@ -14,7 +14,8 @@ from met.run import inputs, prepare
 from met.trace.recording import Recording
 
 DECK = Path(ic.__file__).parent / "decks" / "two_link.ic"
-NAMES = [pytest.param("c", marks=pytest.mark.compiler) if name == "c" else name for name in backends.HOMES]
+MARKS = {"c": [pytest.mark.compiler], "wasm": [pytest.mark.node]}
+NAMES = [pytest.param(name, marks=MARKS.get(name, [])) for name in backends.HOMES]
 
 
 def two_link(run: str = "nominal") -> tuple[Recording, np.ndarray]:

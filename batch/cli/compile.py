@@ -1,0 +1,59 @@
+"""`met compile`: a face of batch.portable."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from met.cli import YES, check_options, deck_options, format_option, loudness_options
+from met.messages.visible import say
+
+
+@click.command(short_help="Compile a run or sweep to WebAssembly, for pages and node.")
+@click.argument("source", metavar="DECK|PLAN.json|ARCHIVE.h5")
+@click.argument("name", metavar="[NAME]", required=False)
+@click.option("-o", "--output", metavar="FILE.wasm", help="The module [NAME.wasm, in this folder].")
+@deck_options
+@format_option
+@loudness_options
+def compile(
+    source: str,
+    name: str | None,
+    output: str | None,
+    form: str,
+    quiet: bool,
+    verbose: bool,
+    **options: Any,
+) -> int:
+    """Compile a deck's only run or sweep, the one marked `default`, or NAME, to a module of WebAssembly; or that of an
+    archive, which is then the module of what was run.
+
+    The module has the bits of `met run`, wherever it runs. FILE.json beside it says what stands where in its memory:
+    inputs, recorded numbers, metrics; and the inputs of the cases. What a sweep varies is an input; all else is in the
+    code. Written over is only what this command wrote.
+    """
+    import json
+
+    from batch.portable import files
+    from ic.printing.columns import size
+
+    names = (name,) if name is not None else ()
+    check_options(source, names, **options)
+    if output is not None:
+        files.check(Path(output))
+    experiment = files.experiment_of(source, names, **options, quiet=quiet or form == "json")
+    target = Path(f"{experiment.name}{files.ENDING}" if output is None else output)
+    if output is None:
+        files.check(target)
+    done = files.write(experiment, target)
+    if form == "json":
+        told = {"module": str(done.module), "description": str(done.description), **done.described["kernel"]}
+        click.echo(json.dumps(told, indent=1))
+    elif not quiet:
+        of = done.described
+        what = f"{len(of['inputs'])} inputs, {len(of['columns'])} recorded numbers, {len(of['metrics'])} metrics"
+        say(f"{done.module}  ({size(done.module.stat().st_size)})  {what}")
+        say(f"{done.description}  ({size(done.description.stat().st_size)})")
+    return YES

@@ -1,0 +1,81 @@
+"""What a program must know of an experiment's module to run it and to show its numbers, as JSON has it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from met.backends.wasm.module import WasmModule
+from met.plan import REPEAT, Experiment
+from met.plan.outputs import metric_units
+from met.program.build import METRIC
+from met.run import Prepared, inputs
+from met.version import VERSION
+
+FORMAT = "met module 1"
+"""Name and version of the description."""
+
+MOST_CASES = 1_000
+"""Cases whose inputs are listed; of more, the first ones are."""
+
+
+def described(prepared: Prepared, module: WasmModule) -> dict[str, Any]:
+    """The description of a module.
+
+    name, deck, made_by, code_key   the experiment, where it is from, and what decides its numbers, as archives have it
+    kernel       the module's memory (`WasmModule.description`)
+    ticks        the number of the run's last tick; rows: recorded ones
+    inputs       of each the name, what it is (coordinate, repeat, seed); a value is shown as `value / scale` in `unit`
+    columns      of each recorded number the channel, the signal that it is of, the SI unit
+    metrics      of each the name, the SI unit, and its place among the outputs
+    requirements of each its text, its metric, and the comparison with a limit in SI
+    cases        how many there are, and the inputs of the first ones, a list each
+    """
+    experiment = prepared.experiment
+    structure, schedule = experiment.structure, experiment.structure.schedule
+    units, outputs = metric_units(structure), prepared.program.outputs
+    rows = np.arange(min(experiment.cases.count, MOST_CASES))
+    return {
+        "format": FORMAT,
+        "made_by": f"MET {VERSION}",
+        "name": experiment.name,
+        "code_key": prepared.code_key,
+        "kernel": module.description,
+        "ticks": schedule.ticks,
+        "rows": schedule.rows,
+        "inputs": _inputs(experiment),
+        "columns": _columns(experiment),
+        "metrics": [
+            {"name": use.name, "unit": units[use.name], "output": outputs.index(METRIC + use.name)}
+            for use in structure.metrics
+        ],
+        "requirements": [
+            {"text": each.text, "metric": each.metric, "comparison": each.comparison, "limit": each.limit}
+            for each in experiment.requirements
+        ],
+        "cases": {"count": experiment.cases.count, "inputs": inputs(experiment, rows).tolist()},
+    }
+
+
+def _inputs(experiment: Experiment) -> list[dict[str, Any]]:
+    cases = experiment.cases
+    return [
+        *(
+            {"name": each.path, "is": "coordinate", "unit": each.unit, "scale": each.scale}
+            for each in cases.coordinates
+        ),
+        *({"name": n, "is": "repeat" if n == REPEAT else "seed", "unit": "1", "scale": 1.0} for n in cases.noise),
+    ]
+
+
+def _columns(experiment: Experiment) -> list[dict[str, Any]]:
+    found = []
+    for recorded in experiment.structure.record:
+        count = len(recorded.channels)
+        own = recorded.unit if len(recorded.unit) == count else [recorded.unit[0]] * count
+        if len(recorded.unit) == len(recorded.joints) != count:  # one a joint, of vectors
+            own = [unit for unit in recorded.unit for _ in range(count // len(recorded.joints))]
+        for channel, unit in zip(recorded.channels, own, strict=True):
+            found.append({"channel": channel, "signal": recorded.name, "unit": unit})
+    return found

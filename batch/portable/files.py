@@ -1,0 +1,106 @@
+"""The files of a module: which experiment is meant, where they go, and that they are there whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from batch.archive.read import ArchiveFile
+from batch.campaigns.choosing import experiments_named
+from batch.campaigns.plans import read_plan
+from batch.portable.description import FORMAT, described
+from met.backends.wasm.module import compiled
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+from met.host.files import open_regular, whole_file
+from met.host.sources import names_archive, names_plan
+from met.outputs import cannot_write, check_overwrite, check_place, quoted
+from met.plan import Experiment
+from met.run import prepare
+
+ENDING = ".wasm"
+
+
+@frozen
+class ModuleFiles:
+    """The two files that were written, and what the second holds."""
+
+    module: Path
+    description: Path
+    described: dict[str, Any]
+
+
+def experiment_of(source: str, names: tuple[str, ...], *, quiet: bool, **options: Any) -> Experiment:
+    """The experiment of a deck, a plan file or an archive that is meant. options: how a deck is read, as
+    `batch.campaigns.plans.read_plan` has it. Raises Problem."""
+    if names_archive(source):
+        with ArchiveFile(source) as file:
+            plan = file.plan()
+    else:
+        plan = read_plan(source, names, **options, quiet=quiet)
+    return _the_one(experiments_named(plan, names or None), source)
+
+
+def _the_one(experiments: tuple[Experiment, ...], source: str) -> Experiment:
+    """The experiment that a module is made of. Raises Problem E472 where there are several."""
+    if len(experiments) == 1:
+        return experiments[0]
+    names = list(dict.fromkeys(each.name_in_deck for each in experiments))
+    if len(names) > 1:
+        helps = [f"name one: {', '.join(names)}"]
+    else:
+        groups = ", ".join(each.name for each in experiments)
+        helps = [f"name a group: {groups}"]
+        if not names_archive(source) and not names_plan(source):
+            plan = f"`met plan {quoted(source)} {quoted(names[0])} -o plan.json`"
+            helps = [f"{plan}, then `met compile plan.json GROUP`: {groups}"]
+    what = (
+        f"{source} has {len(names)} runs and sweeps"
+        if len(names) > 1
+        else f"`{names[0]}` has {len(experiments)} structures"
+    )
+    raise Problem(error("E472", f"{what}, and a module is of one", help=helps))
+
+
+def check(output: Path) -> None:
+    """Refuse places before anything is compiled. Raises Problem E470, or E471 where the name is no module's."""
+    if output.suffix != ENDING and not output.is_dir():
+        helps = [f"`-o {quoted(output.with_suffix(ENDING))}`"] if output.name else []
+        raise Problem(error("E471", f"cannot write {output}: modules are .wasm files", help=helps))
+    for path, own in ((output, _is_module), (output.with_suffix(".json"), _is_description)):
+        try:
+            check_place(path, code="E470", inside=output / "module.wasm")
+            check_overwrite(path, own, code="E470", because=" and was not written by `met compile`")
+        except OSError as reason:
+            raise _cannot_write(path, reason) from reason
+
+
+def write(experiment: Experiment, output: Path) -> ModuleFiles:
+    """Compile an experiment to `output`, and describe it in the .json file beside it. Raises Problem E470."""
+    prepared = prepare(experiment)
+    module = compiled(prepared.recording)
+    told = described(prepared, module)
+    text = json.dumps(told, indent=1, allow_nan=False) + "\n"
+    beside = output.with_suffix(".json")
+    for path, data in ((output, module.code), (beside, text.encode())):
+        try:
+            with whole_file(path) as file:
+                file.write(data)
+        except OSError as reason:
+            raise _cannot_write(path, reason) from reason
+    return ModuleFiles(output, beside, told)
+
+
+def _is_module(path: Path) -> bool:
+    with open_regular(path) as file:
+        return file.read(4) == b"\0asm"
+
+
+def _is_description(path: Path) -> bool:
+    with open_regular(path) as file:
+        return f'"format": "{FORMAT}"'.encode() in file.read(100)
+
+
+def _cannot_write(path: Path, reason: OSError) -> Problem:
+    return cannot_write(path, reason, code="E470", help="`-o FILE` names another place")

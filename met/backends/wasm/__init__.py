@@ -1,0 +1,48 @@
+"""The WebAssembly back end: a program as a module that browsers and node run, with the bits of every other back end.
+
+module     the LLVM back end's text compiled for wasm32, and what a caller must know of the module
+fma        an exact multiply-add, for machines without;  link: an object file made a module
+kernel.js  runs a module in a page or in node;  node: running it here, by way of node
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from met.backends.backend import Kernel
+from met.frozen import frozen
+from met.trace.recording import Recording
+
+
+@frozen
+class Wasm:
+    """WebAssembly, as `met.backends.backend.Backend` has it."""
+
+    name: str = "wasm"
+    version: int = 1
+
+    def emit(self, recording: Recording) -> str:
+        from met.backends.wasm.module import text
+
+        return text(recording)
+
+    def listing(self, recording: Recording) -> str:
+        """The code as LLVM's assembler writes WebAssembly."""
+        from met.backends.llvm import machine
+
+        return machine.listing(self.emit(recording), machine.wasm32())
+
+    def load(self, recording: Recording, *, lanes: int | None = None, inline: bool = True) -> Kernel:
+        """The program, compiled; running it raises RuntimeError where there is no node. It has two lanes, always."""
+        from met.backends.wasm.module import compiled
+        from met.backends.wasm.node import WasmKernel
+
+        return WasmKernel(compiled(recording))
+
+    def libraries(self) -> Mapping[str, str]:
+        from importlib.metadata import version
+
+        return {"llvmlite": version("llvmlite")}
+
+
+BACKEND = Wasm()

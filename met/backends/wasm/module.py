@@ -1,0 +1,135 @@
+"""A recorded program as a module of WebAssembly, and what a caller must know to run it.
+
+The code is the LLVM back end's text, two cases a block, which a register of WebAssembly holds. A module calls an exact
+multiply-add of its own (`met.backends.wasm.fma`); where a machine fuses by itself, which `kernel.js` finds out, the
+calls are overwritten by its instruction. Both give the same bits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from met.backends.llvm import emit as llvm_text
+from met.backends.llvm import machine
+from met.backends.llvm.entry import ENTRY
+from met.backends.wasm import fma, link
+from met.frozen import frozen
+from met.host import cache
+from met.trace.recording import Recording
+
+LANES = 2
+
+KERNEL_JS = Path(__file__).with_name("kernel.js")
+"""The script that runs a module, for pages and for node."""
+
+_FUSED = "@llvm.fma.v2f64"
+_ATTRIBUTES = ("noinline nounwind willreturn memory(none)", "noinline nounwind")
+_LIBRARY = (
+    "declare double @llvm.fabs.f64(double)",
+    "declare ptr @malloc(i64)",
+    "declare void @free(ptr)",
+)
+
+
+@frozen
+class WasmModule:
+    """A program in WebAssembly. recording: of which; code: the module; heap: the first free byte of its memory.
+
+    cached  whether it was found in the cache rather than made;  fma_calls: places where it multiplies and adds
+    """
+
+    recording: Recording
+    code: bytes
+    heap: int
+    fma_calls: int
+    cached: bool
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """What a caller must know, as JSON has it.
+
+        module   SHA-256 of the module;  entry, heap: its function, and the first byte of memory that is free
+        lanes    cases a block;  numbers are doubles, [block][number][lane], from a multiple of 64 bytes on
+        inputs, cells, outputs   names of the numbers of a case, in the order of memory
+        columns  numbers of a row;  record_divisor: ticks a row;  base_hz: ticks a second
+        """
+        program = self.recording.program
+        return {
+            "module": hashlib.sha256(self.code).hexdigest(),
+            "entry": ENTRY,
+            "heap": self.heap,
+            "lanes": LANES,
+            "base_hz": program.base_hz,
+            "record_divisor": program.record_divisor,
+            "columns": program.columns,
+            "inputs": list(program.inputs),
+            "cells": list(self.recording.cells),
+            "outputs": list(program.outputs),
+        }
+
+
+def text(recording: Recording) -> str:
+    """The program as LLVM IR, with all that it calls."""
+    made = llvm_text.emit(recording, LANES, vector=LANES, width=LANES)
+    lines = [
+        line
+        for line in made.splitlines()
+        if line not in _LIBRARY and not line.startswith(f"declare {_VECTOR} {_FUSED}(")
+    ]
+    made = "\n".join(lines).replace(_FUSED, f"@{fma.NAME}")
+    numbers = [len(llvm_text.ATTRIBUTES) + n for n in range(len(_ATTRIBUTES))]
+    parts = [made, fma.function(f"#{numbers[0]}"), _memory(f"#{numbers[1]}")]
+    fabs = f"declare {_VECTOR} @llvm.fabs.v2f64({_VECTOR})"
+    if fabs not in lines:
+        parts.append(fabs)
+    parts += [f"attributes #{n} = {{ {words} }}" for n, words in zip(numbers, _ATTRIBUTES, strict=True)]
+    return "\n".join([*parts, ""])
+
+
+_VECTOR = "<2 x double>"
+
+
+def _memory(attributes: str) -> str:
+    """`malloc` and `free` for the one piece of memory that an entry may ask for, always of the same size: memory grows
+    once, and what it grew by is kept."""
+    return f"""\
+@work = private global ptr null
+define private ptr @malloc(i64 %bytes) {attributes} {{
+  %kept = load ptr, ptr @work
+  %there = icmp ne ptr %kept, null
+  br i1 %there, label %old, label %new
+old:
+  ret ptr %kept
+new:
+  %more = add i64 %bytes, {link.PAGE - 1}
+  %pages = lshr i64 %more, {link.PAGE.bit_length() - 1}
+  %count = trunc i64 %pages to i32
+  %page = call i32 @llvm.wasm.memory.grow.i32(i32 0, i32 %count)
+  %none = icmp eq i32 %page, -1
+  br i1 %none, label %full, label %grown
+full:
+  call void @llvm.trap()
+  unreachable
+grown:
+  %begin = shl i32 %page, {link.PAGE.bit_length() - 1}
+  %made = inttoptr i32 %begin to ptr
+  store ptr %made, ptr @work
+  ret ptr %made
+}}
+define private void @free(ptr %memory) {attributes} {{
+  ret void
+}}
+declare i32 @llvm.wasm.memory.grow.i32(i32, i32)
+declare void @llvm.trap()"""
+
+
+def compiled(recording: Recording) -> WasmModule:
+    """The module of a program, from the cache where it is there."""
+    target = machine.wasm32()
+    source = text(recording)
+    name = cache.key(llvm_text.numbered(source), machine.versions(), target.cpu, target.features, target.triple)
+    obj, cached = cache.kept(name, lambda: machine.assemble(source, target))
+    linked = link.link(obj, ENTRY, fma.NAME)
+    return WasmModule(recording, linked.code, linked.heap, linked.fma_calls, cached)
