@@ -50,6 +50,7 @@ ORDER = (
     "margin",
     "linear",
     "bed",
+    "lsp",
     "doc",
     "dump",
 )
