@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
@@ -13,8 +13,12 @@ from pygls.lsp.server import LanguageServer
 
 from ic.editor.checker_process import CheckerProcess
 from ic.editor.checks import CheckedDeck, Checks, OpenText
-from ic.editor.positions import Texts, file_named, uri_of
+from ic.editor.fixes import QuickFix, actions, quick_fixes
+from ic.editor.outline import folds, symbols
+from ic.editor.positions import Texts, file_named, lines_of, uri_of
+from ic.editor.structure import DeckText
 from ic.editor.told import in_editor
+from met.diagnostic import Problem
 from met.version import VERSION
 
 OPTIONS = ("includeDirs", "defines", "helpInMessage")
@@ -35,6 +39,7 @@ class DeckServer(LanguageServer):
             defines=defines,
         )
         self.related = True
+        self.fixes: dict[str, list[QuickFix]] = {}
         self._published: dict[str, types.PublishDiagnosticsParams] = {}
         self._worker: asyncio.Task[None] | None = None
 
@@ -84,18 +89,67 @@ class DeckServer(LanguageServer):
         real = os.path.realpath(path)
         return next((each.uri for each in self.checks.texts.values() if each.identity == real), uri_of(path))
 
+    def _as_checked(self, deck: CheckedDeck, uri: str) -> bool:
+        """True where a text is what it was when the deck was checked."""
+        return deck.texts.get(uri) == self.checks.texts.get(uri)
+
+    def unchanged(self, deck: CheckedDeck) -> bool:
+        """True where all texts of a deck are what they were when it was checked."""
+        return all(
+            self._as_checked(deck, uri) for uri, each in self.checks.texts.items() if each.identity in deck.files
+        )
+
+    def layout(self, uri: str) -> list[types.TextEdit]:
+        """The edit that lays a text out as `met fmt` does; none where it is laid out, or broken, which is logged."""
+        from ic.formatting.files import lay_out_text
+
+        opened = self.checks.texts.get(uri)
+        if opened is None:
+            return []
+        before = "\n".join(lines_of(opened.text))
+        try:
+            after = lay_out_text(opened.path or uri, before)
+        except Problem as problem:
+            self._warn(f"not laid out: {problem.diagnostics[0].message}")
+            return []
+        if after == opened.text:
+            return []
+        lines = before.split("\n")
+        end = types.Position(len(lines) - 1, self.workspace.position_codec.client_num_units(lines[-1]))
+        return [types.TextEdit(types.Range(types.Position(0, 0), end), after)]
+
+    def text(self, uri: str) -> DeckText:
+        """A text that is open, with its structure."""
+        opened = self.checks.texts.get(uri)
+        return DeckText(uri, "\n".join(lines_of(opened.text if opened is not None else "")))
+
+    def position_in(self, text: DeckText) -> Callable[[int], types.Position]:
+        """Where offsets of a text are, for the editor."""
+        texts = Texts({text.source.name: text.source.text}, self.workspace.position_codec)
+
+        def position(offset: int) -> types.Position:
+            place = text.source.place(offset, 1)
+            return texts.position(place.file, place.line, place.column)
+
+        return position
+
     def publish(self, decks: Iterable[CheckedDeck]) -> None:
         """Tell the editor what is wrong in which file, where that is another than it knows."""
         found: dict[str, list[types.Diagnostic]] = {}
         versions: dict[str, int | None] = {}
+        self.fixes = {}
         for deck in decks:
             texts = Texts(deck.reply.sources, self.workspace.position_codec)
             versions |= {uri: each.version for uri, each in deck.texts.items()}
-            for diagnostic in deck.reply.diagnostics:
-                uri, made = in_editor(diagnostic, deck.name, texts, partial(self.address, deck), self.related)
+            address = partial(self.address, deck)
+            for diagnostic, edits in zip(deck.reply.diagnostics, deck.reply.edits, strict=True):
+                uri, made = in_editor(diagnostic, deck.name, texts, address, self.related)
                 there = found.setdefault(uri, [])
-                if made not in there:
-                    there.append(made)
+                if made in there:
+                    continue
+                there.append(made)
+                fixes = quick_fixes(diagnostic, edits, made, texts, address)
+                self.fixes.setdefault(uri, []).extend(fix for fix in fixes if self._as_checked(deck, fix.file))
         for uri in {**self._published, **dict.fromkeys(self.checks.texts), **found}:
             told = types.PublishDiagnosticsParams(uri, found.get(uri, []), versions.get(uri))
             if self._published.get(uri) != told:
@@ -136,6 +190,29 @@ def make(include_dirs: Sequence[str] = (), defines: Sequence[str] = ()) -> DeckS
     @server.feature(types.TEXT_DOCUMENT_DID_CLOSE)
     def did_close(parameters: types.DidCloseTextDocumentParams) -> None:
         server.checks.shut(parameters.text_document.uri)
+
+    @server.feature(
+        types.TEXT_DOCUMENT_CODE_ACTION, types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix])
+    )
+    def code_action(parameters: types.CodeActionParams) -> list[types.CodeAction]:
+        uri, wanted = parameters.text_document.uri, parameters.context.only
+        deck = server.checks.deck_of(uri)
+        if deck is None or not server.unchanged(deck) or (wanted and types.CodeActionKind.QuickFix not in wanted):
+            return []
+        return actions(server.fixes.get(uri, ()), parameters.range)
+
+    @server.feature(types.TEXT_DOCUMENT_FORMATTING)
+    def formatting(parameters: types.DocumentFormattingParams) -> list[types.TextEdit]:
+        return server.layout(parameters.text_document.uri)
+
+    @server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
+    def document_symbol(parameters: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
+        text = server.text(parameters.text_document.uri)
+        return symbols(text, server.position_in(text))
+
+    @server.feature(types.TEXT_DOCUMENT_FOLDING_RANGE)
+    def folding_range(parameters: types.FoldingRangeParams) -> list[types.FoldingRange]:
+        return folds(server.text(parameters.text_document.uri))
 
     @server.feature("met/settled")
     async def settled(parameters: None) -> bool:
