@@ -27,7 +27,7 @@ class NamedFiles(Generic[T]):
     ) -> None:
         self._deck, self._load, self._kind, self._ending = deck.file, load, kind, ending
         self._most, self._missing = most, missing
-        self._files = Files(deck.include_dirs)
+        self._files = Files(deck.include_dirs, unsaved=deck.unsaved)
         self._read: dict[str, T | Problem] = {}
 
     @property

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ic.grammar.parse import parse_on
 from ic.grammar.syntax import Deck, Entry
-from ic.text.files import LIBRARY
+from ic.text.files import LIBRARY, NOTHING_UNSAVED, Unsaved
 from ic.text.limits import Findings, GiveUp
 from ic.text.preprocess import preprocess
 from ic.text.source import SourceFile, UnreadableStretch
@@ -28,17 +28,19 @@ def read(
     library: Path = LIBRARY,
     despite_errors: bool = False,
     text: str | None = None,
+    unsaved: Unsaved = NOTHING_UNSAVED,
 ) -> Deck:
     """The deck at `path`, or the standard library's of that name where there is no such file.
 
     include_dirs  further directories for `#include`, and for other files that the deck names
     defines       macros, `NAME` or `NAME=VALUE`
     text          of the deck, where it is in no file: then `path` counts for nothing
+    unsaved       texts in place of what files hold, by the files' real paths
     despite_errors  also where errors are found, as long as what is not wrong could be read: `Deck.unreadable`
 
     Raises Problem with every error and warning found, in the order of the text, and the text of every file read.
     """
-    seen = preprocess(path, include_dirs, defines, library=library, text=text)
+    seen = preprocess(path, include_dirs, defines, library=library, text=text, unsaved=unsaved)
     findings = Findings()
     entries: tuple[Entry, ...] = ()
     unreadable: tuple[UnreadableStretch, ...] = ()
@@ -61,6 +63,7 @@ def read(
         tuple(defines),
         unreadable,
         text,
+        unsaved,
     )
 
 
@@ -68,7 +71,7 @@ def read_again(deck: Deck, defines: Sequence[str], *, library: Path = LIBRARY) -
     """A deck as it is with further macros, `NAME=VALUE`, in place of those of their names on the command line."""
     names = {each.partition("=")[0] for each in defines}
     kept = [each for each in deck.defines if each.partition("=")[0] not in names]
-    return read(deck.path, deck.include_dirs, (*kept, *defines), library=library, text=deck.text)
+    return read(deck.path, deck.include_dirs, (*kept, *defines), library=library, text=deck.text, unsaved=deck.unsaved)
 
 
 def in_order(diagnostics: Iterable[Diagnostic], sources: Sequence[SourceFile]) -> tuple[Diagnostic, ...]:

@@ -51,6 +51,7 @@ ORDER = (
     "margin",
     "linear",
     "bed",
+    "lsp",
     "doc",
     "dump",
 )

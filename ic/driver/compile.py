@@ -23,6 +23,7 @@ from ic.sweeps.effects import Effects
 from ic.sweeps.groups import DeckSource, ScopedExperiment, experiments_of
 from ic.sweeps.settings import Settings
 from ic.text.complaints import Complaints, known_words
+from ic.text.files import NOTHING_UNSAVED, Unsaved
 from ic.text.lexer import COMMAND_LINE
 from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
 from met.frozen import frozen
@@ -54,10 +55,12 @@ def check(
     select: Select,
     settings: Sequence[str] = (),
     text: str | None = None,
+    unsaved: Unsaved = NOTHING_UNSAVED,
 ) -> Compiled:
-    """The deck at `path`, or of this text, compiled."""
+    """The deck at `path`, or of this text, compiled. unsaved: texts in place of what files hold, by real paths."""
     try:
-        deck = read(Path(path), [Path(each) for each in include_dirs], defines, despite_errors=True, text=text)
+        folders = [Path(each) for each in include_dirs]
+        deck = read(Path(path), folders, defines, despite_errors=True, text=text, unsaved=unsaved)
     except Problem as problem:
         return Compiled(None, problem.diagnostics, problem.sources)
     return compile_deck(deck, select=select, defines=defines, settings=settings)

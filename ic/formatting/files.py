@@ -91,6 +91,12 @@ def lay_out(path: str) -> LaidOut:
         return _laid_out(file, stream.read(MOST_BYTES + 1))
 
 
+def lay_out_text(path: str, text: str) -> str:
+    """The text of a deck at a path, as an editor has it, laid out. Raises Problem where it is broken."""
+    file = FoundFile(path, os.path.normpath(path))
+    return formatted(file.name, text, making_strings(text, file))
+
+
 def _laid_out(file: FoundFile, data: bytes) -> LaidOut:
     if len(data) > MOST_BYTES:
         raise Problem(error("D018", f"`{file.name}` has more than the {MOST_BYTES >> 20} MiB that a deck may have"))

@@ -25,8 +25,9 @@ what may stand where is decided when the tree is resolved. So a joint may be cal
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import field, replace
 
+from ic.text.files import Unsaved
 from ic.text.source import SourceFile, UnreadableStretch
 from met.diagnostic import Diagnostic, Place
 from met.frozen import frozen
@@ -239,6 +240,7 @@ class Deck:
 
     include_dirs: further directories in which files that the deck names are looked for.
     path, text, defines: what it was read from and with, to read it again; text: None where it was in a file.
+    unsaved: texts that count in place of what files hold.
     unreadable: what could not be read; where there are some, `warnings` holds errors too.
     """
 
@@ -251,3 +253,4 @@ class Deck:
     defines: tuple[str, ...] = ()
     unreadable: tuple[UnreadableStretch, ...] = ()
     text: str | None = None
+    unsaved: Unsaved = field(default_factory=dict, compare=False, repr=False)

@@ -12,8 +12,9 @@ import os
 import posixpath
 import re
 import stat
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 from ic.text.limits import MOST_BYTES
 from ic.text.source import SourceFile
@@ -31,6 +32,11 @@ DECK_IN_MEMORY = "deck"
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 """The bytes that an HDF5 file begins with."""
+
+Unsaved = Mapping[str, str]
+"""Texts that count in place of what files hold, by the files' real paths: what an editor has and has not saved yet."""
+
+NOTHING_UNSAVED: Unsaved = MappingProxyType({})
 
 _NOT_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
@@ -88,7 +94,10 @@ def file_at(path: str) -> FoundFile:
 class Files:
     """The places to look in, and every file that was read, in order."""
 
-    def __init__(self, include_dirs: Sequence[str | Path] = (), library: Path = LIBRARY) -> None:
+    def __init__(
+        self, include_dirs: Sequence[str | Path] = (), library: Path = LIBRARY, unsaved: Unsaved = NOTHING_UNSAVED
+    ) -> None:
+        self._unsaved = unsaved
         named = [os.fspath(d) for d in include_dirs]
         named += [d for d in os.environ.get("MET_DECK_PATH", "").split(os.pathsep) if d]
         self.path = [Directory(d, d) for d in named] + [Directory(os.fspath(library), "<>")]
@@ -99,7 +108,7 @@ class Files:
         """The deck of that name: a file, or else one of the library's."""
         name = os.fspath(path)
         given = file_at(name)
-        if os.path.exists(name) or os.path.isabs(name):
+        if self._is_there(given) or os.path.isabs(name):
             return given
         return next((found for d in self.path if os.path.isfile((found := d.join(name)).path)), given)
 
@@ -116,8 +125,11 @@ class Files:
     def find(self, header: str, directories: Sequence[Directory]) -> FoundFile | None:
         """The first that there is; a folder of that name only where there is no file."""
         asked = [file_at(header)] if os.path.isabs(header) else [d.join(header) for d in directories]
-        there = [file for file in asked if os.path.exists(file.path)]
+        there = [file for file in asked if self._is_there(file)]
         return next((file for file in there if not os.path.isdir(file.path)), there[0] if there else None)
+
+    def _is_there(self, file: FoundFile) -> bool:
+        return os.path.exists(file.path) or (bool(self._unsaved) and file.identity in self._unsaved)
 
     def dangling(self, header: str, directories: Sequence[Directory]) -> str | None:
         """The name of a link that leads nowhere, where that is what an include has found."""
@@ -152,7 +164,9 @@ class Files:
         if file.name in self._refused:
             raise self._refused[file.name]
         if file.name not in self.read_so_far:
-            self._keep(file, _read_bytes(file, kind, most), kind, most)
+            unsaved = self._unsaved.get(file.identity) if self._unsaved else None
+            data = _read_bytes(file, kind, most) if unsaved is None else unsaved.encode("utf-8", "surrogatepass")
+            self._keep(file, data, kind, most)
             if file.name in self._refused:
                 raise self._refused[file.name]
         return self.read_so_far[file.name].text

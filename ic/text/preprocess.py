@@ -17,7 +17,7 @@ from pcpp import Action, OutputDirective
 
 from ic.text.complaints import Complaints
 from ic.text.conditions import Refused, evaluate, well_formed, with_defined
-from ic.text.files import LIBRARY, Files, FoundFile
+from ic.text.files import LIBRARY, NOTHING_UNSAVED, Files, FoundFile, Unsaved
 from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, NAME, NOTHING, SPACE, STRING, Text, Token, logical_lines
 from ic.text.limits import (
     CONDITION_DEPTH,
@@ -67,10 +67,11 @@ def preprocess(
     *,
     library: Path = LIBRARY,
     text: str | None = None,
+    unsaved: Unsaved = NOTHING_UNSAVED,
 ) -> Tokens:
     """Reads a deck and all that it includes. `defines` are as after `-D`: `NAME` or `NAME=VALUE`. text: of the deck,
-    where it is in no file."""
-    files = Files(include_dirs, library)
+    where it is in no file. unsaved: texts in place of what files hold."""
+    files = Files(include_dirs, library, unsaved)
     findings = Findings()
     run = _Preprocessor(files, findings)
     whole = True

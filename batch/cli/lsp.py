@@ -1,0 +1,40 @@
+"""`met lsp`: the face of ic.editor, the language server."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+
+import click
+
+from met.diagnostic import Problem, error
+
+
+@click.command(short_help="Serve an editor: messages as you type, completion, what a word means.")
+@click.option(
+    "-I",
+    "include_dirs",
+    multiple=True,
+    metavar="DIR",
+    type=click.Path(exists=True, file_okay=False),
+    help="Look for included files here too; may be repeated.",
+)
+@click.option(
+    "-D", "defines", multiple=True, metavar="NAME[=VALUE]", help="Define a macro as #define does; may be repeated."
+)
+@click.option("--stdio", is_flag=True, help="As editors ask for it: it is the only way there is.")
+def lsp(include_dirs: tuple[str, ...], defines: tuple[str, ...], stdio: bool) -> None:
+    """Serve an editor by the Language Server Protocol, on standard input and output.
+
+    An editor starts it and asks; docs/editors.md has settings for Neovim, Helix, Emacs and VS Code. It needs the
+    package pygls, which MET's extra `editor` names.
+    """
+    from importlib.util import find_spec
+
+    if find_spec("pygls") is None:
+        install = f"`{shlex.quote(sys.executable)} -m pip install pygls` brings it to the Python that runs MET"
+        message = "`met lsp` speaks to editors by pygls, which is not here"
+        raise Problem(error("E345", message, help=(install, "MET's extra `editor` names it")))
+    from ic.editor.server import serve
+
+    serve(include_dirs, defines)

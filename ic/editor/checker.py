@@ -1,0 +1,72 @@
+"""The process that checks decks for an editor: warmed up once, it forks a child for each check.
+
+    python -m ic.editor.checker FD        started by `CheckerProcess`; FD is one end of a socket pair
+
+Each check begins from the same state, so what it says is what a fresh start says, and nothing is kept that could grow.
+A check that is outdated is killed. One that crashes takes nothing with it.
+
+On the socket, from the server, a byte each: `b"c"`, with two file descriptors, of a memory file that holds a pickled
+`CheckRequest` and of the pipe for the answers; or `b"s"`, which stops the check that runs, as the next one does too.
+The answers are pickled, each behind its length: a `CheckReply`; or a `Crash`.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import pickle
+import signal
+import socket
+import sys
+
+from ic.editor.checking import CheckRequest, answer, check_reply
+
+
+def _warm_up() -> None:
+    """Import what a check imports, by a check; what is there from now on is shared by all children."""
+    check_reply(CheckRequest(os.getcwd(), "", "#include <two_link.ic>\n", (), (), {}))
+    gc.collect()
+    gc.freeze()
+
+
+def serve(connection: socket.socket) -> None:
+    """Take requests until the server has gone."""
+    child = 0
+    while True:
+        head, passed, _, _ = socket.recv_fds(connection, 1, 2)
+        if child:
+            os.kill(child, signal.SIGKILL)  # it may have ended long ago; nobody else has its number until `waitpid`
+            os.waitpid(child, 0)
+            child = 0
+        if not head:
+            return
+        if head == b"s":
+            continue
+        child = os.fork()
+        if child == 0:
+            connection.close()
+            status = 1
+            try:
+                with os.fdopen(passed[0], "rb") as asked:
+                    answer(pickle.load(asked), passed[1])
+                status = 0
+            finally:
+                os._exit(status)
+        for each in passed:
+            os.close(each)
+
+
+def main() -> None:
+    """Warm up, then serve the socket whose file descriptor is the argument."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server, which then closes the socket
+    gc.set_threshold(50_000)
+    with socket.socket(fileno=int(sys.argv[1])) as connection:
+        _warm_up()
+        try:
+            serve(connection)
+        except ConnectionError:
+            pass
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,222 @@
+"""Which decks are checked when: those an editor has open, again after each change that concerns them.
+
+An open text is a deck of its own unless another open deck includes it. A check waits until nothing was typed for a
+moment; a change while it runs ends it. So what is told is never older than what was told before, and once nothing
+changes any more it is what a fresh start would say.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import time
+import traceback
+from collections.abc import Callable, Iterable
+
+from ic.editor.checker_process import CheckerProcess
+from ic.editor.checking import CheckReply, CheckRequest, Crash
+from ic.editor.positions import file_named, path_of
+from met.frozen import frozen
+
+PAUSE = 0.04
+"""Seconds without a change before a check begins."""
+
+
+@frozen
+class OpenText:
+    """A text that an editor has open."""
+
+    uri: str
+    text: str
+    version: int | None
+
+    @property
+    def path(self) -> str | None:
+        return path_of(self.uri)
+
+    @property
+    def identity(self) -> str:
+        """The file's real path, or the address of what is in no file."""
+        return self.uri if self.path is None else os.path.realpath(self.path)
+
+
+@frozen
+class CheckedDeck:
+    """A deck with what its last check found.
+
+    deck    the text that was checked; folder: what names of files are seen from; name: the deck's own
+    texts   all texts that were open then, by address
+    files   the identities of all files that were read
+    """
+
+    deck: OpenText
+    folder: str
+    name: str
+    texts: dict[str, OpenText]
+    files: frozenset[str]
+    reply: CheckReply
+
+
+class Checks:
+    """The open texts, what is known of each, and the one check that runs."""
+
+    def __init__(
+        self,
+        process: CheckerProcess,
+        tell: Callable[[Iterable[CheckedDeck]], None],
+        log: Callable[[str], None],
+        *,
+        include_dirs: Iterable[str] = (),
+        defines: Iterable[str] = (),
+    ) -> None:
+        self._process, self._tell, self._log = process, tell, log
+        self.include_dirs, self.defines = tuple(include_dirs), tuple(defines)
+        self.texts: dict[str, OpenText] = {}
+        self.checked: dict[str, CheckedDeck] = {}
+        self._stale: dict[str, None] = {}  # addresses of decks to be checked, in the order of changes
+        self._failed: set[str] = set()  # decks whose last check has died; nothing is known of what they are now
+        self._running: str | None = None
+        self._outdated = False
+        self._due = 0.0
+        self._wake = asyncio.Event()
+        self._resting = asyncio.Event()
+        self._resting.set()
+
+    def open(self, text: OpenText) -> None:
+        """An editor has opened a text; it may be what another one lacked."""
+        self.texts[text.uri] = text
+        self.all_changed()
+
+    def change(self, text: OpenText) -> None:
+        """A text has changed, and so have the decks that read it."""
+        self.texts[text.uri] = text
+        self._changed([text.identity])
+
+    def shut(self, uri: str) -> None:
+        """An editor has closed a text: its file counts again."""
+        self.texts.pop(uri, None)
+        self.checked.pop(uri, None)
+        self._stale.pop(uri, None)
+        self.all_changed()
+        self._tell(self.decks())
+
+    def all_changed(self) -> None:
+        """Check all decks anew: files may have changed that no editor has open."""
+        for uri in self.texts:
+            self._make_stale(uri)
+
+    def deck_of(self, uri: str) -> CheckedDeck | None:
+        """The deck that a text is part of, as it was last checked."""
+        text = self.texts.get(uri)
+        if uri in self.checked:
+            return self.checked[uri]
+        return next((each for each in self.decks() if text is not None and text.identity in each.files), None)
+
+    def decks(self) -> list[CheckedDeck]:
+        """What is known of the open texts that no other one includes."""
+        return [self.checked[uri] for uri in self._roots() if uri in self.checked]
+
+    async def rest(self) -> None:
+        """Wait until all that is told is of what the texts are now."""
+        await self._resting.wait()
+
+    async def work(self) -> None:
+        """Check what is to be checked, for ever."""
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            while (uri := self._next()) is not None:
+                pause = self._due - time.monotonic()
+                if pause > 0:
+                    await asyncio.sleep(pause)
+                    continue
+                try:
+                    await self._check(uri)
+                except Exception:  # a defect of the server ends no server
+                    self._failed.add(uri)
+                    self._log(f"this is a defect of MET; please report it:\n{traceback.format_exc()}")
+            self._resting.set()
+
+    def _changed(self, identities: Iterable[str]) -> None:
+        found = set(identities)
+        for uri, text in self.texts.items():
+            checked = self.checked.get(uri)
+            if text.identity in found or (checked is not None and found & checked.files):
+                self._make_stale(uri)
+
+    def _make_stale(self, uri: str) -> None:
+        self._stale.pop(uri, None)
+        self._stale[uri] = None
+        self._due = time.monotonic() + PAUSE
+        if self._running == uri and not self._outdated:
+            self._outdated = True
+            self._process.stop_check()
+        self._wake.set()
+        self._resting.clear()
+
+    def _roots(self) -> list[str]:
+        """The open texts that no other one includes; of some that include each other, the first that was opened."""
+        roots = []
+        order = list(self.texts)
+        for n, uri in enumerate(order):
+            identity = self.texts[uri].identity
+            for m, other in enumerate(order):
+                includes = other != uri and other in self.checked and identity in self.checked[other].files
+                back = uri in self.checked and self.texts[other].identity in self.checked[uri].files
+                if includes and (m < n or not back):
+                    break
+            else:
+                roots.append(uri)
+        return roots
+
+    def _next(self) -> str | None:
+        """The deck to be checked next, the one that was changed last first."""
+        roots = self._roots()
+        for uri in roots:
+            if uri not in self.checked and uri not in self._failed:
+                self._stale.setdefault(uri)
+        waiting = [uri for uri in self._stale if uri in roots]
+        return waiting[-1] if waiting else None
+
+    async def _check(self, uri: str) -> None:
+        deck = self.texts[uri]
+        folder, name = os.path.split(deck.path) if deck.path is not None else (os.getcwd(), "")
+        texts = dict(self.texts)
+        request = CheckRequest(
+            folder if os.path.isdir(folder) else os.getcwd(),
+            name if os.path.isdir(folder) else deck.path or "",
+            deck.text if deck.path is None else None,
+            self.include_dirs,
+            self.defines,
+            {each.identity: each.text for each in texts.values() if each.path is not None},
+        )
+        self._running, self._outdated = uri, False
+        self._stale.pop(uri, None)
+        self._failed.discard(uri)
+        answers = 0
+        try:
+            async for answer in self._process.ask(request):
+                answers += 1
+                if self._outdated or uri not in self.texts:
+                    break
+                self._take(deck, request, texts, answer)
+        finally:
+            self._running = None
+        if not answers and not self._outdated and uri in self.texts:
+            self._failed.add(uri)
+            self._log(f"the check of {deck.path or uri} ended without an answer")
+
+    def _take(self, deck: OpenText, request: CheckRequest, texts: dict[str, OpenText], answer: object) -> None:
+        if isinstance(answer, Crash):
+            self._log(
+                f"this is a defect of MET, not of what you gave it; please report it together with the deck, "
+                f"{deck.path or deck.uri}:\n{answer.traceback}"
+            )
+            self._failed.add(deck.uri)
+        if not isinstance(answer, CheckReply):
+            return
+        paths = (file_named(name, request.folder) for name in answer.sources)
+        files = frozenset(os.path.realpath(path) for path in paths if path is not None)
+        name = request.name if request.text is None else next(iter(answer.sources), "")
+        self.checked[deck.uri] = CheckedDeck(deck, request.folder, name, texts, files, answer)
+        self._tell(self.decks())

@@ -1,0 +1,90 @@
+"""What an editor lists of a text and folds in it: definitions, blocks, comments, `#if`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from types import MappingProxyType
+
+from lsprotocol import types
+
+from ic.editor.structure import DeckText, TextEntry
+from ic.language import BLOCKS
+from ic.text.lexer import Token
+
+Position = Callable[[int], types.Position]
+"""Where an offset of a text is."""
+
+_KINDS: Mapping[str, types.SymbolKind] = MappingProxyType({
+    "arm": types.SymbolKind.Class, "servo": types.SymbolKind.Class, "link": types.SymbolKind.Struct,
+    "joint": types.SymbolKind.Field, "run": types.SymbolKind.Function, "sweep": types.SymbolKind.Array,
+    "search": types.SymbolKind.Array, "tune": types.SymbolKind.Array, "let": types.SymbolKind.Variable,
+    "metric": types.SymbolKind.Property, "require": types.SymbolKind.Boolean,
+})  # fmt: skip
+
+
+def symbols(text: DeckText, position: Position) -> list[types.DocumentSymbol]:
+    """The definitions of a text, those of a block below it, and its macros."""
+    found = list(_symbols(text.entries, position))
+    for directive in text.directives:
+        if directive.name == "define" and len(directive.tokens) > 2:
+            name = directive.tokens[2]
+            whole = types.Range(position(directive.tokens[0].offset), position(directive.tokens[-1].end))
+            own = types.Range(position(name.offset), position(name.end))
+            found.append(types.DocumentSymbol(name.text, types.SymbolKind.Constant, whole, own, "#define"))
+    return sorted(found, key=lambda each: (each.range.start.line, each.range.start.character))
+
+
+def _symbols(entries: Iterable[TextEntry], position: Position) -> Iterator[types.DocumentSymbol]:
+    for entry in entries:
+        name = entry.named
+        if name is None and (entry.opened is None or entry.kind not in BLOCKS):
+            continue
+        shown = name if name is not None else entry.words[0]
+        yield types.DocumentSymbol(
+            shown.text,
+            _KINDS.get(entry.kind, types.SymbolKind.Object),
+            types.Range(position(entry.words[0].offset), position(max(entry.closed, shown.end))),
+            types.Range(position(shown.offset), position(shown.end)),
+            detail=" ".join(each for each in entry.texts if each != shown.text)[:80] or None,
+            children=list(_symbols(entry.entries, position)),
+        )
+
+
+def folds(text: DeckText) -> list[types.FoldingRange]:
+    """The stretches of lines that fold: blocks, comments of several lines, conditionals, runs of includes."""
+    line = text.source.line
+    found = [
+        types.FoldingRange(line(entry.opened.offset) - 1, line(max(entry.closed - 1, 0)) - (2 if entry.complete else 1))
+        for entry in text.all_entries()
+        if entry.opened is not None
+    ]
+    found += _folded_comments(text.comments, line)
+    found += _folded_conditionals(text, line)
+    return sorted(
+        (each for each in found if each.end_line > each.start_line), key=lambda each: (each.start_line, each.end_line)
+    )
+
+
+def _folded_comments(comments: list[Token], line: Callable[[int], int]) -> Iterator[types.FoldingRange]:
+    """A fold for each run of comments on lines one after the other."""
+    runs: list[tuple[int, int]] = []
+    for token in comments:
+        first, last = line(token.offset) - 1, line(token.end - 1) - 1
+        if runs and first <= runs[-1][1] + 1:
+            runs[-1] = runs[-1][0], last
+        else:
+            runs.append((first, last))
+    for first, last in runs:
+        yield types.FoldingRange(first, last, kind=types.FoldingRangeKind.Comment)
+
+
+def _folded_conditionals(text: DeckText, line: Callable[[int], int]) -> Iterator[types.FoldingRange]:
+    opened: list[int] = []
+    for directive in text.directives:
+        at = line(directive.tokens[0].offset) - 1
+        if directive.name.startswith("if"):
+            opened.append(at)
+        elif directive.name.startswith(("el", "end")) and opened:
+            yield types.FoldingRange(opened.pop(), at - 1, kind=types.FoldingRangeKind.Region)
+            if directive.name != "endif":
+                opened.append(at)

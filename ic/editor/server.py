@@ -1,0 +1,238 @@
+"""The server that `met lsp` starts: an editor's questions on standard input, answers on standard output."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import Any
+
+from lsprotocol import types
+from pygls.lsp.server import LanguageServer
+
+from ic.editor.checker_process import CheckerProcess
+from ic.editor.checks import CheckedDeck, Checks, OpenText
+from ic.editor.fixes import QuickFix, actions, quick_fixes
+from ic.editor.outline import folds, symbols
+from ic.editor.positions import Texts, file_named, lines_of, uri_of
+from ic.editor.structure import DeckText
+from ic.editor.told import in_editor
+from met.diagnostic import Problem
+from met.version import VERSION
+
+OPTIONS = ("includeDirs", "defines", "helpInMessage")
+"""What an editor may give as `initializationOptions`."""
+
+
+class DeckServer(LanguageServer):
+    """A language server with what it knows of decks."""
+
+    def __init__(self, include_dirs: Iterable[str], defines: Iterable[str]) -> None:
+        super().__init__("met", VERSION, text_document_sync_kind=types.TextDocumentSyncKind.Full)
+        self.process = CheckerProcess()
+        self.checks = Checks(
+            self.process,
+            self.publish,
+            self.log,
+            include_dirs=[os.path.abspath(each) for each in include_dirs],
+            defines=defines,
+        )
+        self.related = True
+        self.fixes: dict[str, list[QuickFix]] = {}
+        self._published: dict[str, types.PublishDiagnosticsParams] = {}
+        self._worker: asyncio.Task[None] | None = None
+
+    def begin(self, parameters: types.InitializeParams) -> None:
+        """Take the editor's options, and start to check."""
+        shown = parameters.capabilities.text_document and parameters.capabilities.text_document.publish_diagnostics
+        self.related = bool(shown and shown.related_information)
+        self._take_options(parameters.initialization_options)
+        self.process.start()
+        self._worker = asyncio.create_task(self.checks.work())
+
+    def _take_options(self, given: Any) -> None:
+        options = given if isinstance(given, dict) else {}
+        for name in options.keys() - set(OPTIONS):
+            self._warn(f"no option `{name}`; there are: {', '.join(OPTIONS)}")
+        for name in ("includeDirs", "defines"):
+            words = options.get(name, [])
+            if not isinstance(words, list) or not all(isinstance(each, str) for each in words):
+                self._warn(f"the option `{name}` is a list of texts")
+            elif name == "defines":
+                self.checks.defines = (*self.checks.defines, *words)
+            else:
+                self.checks.include_dirs = (*self.checks.include_dirs, *map(os.path.abspath, words))
+        if options.get("helpInMessage"):
+            self.related = False
+
+    def _warn(self, text: str) -> None:
+        self.window_show_message(types.ShowMessageParams(types.MessageType.Warning, f"met lsp: {text}"))
+
+    def log(self, text: str) -> None:
+        """Write an error into the editor's log."""
+        self.window_log_message(types.LogMessageParams(types.MessageType.Error, f"met lsp: {text}"))
+
+    def end(self) -> None:
+        """End the process that checks."""
+        if self._worker is not None:
+            self._worker.cancel()
+        self.process.close()
+
+    def address(self, deck: CheckedDeck, name: str) -> str | None:
+        """The address of a file that a deck's places name, as the editor writes it where it has the file open."""
+        if name == deck.name:
+            return deck.deck.uri
+        path = file_named(name, deck.folder)
+        if path is None:
+            return None
+        real = os.path.realpath(path)
+        return next((each.uri for each in self.checks.texts.values() if each.identity == real), uri_of(path))
+
+    def _as_checked(self, deck: CheckedDeck, uri: str) -> bool:
+        """True where a text is what it was when the deck was checked."""
+        return deck.texts.get(uri) == self.checks.texts.get(uri)
+
+    def unchanged(self, deck: CheckedDeck) -> bool:
+        """True where all texts of a deck are what they were when it was checked."""
+        return all(
+            self._as_checked(deck, uri) for uri, each in self.checks.texts.items() if each.identity in deck.files
+        )
+
+    def layout(self, uri: str) -> list[types.TextEdit]:
+        """The edit that lays a text out as `met fmt` does; none where it is laid out, or broken, which is logged."""
+        from ic.formatting.files import lay_out_text
+
+        opened = self.checks.texts.get(uri)
+        if opened is None:
+            return []
+        before = "\n".join(lines_of(opened.text))
+        try:
+            after = lay_out_text(opened.path or uri, before)
+        except Problem as problem:
+            self._warn(f"not laid out: {problem.diagnostics[0].message}")
+            return []
+        if after == opened.text:
+            return []
+        lines = before.split("\n")
+        end = types.Position(len(lines) - 1, self.workspace.position_codec.client_num_units(lines[-1]))
+        return [types.TextEdit(types.Range(types.Position(0, 0), end), after)]
+
+    def text(self, uri: str) -> DeckText:
+        """A text that is open, with its structure."""
+        opened = self.checks.texts.get(uri)
+        return DeckText(uri, "\n".join(lines_of(opened.text if opened is not None else "")))
+
+    def position_in(self, text: DeckText) -> Callable[[int], types.Position]:
+        """Where offsets of a text are, for the editor."""
+        texts = Texts({text.source.name: text.source.text}, self.workspace.position_codec)
+
+        def position(offset: int) -> types.Position:
+            place = text.source.place(offset, 1)
+            return texts.position(place.file, place.line, place.column)
+
+        return position
+
+    def publish(self, decks: Iterable[CheckedDeck]) -> None:
+        """Tell the editor what is wrong in which file, where that is another than it knows."""
+        found: dict[str, list[types.Diagnostic]] = {}
+        versions: dict[str, int | None] = {}
+        self.fixes = {}
+        for deck in decks:
+            texts = Texts(deck.reply.sources, self.workspace.position_codec)
+            versions |= {uri: each.version for uri, each in deck.texts.items()}
+            address = partial(self.address, deck)
+            for diagnostic, edits in zip(deck.reply.diagnostics, deck.reply.edits, strict=True):
+                uri, made = in_editor(diagnostic, deck.name, texts, address, self.related)
+                there = found.setdefault(uri, [])
+                if made in there:
+                    continue
+                there.append(made)
+                fixes = quick_fixes(diagnostic, edits, made, texts, address)
+                self.fixes.setdefault(uri, []).extend(fix for fix in fixes if self._as_checked(deck, fix.file))
+        for uri in {**self._published, **dict.fromkeys(self.checks.texts), **found}:
+            told = types.PublishDiagnosticsParams(uri, found.get(uri, []), versions.get(uri))
+            if self._published.get(uri) != told:
+                self.text_document_publish_diagnostics(told)
+                self._published[uri] = told
+        for uri in [uri for uri, told in self._published.items() if not told.diagnostics]:
+            if uri not in self.checks.texts:
+                del self._published[uri]
+
+
+def make(include_dirs: Sequence[str] = (), defines: Sequence[str] = ()) -> DeckServer:
+    """A server with all that it answers."""
+    server = DeckServer(include_dirs, defines)
+
+    @server.feature(types.INITIALIZE)
+    def initialize(parameters: types.InitializeParams) -> None:
+        server.begin(parameters)
+
+    @server.feature(types.TEXT_DOCUMENT_DID_OPEN)
+    def did_open(parameters: types.DidOpenTextDocumentParams) -> None:
+        given = parameters.text_document
+        server.checks.open(OpenText(given.uri, given.text, given.version))
+
+    @server.feature(types.TEXT_DOCUMENT_DID_CHANGE)
+    def did_change(parameters: types.DidChangeTextDocumentParams) -> None:
+        given = parameters.text_document
+        text = server.workspace.get_text_document(given.uri).source
+        server.checks.change(OpenText(given.uri, text, given.version))
+
+    @server.feature(types.TEXT_DOCUMENT_DID_SAVE)
+    def did_save(parameters: types.DidSaveTextDocumentParams) -> None:
+        server.checks.all_changed()
+
+    @server.feature(types.WORKSPACE_DID_CHANGE_WATCHED_FILES)
+    def did_change_files(parameters: types.DidChangeWatchedFilesParams) -> None:
+        server.checks.all_changed()
+
+    @server.feature(types.TEXT_DOCUMENT_DID_CLOSE)
+    def did_close(parameters: types.DidCloseTextDocumentParams) -> None:
+        server.checks.shut(parameters.text_document.uri)
+
+    @server.feature(
+        types.TEXT_DOCUMENT_CODE_ACTION, types.CodeActionOptions(code_action_kinds=[types.CodeActionKind.QuickFix])
+    )
+    def code_action(parameters: types.CodeActionParams) -> list[types.CodeAction]:
+        uri, wanted = parameters.text_document.uri, parameters.context.only
+        deck = server.checks.deck_of(uri)
+        if deck is None or not server.unchanged(deck) or (wanted and types.CodeActionKind.QuickFix not in wanted):
+            return []
+        return actions(server.fixes.get(uri, ()), parameters.range)
+
+    @server.feature(types.TEXT_DOCUMENT_FORMATTING)
+    def formatting(parameters: types.DocumentFormattingParams) -> list[types.TextEdit]:
+        return server.layout(parameters.text_document.uri)
+
+    @server.feature(types.TEXT_DOCUMENT_DOCUMENT_SYMBOL)
+    def document_symbol(parameters: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
+        text = server.text(parameters.text_document.uri)
+        return symbols(text, server.position_in(text))
+
+    @server.feature(types.TEXT_DOCUMENT_FOLDING_RANGE)
+    def folding_range(parameters: types.FoldingRangeParams) -> list[types.FoldingRange]:
+        return folds(server.text(parameters.text_document.uri))
+
+    @server.feature("met/settled")
+    async def settled(parameters: None) -> bool:
+        """An answer once all that the editor has said is checked, and told."""
+        await server.checks.rest()
+        return True
+
+    @server.feature(types.SHUTDOWN)
+    def shutdown(parameters: None) -> None:
+        server.end()
+
+    return server
+
+
+def serve(include_dirs: Sequence[str] = (), defines: Sequence[str] = ()) -> None:
+    """Serve an editor until it says that it ends, or has gone."""
+    server = make(include_dirs, defines)
+    out = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever prints does not print into the protocol
+    try:
+        server.start_io(stdout=out)
+    finally:
+        server.end()

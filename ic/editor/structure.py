@@ -1,0 +1,171 @@
+"""The blocks and names of a deck's text as it stands, whole or not: for outlines, completion and the search for names.
+
+The parser's tree is of a deck with its includes and macros, and there is none where the text is broken. This one is of
+a single text, and takes whatever there is.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from ic.text.lexer import NAME, SPACE, Text, Token, logical_lines
+
+
+@dataclass
+class TextEntry:
+    """An entry of a block: from its first token to its `;`, `}` or the end of the text.
+
+    words     the tokens before its block, its `;`, or all there are
+    opened    the `{` of its block; None where it has none
+    closed    the offset behind its last token
+    entries   those in its block
+    """
+
+    words: list[Token]
+    within: TextEntry | None
+    opened: Token | None = None
+    closed: int = 0
+    complete: bool = False
+    entries: list[TextEntry] = field(default_factory=list)
+
+    @property
+    def texts(self) -> list[str]:
+        """Its words, without a `default` before them."""
+        texts = [token.text for token in self.words]
+        return texts[1:] if texts[:1] == ["default"] and len(texts) > 1 else texts
+
+    @property
+    def kind(self) -> str:
+        return self.texts[0] if self.texts else ""
+
+    @property
+    def named(self) -> Token | None:
+        """The token of the name that it defines: `reach` of `let reach = 2 m;`, `motor` of `servo motor { ... }`."""
+        words = self.words[len(self.words) - len(self.texts) :]
+        if len(words) < 2 or words[0].kind != NAME or words[1].kind != NAME:
+            return None
+        if words[0].text == "let" or self.opened is not None or "like" in self.texts[2:3]:
+            return words[1]
+        behind = words[2].text if len(words) > 2 else ""
+        return words[1] if behind in ("=", ":") and words[0].text in ("metric", "require", "sweep") else None
+
+    def word_behind(self, word: str) -> str:
+        """The word behind another one, such as the servo that one is `like`; "" where there is none."""
+        texts = self.texts
+        return texts[texts.index(word) + 1] if word in texts[:-1] else ""
+
+
+@dataclass
+class TextDirective:
+    """A line of the preprocessor: its tokens without white space, `#` first."""
+
+    tokens: list[Token]
+
+    @property
+    def name(self) -> str:
+        return self.tokens[1].text if len(self.tokens) > 1 else ""
+
+
+class DeckText:
+    """A text with its tokens, entries and preprocessor lines."""
+
+    def __init__(self, name: str, text: str) -> None:
+        self.source = Text(name, text)
+        self.tokens: list[Token] = []  # of the deck itself
+        self.comments: list[Token] = []
+        self.directives: list[TextDirective] = []
+        for line in logical_lines(self.source):
+            seen = [token for token in line if token.kind != SPACE and token.text]
+            self.comments += (
+                each for each in line if each.kind == SPACE and text[each.offset : each.offset + 1] == "/"
+            )
+            if seen and seen[0].text == "#":
+                self.directives.append(TextDirective(seen))
+            else:
+                self.tokens += (token for token in seen if token.text.strip())
+        self.entries: list[TextEntry] = []
+        self._structure()
+
+    def _structure(self) -> None:
+        around: TextEntry | None = None
+        entry: TextEntry | None = None
+        rounds = 0
+        for token in self.tokens:
+            text = token.text
+            rounds = max(rounds + (text in ("(", "[")) - (text in (")", "]")), 0)
+            if text == "}":
+                rounds = 0
+                self._end(entry, token.offset, False)
+                entry = None
+                if around is not None:
+                    self._end(around, token.end, True)
+                    around = around.within
+                continue
+            if entry is None:
+                if text == ";":
+                    continue
+                entry = TextEntry([], around)
+                (self.entries if around is None else around.entries).append(entry)
+            if text == ";" and not rounds:
+                self._end(entry, token.end, True)
+                entry = None
+            elif text == "{":
+                rounds = 0
+                entry.opened = token
+                around, entry = entry, None
+            else:
+                entry.words.append(token)
+        last = len(self.source.text)
+        self._end(entry, last, False)
+        while around is not None:
+            self._end(around, last, False)
+            around = around.within
+
+    @staticmethod
+    def _end(entry: TextEntry | None, at: int, complete: bool) -> None:
+        if entry is not None:
+            entry.closed, entry.complete = at, complete
+
+    def all_entries(self) -> Iterator[TextEntry]:
+        """All entries, outer ones first."""
+        waiting = list(reversed(self.entries))
+        while waiting:
+            entry = waiting.pop()
+            yield entry
+            waiting += reversed(entry.entries)
+
+    def around(self, offset: int) -> TextEntry | None:
+        """The innermost entry in whose block an offset is; None outside all blocks."""
+        found: TextEntry | None = None
+        entries = self.entries
+        while True:
+            inside = [e for e in entries if e.opened is not None and e.opened.end <= offset < max(e.closed, 1)]
+            inside += [e for e in entries if e.opened is not None and not e.complete and offset == e.closed]
+            if not inside:
+                return found
+            found, entries = inside[-1], inside[-1].entries
+
+    def token_at(self, offset: int) -> Token | None:
+        """The word at an offset or just before it, in the deck or in a preprocessor line."""
+        tokens = self._all_tokens
+        n = bisect_right([token.offset for token in tokens], offset) - 1
+        if n < 0:
+            return None
+        token = tokens[n]
+        if token.offset == offset and token.kind != NAME and n and tokens[n - 1].end == offset:
+            token = tokens[n - 1]
+        return token if token.offset <= offset <= token.end else None
+
+    @cached_property
+    def _all_tokens(self) -> list[Token]:
+        tokens = self.tokens + [token for line in self.directives for token in line.tokens if token.text.strip()]
+        return sorted(tokens, key=lambda token: token.offset)
+
+    def offset(self, line: int, column: int) -> int:
+        """The offset of a column of a line, both counted from 0."""
+        lines = self.source.text.split("\n")
+        line = min(line, len(lines) - 1)
+        return sum(len(each) + 1 for each in lines[:line]) + min(column, len(lines[line]))

@@ -1,0 +1,26 @@
+"""A server for the tests of a file, since each start takes a second; each test finds nothing open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from tests.ic.editor.client import Editor
+
+
+@pytest.fixture(scope="module")
+def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Editor]:
+    """An editor with its server; that it ends well is part of each file's tests."""
+    with Editor(tmp_path_factory.mktemp("editor")) as made:
+        yield made
+        assert made.end() == 0
+
+
+@pytest.fixture
+def editor(started: Editor) -> Iterator[Editor]:
+    """The editor with nothing open, before and after."""
+    started.forget()
+    yield started
+    started.close_all()
+    assert not any(started.diagnostics.values()), "closed files show nothing"
