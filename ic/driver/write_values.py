@@ -185,8 +185,10 @@ def _word(group: Group) -> str:
 def _why(copy: _Copy, place: Place | None, home: str) -> str:
     if place is None:
         return f"it stands in no place of its own, and no `servo {home} {{ ... }}` of this deck can have it"
-    if place.expansions:
-        return f"it comes through the macro {place.expansions[0].macro}"
+    if place.macros:
+        return f"it comes through the macro {place.macros[0].macro}"
+    if place.turns:
+        return f"it stands in `for {place.turns[0].macro}`, which says it for every turn"
     if Path(place.file) != copy.path:
         return f"it stands in {place.file}, line {place.line}, which other decks may use"
     return f"it stands at line {place.line}, which is of more than this"

@@ -197,7 +197,7 @@ def _separator(row: Row) -> int | None:
     for at, piece in enumerate(row.pieces):
         if piece.text in ("=", "+=") or (piece.text == "{" and at == 1):
             return at or None
-        if piece.kind not in ("name", "word"):
+        if piece.kind not in ("name", "word") and (at or piece.text != "*"):
             return None
     return None
 

@@ -20,16 +20,24 @@ def stands_below(row: Row) -> bool:
     return row.column(row.whole[0].offset) == following[0].column
 
 
+def _sets_others(row: Row) -> bool:
+    """Return True for `* = spindle;`."""
+    return [piece.text for piece in row.pieces[:2]] == ["*", "="]
+
+
 def goes_on(row: Row) -> bool:
     """Return True if a row continues what the row before has begun, where no bracket says so."""
     behind = row.behind
     if row.closes is not None or stands_below(row):
         return False
     if behind is None or behind.text in (";", ",", "}"):
-        return bool(row.pieces) and behind is not None and behind.text == "}" and row.pieces[0].text in _JOINING
+        joining = bool(row.pieces) and row.pieces[0].text in _JOINING and not _sets_others(row)
+        return behind is not None and behind.text == "}" and joining
     if behind.text in _LEFT_OPEN:
         return True
     if not row.pieces:
         return False
     first = row.pieces[0]
+    if _sets_others(row):
+        return False
     return first.text in _JOINING or first.text in ("(", "[") or first.tokens[0].kind in (STRING, *NUMBERS)

@@ -6,17 +6,18 @@ A path, a unit and a number with its sign are one piece each. Where a unit ends 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 from ic.formatting.row import Kind, Row, RowPiece
+from ic.grammar.braced_names import name_length
 from ic.grammar.cursor import OPENING
 from ic.grammar.expressions import Expressions
 from ic.text.lexer import END, NAME, NUMBERS, SPACE, STRING, WHOLE, Text, Token, logical_lines
 from ic.text.limits import Findings
 from met import units
 
-WORDS = ("and", "or", "not", "when", "require", "by")
+WORDS = ("and", "or", "not", "when", "require", "by", "in")
 """Behind these a value begins."""
 
 OPERATORS = ("+", "-", "*", "/", "^", "=", "+=", "<", "<=", ">", ">=", "==", "!=", "..", "&&", "||")
@@ -74,7 +75,7 @@ def _piece(parser: Expressions, at: int, free: int, before: RowPiece | None, ope
     text = token.text
     if before is not None and operand and (length := _unit(parser, at, before)) and length <= free:
         return "unit", length
-    if token.kind == NAME:
+    if token.kind == NAME or 1 < name_length(parser.tokens, at) <= free:
         length = _path(parser, at, free)
         return ("word" if length == 1 and text in WORDS else "name"), length
     if token.kind in NUMBERS:
@@ -98,10 +99,20 @@ def _piece(parser: Expressions, at: int, free: int, before: RowPiece | None, ope
 
 def _path(parser: Expressions, at: int, free: int) -> int:
     """The number of tokens of the path that begins here."""
-    length = 1
-    while length + 2 <= free and parser.tokens[at + length].text == "." and parser.tokens[at + length + 1].kind == NAME:
-        length += 2
+    tokens = parser.tokens
+    length = _name(tokens, at, free)
+    while length + 2 <= free and tokens[at + length].text == ".":
+        more = _name(tokens, at + length + 1, free - length - 1)
+        if not more:
+            break
+        length += 1 + more
     return length
+
+
+def _name(tokens: Sequence[Token], at: int, free: int) -> int:
+    """The number of tokens of the name that begins here, `seg_{i}` among them; 0 where none does."""
+    length = name_length(tokens, at)
+    return length if length <= free else int(tokens[at].kind == NAME)
 
 
 def _number(parser: Expressions, at: int, free: int) -> int:

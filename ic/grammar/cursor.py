@@ -6,12 +6,13 @@ end and goes on, so that one run reports several mistakes, and none twice.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NoReturn
 
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, Token
 from ic.text.limits import DEPTH, MOST_OPERATORS, Findings, GiveUp
 from met.diagnostic import Help, Label, Place, write
+from met.messages.message import macro_count
 
 OPENING = {"(": ")", "[": "]", "{": "}"}
 SHOWN = 40  # characters of a token in a message
@@ -55,6 +56,8 @@ class Cursor:
         self.peak = 0
         self.misindented: tuple[Token, Token] | None = None
         self.unbalanced = False  # whether a brace is missing somewhere, or a bracket too many
+        self.indices: Mapping[str, str] = {}  # of the loops around: what each stands for in this turn
+        self.depth = 0  # brackets that are open around the tokens
 
     @property
     def token(self) -> Token:
@@ -117,7 +120,7 @@ class Cursor:
     def enter(self) -> Token:
         """Takes an opening brace, bracket or parenthesis."""
         opening = self.advance()
-        if len(self.open) >= DEPTH:
+        if self.depth + len(self.open) >= DEPTH:
             self.tell("D029", f"braces, brackets and parentheses go deeper than {DEPTH}", opening)
             raise GiveUp
         self.open.append(opening)
@@ -159,8 +162,9 @@ class Cursor:
     # lines, as the reader of the deck sees them
 
     def line_of(self, token: Token) -> tuple[str, int]:
-        if token.expansions:
-            use = token.expansions[-1].use
+        macros = macro_count(token.expansions)
+        if macros:
+            use = token.expansions[macros - 1].use
             return use.file, use.line
         return token.source.name, token.line
 

@@ -6,14 +6,17 @@ a .. b by c  <  or  <  and  <  not  <  comparison  <  + -  <  * /  <  unary -  <
 from __future__ import annotations
 
 import re
+from copy import copy
 
-from ic.grammar.cursor import span, token_in_words
+from ic.grammar.braced_names import USAGE, adjacent, braces_length, name_length
+from ic.grammar.cursor import SHOWN, span, token_in_words
 from ic.grammar.quantities import Quantities
 from ic.grammar.syntax import (
     Binary,
     Call,
     Entry,
     Expression,
+    Indexed,
     List,
     Name,
     Range,
@@ -22,7 +25,7 @@ from ic.grammar.syntax import (
     WithUnit,
     Word,
 )
-from ic.text.lexer import BAD, NAME, NUMBERS, STRING, Token
+from ic.text.lexer import BAD, NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import LONGEST_NUMBER, LONGEST_STRING
 from met import units
 from met.diagnostic import Label, write
@@ -121,6 +124,8 @@ class Expressions(Quantities):
 
     def operand(self) -> Expression:
         token = self.token
+        if token.kind == NAME and token.text in self.indices:
+            token = self.tokens[self.at] = self.stand_in(token)
         if token.kind in NUMBERS:
             return self.number()
         if token.kind == NAME or (token.text == EVERY_JOINT and self.following.text == "."):
@@ -142,6 +147,13 @@ class Expressions(Quantities):
             "..": "a range is written `first .. last by step`",
         }
         self.unexpected("a value", help=helps.get(token.text, ()))
+
+    def stand_in(self, index: Token) -> Token:
+        """What the index of a loop stands for in this turn, at the index's place."""
+        token = copy(index)
+        token.text = self.indices[index.text]
+        token.kind = WHOLE if token.text.lstrip("-").isdigit() else NAME
+        return token
 
     def with_unit(self, inner: Expression, opening: Token) -> Expression:
         """The expression whose bracket was just closed, with the unit that may follow it."""
@@ -186,7 +198,10 @@ class Expressions(Quantities):
         if self.token.text == "(":
             return self.call(name, parts[0])
         if self.token.text == "{":
+            self.refuse_braces()
             return Call(name, (), (), self.block(), name.place)
+        if self.token.text == "[" and adjacent(self.previous, self.token):
+            return self.indexed(name, parts[0])
         token = self.token
         if units.is_unit(token.text) and token.kind == NAME and not self.begins_entry(self.at):
             if units.is_unit(name.text):
@@ -271,6 +286,25 @@ class Expressions(Quantities):
         body = self.block() if self.token.text == "{" else None
         call = Call(name, tuple(positional), tuple(named), body, place)
         return call if body is not None else self.with_unit(call, first)
+
+    def refuse_braces(self) -> None:
+        """Refuses `seg_{i}` where there is no loop: at the brace."""
+        length = braces_length(self.tokens, self.at)
+        if length and adjacent(self.previous, self.token):
+            first, start = self.token, self.at - 1
+            written = "".join(token.text for token in self.tokens[self.at : self.at + length])
+            self.at = start + name_length(self.tokens, start)
+            place = span(first, self.tokens[start + length])
+            self.fail("D285", f"`{written[:SHOWN]}` within a name stands in a loop alone", place, help=USAGE)
+
+    def indexed(self, name: Name, first: Token) -> Indexed:
+        """`lengths[i]`, from the bracket on."""
+        self.enter()
+        outer = self.begin_items()
+        index = self.value()
+        closing = self.leave()
+        self.end_items(outer)
+        return Indexed(name, index, span(first, closing))
 
     def list(self) -> List:
         opening = self.enter()

@@ -1,12 +1,13 @@
 """Tokens to the tree of `ic.grammar.syntax`, by recursive descent.
 
-The parser knows no word of the language but `let`, `like`, `of`, `from`, `and`, `or`, `not` and `when`, and those only
-where they stand: what a run of names means is decided by what comes behind it, so a joint may be called `at`, `let` or
-`sample`.
+The parser knows no word of the language but `for`, `let`, `like`, `of`, `from`, `and`, `or`, `not` and `when`, and
+those only where they stand: what a run of names means is decided by what comes behind it, so a joint may be called
+`at`, `let` or `sample`.
 
     names =  or  +=      a setting; all names but the last are words
     names {              a group
     names value ;        a statement;  require name: value ;  one with a name
+    for name in ... {    a loop, and [names] = value ; an entry for each name (`ic.grammar.loops`)
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ from contextlib import suppress
 from itertools import takewhile
 
 from ic.grammar.cursor import OPENING, SHOWN, EndedInsideBlock, Unreadable, span, token_in_words
-from ic.grammar.expressions import Expressions
+from ic.grammar.loops import Loops
 from ic.grammar.syntax import Broken, Call, Entry, Expression, Group, Let, Name, OverCases, Setting, Statement, Word
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import Findings, GiveUp, without_collection
 from ic.text.source import UnreadableStretch
 from met import units
-from met.diagnostic import Diagnostic, Label, Place, write
+from met.diagnostic import Diagnostic, Label, write
 
 COMPARE = ("require", "exclude")
 _OVER_CASES = "write `require METRIC < LIMIT in 99 % of cases with 90 % confidence;`"
@@ -65,12 +66,7 @@ def parse_expression(tokens: Sequence[Token], findings: Findings) -> Expression 
     return None
 
 
-class _Parser(Expressions):
-    def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
-        super().__init__(tokens, findings)
-        self.unreadable: list[UnreadableStretch] = []
-        self.within: Place | None = None
-
+class _Parser(Loops):
     def entries(self, into: list[Entry]) -> None:
         """Entries up to the closing brace of the block they stand in, or to the end."""
         depth = len(self.open)
@@ -91,7 +87,12 @@ class _Parser(Expressions):
             start = self.at
             try:
                 operators = self.operators
-                into.append(self.entry())
+                if self.at_loop():
+                    self.loop(into)
+                elif self.at_several():
+                    into += self.several()
+                else:
+                    into.append(self.entry())
                 self.operators = operators
             except Unreadable:
                 self.operators = operators
@@ -108,8 +109,8 @@ class _Parser(Expressions):
         path = [names[-1], *tokens[len(names) + 1 : behind : 2]] if names else []
         first, last = tokens[0], tokens[-1]
         sets = bool(names) and behind < len(tokens) and tokens[behind].text in ("=", "+=")
-        end = last.expansions[-1].use if last.expansions else last.place
-        at = first.expansions[-1].use if first.expansions else first.place
+        end = last.place.macros[-1].use if last.place.macros else last.place
+        at = first.place.macros[-1].use if first.place.macros else first.place
         known = [each.text for each in names[1:] or names]
         if len(names) == 1 and behind == 1 and tokens[behind:] and tokens[behind].text == "(":  # likewise, misspelt
             known += [token.text for token in tokens if token.kind == NAME]
@@ -172,7 +173,7 @@ class _Parser(Expressions):
         if first.kind != NAME:
             self.not_an_entry()
         names = [self.advance()]
-        if first.text == "let" and self.token.kind != NAME and self.token.expansions:
+        if first.text == "let" and self.token.kind not in (NAME, BAD) and self.token.place.macros:
             self.replaced_name()
         while self.token.kind == NAME and not (len(names) > 0 and self.line_break_in(names)):
             names.append(self.advance())
@@ -187,6 +188,8 @@ class _Parser(Expressions):
             if names[0].text == "let" and len(names) == 2:
                 return self.let(names, tail)
             return self.setting(names, tail)
+        if text == "{":
+            self.refuse_braces()
         if text == "{" or (text == ";" and _base_at(names) is not None):
             return self.group(names, tail)
         if text == "(" and _made_from(names, tail):
@@ -265,7 +268,7 @@ class _Parser(Expressions):
 
     def replaced_name(self) -> None:
         """A macro has put its body where the name of a `let` stands: `-D height=2` and `let height = ...`."""
-        step = self.token.expansions[-1]
+        step = self.token.place.macros[-1]
         message = f"the macro `{step.macro}` has put {token_in_words(self.token)} in the place of this name"
         helps: tuple[str, ...] = ("give one of the two another name",)
         if self.token.source.name == COMMAND_LINE:

@@ -9,6 +9,7 @@ from ic.grammar.syntax import (
     Entry,
     Expression,
     Group,
+    Indexed,
     Let,
     List,
     Name,
@@ -36,6 +37,8 @@ def spell(expression: Expression, within: int = 0) -> str:
             return f'"{expression.value}"'
         case Name():
             return expression.text
+        case Indexed():
+            return f"{expression.name.text}[{spell(expression.index)}]"
         case List():
             return "[" + ", ".join(spell(item) for item in expression.items) + "]"
         case WithUnit():

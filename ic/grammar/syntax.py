@@ -79,6 +79,15 @@ class Name:
 
 
 @frozen
+class Indexed:
+    """`lengths[i]`: one of the values of a list, the first of which is `lengths[0]`."""
+
+    name: Name
+    index: Expression
+    place: Place
+
+
+@frozen
 class List:
     items: tuple[Expression, ...]
     place: Place
@@ -148,7 +157,7 @@ class Broken:
     place: Place
 
 
-Expression = Number | String | Name | List | Call | WithUnit | Range | Unary | Binary | OverCases | Broken
+Expression = Number | String | Name | Indexed | List | Call | WithUnit | Range | Unary | Binary | OverCases | Broken
 
 
 def children(expression: Expression) -> tuple[Expression, ...]:
@@ -156,6 +165,8 @@ def children(expression: Expression) -> tuple[Expression, ...]:
     match expression:
         case List(items=items):
             return items
+        case Indexed(name=name, index=index):
+            return (name, index)
         case WithUnit(inner=inner):
             return (inner,)
         case Range(first=first, last=last, step=step):
@@ -176,6 +187,8 @@ def mapped(expression: Expression, change: Callable[[Expression], Expression]) -
     match expression:
         case List(items=items):
             return replace(expression, items=tuple(map(change, items)))
+        case Indexed(index=index):
+            return replace(expression, index=change(index))
         case WithUnit(inner=inner):
             return replace(expression, inner=change(inner))
         case Range(first=first, last=last, step=step):

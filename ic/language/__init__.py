@@ -6,6 +6,7 @@ sweeps are made of these declarations. A key more is an `Entry` more, and the co
 
 from __future__ import annotations
 
+from ic.language.anywhere import ANYWHERE
 from ic.language.bodies import ARM, JOINT, LINK, PAYLOAD
 from ic.language.declaration import BlockDeclaration, Entry
 from ic.language.runs import (
@@ -62,4 +63,14 @@ def choices(head: str) -> tuple[str, ...]:
     return tuple(last for first, _, last in split if first == head)
 
 
-__all__ = ["BLOCKS", "DEFINITIONS", "EXPERIMENTS", "HEADS", "OF_A_RUN", "BlockDeclaration", "Entry", "choices"]
+__all__ = [
+    "ANYWHERE",
+    "BLOCKS",
+    "DEFINITIONS",
+    "EXPERIMENTS",
+    "HEADS",
+    "OF_A_RUN",
+    "BlockDeclaration",
+    "Entry",
+    "choices",
+]

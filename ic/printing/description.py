@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ic.find import library_files
-from ic.language import BLOCKS, DEFINITIONS
+from ic.language import ANYWHERE, BLOCKS, DEFINITIONS
 from ic.language.bodies import JOINT_KINDS
 from ic.language.runs import BASE_KINDS
 from ic.meaning.expressions.evaluate import COMPARISONS, CONSTANTS, RESERVED, USAGE
@@ -50,6 +50,7 @@ def description() -> dict[str, Any]:
             }
             for block in BLOCKS.values()
         ],
+        "anywhere": [{key: each[key] for key in ("name", "written", "doc")} for each in block_json(ANYWHERE)],
         "models": [
             {**model_json(kind, model), "written": where_written(kind, model)}
             for kind in KINDS

@@ -356,5 +356,10 @@ def _declaration(experiment: Experiment, name: str) -> tuple[Parameter | None, s
 def _place_json(place: Place | None) -> dict[str, Any] | None:
     if place is None:
         return None
-    steps = [{"macro": step.macro, "use": _place_json(step.use)} for step in place.expansions]
-    return {"file": place.file, "line": place.line, "column": place.column, "length": place.length, "expansions": steps}
+    steps = [{"macro": step.macro, "use": _place_json(step.use)} for step in place.macros]
+    made = {"file": place.file, "line": place.line, "column": place.column, "length": place.length, "expansions": steps}
+    if place.turns:
+        made["turns"] = [
+            {"index": step.macro, "value": step.turn, "loop": _place_json(step.use)} for step in place.turns
+        ]
+    return made

@@ -44,6 +44,10 @@ PARTS = tuple(dict.fromkeys(word for block in BLOCKS.values() for word in block.
 _DECLARED = [each.parameter for block in BLOCKS.values() for each in block.entries if each.parameter is not None]
 WORDS = (BASE, "faults", *BASE_KINDS[1:], *(word for wanted in _DECLARED for word in wanted.words))
 NAME = r"[A-Za-z_][A-Za-z0-9_]*"
+BRACES = r"\{[A-Za-z0-9_(+-][A-Za-z0-9_ +*/%()-]*\}"
+IN_LOOPS = rf"(?:[A-Za-z_]|{BRACES})(?:[A-Za-z0-9_]|{BRACES})*"
+"""A name as it may stand in a loop: `seg_{i}`."""
+
 PATH = rf"{NAME}(?:\s*\.\s*{NAME})*"
 NUMBER = r"(?<![A-Za-z0-9_.])(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 
@@ -161,16 +165,17 @@ def _entries() -> dict[str, Any]:
     kinds = _any(DEFINITIONS)
     return _patterns(
         _groups(rf"\b(default)\s+(?={kinds}\b)", "storage.modifier"),
-        _groups(rf"\b({kinds})\s+({NAME})(?=\s+(?:like|of|from)\b|\s*[{{=;])", "storage.type", "entity.name.type"),
+        _groups(rf"\b({kinds})\s+({IN_LOOPS})(?=\s+(?:like|of|from)\b|\s*[{{=;])", "storage.type", "entity.name.type"),
         _groups(rf"\b(like|of)\s+({PATH})(?=\s*(?:[{{;]|\bof\b))", "keyword.other", "entity.other.inherited-class"),
-        _groups(rf"\b(let)\s+({NAME})(?=\s*=)", "storage.type", "variable.other.constant"),
+        _groups(rf"\b(let)\s+({IN_LOOPS})(?=\s*=)", "storage.type", "variable.other.constant"),
+        _groups(rf"\b(for)\s+({NAME})\s+(in)\b", "keyword.control", "variable.parameter", "keyword.control"),
         _groups(
-            rf"\b(joint)\s+({NAME})\s+({_any(JOINT_KINDS)})\b",
+            rf"\b(joint)\s+({IN_LOOPS})\s+({_any(JOINT_KINDS)})\b",
             "storage.type.part",
             "entity.name.section",
             "storage.modifier.joint",
         ),
-        _groups(rf"\b({_any(PARTS)})\s+({NAME})(?=\s*[={{;])", "storage.type.part", "entity.name.section"),
+        _groups(rf"\b({_any(PARTS)})\s+({IN_LOOPS})(?=\s*[={{;])", "storage.type.part", "entity.name.section"),
         _groups(rf"\b({_any(STATEMENTS)})\b(?=\s+[^=\s]|\s*\{{|\s*\(|\s*\")(?!\s*\+=)", "keyword.control"),
         _groups(rf"\b({_any(_keys())})(?=\s*(?:\+=|=(?!=)|\{{))", "support.type.property-name"),
         _groups(rf"\b({PATH})(?=\s*(?:\+=|=(?!=)))", "variable.other.property"),

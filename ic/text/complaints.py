@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from ic.text.source import UnreadableStretch
-from met.diagnostic import Diagnostic, Label, Place, Problem, error, meant
+from met.diagnostic import Diagnostic, Expansion, Label, Place, Problem, error, meant
 
 MOST_DIAGNOSTICS = 200  # diagnostics of one deck; any after these seldom say more
 
@@ -22,6 +22,10 @@ REMARKED_ONCE = ("D317", "D318", "D319", "D320", "D322")
 
 PROVISIONAL = ("D104", "D105", "D249")
 """Codes of what a servo or a sensor says of its own step, which waits for what the whole arm's step says."""
+
+
+MOST_TURNS_SHOWN = 4
+"""Turns of a loop that are named beside a mistake of the first."""
 
 
 UNKNOWN_WORDS = ("D044", "D045", "D082", "D108", "D136", "D157")
@@ -46,11 +50,13 @@ class Complaints:
         self._allowed: Mapping[str, Place] | None = None  # codes that the run at hand allows; None outside of runs
         self._silenced: dict[Diagnostic, Place] = {}
         self._of_no_run: set[Diagnostic] = set(self._found)
+        self._turns: dict[object, dict[tuple[Expansion, ...], None]] = {}  # by mistake of a loop's body: its turns
         self.needed_allowances: set[Place] = set()  # the places of each `allow` that silenced a warning
 
     @property
     def all(self) -> tuple[Diagnostic, ...]:
-        return tuple(self._found)
+        """What was found; of what turns of a loop all get wrong, that of the first, which names the others."""
+        return tuple(map(self._with_turns, self._found))
 
     @property
     def errors(self) -> tuple[Diagnostic, ...]:
@@ -73,11 +79,35 @@ class Complaints:
     def _record(self, diagnostic: Diagnostic) -> None:
         self.error_count += diagnostic.severity == "error"
         if (
-            len(self._found) < MOST_DIAGNOSTICS
+            not self.is_of_another_turn(diagnostic)
+            and len(self._found) < MOST_DIAGNOSTICS
             and not self._is_known_at_this_place(diagnostic)
             and not self._follows_from_unreadable(diagnostic)
         ):
             self._found.setdefault(diagnostic)
+
+    def is_of_another_turn(self, diagnostic: Diagnostic) -> bool:
+        """Return True if a turn of a loop made the same mistake in the same place before; this turn is noted."""
+        if diagnostic.at is None or not diagnostic.at.place.turns:
+            return False
+        turns = diagnostic.at.place.turns
+        known = self._turns.setdefault(_mistake(diagnostic), {turns: None})
+        known[turns] = None
+        return next(iter(known)) != turns
+
+    def _with_turns(self, diagnostic: Diagnostic) -> Diagnostic:
+        if not self._turns or diagnostic.at is None or not diagnostic.at.place.turns:
+            return diagnostic
+        others = tuple(self._turns.get(_mistake(diagnostic), ()))[1:]
+        if not others:
+            return diagnostic
+        loop = diagnostic.at.place.turns[0]
+        text = f"likewise in {len(others):,} other turn{'s' * (len(others) > 1)}"
+        if all(len(turns) == 1 for turns in others):
+            shown = [turns[0].turn for turns in others[:MOST_TURNS_SHOWN]]
+            more = f" and {len(others) - len(shown):,} more" * (len(others) > len(shown))
+            text = f"likewise where {loop.macro} = {', '.join(shown)}{more}"
+        return replace(diagnostic, also=(*diagnostic.also, Label(loop.use, text)))
 
     def note_unreadable(self, stretches: Sequence[UnreadableStretch]) -> None:
         """Note what could not be read, so that nothing is reported that follows from it, nor from the errors so far."""
@@ -271,9 +301,16 @@ class Complaints:
             self.add(*problem.diagnostics)
 
 
+def _mistake(diagnostic: Diagnostic) -> object:
+    """Equal of mistakes that turns of a loop have in common: the code and the place, without the turn."""
+    assert diagnostic.at is not None
+    place = diagnostic.at.place
+    return diagnostic.code, diagnostic.severity, place.file, place.line, place.column, place.macros
+
+
 def _spot(place: Place) -> tuple[str, int, int]:
     """The file, line and column that the deck's reader sees; for what a macro made, those of the macro's use."""
-    at = place.expansions[-1].use if place.expansions else place
+    at = place.macros[-1].use if place.macros else place
     return at.file, at.line, at.column
 
 

@@ -16,8 +16,9 @@ class Place:
     """A stretch of one line of a source file.
 
     line and column count from 1; a column counts characters, not bytes. `expansions` is not empty for a token
-    that a macro made: the token is then written at this place, in the macro's body or in an argument, and each
-    expansion, innermost first, says through which macro it came and where that macro was used.
+    that a macro or a loop made: the token is then written at this place, in the macro's body, in an argument or in the
+    loop's body. Each expansion, innermost first, says through which macro it came and where that macro was used; behind
+    those, likewise, come the turns of loops.
     `included` is the chain of `#include` lines that led to the file, innermost first.
     """
 
@@ -31,13 +32,41 @@ class Place:
     def __str__(self) -> str:
         return f"{self.file}:{self.line}:{self.column}"
 
+    @property
+    def macros(self) -> tuple[Expansion, ...]:
+        """The steps of macro expansion alone, without turns of loops."""
+        return self.expansions[: macro_count(self.expansions)]
+
+    @property
+    def turns(self) -> tuple[Expansion, ...]:
+        """The turns of loops alone, the innermost loop's first."""
+        return self.expansions[macro_count(self.expansions) :]
+
 
 @frozen
 class Expansion:
-    """One step of macro expansion: the macro's name and the place where it was used."""
+    """One step of macro expansion, or one turn of a loop.
+
+    macro  the macro's name; of a loop, that of its index
+    use    the place where the macro was used; the first words of the loop
+    turn   of a loop, what its index stands for in this turn; "" of a macro
+    """
 
     macro: str
     use: Place
+    turn: str = ""
+
+    def __str__(self) -> str:
+        """A turn as messages have it: `i = 7`."""
+        return f"{self.macro} = {self.turn}"
+
+
+def macro_count(expansions: tuple[Expansion, ...]) -> int:
+    """The number of steps of macro expansion, behind which the turns of loops stand."""
+    count = len(expansions)
+    while count and expansions[count - 1].turn:
+        count -= 1
+    return count
 
 
 @frozen
@@ -119,8 +148,8 @@ def shown_place(place: Place) -> Place:
 
     A macro's body stands before its uses, or in another file; what stands behind the use is one of its arguments.
     """
-    if not place.expansions:
+    if not place.macros:
         return place
-    use = place.expansions[-1].use
+    use = place.macros[-1].use
     argument = place.file == use.file and (place.line, place.column) > (use.line, use.column)
     return place if argument and place.included == use.included else use

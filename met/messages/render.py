@@ -9,6 +9,7 @@
        = help: nearest that fit: 333.333 Hz (1000/3), 250 Hz (1000/4)
 
 For a token that a macro made, the place shown is where the deck used the macro; the place in the macro's body follows.
+For one in a loop, the loop and the value of its index follow.
 A token from an argument is shown where the argument was written.
 """
 
@@ -103,9 +104,10 @@ def _one(diagnostic: Diagnostic, lines: Mapping[str, list[str]], paint: _Paint) 
 
 
 def _came_through(place: Place) -> list[str]:
-    """The macros that made a token, innermost first."""
-    steps = [f"note: in expansion of macro {step.macro}, used at {step.use}" for step in place.expansions]
-    return _cut(steps, "macros")
+    """The macros that made a token, and the turns of loops in which it stands, innermost first."""
+    steps = [f"note: in expansion of macro {step.macro}, used at {step.use}" for step in place.macros]
+    turns = [f"note: in `for {step.macro}` at {shown_place(step.use)}, {step}" for step in place.turns]
+    return _cut(steps, "macros") + _cut(turns, "loops")
 
 
 def _came_in(place: Place) -> list[str]:

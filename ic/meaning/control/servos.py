@@ -11,6 +11,7 @@ import numpy as np
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, Word
+from ic.meaning.control.other_joints import with_other_joints
 from ic.meaning.control.schedule import CONTINUOUS, Rate
 from ic.meaning.control.sensors import use_sensor, without_sensors
 from ic.meaning.control.trajectories import use_file, with_file_named
@@ -93,6 +94,7 @@ def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[l
     that is no joint's (already reported).
     """
     uses = {}
+    body = with_other_joints(body, arm, scope.complaints)
     _note_kinds(scope, body, arm)
     for item in body.items.values():
         with scope.complaints.gather():

@@ -410,9 +410,11 @@ def defined_twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnos
     if (place.file, place.line, place.column) == (earlier.file, earlier.line, earlier.column):
         once = "its file is included twice: begin that file with `#pragma once`"
         helps = [write("#pragma once\n", once, at=Place(place.file, 1, 1, 0), where="before")]
-        if place.expansions and place.expansions != earlier.expansions:
+        if place.turns != earlier.turns:
+            helps = [f"each turn writes it: name it by the index, as in `{name}_{{{place.turns[0].macro}}}`"]
+        elif place.macros and place.expansions != earlier.expansions:
             helps = [
-                f"macro `{place.expansions[-1].macro}` is used twice here: give it the name as an argument, "
+                f"macro `{place.macros[-1].macro}` is used twice here: give it the name as an argument, "
                 "another one each time, or use it once"
             ]
     return error("D040", f"{what} is written twice", Label(place, "again"), also=[Label(earlier, "first")], help=helps)

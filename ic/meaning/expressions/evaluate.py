@@ -13,6 +13,7 @@ from ic.grammar.syntax import (
     Broken,
     Call,
     Expression,
+    Indexed,
     List,
     Name,
     Number,
@@ -22,7 +23,7 @@ from ic.grammar.syntax import (
     WithUnit,
     children,
 )
-from ic.meaning.expressions.lists import list_arithmetic, signed
+from ic.meaning.expressions.lists import indexed, list_arithmetic, signed
 from ic.meaning.expressions.quantity import (
     Value,
     ValueList,
@@ -122,6 +123,8 @@ def _leaf(expression: Expression, lookup: Lookup) -> Value | ValueList:
             if expression.text in CONSTANTS:
                 return Value(CONSTANTS[expression.text], PURE, expression.place, hertz=None)
             return replace(lookup(expression), place=expression.place)
+        case Indexed():
+            return indexed(expression, evaluate(expression.name, lookup), evaluate_number(expression.index, lookup))
         case List():
             return ValueList(tuple(_items(expression, lookup)), expression.place)
         case Range():
@@ -266,8 +269,8 @@ def _of_numbers(node: Binary, left: Value, right: Value) -> Value:
 
 def _made_alike(node: Binary, left: Value, right: Value) -> Help:
     """The remedy where a bare number is added to a quantity, or quantities of two dimensions are."""
-    of_macro = [each.macro for each in node.place.expansions]
-    outside = [each for each in (node.left, node.right) if not place_of(each).expansions]
+    of_macro = [each.macro for each in node.place.macros]
+    outside = [each for each in (node.left, node.right) if not place_of(each).macros]
     if of_macro and (outside or any(place_of(each).expansions != node.place.expansions for each in children(node))):
         return Help(f"`{node.operator}` comes from macro `{of_macro[0]}`: put brackets around the macro's body")
     other, bare_one, written = (right, left, node.left) if left.bare else (left, right, node.right)

@@ -10,9 +10,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ic.grammar.places import spanned
-from ic.grammar.syntax import Binary, Name
+from ic.grammar.syntax import Binary, Indexed, Name
 from ic.meaning.expressions.quantity import Value, ValueList
+from met import units
 from met.diagnostic import Label, Place, Problem, error
+from met.trace import Scalar
 from met.units import PURE
 
 COMPONENTS = ("x", "y", "z")
@@ -64,6 +66,27 @@ def component(name: Name, vector: Value | ValueList) -> Value:
         helps = "`.x`, `.y` and `.z` are of a list of three"
         raise Problem(error("D071", f"`{head.text}` {has}, and `.{axis.text}` is one of three", name.place, help=helps))
     return replace(_numbers(vector)[COMPONENTS.index(axis.text)], place=name.place)
+
+
+def indexed(node: Indexed, written: Value | ValueList, index: Value) -> Value | ValueList:
+    """The value that `lengths[i]` names of a list, the first of which has the index 0. Raises Problem D286."""
+    name, number = node.name.text, index.number
+    if not isinstance(written, ValueList):
+        helps = f"write it without brackets, or a list: `let {name} = [..., ...];`"
+        raise Problem(error("D286", f"`{name}` is one number, and no list", node.place, help=helps))
+    if isinstance(number, Scalar):
+        helps = "vary the values of the list, or a value of its own"
+        raise Problem(error("D286", "which value of a list is taken cannot vary", index.place, help=helps))
+    count = len(written.items)
+    if index.dimension != PURE or number != int(number) or not 0 <= number < count:
+        shown = f"{number:g}" if index.dimension == PURE else f"a quantity in {units.text(index.dimension)}"
+        helps = (
+            f"`{name}` has {count} values, `{name}[0]` to `{name}[{count - 1}]`"
+            if count != 1
+            else (f"`{name}` has one value, `{name}[0]`")
+        )
+        raise Problem(error("D286", f"`{name}` has no value with the index {shown}", index.place, help=helps))
+    return replace(written.items[int(number)], place=node.place)
 
 
 def _made(items: list[Value], place: Place) -> ValueList:

@@ -20,12 +20,12 @@ DEEPEST = 64  # lets that need lets: far more than a deck has, far less than Pyt
 
 def _uses(place: Place) -> list[Place]:
     """The places at which the macros were used that a place came through."""
-    return [each.use for each in place.expansions]
+    return [each.use for each in place.macros]
 
 
 def _macro(place: Place) -> str:
     """The macro whose body a place is in."""
-    return place.expansions[0].macro
+    return place.macros[0].macro
 
 
 def _if_a_unit(help: str) -> Help:

@@ -1,7 +1,7 @@
 """Every message about text and grammar, whole: the sentence, its place, other places, remedies, and how it got there.
 
-`text.txt` and `grammar.txt` hold a deck with a mistake after each line `=== ...`, files that it includes after lines
-`-- name`, and what the user is shown after a line `>>>`.
+`text.txt`, `grammar.txt` and `loops.txt` hold a deck with a mistake after each line `=== ...`, files that it includes
+after lines `-- name`, and what the user is shown after a line `>>>`.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def cases(name: str) -> dict[str, tuple[str, dict[str, str], str]]:
     return found
 
 
-TEXT, GRAMMAR = cases("text.txt"), cases("grammar.txt")
-ALL = {**TEXT, **GRAMMAR}
+TEXT, GRAMMAR, LOOPS = cases("text.txt"), cases("grammar.txt"), cases("loops.txt")
+ALL = {**TEXT, **GRAMMAR, **LOOPS}
 
 
 @pytest.mark.parametrize("title", ALL)

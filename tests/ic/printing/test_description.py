@@ -24,11 +24,12 @@ PARAMETER = {field.name for field in fields(Parameter)}
 
 KEYS = {
     "": {
-        "schema", "version", "met", "definitions", "blocks", "models", "shapes", "dh", "joint_kinds", "base_kinds",
+        "schema", "version", "met", "definitions", "blocks", "anywhere", "models", "shapes", "dh", "joint_kinds", "base_kinds",
         "channels", "units", "unit_words", "functions", "constants", "comparisons", "designs", "distributions",
         "directives", "taken_names", "diagnostics", "library",
     },
     "blocks": {"name", "doc", "written", "within", "head", "free", "entries"},
+    "anywhere": {"name", "written", "doc"},
     "models": {"kind", "name", "doc", "written", "parameters"},
     "shapes": {"name", "parameters"},
     "dh": {"name", "unit", "doc", "default"},

@@ -1,0 +1,153 @@
+"""Names with braces in them, `seg_{i-1}`, and the whole numbers that braces and the ends of a loop hold.
+
+What stands in braces is an index of a loop or whole numbers with `+ - * / %` and brackets; nothing that a block may
+hold looks so, since entries have a `;`. The opening brace and what follows it touch.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+from ic.text.lexer import NAME, WHOLE, Token
+from ic.text.limits import CONDITION_NESTING, LONGEST_NAME
+
+USAGE = "a loop is written `for i in 1 .. 6 { ... }`, with `by 2` or without, or `for side in [left, right] { ... }`"
+LARGEST = 10**9
+_FAR = 1_000  # characters between two tokens: of a macro's body and of an argument, surely
+_SIGNS = ("+", "-", "*", "/", "%", "(", ")")
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+class NotWhole(Exception):
+    """Raised where what should be a whole number is none: the token, what is wrong, and the remedy."""
+
+    def __init__(self, token: Token, message: str, help: str = "") -> None:
+        super().__init__(message)
+        self.token, self.message, self.help = token, message, help
+
+
+class NoName(Exception):
+    """Raised where braces make no name: the text that they make."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.text = text
+
+
+def adjacent(first: Token, second: Token) -> bool:
+    """Return True if nothing stands between two tokens in the text."""
+    return first.source is second.source and first.end == second.offset
+
+
+def _may_touch(first: Token, second: Token) -> bool:
+    """The same where a macro may have put an argument between or beside the two: then it is as if nothing were."""
+    if adjacent(first, second) or not second.expansions:
+        return adjacent(first, second)
+    apart = second.offset - first.end
+    if first.source is not second.source or not 0 < apart < _FAR:
+        return True
+    return first.source.text[first.end : second.offset].strip() != ""
+
+
+def braces_length(tokens: Sequence[Token], at: int) -> int:
+    """The number of tokens of the braces at token `at` that belong to a name; 0 where there are none, or a block."""
+    if tokens[at].text != "{" or at + 2 >= len(tokens) or not _may_touch(tokens[at], tokens[at + 1]):
+        return 0
+    end = at + 1
+    while end < len(tokens) and (tokens[end].kind in (NAME, WHOLE) or tokens[end].text in _SIGNS):
+        end += 1
+    closed = at + 1 < end < len(tokens) and tokens[end].text == "}"
+    return end + 1 - at if closed else 0
+
+
+def name_length(tokens: Sequence[Token], at: int) -> int:
+    """The number of tokens of the name that begins at token `at`, braces included; 0 where none begins there."""
+    end = at + (1 if tokens[at].kind == NAME else braces_length(tokens, at))
+    while at < end < len(tokens):
+        before, token = tokens[end - 1 : end + 1]
+        more = braces_length(tokens, end) if _may_touch(before, token) else 0
+        if before.text == "}" and token.kind in (NAME, WHOLE) and adjacent(before, token):
+            more = 1
+        if not more:
+            break
+        end += more
+    return end - at
+
+
+def filled(tokens: Sequence[Token], known: Mapping[str, str]) -> str:
+    """The name that these tokens make, where indices stand for what `known` says. Raises NotWhole, NoName."""
+    text, at = "", 0
+    while at < len(tokens):
+        length = braces_length(tokens, at)
+        if not length:
+            text, at = text + tokens[at].text, at + 1
+            continue
+        inside = tokens[at + 1 : at + length]
+        if len(inside) == 2 and _NAME.fullmatch(known.get(inside[0].text, "")):
+            text += known[inside[0].text]
+        else:
+            number, end = whole(inside, 0, known)
+            if end != len(inside) - 1:
+                raise NotWhole(inside[end], f"`{inside[end].text}` does not belong here")
+            text += str(number)
+        at += length
+    if len(text) > LONGEST_NAME or not _NAME.fullmatch(text):
+        raise NoName(text)
+    return text
+
+
+def whole(tokens: Sequence[Token], at: int, known: Mapping[str, str], depth: int = 0) -> tuple[int, int]:
+    """The whole number that begins at token `at`, and where it ends; there is a token behind it. Raises NotWhole."""
+    value, at = _product(tokens, at, known, depth)
+    while tokens[at].text in ("+", "-"):
+        sign = tokens[at]
+        other, at = _product(tokens, at + 1, known, depth)
+        value = _bounded(value + other if sign.text == "+" else value - other, sign)
+    return value, at
+
+
+def _product(tokens: Sequence[Token], at: int, known: Mapping[str, str], depth: int) -> tuple[int, int]:
+    value, at = _factor(tokens, at, known, depth)
+    while tokens[at].text in ("*", "/", "%"):
+        sign = tokens[at]
+        other, at = _factor(tokens, at + 1, known, depth)
+        if sign.text == "*":
+            value = _bounded(value * other, sign)
+        elif other == 0:
+            raise NotWhole(sign, "division by zero")
+        elif sign.text == "%":
+            value %= other
+        elif value % other:
+            raise NotWhole(sign, f"{value}/{other} is not a whole number", "`%` is the rest of a division")
+        else:
+            value //= other
+    return value, at
+
+
+def _factor(tokens: Sequence[Token], at: int, known: Mapping[str, str], depth: int) -> tuple[int, int]:
+    token = tokens[at]
+    if depth > CONDITION_NESTING:
+        raise NotWhole(token, f"signs and brackets go deeper than {CONDITION_NESTING} here")
+    if token.text in ("-", "+"):
+        value, at = _factor(tokens, at + 1, known, depth + 1)
+        return -value if token.text == "-" else value, at
+    if token.text == "(":
+        value, at = whole(tokens, at + 1, known, depth + 1)
+        if tokens[at].text != ")":
+            raise NotWhole(tokens[at], "a `)` is missing before this")
+        return value, at + 1
+    if token.kind == WHOLE and token.text.isdigit() and len(token.text) <= len(str(LARGEST)):
+        return _bounded(int(token.text), token), at + 1
+    text = known.get(token.text) if token.kind == NAME else None
+    if text is None:
+        raise NotWhole(token, "")
+    if _NAME.fullmatch(text):
+        raise NotWhole(token, f"`{token.text}` is a name here, `{text}`, and a whole number is needed")
+    return int(text), at + 1
+
+
+def _bounded(value: int, token: Token) -> int:
+    if abs(value) > LARGEST:
+        raise NotWhole(token, f"whole numbers of a loop go to {LARGEST:,} at most")
+    return value

@@ -1,0 +1,332 @@
+"""Entries that stand for several: `for i in 1 .. 6 { ... }`, `for side in [left, right] { ... }`, and
+`[lift, swing] = turner;`.
+
+The block of a loop is read anew in each turn. Its tokens know the turn, behind the macros that they came through
+(`Expansion.turn`); names with braces in them are made, and where a value begins the index stands for itself. So what
+comes behind the parser meets plain names, and messages know the loop and the value of its index.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NoReturn
+
+from ic.grammar.braced_names import USAGE, NoName, NotWhole, filled, name_length, whole
+from ic.grammar.cursor import span, token_in_words
+from ic.grammar.expressions import EVERY_JOINT, Expressions
+from ic.grammar.syntax import Entry, Expression, Group, Setting, Word
+from ic.text.lexer import BAD, END, NAME, Token
+from ic.text.limits import MOST_LOOPED, MOST_TURNS, Findings, GiveUp
+from ic.text.source import UnreadableStretch
+from met import units
+from met.diagnostic import Expansion, Place, did_you_mean
+from met.messages.message import macro_count
+
+_LISTED = (
+    "a loop goes over names and whole numbers; for other values write a list, `let lengths = [1.2, 0.8] m;`, and take "
+    "`lengths[i]`"
+)
+_ENDS = "its ends are whole numbers, macros that are such (`#define COUNT 6`, `-D COUNT=6`), and indices around it"
+
+
+class Loops(Expressions):
+    """The part of the parser that knows entries which stand for several."""
+
+    def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
+        super().__init__(tokens, findings)
+        self.unreadable: list[UnreadableStretch] = []
+        self.within: Place | None = None
+        self.looped = [0]  # tokens of all turns so far, of the whole deck
+
+    def entries(self, into: list[Entry]) -> None:
+        raise NotImplementedError
+
+    def semicolon(self, value: Expression) -> None:
+        raise NotImplementedError
+
+    def never_closed(self) -> NoReturn:
+        raise NotImplementedError
+
+    # loops
+
+    def at_loop(self) -> bool:
+        """Return True if a loop begins here, or something that was meant for one."""
+        if self.token.text != "for":
+            return False
+        behind = self.tokens[self.at + 2].text
+        return self.following.text == "(" or (self.following.kind == NAME and behind in ("in", "=", ":", "from"))
+
+    def loop(self, into: list[Entry]) -> None:
+        """The entries of all turns of a loop."""
+        first = self.advance()
+        if self.token.kind != NAME or self.following.text != "in":
+            self.fail("D283", "this is not how a loop is written", span(first, self.previous), help=USAGE)
+        index = self.advance()
+        self.check_index(index)
+        self.advance()
+        values = self.listed() if self.token.text == "[" else self.counted()
+        if self.token.text != "{":
+            self.fail(
+                "D283", f"expected the block of the loop, found {token_in_words(self.token)}", self.token, help=USAGE
+            )
+        opening, start = self.token, self.at + 1
+        closing = self.closing(self.at)
+        if self.tokens[closing].kind == END:
+            self.enter()
+            self.at = closing
+            self.never_closed()
+        self.enter()
+        pieces = self.pieces(start, closing)
+        use = first.source.place(
+            first.offset,
+            index.end - first.offset if index.source is first.source and index.line == first.line else first.length,
+            first.expansions[: macro_count(first.expansions)],
+        )
+        for value in values:
+            self.looped[0] += closing - start + 8
+            if self.looped[0] > MOST_LOOPED:
+                self.tell(
+                    "D284",
+                    f"the loops of this deck make more than {MOST_LOOPED:,} tokens",
+                    use,
+                    help="write fewer turns, or a smaller block",
+                )
+                raise GiveUp
+            known = {**self.indices, index.text: value}
+            tokens = self.tokens_of(pieces, Expansion(index.text, use, value), known)
+            self.read_turn([*tokens, self.tokens[closing]], opening, known, into)
+        self.at = closing
+        self.leave()
+
+    def read_turn(self, tokens: Sequence[Token], opening: Token, known: Mapping[str, str], into: list[Entry]) -> None:
+        """The entries of one turn's tokens, the closing brace among these."""
+        end = Token(END, "", tokens[-1].source, tokens[-1].end, 1)
+        turn = type(self)([*tokens, end], self.findings)
+        turn.indices, turn.looped, turn.within = known, self.looped, self.within
+        turn.open, turn.depth, turn.operators = [opening], self.depth + len(self.open) - 1, self.operators
+        turn.entries(into)
+        self.unreadable += turn.unreadable
+        self.unbalanced = self.unbalanced or turn.unbalanced
+        self.peak = max(self.peak, turn.peak)
+
+    def check_index(self, index: Token) -> None:
+        if units.is_unit(index.text):
+            message = f"`{index.text}` is the unit {units.UNITS[index.text].word}, so it cannot be a loop's index"
+            self.tell("D026", message, index, help="choose another name: after a number it would be read as the unit")
+        if index.text in self.indices:
+            message = f"`{index.text}` is the index of a loop around this one"
+            self.tell("D283", message, index, help="give one of the two another name")
+
+    def closing(self, at: int) -> int:
+        """The position of the brace that closes the one at `at`, or that of the end."""
+        depth = 0
+        while self.tokens[at].kind != END:
+            depth += {"{": 1, "}": -1}.get(self.tokens[at].text, 0)
+            if depth == 0:
+                break
+            at += 1
+        return at
+
+    def counted(self) -> Sequence[str]:
+        """The turns of `1 .. 6 by 2`: both ends are among them where the steps meet the last."""
+        start = self.at
+        first = self.whole()
+        if self.token.text != "..":
+            self.fail("D283", f"expected `..`, found {token_in_words(self.token)}", self.token, help=USAGE)
+        self.advance()
+        last = self.whole()
+        place = span(self.tokens[start], self.previous)
+        step, by = 1, self.token
+        if by.text == "by":
+            self.advance()
+            step = self.whole()
+        if step == 0:
+            self.fail(
+                "D283",
+                "this loop has a step of 0",
+                span(by, self.previous),
+                help="leave it out: a step is 1 unless written",
+            )
+        if (last - first) * step < 0 and (step != 1 or last < first - 1):
+            message = f"this loop goes from {first} to {last} in steps of {step}: that is no turn"
+            self.fail(
+                "D283",
+                message,
+                place,
+                help=f"write `by {-step}`, or change the ends"
+                if by.text == "by"
+                else (
+                    "to count down write `by -1`",
+                    "no turn at all is an end that is 1 below the beginning: `1 .. 0`",
+                ),
+            )
+        turns = range(first, last + (1 if step > 0 else -1), step)
+        if len(turns) > MOST_TURNS:
+            message = f"a loop has at most {MOST_TURNS:,} turns, and this one has {len(turns):,}"
+            self.fail("D284", message, place, help="change its ends, or take larger steps: `by 2`")
+        return [str(each) for each in turns]
+
+    def whole(self, help: str = _ENDS) -> int:
+        """The whole number that begins here. help: what to write where there is none."""
+        try:
+            value, self.at = whole(self.tokens, self.at, self.indices)
+        except NotWhole as reason:
+            self.at = max(self.at, self.tokens.index(reason.token, self.at))
+            found = token_in_words(reason.token)
+            near = did_you_mean(reason.token.text, () if reason.message else self.indices)
+            self.fail(
+                "D283",
+                reason.message or f"expected a whole number, found {found}",
+                reason.token,
+                help=[*near, reason.help or help],
+            )
+        return value
+
+    def listed(self) -> Sequence[str]:
+        """The turns of `[left, right]`: names, or whole numbers."""
+        opening = self.enter()
+        values = []
+        while self.token.text != "]":
+            if self.token.kind == NAME and self.following.text in (",", "]"):
+                token = self.advance()
+                values.append(self.indices.get(token.text, token.text))
+            else:
+                values.append(str(self.whole(_LISTED)))
+            if not self.another("]"):
+                break
+        self.leave("`,` or ")
+        if self.token.kind == NAME and units.is_unit(self.token.text):
+            self.fail("D283", "a loop goes over names and whole numbers, without a unit", self.token, help=_LISTED)
+        if not values:
+            self.fail(
+                "D283", "this loop goes over nothing", opening, help="write names or whole numbers: `[left, right]`"
+            )
+        if len(values) > MOST_TURNS:
+            self.fail(
+                "D284",
+                f"a loop has at most {MOST_TURNS:,} turns, and this one has {len(values):,}",
+                opening,
+                help="write two loops",
+            )
+        return values
+
+    # turns
+
+    def pieces(self, start: int, end: int) -> list[tuple[Token, ...]]:
+        """The tokens of a loop's block, of a name with braces all in one; loops in it are left as they are."""
+        found: list[tuple[Token, ...]] = []
+        at = start
+        while at < end:
+            token = self.tokens[at]
+            length = 1
+            if token.text == "for" and self.tokens[at + 1].kind == NAME and self.tokens[at + 2].text == "in":
+                inner = at
+                while inner < end and self.tokens[inner].text != "{":
+                    inner += 1
+                inner = min(end, self.closing(inner) + 1) if inner < end else end
+                found += ((each,) for each in self.tokens[at:inner])
+                at = inner
+                continue
+            if token.kind == NAME or token.text == "{":
+                length = max(1, name_length(self.tokens, at))
+            found.append(tuple(self.tokens[at : at + length]))
+            at += length
+        return found
+
+    def tokens_of(self, pieces: Sequence[tuple[Token, ...]], turn: Expansion, known: dict[str, str]) -> list[Token]:
+        """The tokens of one turn."""
+        through: dict[int, tuple[Expansion, ...]] = {}  # by identity, as of macros
+        made: list[Token] = []
+        for piece in pieces:
+            first = piece[0]
+            came = first.expansions
+            if id(came) not in through:
+                count = macro_count(came)
+                through[id(came)] = (*came[:count], turn, *came[count:])
+            token = Token(first.kind, first.text, first.source, first.offset, piece[-1].end - first.offset)
+            token.expansions = through[id(came)]
+            if len(piece) > 1:
+                self.fill(token, piece, known)
+            made.append(token)
+        return made
+
+    def fill(self, token: Token, piece: Sequence[Token], known: dict[str, str]) -> None:
+        """Makes of a token the name that a piece with braces stands for; where there is none, that is reported."""
+        written = "".join(each.text for each in piece)
+        try:
+            token.kind, token.text = NAME, filled(piece, known)
+        except NotWhole as reason:
+            at = reason.token
+            place = at.source.place(at.offset, at.length, token.expansions)
+            near = did_you_mean(at.text, known) if at.kind == NAME and not reason.message else []
+            message = reason.message or f"no index {token_in_words(at)} in `{written}`"
+            self.tell(
+                "D285",
+                message,
+                place,
+                help=[*near, reason.help or f"braces hold an index, {_indices(known)}, or whole numbers"],
+            )
+            token.kind, token.text = BAD, ""
+        except NoName as reason:
+            message, helps = f"`{written}` makes `{reason.text[:40]}`, which is no name", ""
+            if piece[0].text == "{":
+                helps = "in a value the index stands without braces; a name has letters before them: `seg_{i}`"
+            self.tell("D285", message, token.place, help=helps or "a name is made of letters, digits and `_`")
+            token.kind, token.text = BAD, ""
+
+    # several names
+
+    def heads(self) -> list[list[Token]]:
+        """The names in brackets that begin an entry."""
+        opening = self.enter()
+        heads = []
+        while self.token.text != "]":
+            if self.token.kind != NAME:
+                self.unexpected("a name")
+            heads.append(self.path())
+            if not self.another("]"):
+                break
+        self.leave("`,` or ")
+        if not heads:
+            self.fail("D020", "these brackets hold no names", opening, help="write `[lift, swing] = turner;`")
+        return heads
+
+    def at_several(self) -> bool:
+        """Return True if names in brackets begin an entry here, or `*`, which is all that have none of their own."""
+        token = self.token
+        return token.text == "[" or (token.text == EVERY_JOINT and self.following.text in ("=", "{"))
+
+    def several(self) -> list[Entry]:
+        """An entry for each name of `[lift, swing] = turner;`, and the one of `* = spindle;`."""
+        heads = [[self.advance()]] if self.token.text == EVERY_JOINT else self.heads()
+        tail: list[Token] = []
+        if self.token.text == ".":
+            self.at -= 1
+            tail = self.path()[1:]
+        operator = self.token
+        if operator.text == "{":
+            body = self.block()
+            words = [(Word(head[0].text, head[0].place), span(head[0], head[-1])) for head in heads]
+            if tail or any(len(head) > 1 for head in heads):
+                self.fail("D020", "a block's name has no points", operator, help="write one block within another")
+            return [Group((word,), None, None, body, place) for word, place in words]
+        if operator.text not in ("=", "+="):
+            self.unexpected("`=` or `{` behind the names", help="several are set alike by `[lift, swing] = turner;`")
+        self.advance()
+        value = self.value()
+        self.semicolon(value)
+        return [
+            Setting(
+                (),
+                tuple(Word(each.text, each.place) for each in (*head, *tail)),
+                operator.text,
+                value,
+                span(head[0], head[-1]),
+            )
+            for head in heads
+        ]
+
+
+def _indices(known: Mapping[str, str]) -> str:
+    """`i`, or `i` or `j`."""
+    return " or ".join(f"`{each}`" for each in known)

@@ -1,0 +1,43 @@
+"""`* = spindle;` in the servos of a run: the servo of every joint that has none of its own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ic.grammar.expressions import EVERY_JOINT
+from ic.meaning.definitions.merge import Item, MergedBlock, overlay
+from ic.meaning.mechanics.arm import ResolvedArm
+from ic.text.complaints import Complaints
+from met.diagnostic import leave_out
+
+
+def with_other_joints(body: MergedBlock, arm: ResolvedArm, complaints: Complaints) -> MergedBlock:
+    """The servos with an entry for each joint that moves, where `*` stands for those that have none.
+
+    An entry that only changes its servo, `lift { kp = ...; }`, changes that of `*`.
+    """
+    every = body.get(EVERY_JOINT)
+    if every is None:
+        return body
+    items = {key: item for key, item in body.items.items() if item is not every}
+    used = False
+    for joint in arm.moving:
+        own = items.get(joint.name)
+        if own is not None and own.value is not None:
+            continue
+        used = True
+        items[joint.name] = replace(every, name=joint.name) if own is None else _changed(every, own, complaints)
+    if not used and arm.moving and not arm.failed:
+        complaints.remark(
+            "D287",
+            "`*` stands for no joint: each of them has a servo of its own",
+            every.place,
+            help=leave_out("leave it out"),
+        )
+    return replace(body, items=items)
+
+
+def _changed(every: Item, own: Item, complaints: Complaints) -> Item:
+    """The entry of `*` as one joint changes it."""
+    body = own.body if every.body is None or own.body is None else overlay(every.body, own.body, complaints)
+    return replace(every, name=own.name, body=body, upon=own.place)
