@@ -163,7 +163,7 @@ def _entries() -> dict[str, Any]:
         _groups(rf"\b(default)\s+(?={kinds}\b)", "storage.modifier"),
         _groups(rf"\b({kinds})\s+({NAME})(?=\s+(?:like|of|from)\b|\s*[{{=;])", "storage.type", "entity.name.type"),
         _groups(rf"\b(like|of)\s+({PATH})(?=\s*(?:[{{;]|\bof\b))", "keyword.other", "entity.other.inherited-class"),
-        _groups(rf"\b(let)\s+({NAME})(?=\s*=)", "storage.type", "variable.other.constant"),
+        _groups(rf"\b(let|param)\s+({NAME})(?=\s*=)", "storage.type", "variable.other.constant"),
         _groups(
             rf"\b(joint)\s+({NAME})\s+({_any(JOINT_KINDS)})\b",
             "storage.type.part",
