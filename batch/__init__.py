@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,6 +61,8 @@ def __getattr__(name: str) -> Any:
 def run(
     plan: Plan | str | os.PathLike[str],
     *,
+    set: Mapping[str, object] | Sequence[str] = (),
+    vary: Mapping[str, object] | Sequence[str] = (),
     output: str | os.PathLike[str] | None = None,
     experiments: Sequence[str] | None = None,
     cases: Sequence[int | str] | None = None,
@@ -80,6 +82,7 @@ def run(
     """Run a plan's cases into an archive: what is missing of it, where an earlier run was interrupted.
 
     plan          a deck's path; what `ic.compile` gives; or a plan file (`met plan DECK -o p.json`)
+    set, vary     of a deck: values in place of its own, and what a sweep of the run varies, as `ic.compile` has them
     output        the archive; None: in the current folder, called as `met run` calls it: the deck's name, and those of
                   the runs and sweeps that were asked for (`two_link.gains.h5`). FILE.mcap, FILE.csv or FILE.parquet:
                   FILE.h5, and an export of it: a table of a sweep has its metrics, or the histories that are asked for
@@ -108,9 +111,10 @@ def run(
     from batch.export import from_run
 
     archive, target = from_run.archive_and_export(output)
+    made = _plan(plan, experiments, set, vary)
     chosen = executor or choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
     campaign = prepare(
-        _plan(plan, experiments),
+        made,
         output=archive,
         experiments=experiments,
         cases=cases,
@@ -210,18 +214,26 @@ def gradient(
     return to_dataset(found, GradientProgram(found).of([int(row) for row in rows], metrics))
 
 
-def _plan(given: object, experiments: Sequence[str] | None) -> Plan:
-    """A plan; the one in a plan file; or a deck compiled, its runs and sweeps of these names. TypeError for others."""
+def _plan(
+    given: object,
+    experiments: Sequence[str] | None,
+    set: Mapping[str, object] | Sequence[str] = (),
+    vary: Mapping[str, object] | Sequence[str] = (),
+) -> Plan:
+    """A plan; the one in a plan file; or a deck compiled, its runs and sweeps of these names. TypeError for others, and
+    for values that are set or varied in a plan."""
     from met.plan import Plan
 
-    if isinstance(given, Plan):
-        return given
-    if not isinstance(given, str | os.PathLike):
+    if not isinstance(given, Plan | str | os.PathLike):
         raise TypeError(f"batch.run takes a deck's path or a plan, and not {type(given).__name__}")
-    if Path(given).suffix != ".json":
+    if not isinstance(given, Plan) and Path(given).suffix != ".json":
         import ic
 
-        return ic.compile(given, select=experiments)
+        return ic.compile(given, set=set, vary=vary, select=experiments)
+    if set or vary:
+        raise TypeError("`set` and `vary` are of decks: the values of a plan are settled")
+    if isinstance(given, Plan):
+        return given
     from met.plan import file as plan_file
 
     return plan_file.read(given)

@@ -26,6 +26,7 @@ def check(
     include_dirs: Iterable[str | PathLike[str]] = (),
     defines: Iterable[str] = (),
     set: Mapping[str, object] | Iterable[str] = (),
+    vary: Mapping[str, object] | Iterable[str] = (),
     select: Sequence[str] | Literal["all"] | None = "all",
 ) -> Compiled:
     """The plan of all runs and sweeps or None, all diagnostics, every file's text. A mistake raises nothing.
@@ -33,16 +34,16 @@ def check(
     Parameters as of `compile`.
     """
     from ic.driver.compile import check as lowered
+    from met.settings import VARY, to_set
 
     if (path is None) == (text is None):
         raise TypeError("a deck is given by its path or by its text")
-    settings = [f"{path}={value}" for path, value in set.items()] if isinstance(set, Mapping) else set
     return lowered(
         path or "",
         include_dirs=tuple(include_dirs),
         defines=tuple(defines),
         select=select,
-        settings=tuple(settings),
+        settings=(*map(to_set, _settings(set)), *(f"{VARY} {each}" for each in _settings(vary))),
         text=text,
     )
 
@@ -54,6 +55,7 @@ def compile(
     include_dirs: Iterable[str | PathLike[str]] = (),
     defines: Iterable[str] = (),
     set: Mapping[str, object] | Iterable[str] = (),
+    vary: Mapping[str, object] | Iterable[str] = (),
     select: Sequence[str] | Literal["all"] | None = None,
 ) -> Plan:
     """The run plan of a deck.
@@ -61,12 +63,27 @@ def compile(
     text    of a deck in no file; what it includes is looked for as if it stood in the current folder
     set     values in place of the deck's, as the deck would write them: `{"gearbox.kp": "0.02 V*s/rad"}`, or
             texts, `["gearbox.kp=0.02 V*s/rad"]`
+    vary    what a sweep of the one run varies, as the deck would write it: `{"gearbox.kp": "[0.01, 0.02] V*s/rad"}`; of
+            a list of values each as `set` has them, `{"gearbox.kp": ["0.01 V*s/rad", "0.02 V*s/rad"]}`
     select  names of runs and sweeps, "all", or None: the only one, else the one marked `default`
     Raises `met.diagnostic.Problem` with every error and warning found, and the text of every file read.
     """
     from met.diagnostic import Problem
 
-    compiled = check(path, text=text, include_dirs=include_dirs, defines=defines, set=set, select=select)
+    compiled = check(path, text=text, include_dirs=include_dirs, defines=defines, set=set, vary=vary, select=select)
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)
     return compiled.plan
+
+
+def _settings(given: Mapping[str, object] | Iterable[str]) -> Iterable[str]:
+    """Texts `PATH=VALUE`; several values as the deck's list of them."""
+    if not isinstance(given, Mapping):
+        return (given,) if isinstance(given, str) else given
+    return [f"{path}={_as_written(value)}" for path, value in given.items()]
+
+
+def _as_written(value: object) -> str:
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        return str(value)
+    return f"[{', '.join(map(str, value))}]"

@@ -24,6 +24,7 @@ from met.cli import (
 from met.diagnostic import Diagnostic, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.messages.visible import say
+from met.settings import settings_of
 
 if TYPE_CHECKING:
     from ic.driver.compile import Compiled
@@ -102,7 +103,7 @@ def _checked(file: str, include_dirs: tuple[str, ...], defines: tuple[str, ...],
     from ic.find import find
 
     find(file, include_dirs)
-    compiled = ic.check(file, include_dirs=include_dirs, defines=defines, set=settings, select="all")
+    compiled = ic.check(file, include_dirs=include_dirs, defines=defines, **settings_of(settings), select="all")
     return _Checked(file, compiled.plan, tuple(compiled.diagnostics), compiled.sources, tuple(compiled.allowed))
 
 
@@ -367,7 +368,8 @@ def dump(
     check_options(deck, settings=settings)
     shown = find_stage(stage)
     if settings and stage in WRITTEN:
-        raise click.UsageError(f"`met dump {stage}` shows what the deck says; `met dump plan`, what --set makes of it")
+        message = f"`met dump {stage}` shows what the deck says; `met dump plan`, what --set and --vary make of it"
+        raise click.UsageError(message)
     _print(shown(DumpRequest(deck, include_dirs, defines, names or None, settings)))
 
 
@@ -402,7 +404,7 @@ def _compiled(
     from ic.find import find
 
     find(deck, include_dirs)
-    compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, set=settings, select=select)
+    compiled = ic.check(deck, include_dirs=include_dirs, defines=defines, **settings_of(settings), select=select)
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)
     return compiled

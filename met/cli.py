@@ -21,6 +21,7 @@ from met.diagnostic import Diagnostic, Problem, error, nearest
 from met.host.entry_points import EntryPoint, offered
 from met.host.sources import names_archive, names_plan
 from met.messages.visible import say
+from met.settings import VARY, setting_option, to_set, varies
 from met.version import VERSION
 
 YES, NO, BAD_INPUT = 0, 1, 2
@@ -128,12 +129,23 @@ def met() -> None:
 
 
 def deck_options(face: Face) -> Face:
-    """The options of whatever reads a deck: -D, -I and --set, given on as `defines`, `include_dirs` and `settings`."""
+    """The options of whatever reads a deck: -D, -I, --set and --vary, given on as `defines`, `include_dirs` and
+    `settings` (of --vary, `vary PATH=VALUES`)."""
+    face = click.option(
+        "--vary",
+        multiple=True,
+        metavar="PATH=VALUES",
+        expose_value=False,
+        is_eager=True,  # before --set, which takes it in
+        callback=_keep_varied,
+        help="Sweep the run over this, as `vary` does: 'gearbox.kp=0.01..0.1 by 0.01 V*s/rad'; several are combined.",
+    )(face)
     face = click.option(
         "--set",
         "settings",
         multiple=True,
         metavar="PATH=VALUE",
+        callback=_with_varied,
         help="Set what `vary` names, as if the deck said so: 'gearbox.kp=0.02 V*s/rad'; may be repeated.",
     )(face)
     face = click.option(
@@ -147,6 +159,17 @@ def deck_options(face: Face) -> Face:
     return click.option(
         "-D", "defines", multiple=True, metavar="NAME[=VALUE]", help="Define a macro as #define does; may be repeated."
     )(face)
+
+
+_VARIED = "met.varied"  # where the context of a command keeps what --vary says
+
+
+def _keep_varied(context: click.Context, _: click.Parameter, values: tuple[str, ...]) -> None:
+    context.meta[_VARIED] = tuple(f"{VARY} {value.strip()}" for value in values)
+
+
+def _with_varied(context: click.Context, _: click.Parameter, values: tuple[str, ...]) -> tuple[str, ...]:
+    return (*map(to_set, values), *context.meta.get(_VARIED, ()))
 
 
 def check_options(
@@ -163,11 +186,16 @@ def check_options(
     for option, given in (("-D", defines), ("-I", include_dirs)):
         if given and names_plan(source):
             raise click.UsageError(f"{option} is for decks: `{source}` is a plan, whose macros are expanded already")
+    varied = [each for each in settings if varies(each)]
+    set_or_vary = "--vary" if settings and len(varied) == len(settings) else "--set"
+    if varied and everything:
+        raise click.UsageError("--vary is of one run, and --all of all: name the run")
     if settings and names_plan(source):
-        made = f"`met plan DECK --set '{settings[0]}' -o {source}` makes another"
-        raise click.UsageError(f"--set is for decks: `{source}` is a plan, whose values are settled; {made}")
+        made = f"`met plan DECK {setting_option(settings[0])} -o {source}` makes another"
+        settled = "cases are listed" if set_or_vary == "--vary" else "values are settled"
+        raise click.UsageError(f"{set_or_vary} is for decks: `{source}` is a plan, whose {settled}; {made}")
     if names_archive(source):
-        for option, wanted in (("-D", defines), ("-I", include_dirs), ("--set", settings)):
+        for option, wanted in (("-D", defines), ("-I", include_dirs), (set_or_vary, settings)):
             if wanted:
                 raise click.UsageError(f"{option} is for decks: `{source}` is an archive, of what was run")
 

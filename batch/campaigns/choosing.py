@@ -13,15 +13,20 @@ from met.outputs import quoted
 from met.plan import Experiment, Plan, keys
 from met.plan.columns import CaseValues, all_rows, row_at
 from met.plan.swept import blocks
+from met.settings import varied_run, varies
 
 
 def experiments_named(plan: Plan, names: Sequence[str] | None) -> tuple[Experiment, ...]:
-    """The plan's experiments of these names; all of them for None. Raises Problem E310."""
+    """The plan's experiments of these names; all of them for None. Raises Problem E310.
+
+    Of a run that the command line varied, the experiments of its sweep.
+    """
     if names is None:
         return plan.experiments
     by_name: dict[str, list[Experiment]] = {}
     for experiment in plan.experiments:
-        for name in {experiment.name, experiment.name_in_deck}:
+        of_run = {varied_run(experiment.name_in_deck)} if any(map(varies, plan.settings)) else set()
+        for name in {experiment.name, experiment.name_in_deck} | of_run:
             by_name.setdefault(name, []).append(experiment)
     problems = []
     for name in names:

@@ -21,6 +21,7 @@ from met.host.files import new_file
 from met.outputs import check_overwrite, check_place, quoted
 from met.plan import Experiment, Plan
 from met.plan.columns import CaseValues
+from met.settings import varies
 
 
 def default_output(
@@ -35,7 +36,8 @@ def default_output(
     So a case that is run again does not take its sweep's place. A deck of the standard library is called `<name>`.
     whole: how many cases there are of all that was asked for; None: of what is selected.
     """
-    names = [Path(plan.deck.strip("<>")).stem, *(experiments or plan.selected)]
+    asked = plan.selected if any(map(varies, plan.settings)) else experiments or plan.selected
+    names = [Path(plan.deck.strip("<>")).stem, *asked]
     count = sum(len(rows) for _, rows in selected)
     if count < (sum(experiment.cases.count for experiment, _ in selected) if whole is None else whole):
         few = [int(position) for each, rows in selected for position in each.cases.table[rows]] if count <= 4 else []

@@ -8,6 +8,7 @@ from typing import Any
 from met.diagnostic import Problem
 from met.host.sources import names_plan
 from met.plan import Plan
+from met.settings import settings_of
 
 
 def read_plan(
@@ -30,7 +31,7 @@ def read_plan(
 
     select: Any = "all" if everything else names or None
     find(source, include_dirs)  # a misspelt name is told with the one that was probably meant
-    compiled = ic.check(source, include_dirs=include_dirs, defines=defines, set=settings, select=select)
+    compiled = ic.check(source, include_dirs=include_dirs, defines=defines, **settings_of(settings), select=select)
     if compiled.plan is None:
         raise Problem(compiled.diagnostics, compiled.sources)
     if compiled.diagnostics and not quiet:

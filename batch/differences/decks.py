@@ -203,7 +203,7 @@ def _of_file(name: str, text: str) -> Iterator[tuple[int, str, str]]:
                 yield line[at].line, f"#define {line[at].text}{takes}", _text(line[at + 1 :])
             continue
         for each in line:
-            if each.text == "let":
+            if each.text in ("let", "param"):
                 let = []
             elif each.text == ";" and let is not None:
                 head = [at for at, token in enumerate(let) if token.text.strip()][:2]

@@ -17,11 +17,11 @@ from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import number_text, pretty_unit
 from batch.queries.summary import finite
 from ic.driver.written_value import WrittenValue
-from ic.meaning.expressions.command_line import ON_COMMAND_LINE
 from ic.printing.columns import columns, count
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.outputs import quoted
+from met.settings import setting_option, setting_path, varied_run, varies
 from met.unit_parser import written
 from met.units import text as unit_text
 
@@ -51,6 +51,7 @@ class BestAnswer:
 
     deck     of the archive;  name: of the sweep;  seed: the campaign's
     defines  what `-D` defined for it, `NAME=VALUE`;  remarks: what else is to be known of it
+    given    what `--set` and `--vary` set and varied for it (`met.settings`)
     front    goals that are traded off against each other
     """
 
@@ -64,11 +65,12 @@ class BestAnswer:
         name: str,
         seed: int,
         defines: Sequence[str] = (),
+        given: Sequence[str] = (),
         remarks: Sequence[str] = (),
     ) -> None:
         self.designs, self.goals, self.front = designs, tuple(goals), tuple(front)
         self.deck, self.name, self.seed = deck, name, seed
-        self.defines, self.remarks = tuple(defines), tuple(remarks)
+        self.defines, self.given, self.remarks = tuple(defines), tuple(given), tuple(remarks)
         self.order = designs.order(goals)
         required = [
             goal
@@ -302,7 +304,10 @@ class BestAnswer:
     def command(self, design: int, *, seed: int | None = None) -> str:
         """The command that runs a design's cases again, with other draws where there is a seed."""
         words = [f"-D {quoted(each)}" for each in self.defines]
-        for path, value in self.settings(design):
+        chosen = dict(self.settings(design))
+        replaced = {*chosen, *(["seed"] if seed is not None else [])}
+        words += [setting_option(each) for each in self.given if setting_path(each) not in replaced]
+        for path, value in chosen.items():
             option = "-D" if path.startswith(MACRO) else "--set"
             words.append(f"{option} {quoted(f'{path.removeprefix(MACRO)}={value}')}")
         words += [f"--set seed={seed}"] if seed is not None else []
@@ -397,20 +402,19 @@ def _wrapped(text: str, width: int) -> list[str]:
 
 
 def context(archive: ArchiveFile, pool: Pool) -> dict[str, Any]:
-    """The arguments of `BestAnswer` that say how a campaign was run: deck, name, seed, `-D`, and remarks."""
+    """The arguments of `BestAnswer` that say how a campaign was run: deck, name, seed, options, and remarks."""
     defines = str(archive.provenance.get("defines") or "").split()
     remarks = []
     if any(group.attributes.get("step_errors") for group in pool.groups):
         remarks.append("requirements on errors by the step are not looked at here: `met show --evidence`")
+    given: tuple[str, ...] = ()
     try:
-        plan = archive.plan(as_written=True)
-        own = [each for each in plan.experiments if each.name in {group.name for group in pool.groups}]
-        given = any(q.origin.note == ON_COMMAND_LINE for each in own for q in each.parameters.values())
+        given = archive.plan(as_written=True).settings
     except Problem:  # such as: a model of the plan's is not installed here
-        given = False
-    if given:
-        remarks.append("this archive was made with `--set`: what that set is not in the command")
+        remarks.append("the plan in this archive cannot be read: what `--set` set, if it did, is not in the command")
     seed = int(pool.groups[0].at("seed", [0])[0])
+    name = varied_run(pool.name) if any(map(varies, given)) else pool.name
     return {
-        "deck": archive.deck.strip("<>"), "name": pool.name, "seed": seed, "defines": defines, "remarks": remarks,
+        "deck": archive.deck.strip("<>"), "name": name, "seed": seed, "defines": defines, "given": given,
+        "remarks": remarks,
     }  # fmt: skip

@@ -16,6 +16,7 @@ from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import read_regular, whole_file
 from met.outputs import quoted
+from met.settings import setting_option
 
 
 @frozen
@@ -76,7 +77,7 @@ def chosen_deck(
     before = sources[file.deck]
     plan = file.plan(as_written=True)
     if plan.settings:
-        message = f"the archive was made with `--set {plan.settings[0]}`, which is not in its deck"
+        message = f"the archive was made with `{setting_option(plan.settings[0])}`, which is not in its deck"
         raise _other(message, "write that into the deck, and run the sweep again")
     target, newline = Path(output) if output is not None else Path(file.deck), "\n"
     if output is None:

@@ -12,6 +12,7 @@ from batch.terminal.best import context
 from ic.driver.written_value import WrittenValue
 from met.frozen import frozen
 from met.outputs import quoted
+from met.settings import setting_option, setting_path
 
 
 @frozen
@@ -58,7 +59,10 @@ def _commands(archive: ArchiveFile, group: ArchiveGroup, answer: SearchAnswer) -
     how = context(archive, Pool(group.name, [group]))
     name = answer.search.against or answer.search.of
     words = [f"-D {quoted(each)}" for each in how["defines"]]
-    words += [f"--set {quoted(each.setting)}" for each in answer.values()]
+    chosen = [each.setting for each in answer.values()]
+    replaced = {*map(setting_path, chosen), *(["seed"] if answer.draws else [])}
+    words += [setting_option(each) for each in how["given"] if setting_path(each) not in replaced]
+    words += [setting_option(each) for each in chosen]
     command = f"met run {quoted(how['deck'])} {quoted(name)} {' '.join(words)}"
     found = [("its worst case again:", again), ("run it:", f"{command} -o chosen.h5")]
     if answer.draws:

@@ -20,8 +20,9 @@ from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import allowed_warnings, silence_of_all, warn_of_unneeded
 from ic.read import in_order, read, read_again
 from ic.sweeps.effects import Effects
+from ic.sweeps.from_command_line import command_line_sweep
 from ic.sweeps.groups import DeckSource, ScopedExperiment, experiments_of
-from ic.sweeps.settings import Settings
+from ic.sweeps.settings import Settings, check_params
 from ic.text.complaints import Complaints, known_words
 from ic.text.files import NOTHING_UNSAVED, Unsaved
 from ic.text.lexer import COMMAND_LINE
@@ -76,20 +77,36 @@ def compile_deck(
 ) -> Compiled:
     """The plan of the deck's runs and sweeps that `select` names, with everything that is wrong on the way.
 
-    settings  `PATH=VALUE`, each as if the deck said so
+    settings  `PATH=VALUE`, each as if the deck said so; `vary PATH=VALUES`, as if it had a sweep of the run that
+              `select` names
     """
     defines = tuple(defines)
     complaints = complaints if complaints is not None else Complaints(deck.warnings)
     complaints.note_unreadable(deck.unreadable)
     deck, entries = _with_settings(deck, settings, complaints)
     definitions = Definitions(deck, complaints)
-    given = Settings(entries)
-    written, definitions = definitions, given.in_definitions(definitions)
-    source = DeckSource(definitions, complaints, partial(read_again, deck), given, Effects(given))
+    varied = tuple(entry for entry in entries if entry.words)
+    given = Settings(tuple(entry for entry in entries if not entry.words))
+    written = definitions
+    selected = (select,) if isinstance(select, str) else tuple(dict.fromkeys(select or ()))
+    sweep: Definition | None = None
+    if varied:
+        try:
+            names = None if select == "all" else select
+            sweep = command_line_sweep(written, asked_definitions(written, complaints, names), varied)
+        except Problem as problem:
+            complaints.add(*problem.diagnostics)
+        else:
+            definitions = definitions.replacing(sweep)
+            select = "all" if select == "all" else (sweep.name,)
+            selected = (select,) if isinstance(select, str) else select
+    definitions = given.in_definitions(definitions)
+    source = DeckSource(definitions, complaints, partial(read_again, deck), given, Effects(given), sweep)
     asked: list[Definition] = []
     experiments: list[Experiment] = []
     scopes: list[Scope] = []
     try:
+        check_params(written, complaints)
         given.check_lets(written, complaints)
         complaints.add(
             *(d for problem in Scope(definitions, complaints).names.check_lets() for d in problem.diagnostics)
@@ -129,7 +146,6 @@ def compile_deck(
     else:
         return Compiled(None, in_order(complaints.all, sources), texts)
     files = tuple(File(source.name, source.text, source.sha256) for source in sources)
-    selected = (select,) if isinstance(select, str) else tuple(dict.fromkeys(select or ()))
     return Compiled(
         Plan(deck.file, tuple(experiments), files, tuple(defines), selected, tuple(settings)),
         in_order(complaints.all, sources),

@@ -10,7 +10,7 @@ from ic.driver.compile import Compiled, Select, check
 from ic.grammar.places import place_of
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Expression, Name, children
-from ic.meaning.expressions.command_line import ON_COMMAND_LINE, is_on_command_line, written_origin
+from ic.meaning.expressions.command_line import written_origin
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.owner import Settled
 from ic.meaning.parameters.scope import Scope
@@ -123,10 +123,9 @@ def _let(scope: Scope, name: str) -> Settled | None:
     if let is None:
         return None
     varied = scope.varied.get(name)
-    origin = written_origin(place_of(let.value), ())
-    if varied is not None or origin.note == ON_COMMAND_LINE:
-        place = varied.place if varied is not None else origin.place
-        origin = Origin("case" if varied is not None else "deck", place, (let.name.place,), origin.note)
+    origin = written_origin(place_of(let.value), let.overrides)
+    if varied is not None:
+        origin = Origin("case", varied.place, (let.given_at, *let.overrides), origin.note)
     found = scope.names.find(Name((let.name,), let.name.place))
     if isinstance(found, Value):
         return Settled(found.number, units.text(found.dimension), origin, "", let.value)
@@ -175,9 +174,7 @@ def _names(scope: Scope, expression: Expression) -> Iterator[Label]:
                     seen.add(name.text)
                     below.append(let.value)
                     place = place_of(let.value)
-                    yield Label(
-                        place if is_on_command_line(place) else let.name.place, f"{name.text} = {spell(let.value)}"
-                    )
+                    yield Label(let.name.place if let.set_at is None else place, f"{name.text} = {spell(let.value)}")
         level = below
 
 

@@ -1,7 +1,7 @@
 """Tokens to the tree of `ic.grammar.syntax`, by recursive descent.
 
-The parser knows no word of the language but `for`, `let`, `like`, `of`, `from`, `and`, `or`, `not` and `when`, and
-those only where they stand: what a run of names means is decided by what comes behind it, so a joint may be called
+The parser knows no word of the language but `for`, `let`, `param`, `like`, `of`, `from`, `and`, `or`, `not` and `when`,
+and those only where they stand: what a run of names means is decided by what comes behind it, so a joint may be called
 `at`, `let` or `sample`.
 
     names =  or  +=      a setting; all names but the last are words
@@ -27,6 +27,8 @@ from met import units
 from met.diagnostic import Diagnostic, Label, write
 
 COMPARE = ("require", "exclude")
+PARAM = "param"
+LETS = ("let", PARAM)
 _OVER_CASES = "write `require METRIC < LIMIT in 99 % of cases with 90 % confidence;`"
 _SEMICOLON = "an entry ends with `;`"
 _NOT_OPEN = "leave it out, or open it where it begins"
@@ -124,7 +126,7 @@ class _Parser(Loops):
         if not sets:
             return []
         value = Broken(first.place)
-        if names[0].text == "let":
+        if names[0].text in LETS:
             return [Let(_word(names[1]), value, span(names[0], names[1]))] if len(names) == 2 and len(path) == 1 else []
         operator = tokens[behind].text
         return [Setting(_words(names[:-1]), _words(path), operator, value, span(names[0], path[-1]))]
@@ -173,7 +175,7 @@ class _Parser(Loops):
         if first.kind != NAME:
             self.not_an_entry()
         names = [self.advance()]
-        if first.text == "let" and self.token.kind not in (NAME, BAD) and self.token.place.macros:
+        if first.text in LETS and self.token.kind not in (NAME, BAD) and self.token.place.macros:
             self.replaced_name()
         while self.token.kind == NAME and not (len(names) > 0 and self.line_break_in(names)):
             names.append(self.advance())
@@ -185,7 +187,7 @@ class _Parser(Loops):
             tail = self.path()[1:]
         text = self.token.text
         if text in ("=", "+="):
-            if names[0].text == "let" and len(names) == 2:
+            if len(names) == 2 and (names[0].text == "let" or (names[0].text == PARAM and not self.open)):
                 return self.let(names, tail)
             return self.setting(names, tail)
         if text == "{":
@@ -282,16 +284,16 @@ class _Parser(Loops):
     def let(self, names: list[Token], tail: list[Token]) -> Let:
         name = names[1]
         if tail:
-            self.fail("D020", "`let` gives a value to one name, without points", span(name, tail[-1]))
+            self.fail("D020", f"`{names[0].text}` gives a value to one name, without points", span(name, tail[-1]))
         if units.is_unit(name.text):
             message = f"`{name.text}` is the unit {units.UNITS[name.text].word}, so it cannot name a value"
             self.tell("D026", message, name, help="choose another name: after a number it would be read as the unit")
         if self.token.text == "+=":
-            self.fail("D023", "`let` gives a value once", self.token, help=write("="))
+            self.fail("D023", f"`{names[0].text}` gives a value once", self.token, help=write("="))
         self.advance()
         value = self.value()
         self.semicolon(value)
-        return Let(_word(name), value, span(names[0], name))
+        return Let(_word(name), value, span(names[0], name), names[0].text == PARAM)
 
     def setting(self, names: list[Token], tail: list[Token]) -> Setting:
         operator = self.advance()

@@ -1,4 +1,4 @@
-"""Settings of the command line, `PATH=VALUE`, and its expressions, as a syntax tree."""
+"""Settings of the command line, `PATH=VALUE` and `vary PATH=VALUES`, and its expressions, as a syntax tree."""
 
 from __future__ import annotations
 
@@ -10,18 +10,23 @@ from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, SPACE, Text, Token,
 from ic.text.limits import Findings, GiveUp
 from ic.text.source import SourceFile
 from ic.text.strays import complain_of_stray
-from met.diagnostic import Place, Problem, error
+from met.diagnostic import Problem, error
+from met.settings import VARY
+from met.settings import varies as is_varied
 
 EXAMPLE = "write `PATH=VALUE`, such as `gearbox.kp=0.02 V*s/rad`"
+VARY_EXAMPLE = "write `PATH=VALUES`, such as `gearbox.kp=[0.01, 0.02] V*s/rad` or `gearbox.kp=0.1..0.5 by 0.1 V*s/rad`"
+
+_VARIES = ([VARY], [VARY, "macro"])
 
 
 def command_line(texts: Sequence[str], before: str = "") -> SourceFile:
-    """The text that messages show: a line for each `PATH=VALUE`, behind the macros of -D."""
+    """The text that messages show: a line for each setting, behind the macros of -D."""
     return SourceFile(COMMAND_LINE, before + "".join(f"{_one_line(text)}\n" for text in texts), "")
 
 
 def read_settings(texts: Sequence[str], before: str = "") -> tuple[Setting, ...]:
-    """An entry for each `PATH=VALUE`, in their order. before: as in `command_line`.
+    """An entry for each `PATH=VALUE` and `vary PATH=VALUES`, in their order. before: as in `command_line`.
 
     Raises Problem with all that is wrong with them: what the syntax does not have, and D231, D232.
     """
@@ -35,7 +40,10 @@ def read_settings(texts: Sequence[str], before: str = "") -> tuple[Setting, ...]
                 entry = _read(source, at, text, findings)
                 path = path_of(entry)
                 if path in made:
-                    raise Problem(error("D232", f"`{path}` is set twice", entry.place, help="leave one of the two out"))
+                    twice = "is set twice" if not made[path].words and not entry.words else "is set, and varied"
+                    if made[path].words and entry.words:
+                        twice = "is varied twice"
+                    raise Problem(error("D232", f"`{path}` {twice}", entry.place, help="leave one of the two out"))
                 made[path] = entry
         except GiveUp:
             break
@@ -57,7 +65,7 @@ def read_expression(text: str) -> Expression:
 
 
 def path_of(entry: Setting) -> str:
-    """`gearbox.kp`"""
+    """The path of an entry: `gearbox.kp`."""
     return ".".join(word.text for word in entry.path)
 
 
@@ -68,12 +76,15 @@ def _one_line(text: str) -> str:
 def _read(source: Text, at: int, text: str, findings: Findings) -> Setting:
     """The one entry of a line that begins at `at`. Raises Problem."""
     place = source.place(at, max(len(text), 1))
-    path, equals, value = text.partition("=")
+    varies = is_varied(text)
+    path, equals, value = text.removeprefix(f"{VARY} ").partition("=")
+    example = VARY_EXAMPLE if varies else EXAMPLE
     if not equals or not value.strip():
-        message = f"`{path.strip()[:40]}` is set to nothing"
-        raise Problem(error("D231", message, place, help=EXAMPLE))
+        message = f"`{path.strip()[:40]}` {'varies over' if varies else 'is set to'} nothing"
+        raise Problem(error("D231", message, place, help=example))
     if not path.strip():
-        raise Problem(error("D231", "this sets nothing: no path stands before the `=`", place, help=EXAMPLE))
+        message = f"this {'varies' if varies else 'sets'} nothing: no path stands before the `=`"
+        raise Problem(error("D231", message, place, help=example))
     before = len(findings.errors)
     tokens = [*_tokens(source, at, text, findings), Token(END, "", source, at + len(text.rstrip()), 1)]
     inner = Findings()
@@ -84,17 +95,22 @@ def _read(source: Text, at: int, text: str, findings: Findings) -> Setting:
     if len(findings.errors) > before:
         raise Problem(())
     entry = entries[0] if len(entries) == 1 else None
-    if not isinstance(entry, Setting) or entry.operator != "=" or entry.words:
-        raise Problem(error("D231", "this is not one path and its value", place, help=_remedy(entry, place)))
+    words = [word.text for word in getattr(entry, "words", ())]
+    if not isinstance(entry, Setting) or entry.operator != "=" or words not in (_VARIES if varies else ([],)):
+        what = "values" if varies else "value"
+        raise Problem(error("D231", f"this is not one path and its {what}", place, help=_remedy(words, example)))
     return entry
 
 
-def _remedy(entry: object, place: Place) -> list[str]:
-    """The remedy for an entry that `--set` does not take."""
-    words = [word.text for word in getattr(entry, "words", ())]
-    if isinstance(entry, Setting) and words[-1:] == ["macro"]:
+def _remedy(words: list[str], example: str) -> list[str]:
+    """The remedy for an entry that `--set` or `--vary` does not take."""
+    if words == ["macro"]:
         return ["a macro is defined by `-D NAME=VALUE`"]
-    return [EXAMPLE]
+    if words == [VARY] and example == EXAMPLE:
+        return ["`--vary PATH=VALUES` varies a path"]
+    if words[:2] == [VARY, VARY]:
+        return ["leave out the word `vary`: `--vary` says it"]
+    return [example]
 
 
 def _tokens(source: Text, at: int, text: str, findings: Findings) -> Iterator[Token]:

@@ -80,6 +80,6 @@ def _entry(entry: Entry) -> str:
     if isinstance(entry, Group):
         return " ".join([*(word.text for word in entry.words), _body(entry.body)])
     if isinstance(entry, Let):
-        return f"let {entry.name.text} = {spell(entry.value)};"
+        return f"{'param' if entry.is_param else 'let'} {entry.name.text} = {spell(entry.value)};"
     named = [f"{entry.name.text}:"] if entry.name is not None else []
     return " ".join([*(word.text for word in entry.words), *named, f"{spell(entry.value)};"])

@@ -208,9 +208,25 @@ def mapped(expression: Expression, change: Callable[[Expression], Expression]) -
 
 @frozen
 class Let:
+    """`let NAME = VALUE;`, or `param NAME = VALUE;`.
+
+    is_param   whether it is a `param`, which an including deck and a run may set
+    overrides  where the values are given that its value replaced, latest first;  set_at: where its own is, if not here
+    default    of a `param` that an including deck has set: the value that its own file writes
+    """
+
     name: Word
     value: Expression
     place: Place
+    is_param: bool = False
+    overrides: tuple[Place, ...] = ()
+    default: Expression | None = None
+    set_at: Place | None = None
+
+    @property
+    def given_at(self) -> Place:
+        """The place that gives its value."""
+        return self.name.place if self.set_at is None else self.set_at
 
 
 @frozen

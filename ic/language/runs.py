@@ -159,6 +159,9 @@ RUN = BlockDeclaration(
               path="sensors.NAME", doc="a sensor on a link"),
         Entry(name="payload", form="named", written="payload NAME { ... }", default="none", path="payloads.NAME",
               doc="a body that a link carries, grapples or releases"),
+        Entry(name="with", form="named", written="with PATH = VALUE;", default="none",
+              doc="a value in place of what is written elsewhere, by its path: `with links.boom.mass = 7 kg;` "
+                  "or of a `param`: `with reach = 1 m;`"),
         Entry(name="initial", written="initial { ... }", default="0, `unloaded`",
               doc="`q` and `qd` of all joints or one: `swing.q = 5 deg;` whether servos begin `balanced`"),
         Entry(name="environment", written="environment { ... }", default="no gravity; velocity products on",

@@ -136,7 +136,8 @@ def _entry(entry: Entry, indent: str) -> Iterator[str]:
 
     match entry:
         case tree.Let():
-            yield f"{indent}Let {entry.name.text} = {spell(entry.value)}{_written(entry.place)}"
+            kind = "Param" if entry.is_param else "Let"
+            yield f"{indent}{kind} {entry.name.text} = {spell(entry.value)}{_written(entry.place)}"
         case tree.Setting():
             words = "".join(f"{word.text} " for word in entry.words)
             path = ".".join(word.text for word in entry.path)

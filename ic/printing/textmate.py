@@ -167,7 +167,7 @@ def _entries() -> dict[str, Any]:
         _groups(rf"\b(default)\s+(?={kinds}\b)", "storage.modifier"),
         _groups(rf"\b({kinds})\s+({IN_LOOPS})(?=\s+(?:like|of|from)\b|\s*[{{=;])", "storage.type", "entity.name.type"),
         _groups(rf"\b(like|of)\s+({PATH})(?=\s*(?:[{{;]|\bof\b))", "keyword.other", "entity.other.inherited-class"),
-        _groups(rf"\b(let)\s+({IN_LOOPS})(?=\s*=)", "storage.type", "variable.other.constant"),
+        _groups(rf"\b(let|param)\s+({IN_LOOPS})(?=\s*=)", "storage.type", "variable.other.constant"),
         _groups(rf"\b(for)\s+({NAME})\s+(in)\b", "keyword.control", "variable.parameter", "keyword.control"),
         _groups(
             rf"\b(joint)\s+({IN_LOOPS})\s+({_any(JOINT_KINDS)})\b",

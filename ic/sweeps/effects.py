@@ -1,4 +1,4 @@
-"""Checks that what `--set` sets does something in one of the runs and sweeps that are asked for.
+"""Checks that what `--set`, or a run itself, sets does something in one of the runs and sweeps that are asked for.
 
 Each run is resolved once more with what was set in question. A number becomes an input of the program, and
 `met.analysis.audit` says whether anything is computed from it. Anything else becomes a name that nothing has: reading
@@ -34,7 +34,7 @@ MOST_NAMED = 4
 
 
 class Effects:
-    """The effects of what `--set` sets: whether each setting did something, and the runs in which that was checked."""
+    """The effects of what is set: whether each setting did something, and the runs in which that was checked."""
 
     def __init__(self, settings: Settings) -> None:
         self.waiting = {path_of(entry): entry for entry in settings.entries}
@@ -71,15 +71,16 @@ class Effects:
         for path in _used(scope, run, numbers):
             del self.waiting[path]
 
-    def report(self, complaints: Complaints, asked: Sequence[str]) -> None:
-        """Report all that is set to no effect. asked: names of runs and sweeps."""
+    def report(self, complaints: Complaints, asked: Sequence[str], *, idle: bool = True) -> None:
+        """Report all that is set to no effect. asked: names of runs and sweeps; idle: also what is there, and does
+        nothing."""
         shown = [f"`{name}`" for name in asked]
         where = ", ".join(shown[:MOST_NAMED]) + (f" and {len(shown) - MOST_NAMED} more" * (len(shown) > MOST_NAMED))
         for path, entry in self.waiting.items():
             if self.scopes:
-                self._report_one(complaints, path, entry, where)
+                self._report_one(complaints, path, entry, where, idle)
 
-    def _report_one(self, complaints: Complaints, path: str, entry: Setting, where: str) -> None:
+    def _report_one(self, complaints: Complaints, path: str, entry: Setting, where: str, idle: bool) -> None:
         scope = next((each for each in self.scopes if path in each.known or path in each.not_sweepable), self.scopes[0])
         kind = destination(scope.definitions, entry)
         inside = sorted(known for known in scope.known if known.startswith(f"{path}."))
@@ -89,7 +90,8 @@ class Effects:
         ):
             return  # already reported
         if kind in ("let", "servo") or path in self.met or any(path in each.targets for each in self.scopes):
-            self._report_idle(complaints, scope, path, entry, where)
+            if idle:
+                self._report_idle(complaints, scope, path, entry, where)
         elif path in (*BLOCKS, "record"):
             complaints.error(
                 "D235",

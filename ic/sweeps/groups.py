@@ -46,6 +46,7 @@ class DeckSource:
     """The definitions of a deck, and how to read it again with other macros.
 
     settings, effects  what is set from outside of the deck, and what was found to come of it
+    sweep              that the command line adds to the deck's own, if it does
     """
 
     definitions: Definitions
@@ -53,6 +54,14 @@ class DeckSource:
     reread: Reread
     settings: Settings = Settings()
     effects: Effects = field(default_factory=lambda: Effects(Settings()))
+    sweep: Definition | None = None
+
+    def definitions_with(self, macros: Sequence[str]) -> Definitions:
+        """The definitions of the deck read again with these macros, `NAME=VALUE`. Raises Problem."""
+        definitions = Definitions(self.reread(macros), self.complaints)
+        if self.sweep is not None:
+            definitions = definitions.replacing(self.sweep)
+        return self.settings.in_definitions(definitions)
 
 
 def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExperiment]:
@@ -61,13 +70,21 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
         definitions, run = source.settings.in_run(source.definitions, definition)
         allowances = allowances_of(definitions, run, source.complaints)
         with source.complaints.allowing(places_of(allowances)):
-            scope = Scope(definitions, source.complaints, settings=source.settings.numbers(definitions))
+            scope = Scope(definitions, source.complaints, settings=source.settings.numbers(definitions, run))
             resolved = resolve_run(scope, run)
             source.effects.note_run(scope, run)
+            made_here = source.settings.of_run(definitions, run)
+            made_here.check_lets(source.definitions, source.complaints)
+            own = Effects(made_here)
+            own.note_run(scope, run)
             if resolved is None:
+                own.complete = False
+                own.report(source.complaints, [run.name])
                 return []
             made = experiment(scope, run.name, run.place, resolved, Cases(1, (), resolved.seed), allowances)
             source.effects.examine(scope, run, made)
+            own.examine(scope, run, made)
+            own.report(source.complaints, [run.name])
             if not source.complaints.errors:
                 check_stops(source.complaints, made)
                 check_balance(source.complaints, made)
@@ -104,6 +121,7 @@ class _Sweep:
         self.source, self.definition = source, definition
         self.definitions, self.complaints = source.definitions, source.complaints
         self.read_so_far: dict[tuple[str, ...], _Read] = {}
+        self.own = Effects(Settings())  # of what its run sets itself
 
     def groups(self) -> list[ScopedExperiment]:
         before = self.complaints.error_count
@@ -113,6 +131,9 @@ class _Sweep:
             self._report_the_rest(read)
             return []
         self.read_so_far[()] = read
+        made_here = self.source.settings.of_run(read.definitions, read.base)
+        made_here.check_lets(self.definitions, self.complaints)
+        self.own = Effects(made_here)
         found = structures(sweep)
         made: list[tuple[ScopedExperiment, SweptRows]] = []
         dropped: dict[Place, int] = {}  # by each `exclude when`, of which a macro may bring other ones
@@ -132,6 +153,7 @@ class _Sweep:
                     *(Label(option.place, f"where `{column.path}` is `{option.text}`") for column, option in choices),
                 )
                 return []
+        self.own.report(self.complaints, [read.base.name], idle=False)
         self._report_exclusions(dropped, bool(made))
         if not made:
             return []
@@ -194,10 +216,11 @@ class _Sweep:
             self.complaints,
             {varied.path: varied for varied in there.varied},
             read.graph,
-            settings=self.source.settings.numbers(definitions),
+            settings=self.source.settings.numbers(definitions, run),
         )
         resolved = resolve_run(scope, run)
         self.source.effects.note_run(scope, run)
+        self.own.note_run(scope, run)
         check_coordinates(scope, complete=resolved is not None)
         if resolved is None:
             self.complaints.settle()
@@ -238,14 +261,14 @@ class _Sweep:
             check_beds(self.complaints, made)
         self.complaints.settle()
         self.source.effects.examine(scope, run, made, self.definition.group.body)
+        self.own.examine(scope, run, made, self.definition.group.body)
         return ((made, scope), rows), dropped
 
     def _with_macros(self, sweep: Sweep, choices: Choices) -> _Read:
         """The deck as it is with the macros that are chosen."""
         macros = tuple(f"{column.macro}={option.text}" for column, option in choices if column.macro)
         if macros not in self.read_so_far:
-            deck = self.source.reread(macros)
-            definitions = self.source.settings.in_definitions(Definitions(deck, self.complaints))
+            definitions = self.source.definitions_with(macros)
             definition = definitions.of_kind(self.definition.kind).get(self.definition.name)
             if definition is None or definition.parts:
                 raise Problem(

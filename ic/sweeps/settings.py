@@ -1,6 +1,8 @@
-"""Settings of the command line, `--set PATH=VALUE`: the deck's definitions as if they said so.
+"""Settings of the command line, `--set PATH=VALUE`, and of a run, `with PATH = VALUE;`: the deck's definitions as if
+they said so.
 
-A path is one that `vary` takes, or the seed. Where its value goes is where the deck would say it:
+What the command line sets counts before what a run sets. A path is one that `vary` takes, or the seed. Where its value
+goes is where the deck would say it:
 
     let      a `let`: its value
     servo    a key of a servo's definition: upon what that writes
@@ -18,11 +20,12 @@ from typing import Literal
 from ic.grammar.places import place_of
 from ic.grammar.settings import path_of
 from ic.grammar.syntax import List, Name, Setting
+from ic.meaning.definitions.merge import WITH
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.evaluate import PURE
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Value
+from ic.meaning.expressions.quantity import Value, ValueList
 from ic.meaning.expressions.remedies import unit_remedy
 from ic.meaning.parameters.models import word_of
 from ic.meaning.parameters.scope import VARIES
@@ -30,7 +33,7 @@ from ic.sweeps.axes import Column, Sweep, SweepAxis
 from ic.sweeps.choices import OF_RUN, ONE_OF_TWO, SENSOR, decides_structure, in_servo, keys_of, nested_entry
 from ic.text.complaints import Complaints
 from met import units
-from met.diagnostic import Label, Problem, error
+from met.diagnostic import Label, Place, Problem, error
 from met.frozen import frozen
 from met.trace import Scalar
 
@@ -49,10 +52,10 @@ class Settings:
 
     def in_definitions(self, definitions: Definitions) -> Definitions:
         """The deck's definitions with what is set of lets and of servos."""
-        lets = [
-            replace(definitions.lets[path_of(entry)], value=entry.value)
-            for entry in self.for_destination(definitions, "let")
-        ]
+        lets = []
+        for entry in self.for_destination(definitions, "let"):
+            let = definitions.lets[path_of(entry)]
+            lets.append(replace(let, value=entry.value, overrides=(let.given_at, *let.overrides), set_at=entry.place))
         servos: dict[str, Definition] = {}
         for entry in self.for_destination(definitions, "servo"):
             name, *keys = (word.text for word in entry.path)
@@ -61,7 +64,27 @@ class Settings:
             servos[name] = replace(servo, extra_entries=(*servo.extra_entries, made))
         return definitions.replacing(*servos.values(), lets=lets)
 
+    def of_run(self, definitions: Definitions, run: Definition) -> Settings:
+        """The settings that the run makes itself, or takes over from what it is like, without those made here."""
+        block = definitions.block(run)
+        runs = definitions.of_kind("run")
+        bodies = [run.group.body, *(runs[name].group.body for name in definitions.homes(run) if name in runs)]
+        written = {
+            entry.place: entry
+            for body in bodies
+            for entry in body
+            if isinstance(entry, Setting) and [word.text for word in entry.words] == [WITH]
+        }
+        made = [written[item.place] for item in block.of_kind(WITH) if item.place in written] if block else []
+        here = {path_of(entry) for entry in self.entries}
+        return Settings(tuple(replace(entry, words=()) for entry in made if path_of(entry) not in here))
+
     def in_run(self, definitions: Definitions, run: Definition) -> tuple[Definitions, Definition]:
+        """The definitions and the run with what is set here, and by the run itself."""
+        own = self.of_run(definitions, run)
+        return self._in_structure(*own._in_structure(own.in_definitions(definitions), run))
+
+    def _in_structure(self, definitions: Definitions, run: Definition) -> tuple[Definitions, Definition]:
         """The definitions and the run with what is set of its structure; a whole before a part of it."""
         for entry in sorted(self.for_destination(definitions, "run"), key=lambda entry: len(entry.path)):
             if applies_to(definitions, run, entry):
@@ -71,9 +94,10 @@ class Settings:
                 definitions = definitions.replacing(run)
         return definitions, run
 
-    def numbers(self, definitions: Definitions) -> dict[str, Setting]:
-        """By path, what is settled in place of what the run settles."""
-        return {path_of(entry): entry for entry in self.for_destination(definitions, "number")}
+    def numbers(self, definitions: Definitions, run: Definition) -> dict[str, Setting]:
+        """By path, what is settled in place of what the run settles: what it sets itself, then what is set here."""
+        both = (self.of_run(definitions, run), self)
+        return {path_of(entry): entry for each in both for entry in each.for_destination(definitions, "number")}
 
     def check_lets(self, definitions: Definitions, complaints: Complaints) -> None:
         """Report lets that would get another dimension. definitions: the deck's own."""
@@ -82,8 +106,7 @@ class Settings:
             let = definitions.lets[path_of(entry)]
             with suppress(Problem):  # of the deck's value, now overridden, or of this one, reported elsewhere
                 old, new = names.find(Name((let.name,), let.name.place)), changed.evaluate(entry.value)
-                if isinstance(old, Value) and isinstance(new, Value) and not units.same(old.dimension, new.dimension):
-                    complaints.add(*_of_another_dimension(path_of(entry), old, new, let.name.place).diagnostics)
+                _check_alike(complaints, let.name.text, old, new, let.name.place)
 
     @property
     def sets_seed(self) -> bool:
@@ -109,6 +132,23 @@ class Settings:
                     help=VARIES,
                     also=[Label(column.place, f"`{column.path}` varies here")],
                 )
+
+
+def check_params(definitions: Definitions, complaints: Complaints) -> None:
+    """Report each `param` that an including deck gives another dimension than its own file. definitions: the deck's
+    own."""
+    names = Names(definitions, {})
+    for let in definitions.lets.values():
+        if let.default is not None:
+            with suppress(Problem):  # of one of the two values, reported elsewhere
+                old, new = names.evaluate(let.default), names.find(Name((let.name,), place_of(let.value)))
+                _check_alike(complaints, let.name.text, old, new, let.overrides[-1])
+
+
+def _check_alike(complaints: Complaints, name: str, old: Value | ValueList, new: Value | ValueList, at: Place) -> None:
+    """Report a value of another dimension than the one that it overrides, which is given at a place."""
+    if isinstance(old, Value) and isinstance(new, Value) and not units.same(old.dimension, new.dimension):
+        complaints.add(*_of_another_dimension(name, old, new, at).diagnostics)
 
 
 def _without(axis: SweepAxis, paths: Collection[str]) -> SweepAxis:

@@ -140,7 +140,8 @@ class _Preprocessor(Macros):
 
     def warn_of_names(self) -> None:
         """Warns of names in conditions that are no macros, and of macros on the command line that nothing asks for."""
-        lets = {name.text: name for word, name in pairwise(self.output) if word.text == "let" and name.kind == NAME}
+        named = ((word.text, name) for word, name in pairwise(self.output) if name.kind == NAME)
+        lets = {name.text: name for word, name in named if word in ("let", "param")}
         for name, place in self._zeros.items():
             message = f"`{name}` is no macro, so it counts as 0 in this condition"
             help = f"ask `defined({name})`, or define it before: `#define {name} 1`, `-D {name}=1`"

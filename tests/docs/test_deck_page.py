@@ -37,7 +37,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 PIECES = re.findall(r"<!-- (?P<where>[\w. ]+?)(?:: (?P<code>D\d+))? -->\n```c\n(?P<text>.*?)```", PAGE, re.DOTALL)
 PICKER = "\n".join(text for where, _, text in PIECES if where == "picker.ic")
 TABLES = dict(re.findall(r"<!-- (\w+\.csv) -->\n```csv\n(.*?)```", PAGE, re.DOTALL))
-FRAGMENTS = [piece for piece in PIECES if piece[0] not in ("picker.ic", "chain.ic", "alone")]
+FRAGMENTS = [piece for piece in PIECES if piece[0] not in ("picker.ic", "chain.ic", "stick.ic", "swing.ic", "alone")]
 AROUND = {
     "more": "{}",
     "in arm": "arm another like picker {{ {} }} run other like pick {{ arm = another; }}",
@@ -71,7 +71,7 @@ def ticked(text: str) -> set[str]:
 
 def test_every_deck_of_the_page_says_where_it_belongs() -> None:
     assert PAGE.count("```c\n") == len(PIECES)
-    assert {where for where, _, _ in PIECES} == {"picker.ic", "chain.ic", "alone", *AROUND}
+    assert {where for where, _, _ in PIECES} == {"picker.ic", "chain.ic", "stick.ic", "swing.ic", "alone", *AROUND}
     assert set(TABLES) == {"moves.csv", "cases.csv"}
 
 
@@ -171,6 +171,16 @@ def test_what_the_page_reads_from_a_file_is_followed(tmp_path: Path) -> None:
         assert end.sel(joint="lift") == pytest.approx(0.02, abs=2e-3)
     with xarray.open_dataset(tmp_path / "recorded.h5", group="provenance") as kept:
         assert [Path(str(name)).name for name in kept["source"].values] == ["picker.ic", "moves.csv"]
+
+
+def test_the_deck_that_sets_a_param_has_the_reaches_that_it_says(tmp_path: Path) -> None:
+    for where, _, text in PIECES:
+        if where in ("stick.ic", "swing.ic"):
+            (tmp_path / where).write_text(text, encoding="utf-8")
+    swing, farther, reaches = ic.compile(tmp_path / "swing.ic", select="all").experiments
+    middles = [each.parameters["links.bar.com.x"].value for each in (swing, farther)]
+    assert middles == [0.45, 0.6]
+    assert reaches.cases.coordinates[0].values.tolist() == [0.8, 1.0, 1.2]
 
 
 @pytest.mark.parametrize("links", [None, 1, 2])

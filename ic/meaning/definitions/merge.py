@@ -14,6 +14,9 @@ from ic.text.complaints import Complaints, known_words
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error, leave_out, meant, write
 from met.frozen import frozen
 
+WITH = "with"
+"""Kind of a run's entries `with PATH = VALUE;`, of which the later one of a path stands."""
+
 REQUIREMENT = "requirement"
 """What messages call the one statement that may have a name."""
 
@@ -131,6 +134,15 @@ class _Merger:
             return
         if isinstance(entry, Setting):
             words, name = entry.words, ".".join(word.text for word in entry.path)
+            if [word.text for word in words] == ["param"]:
+                raise Problem(
+                    error(
+                        "D051",
+                        "`param` stands inside a definition",
+                        entry.place,
+                        help="move it out: a `param` belongs to the whole deck",
+                    )
+                )
         else:
             if entry.like is not None or entry.of is not None or entry.made_from is not None:
                 raise Problem(
@@ -153,7 +165,7 @@ class _Merger:
         key = earlier.key if earlier else (f"{kind} {name}" if kind else name)
         if key in self.written:
             raise Problem(defined_twice(kind, name, entry.place, self.written[key]))
-        if kind and earlier:
+        if kind and earlier and kind != WITH:
             raise Problem(
                 error(
                     "D053",

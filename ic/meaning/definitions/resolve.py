@@ -16,7 +16,7 @@ from ic.meaning.definitions.merge import MergedBlock, defined_twice, merge
 from ic.robots.files import RobotFiles
 from ic.text.complaints import Complaints, known_words, where_it_belongs, with_article
 from ic.text.files import add_include, library_defines
-from met.diagnostic import Label, Place, Problem, did_you_mean, error, meant, write
+from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error, meant, write
 from met.frozen import frozen
 from met.messages.message import shown_place
 
@@ -212,8 +212,11 @@ class Definitions:
     def _enter(self, entry: Entry) -> None:
         if isinstance(entry, Let):
             earlier = self.lets.get(entry.name.text)
-            if earlier is not None:
-                raise Problem(defined_twice("let", entry.name.text, entry.name.place, earlier.name.place))
+            if earlier is not None and earlier.is_param and entry.is_param and _includes(earlier, entry):
+                overrides = (entry.name.place, *entry.overrides)
+                entry = replace(earlier, overrides=overrides, default=earlier.default or entry.value)
+            elif earlier is not None:
+                raise Problem(_let_twice(entry, earlier))
             self.lets[entry.name.text] = entry
         elif isinstance(entry, Group):
             self._define(entry)
@@ -415,6 +418,26 @@ class Definitions:
         found = self._defaults()
         own = [each for each in found if self.writes(each)]
         return own[0] if own else found[0] if len({each.place.file for each in found}) == 1 else None
+
+
+def _includes(outer: Let, inner: Let) -> bool:
+    """Return True if the file of `outer` includes that of `inner`, behind it."""
+    at = shown_place(outer.place)
+    return any(file == at.file and line > at.line for file, line in shown_place(inner.place).included)
+
+
+def _let_twice(entry: Let, earlier: Let) -> Diagnostic:
+    """The error that a `let` or `param` is written twice."""
+    kind = "param" if entry.is_param else "let"
+    found = defined_twice(kind, entry.name.text, entry.name.place, earlier.name.place)
+    file = shown_place(entry.place).file
+    if earlier.is_param and any(each == file for each, _ in shown_place(earlier.place).included):
+        how = "move this line up" if entry.is_param else f"write `param {entry.name.text} = ...;` there"
+        return replace(found, help=(f"a deck sets a `param` of a file before it includes it: {how}",))
+    if entry.is_param and _includes(earlier, entry):
+        change = write("param", f"write `param {earlier.name.text}` to set it", old="let", at=earlier.place)
+        return replace(found, help=(change,))
+    return found
 
 
 def _single(name: Name) -> Word:

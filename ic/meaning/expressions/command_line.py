@@ -16,7 +16,7 @@ ON_COMMAND_LINE = "set on the command line"
 
 @frozen
 class CommandLineValue:
-    """A number that `--set` puts in place of a deck's: its value, and the expression as written."""
+    """A number that `--set`, or a run, puts in place of a deck's: its value, and the expression as written."""
 
     path: str
     value: Value
@@ -25,7 +25,7 @@ class CommandLineValue:
     def overriding(self, origin: Origin) -> Origin:
         """The origin of a value that this one overrides, made its own."""
         places = (origin.place,) if origin.place is not None else ()
-        return Origin("deck", self.value.place, (*places, *origin.overrides), ON_COMMAND_LINE)
+        return written_origin(self.value.place, (*places, *origin.overrides))
 
 
 def is_on_command_line(place: Place | None) -> bool:
@@ -39,7 +39,7 @@ def written_origin(place: Place, overrides: tuple[Place, ...], note: str = "") -
 
 
 def evaluate_setting(entry: Setting, path: str, names: Names) -> CommandLineValue:
-    """The number that `--set` gives. Raises Problem where it is no number."""
+    """The number that an entry sets. Raises Problem where it is no number."""
     found = names.evaluate(entry.value)
     if not isinstance(found, Value):
         raise Problem(

@@ -128,8 +128,14 @@ def _leaf(expression: Expression, lookup: Lookup) -> Value | ValueList:
         case List():
             return ValueList(tuple(_items(expression, lookup)), expression.place)
         case Range():
-            ends = (expression.first, expression.last, expression.step)
-            return range_of(expression, *(evaluate_number(each, lookup) for each in ends))
+            parts = (expression.first, expression.last, expression.step)
+            first, last, step = (evaluate_number(each, lookup) for each in parts)
+            written = expression.step
+            if isinstance(written, Number) and written.unit and first.bare and last.bare and step.dimension != PURE:
+                # the unit at the end is for all, as in `0 .. 90 by 5 deg`
+                bare = replace(expression, step=replace(written, unit=None))
+                return _with_unit(WithUnit(bare, written.unit, written.unit.place), lookup)
+            return range_of(expression, first, last, step)
         case WithUnit():
             return _with_unit(expression, lookup)
         case Unary():

@@ -6,8 +6,7 @@ from collections.abc import Iterable
 from typing import cast
 
 from ic.grammar.places import place_of
-from ic.grammar.spell import spell
-from ic.grammar.syntax import Call, Number, Range
+from ic.grammar.syntax import Call, Range
 from ic.meaning.expressions import series
 from ic.meaning.expressions.quantity import Value, ValueList, in_words, measure_of
 from met import units
@@ -23,17 +22,13 @@ def range_of(expression: Range, first: Value, last: Value, step: Value) -> Value
     place = place_of(expression)
     for other in (last, step):
         if not units.same(first.dimension, other.dimension):
-            remedy = "all three must be of one dimension"
-            if first.bare and last.bare and isinstance(expression.step, Number) and expression.step.unit is not None:
-                inside = f"{spell(expression.first)} .. {spell(expression.last)} by {expression.step.text}"
-                remedy = f"a unit behind the brackets is for all: `({inside}) {expression.step.unit.text}`"
             raise Problem(
                 error(
                     "D063",
                     f"a range from {in_words(first)} to {in_words(last)} by {in_words(step)}",
                     expression.place,
                     also=[Label(each.place, in_words(each)) for each in (first, last, step)],
-                    help=remedy,
+                    help="all three must be of one dimension",
                 )
             )
     if any(isinstance(value.number, Scalar) for value in (first, last, step)):

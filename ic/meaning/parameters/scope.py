@@ -56,7 +56,7 @@ class Scope:
     guides          the run's guides, by name: what commands may follow
     sensors         names of the run's sensors on links
     removed         path of a parameter -> where `remove` took it away
-    settings        path -> a number set on the command line
+    settings        path -> a number set by the run, or on the command line
     rate_place      where the rate of the dynamics is written; None where it is not, or wrong
     declared_rates  code -> the largest figure that servos and sensors give for themselves, and the cases that have it
     """
@@ -464,8 +464,11 @@ class Scope:
         path = owner.join(name)
         for known in owner.paths(name, homes):
             self.known.setdefault(known, []).append(path)
+        given_before: CommandLineValue | None = None
         for given in self._given(owner, name, homes):
-            if origin.note == ON_COMMAND_LINE:
+            before, given_before = given_before, given
+            here = is_on_command_line(given.value.place)
+            if before is not None and here == is_on_command_line(before.value.place):
                 self.complaints.error(
                     "D232",
                     f"this sets `{path}`, which is set already",
@@ -511,8 +514,9 @@ class Scope:
             self.checks.fail(path)
 
     def _given(self, owner: Owner, name: str, homes: Iterable[str]) -> list[CommandLineValue]:
-        """The numbers that `--set` gives for this parameter; several where several of its paths are set."""
+        """The numbers that the run and `--set` give for this parameter; several where several of its paths are set."""
         found = [path for path in owner.paths(name, homes) if path in self.settings] if self.settings else []
+        found.sort(key=lambda path: is_on_command_line(self.settings[path].place))
         for path in found:
             if path not in self.evaluated_settings:
                 self.evaluated_settings[path] = None

@@ -24,7 +24,7 @@ from ic.meaning.control.link_sensors import Sensing, resolve_link_sensors
 from ic.meaning.control.schedule import Rate, Ticks, check_stability, fastest_rate
 from ic.meaning.control.servos import Use, check_rest, check_start, resolve_servos
 from ic.meaning.control.substitution import check_brakes, check_ticks, resolve_substitutions
-from ic.meaning.definitions.merge import Item, MergedBlock, with_meant_names
+from ic.meaning.definitions.merge import WITH, Item, MergedBlock, with_meant_names
 from ic.meaning.definitions.resolve import Definition
 from ic.meaning.mechanics.arm import ResolvedArm, resolve_arm
 from ic.meaning.mechanics.bodies import check_moved
@@ -242,6 +242,9 @@ def _keep_settings(
 def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> None:
     metrics = [item.name for kind in RUN.named for item in block.of_kind(kind)]
     for item in block.items.values():
+        if item.kind == WITH and (item.value is None or item.detail):
+            example = "write `with PATH = VALUE;`, such as `with links.boom.mass = 7 kg;`"
+            scope.complaints.error("D108", "`with` sets one path to one value", item.place, help=example)
         if item.kind in RUN.named or (not item.kind and item.name in RUN.keys):
             continue
         if item.kind in RUN.keys:

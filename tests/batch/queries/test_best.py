@@ -295,14 +295,14 @@ sweep sum = some + more;
     assert main(["report", str(out), "-o", str(tmp_path / "a.html"), "-q"]) == 0
 
 
-def test_a_command_repeats_macros_and_says_what_it_lacks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_command_repeats_macros_and_what_was_set(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     macro = "#ifndef LIMIT\n#define LIMIT 40\n#endif\nrun arm"
     deck = DECK.replace("REQUIRED", "require past < LIMIT %;").replace("run arm", macro, 1)
     deck += "sweep limits of arm { vary macro LIMIT = [30, 40]; vary gearbox.ki = [0.1, 0.125] V/rad; }\n"
     (tmp_path / "arm.ic").write_text(deck, encoding="utf-8")
     for words, wanted in (
         (["grid", "-D", "LIMIT=60"], "-D LIMIT=60 --set"),
-        (["grid", "--set", "links.upper.mass=41 kg"], "this archive was made with `--set`"),
+        (["grid", "--set", "links.upper.mass=41 kg"], " grid --set 'links.upper.mass=41 kg' --set "),
     ):
         out = tmp_path / "a.h5"
         command = ["run", str(tmp_path / "arm.ic"), *words, "-o", str(out), "-q", "--histories", "none", "--fresh"]

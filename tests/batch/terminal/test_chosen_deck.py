@@ -184,7 +184,7 @@ def test_what_was_set_for_the_archive_must_be_in_the_deck_first(
     assert said(capsys, "set.h5", "--write") == (
         2,
         "",
-        "error[E398]: the archive was made with `--set slewing.v_max=19 V`, which is not in its deck\n"
+        "error[E398]: the archive was made with `--set 'slewing.v_max=19 V'`, which is not in its deck\n"
         " = help: write that into the deck, and run the sweep again\n\n1 error\n",
     )
 

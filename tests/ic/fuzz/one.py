@@ -5,7 +5,7 @@ from __future__ import annotations
 import resource
 import signal
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -27,15 +27,16 @@ class Hung(BaseException):
 
 
 def fault_of(
-    path: Path, select: Select = "all", also: Callable[[Compiled], None] | None = None
+    path: Path, select: Select = "all", also: Callable[[Compiled], None] | None = None, vary: Sequence[str] = ()
 ) -> tuple[str, str] | None:
     """What is wrong with MET as this deck shows it: a short name of it, and its traceback; None if nothing is.
 
+    vary  what the command line varies, as `ic.check` takes it
     also  what else to try with the deck, once it has compiled
     """
     try:
         with _limited_time():
-            compiled = _all_of_it(path, select)
+            compiled = _all_of_it(path, select, vary)
             if also is not None and compiled.plan is not None:
                 also(compiled)
     except (Exception, Hung, RecursionError) as fault:
@@ -47,8 +48,8 @@ def fault_of(
     return None
 
 
-def _all_of_it(path: Path, select: Select) -> Compiled:
-    compiled = ic.check(path, select=select)
+def _all_of_it(path: Path, select: Select, vary: Sequence[str]) -> Compiled:
+    compiled = ic.check(path, select=select, vary=vary)
     errors = [d for d in compiled.diagnostics if d.severity == "error"]
     assert (compiled.plan is None) == bool(errors), "a plan and errors, or neither"
     text = render(compiled.diagnostics, compiled.sources)

@@ -75,9 +75,14 @@ class Writer:
         self.servos = servos.split(",")
         self.used: list[str] = []
         self.names: tuple[str, ...] = ()
+        self.options: list[str] = []
 
     def text(self) -> str:
-        """The deck: sweeps, and sometimes their sum."""
+        """The deck: sweeps, and sometimes their sum; or none, and `options` of a command line that vary its run."""
+        if self.rng.random() < 0.2:
+            axes = [self.rng.choice((self.vary, self.vary, self.choice))() for _ in range(self.rng.choice((1, 1, 2)))]
+            self.names, self.options = (self.run,), [each.removeprefix("vary ").rstrip(";") for each in axes]
+            return f"#include <{self.deck}>\n"
         count = self.rng.choice((1, 1, 2))
         self.names = ("s0",) if count == 1 else ("both",)
         sweeps = [self.sweep(f"s{n}") for n in range(count)]
@@ -126,7 +131,7 @@ class Writer:
         return "" if unit in ("1", "") else f"{unit[2:]}^-1" if unit.startswith("1/") and unit[2:].isalpha() else unit
 
     def values(self, value: float, unit: str, count: int) -> str:
-        kind = self.rng.randrange(6)
+        kind = self.rng.randrange(7)
         low, high = sorted((self.size(value), self.size(value)))
         if kind == 0 and count > 1:
             return f"linspace({low!r}, {high!r}, {count}) {self.written(unit)}"
@@ -134,6 +139,8 @@ class Writer:
             return f"logspace({low!r}, {high!r}, {count}) {self.written(unit)}"
         if kind == 2 and count > 1:
             return f"({low!r} .. {low!r} + {count - 1} by 1) {self.written(unit)}"
+        if kind == 3 and count > 1:
+            return f"{low!r} .. {low!r} + {count - 1} by 1 {self.written(unit)}"
         return f"[{', '.join(repr(self.size(value)) for _ in range(count))}] {self.written(unit)}"
 
     def vary(self) -> str:
@@ -204,8 +211,9 @@ def fault_of(
         compiled.append(made)
         _explained(made, writer.used)
 
-    found = one.fault_of(path, writer.names, also)
-    return path.read_text(encoding="utf-8"), "" if found is None else "\n".join(found), bool(compiled)
+    found = one.fault_of(path, writer.names, also, writer.options)
+    varied = "".join(f"// --vary {each!r}\n" for each in writer.options)
+    return varied + path.read_text(encoding="utf-8"), "" if found is None else "\n".join(found), bool(compiled)
 
 
 def _explained(compiled: Compiled, paths: Sequence[str]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from met.plan import Experiment
+from met.plan import Experiment, keys
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, messages
 
 
@@ -121,12 +121,21 @@ error[D220]: the steps do not meet the end: they reach 1.9, and 2 is not a whole
     )
 
 
-def test_a_unit_behind_a_range_alone_is_told_how_to_be_for_all(tmp_path: Path) -> None:
-    text = messages(
-        check(tmp_path, ARM, SERVO, RUN, "sweep it of hold { vary drive.kp = 1 .. 2 by 0.5 V*s/rad; }", select=["it"])
+def test_a_unit_behind_a_range_is_for_all_of_it(tmp_path: Path) -> None:
+    one, other = (
+        check(tmp_path, ARM, SERVO, RUN, f"sweep it of hold {{ vary drive.kp = {values}; }}", select=["it"]).plan
+        for values in ("1 .. 2 by 0.1 V*s/rad", "(1 .. 2 by 0.1) V*s/rad")
     )
-    assert "error[D063]: a range from a pure number to a pure number by V*s/rad" in text
-    assert "a unit behind the brackets is for all: `(1 .. 2 by 0.5) V*s/rad`" in text
+    assert one is not None and other is not None
+    assert keys.case_ids(one.experiments[0]) == keys.case_ids(other.experiments[0])
+
+
+def test_only_bare_ends_take_the_unit_behind_a_range(tmp_path: Path) -> None:
+    text = messages(
+        check(tmp_path, ARM, SERVO, RUN, "sweep it of hold { vary drive.kp = 1 .. 2 m by 0.5 V*s/rad; }", select=["it"])
+    )
+    assert "error[D063]: a range from a pure number to m by V*s/rad" in text
+    assert "= help: all three must be of one dimension" in text
 
 
 # Sums

@@ -298,7 +298,8 @@ def test_the_plan_says_what_was_set(deck: str, capsys: pytest.CaptureFixture[str
     (["plan", "p.json"], "--set is for decks: `p.json` is a plan, whose values are settled; "
      "`met plan DECK --set 'duration=2 s' -o p.json` makes another"),
     (["run", "a.h5"], "--set is for decks: `a.h5` is an archive, of what was run"),
-    (["dump", "model", "a.ic"], "`met dump model` shows what the deck says; `met dump plan`, what --set makes of it"),
+    (["dump", "model", "a.ic"], "`met dump model` shows what the deck says; `met dump plan`, what --set and --vary "
+     "make of it"),
 ])  # fmt: skip
 def test_only_a_deck_takes_it(words: list[str], said: str, deck: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main([*words, "--set", "duration=2 s"]) == cli.BAD_INPUT
@@ -313,7 +314,6 @@ def test_only_a_deck_takes_it(words: list[str], said: str, deck: str, capsys: py
     ("drive.kp=", "`drive.kp` is set to nothing", "write `PATH=VALUE`, such as `gearbox.kp=0.02 V*s/rad`"),
     ("=3", "this sets nothing: no path stands before the `=`",
      "write `PATH=VALUE`, such as `gearbox.kp=0.02 V*s/rad`"),
-    ("vary slow=[1]", "this is not one path and its value", "write `PATH=VALUE`, such as `gearbox.kp=0.02 V*s/rad`"),
     ("slow=1; times=2", "this is not one path and its value", "write `PATH=VALUE`, such as `gearbox.kp=0.02 V*s/rad`"),
     ("macro FAST=1", "this is not one path and its value", "a macro is defined by `-D NAME=VALUE`"),
 ])  # fmt: skip
