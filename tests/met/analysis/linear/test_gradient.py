@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from met import run as engine
 from met.analysis.linear import gradient
 from met.analysis.linear.gradient import GradientProgram, MetricGradients
 from met.diagnostic import Problem
+from met.messages.render import render
 from met.plan import Experiment
 from met.program.build import METRIC
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, experiment
@@ -218,18 +219,22 @@ def test_many_cases_are_run_some_at_a_time(monkeypatch: pytest.MonkeyPatch, tmp_
     assert program.of([]).slope.shape == (0, 4, 2)
 
 
+def refused(of: Callable[[], object]) -> str:
+    with pytest.raises(Problem) as problem:
+        of()
+    return render(problem.value.diagnostics, problem.value.sources, colour=False)
+
+
 def test_a_metric_that_is_not_there_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "sway.ic"
     path.write_text(SWAY)
-    with pytest.raises(Problem) as refused:
-        Simulation(path).gradient({"drive.kp": 0.1}, metrics="shale")
-    assert refused.value.diagnostics[0].message == "`sway` has no metric `shale`"
-    with pytest.raises(Problem) as refused:
-        batch.gradient(path)
-    assert (
-        refused.value.diagnostics[0].message == "no number of `sway` varies, so there is nothing to take a gradient by"
-    )
+    said = refused(lambda: Simulation(path).gradient({"drive.kp": 0.1}, metrics="shale"))
+    assert said.startswith("error[D379]: `sway` has no metric `shale`\n")
+    assert "help: did you mean `shake`?\n" in said
+    said = refused(lambda: batch.gradient(path))
+    assert said.startswith("error[D379]: no number of `sway` varies, so there is nothing to take a gradient by\n")
+    assert "help: ask about a sweep: its numbers are those\n" in said
     made = experiment(tmp_path, ARM, SERVO, RUN)
-    with pytest.raises(Problem) as refused:
-        GradientProgram(made).of([0])
-    assert refused.value.diagnostics[0].message == "`hold` has no metric, of which there could be a gradient"
+    said = refused(lambda: GradientProgram(made).of([0]))
+    assert said.startswith("error[D379]: `hold` has no metric, of which there could be a gradient\n")
+    assert "help: a `metric` entry of the run names one\n" in said
