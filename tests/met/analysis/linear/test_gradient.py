@@ -234,6 +234,10 @@ def test_a_metric_that_is_not_there_is_refused(tmp_path: Path) -> None:
     said = refused(lambda: batch.gradient(path))
     assert said.startswith("error[D379]: no number of `sway` varies, so there is nothing to take a gradient by\n")
     assert "help: ask about a sweep: its numbers are those\n" in said
+    asks = "linear loop { open = hinge.servo.voltage; } require phase_margin(loop) > 1 deg;"
+    made = experiment(tmp_path, ARM, SERVO, RUN.replace("duration", f"{asks} duration", 1))
+    said = refused(lambda: GradientProgram(made).of([0], ["loop_phase_margin"]))
+    assert said.startswith("error[D379]: `loop_phase_margin` is a metric of a linear answer, which has no gradient\n")
     made = experiment(tmp_path, ARM, SERVO, RUN)
     said = refused(lambda: GradientProgram(made).of([0]))
     assert said.startswith("error[D379]: `hold` has no metric, of which there could be a gradient\n")
