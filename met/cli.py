@@ -42,6 +42,7 @@ ORDER = (
     "show",
     "plot",
     "report",
+    "view",
     "best",
     "diff",
     "sensitivity",
