@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.archive.read import ArchiveFile, ArchiveGroup, reading
+from batch.archive.stored import Unlike
 from batch.portable.description import MOST_CASES, described
 from batch.queries.groups import groups_named
 from batch.queries.signals import pretty_unit
@@ -62,6 +63,10 @@ def data_of(experiment: Experiment, group: ArchiveGroup) -> dict[str, Any]:
     stored = {variable.name: variable for variable in group.role("metric")}
     known = {name.removeprefix("metrics."): name for name in stored}
     shown: dict[str, Any] = _visible(told)
+    lacking = [each["name"] for each in told["metrics"] if each["name"] not in known]
+    with reading(group.path):
+        if lacking:
+            raise Unlike(f"the plan of `{experiment.name}` has a metric `{lacking[0]}`, and it has none")
     return {
         "module": base64.b64encode(module.code).decode("ascii"),
         "description": shown,

@@ -7,7 +7,6 @@
   const { node, number, ticks, palette } = MET;
   const data = MET_PAGE;
   const { description: told } = data;
-  const outputs = told.kernel.outputs;
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const kernel = METKernel.make(bytes(data.module), told.kernel);
   const cases = told.cases.inputs;
@@ -52,9 +51,9 @@
     const begun = performance.now();
     const found = kernel.run([values], told.ticks);
     const took = performance.now() - begun;
-    const of = (name) => found.outputs[outputs.indexOf(name)];
-    const failed = of("failure") !== 0;
-    const rows = failed ? Math.ceil(of("failure.tick") / told.kernel.record_divisor) : told.rows;
+    const tick = METKernel.failed(found.outputs, told.failure);
+    const failed = tick !== null;
+    const rows = failed ? Math.ceil(tick / told.kernel.record_divisor) : told.rows;
     const width = told.columns.length;
     lines = told.columns.map((_, c) => Array.from(time, (_t, row) => (row < rows ? found.rows[row * width + c] : null)));
     draw();
@@ -62,7 +61,7 @@
     chosen.value = which < 0 ? "" : which;
     knobs.forEach(({ shown, input, n }) => { shown.textContent = `${number(values[n] / input.scale)} ${data.units[n]}`; });
     const measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
-    tell(which, measured, failed, of("failure.tick"), took);
+    tell(which, measured, failed, tick, took);
   }
 
   // Whose numbers these are: the archive's, where every metric has the bits that stand there.

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import pytest
 import xarray
 
@@ -165,6 +167,50 @@ def test_an_archive_that_holds_other_numbers_is_told_apart(chromium: Chromium, s
     page = chromium.open(tmp_path / "unsigned.html")
     assert page.run("document.querySelector('.came')") is None  # no script runs that is not the page's own
     page.close()
+
+
+RUNAWAY = """\
+arm rail {
+    link cart { mass = 1 kg; shape = box(size = [0.1, 0.1, 0.1] m); }
+    joint slide prismatic { parent = base; child = cart; axis = x; }
+}
+run it {
+    arm = rail;  initial { slide.qd = 1 m/s; }
+    environment { drag = joint_damping { sliding = 50 N*s/m; } }
+    rates { dynamics = 100 Hz; record = 100 Hz; }  duration = 3200 ms;
+    record = [qd];  metric late = final { of = slide.qd; }
+}
+sweep damped of it { vary environment.drag.sliding = [50, 220] N*s/m; }
+"""
+
+
+@pytest.mark.browser
+def test_a_case_that_runs_away_fails_in_the_page_as_in_the_archive(chromium: Chromium, tmp_path: Path) -> None:
+    (tmp_path / "deck.ic").write_text(RUNAWAY, encoding="utf-8")
+    archive = tmp_path / "a.h5"
+    assert cli.main(["run", str(tmp_path / "deck.ic"), "damped", "-q", "--no-picture", "-o", str(archive)]) == cli.NO
+    assert cli.main(["view", str(archive), "-q"]) == 0
+    with xarray.open_dataset(archive) as data:
+        valid = data["n_valid"].values.tolist()
+    page = chromium.open(tmp_path / "a.view.html")
+    page.settle()
+    assert page.run(SAID).startswith("Case #0, with the archive's bits in its metric: ")
+    said = page.run(f"{CHOOSE}(1)")
+    assert said.startswith("Case #1 fails, as in the archive: ")
+    assert said.endswith(f"; it fails at {valid[1] / 100:g} s.") and valid[1] < valid[0]
+    assert "no value" in page.run("document.querySelector('.answers').innerText")
+    quiet(page)
+    page.close()
+
+
+def test_an_archive_without_a_metric_of_its_plan_is_damaged(
+    sent: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(sent / "tuned.h5", tmp_path / "a.h5")
+    with h5py.File(tmp_path / "a.h5", "r+") as file:
+        del file["volts"]
+    assert cli.main(["view", str(tmp_path / "a.h5")]) == 2
+    assert "error[E302]: the archive " in capsys.readouterr().err
 
 
 HOSTILE = "</script><img src=x onerror=\"document.title='hurt'\">\u202e"
