@@ -211,7 +211,7 @@ def gradient(
     names = None if experiment is None else (experiment,)
     found = experiments_named(_plan(plan, names), names)[0]
     ((found, rows),) = select_rows([found], cases)
-    return to_dataset(found, GradientProgram(found).of([int(row) for row in rows], metrics))
+    return to_dataset(found, GradientProgram(found).of(rows[:], metrics))
 
 
 def _plan(

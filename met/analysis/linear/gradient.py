@@ -39,6 +39,9 @@ SAME, ROUNDED = 1e-3, 1e-11
 
 _POINTS = (0.0, *(sign * near for near in NEAR for sign in (-1.0, 1.0)))
 
+MOST_LANES = 100_000
+"""Runs of the kernel that are held in memory at once."""
+
 Place = tuple[int, int, int]
 """(case, metric, number), as positions in `MetricGradients`."""
 
@@ -108,12 +111,19 @@ class GradientProgram:
         metrics = tuple(metrics) or tuple(use.name for use in experiment.structure.metrics)
         _refuse(experiment, metrics, self.paths)
         rows = np.asarray(rows, dtype=np.int64)
-        found = _Found.of(self, engine.inputs(experiment, rows), threads)
-        value, slope = found.values(metrics), found.slopes(metrics)
-        why_not = dict(self._why_not(found, metrics))
-        for place in why_not:
-            slope[place] = math.nan
-        return MetricGradients(tuple(rows.tolist()), metrics, self.paths, value, slope, why_not)
+        values, slopes = [np.empty((0, len(metrics)))], [np.empty((0, len(metrics), len(self.paths)))]
+        why_not: dict[Place, str] = {}
+        many = max(1, MOST_LANES // (len(self.paths) * len(_POINTS)))
+        for first in range(0, len(rows), many):
+            found = _Found.of(self, engine.inputs(experiment, rows[first : first + many]), threads)
+            reasons, slope = dict(self._why_not(found, metrics)), found.slopes(metrics)
+            for place in reasons:
+                slope[place] = math.nan
+            why_not |= {(first + case, metric, number): why for (case, metric, number), why in reasons.items()}
+            values.append(found.values(metrics))
+            slopes.append(slope)
+        of_all = np.concatenate(values), np.concatenate(slopes)
+        return MetricGradients(tuple(rows.tolist()), metrics, self.paths, *of_all, why_not)
 
     def _why_not(self, found: _Found, metrics: Sequence[str]) -> Iterator[tuple[Place, str]]:
         failed, value, slope = found.failed(), found.values(metrics), found.slopes(metrics)
@@ -201,10 +211,10 @@ class _Found:
 
     def event(self, case: int, number: int) -> str:
         """The event that comes or goes within a little of a case, in words."""
-        share = f"{NEAR[-1]:g} of the number"
+        share = f"{NEAR[0]:g} of the number"
         counts = self.outputs[case, number, :, : len(self.names)]
         for name in (FAILURE[0], "friction.splits", "friction.clamped", *_limits(self.names)):
-            low, high = counts[-2:, self.names.index(name)]
+            low, high = counts[1:3, self.names.index(name)]
             if low != high:
                 return f"within {share} {_words(name)}"
         return f"within {share} something begins to act, or is decided at another tick"
@@ -224,7 +234,11 @@ def _words(output: str) -> str:
 
 def _refuse(experiment: Experiment, metrics: Sequence[str], paths: Sequence[str]) -> None:
     known = [use.name for use in experiment.structure.metrics]
+    linear = [use.name for use in experiment.linear_metrics]
     for name in metrics:
+        if name in linear:
+            message = f"`{name}` is a metric of a linear answer, which has no gradient"
+            raise Problem(error("D379", message, experiment.place, help="ask it of a few cases of a sweep, and compare"))
         if name not in known:
             helps = did_you_mean(name, known) or [
                 f"there are {', '.join(f'`{each}`' for each in known)}" if known else "a run's `metrics` name them"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +13,10 @@ from batch.simulation.simulation import Simulation
 from ic.driver.given_values import given_run
 from met import backends, models
 from met import run as engine
+from met.analysis.linear import gradient
 from met.analysis.linear.gradient import GradientProgram, MetricGradients
 from met.diagnostic import Problem
+from met.messages.render import render
 from met.plan import Experiment
 from met.program.build import METRIC
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, experiment
@@ -105,6 +107,24 @@ run coast {
 """
 
 
+def test_they_are_those_of_a_run_whose_motor_comes_to_its_limit_again_and_again() -> None:
+    """The hinge's voltage is cut at each turn, at ticks: by extrapolated differences that move none, to 1e-5."""
+    text = changed(SWAY, ("v_max = 24 V", "v_max = 2.5 V"), ("duration = 5.1 s", "duration = 2.1 s"))
+    numbers = {path: NUMBERS[path] for path in ("drive.kp", "links.tip.mass")} | {"drive.v_max": (2.5, "V")}
+    program = GradientProgram(varied(text, numbers))
+    found = program.of([0], ["shake", "last"])
+    outputs = program.recording.program.outputs
+    _, ran = backends.load(program.recording).run(
+        engine.inputs(program.experiment, np.array([0])), program.experiment.structure.schedule.ticks, record=False
+    )
+    assert ran[0, outputs.index("at_limit:hinge.servo.v_max")] > 100.0
+    assert not found.why_not
+    for number in range(len(found.paths)):
+        expected = by_richardson(program, number, 1e-6)
+        for metric, name in enumerate(found.metrics):
+            assert found.slope[0, metric, number] == pytest.approx(expected[name], rel=1e-5), (name, number)
+
+
 @pytest.mark.parametrize("rate", [0.1, 0.0997])
 def test_a_settling_time_is_told_between_samples(rate: float) -> None:
     """A bar that coasts at a rate is within 0.1 rad of 1 rad from 0.9 rad over that rate on, as long as it runs."""
@@ -140,7 +160,7 @@ def test_a_case_on_an_edge_says_so() -> None:
     assert free.slope[0].tolist() == [[0.0], [0.0]] and not free.why_not
     peak = float(free.value[0, 0])
     found = GradientProgram(varied(SWAY, {"drive.v_max": (peak, "V")})).of([0], ["top", "shake"])
-    assert refusals(found)[("top", "drive.v_max")].startswith("on an event's edge: within 1e-05 of the number ")
+    assert refusals(found)[("top", "drive.v_max")].startswith("on an event's edge: within 1e-06 of the number ")
     below = GradientProgram(varied(SWAY, {"drive.v_max": (0.9 * peak, "V")})).of([0], ["top"])
     assert below.slope[0, 0, 0] == pytest.approx(1.0, rel=1e-12) and not below.why_not
 
@@ -184,18 +204,41 @@ def test_they_come_as_a_dataset_of_a_sweep_and_of_a_simulation(tmp_path: Path) -
     assert (made.why_not == "").all()
 
 
+def test_many_cases_are_run_some_at_a_time(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    sweep = (
+        "sweep gains of sway { vary drive.kp = [0.1, 0.12, 0.14] V*s/rad;  vary hinge.servo.v_max = [3.9, 24] V; }\n"
+    )
+    made = experiment(tmp_path, SWAY.replace("duration = 5.1 s", "duration = 0.6 s"), sweep, select=["gains"])
+    program = GradientProgram(made)
+    whole = program.of(range(6))
+    monkeypatch.setattr(gradient, "MOST_LANES", 20)  # two cases
+    parts = program.of(range(6))
+    np.testing.assert_array_equal(parts.slope, whole.slope)
+    np.testing.assert_array_equal(parts.value, whole.value)
+    assert parts.why_not == whole.why_not and parts.why_not
+    assert program.of([]).slope.shape == (0, 4, 2)
+
+
+def refused(of: Callable[[], object]) -> str:
+    with pytest.raises(Problem) as problem:
+        of()
+    return render(problem.value.diagnostics, problem.value.sources, colour=False)
+
+
 def test_a_metric_that_is_not_there_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "sway.ic"
     path.write_text(SWAY)
-    with pytest.raises(Problem) as refused:
-        Simulation(path).gradient({"drive.kp": 0.1}, metrics="shale")
-    assert refused.value.diagnostics[0].message == "`sway` has no metric `shale`"
-    with pytest.raises(Problem) as refused:
-        batch.gradient(path)
-    assert (
-        refused.value.diagnostics[0].message == "no number of `sway` varies, so there is nothing to take a gradient by"
-    )
+    said = refused(lambda: Simulation(path).gradient({"drive.kp": 0.1}, metrics="shale"))
+    assert said.startswith("error[D379]: `sway` has no metric `shale`\n")
+    assert "help: did you mean `shake`?\n" in said
+    said = refused(lambda: batch.gradient(path))
+    assert said.startswith("error[D379]: no number of `sway` varies, so there is nothing to take a gradient by\n")
+    assert "help: ask about a sweep: its numbers are those\n" in said
+    asks = "linear loop { open = hinge.servo.voltage; } require phase_margin(loop) > 1 deg;"
+    made = experiment(tmp_path, ARM, SERVO, RUN.replace("duration", f"{asks} duration", 1))
+    said = refused(lambda: GradientProgram(made).of([0], ["loop_phase_margin"]))
+    assert said.startswith("error[D379]: `loop_phase_margin` is a metric of a linear answer, which has no gradient\n")
     made = experiment(tmp_path, ARM, SERVO, RUN)
-    with pytest.raises(Problem) as refused:
-        GradientProgram(made).of([0])
-    assert refused.value.diagnostics[0].message == "`hold` has no metric, of which there could be a gradient"
+    said = refused(lambda: GradientProgram(made).of([0]))
+    assert said.startswith("error[D379]: `hold` has no metric, of which there could be a gradient\n")
+    assert "help: a `metric` entry of the run names one\n" in said
