@@ -211,7 +211,7 @@ def test_elementary_functions_and_noise_have_the_kernels_bits(tmp_path: Path, wo
 def test_every_compiler_and_level_gives_the_same_bits(
     tmp_path: Path, words: tuple[str, ...], make: Callable[[Scalar, Scalar, Scalar], list[Scalar]]
 ) -> None:
-    same(table(make), three(20_000 if words[0] in ("gcc", "clang") else 4000, 3), tmp_path, words)
+    same(table(make), three(4000, 3), tmp_path, words)
 
 
 @pytest.mark.compiler
