@@ -21,7 +21,7 @@ def linear_lines(found: Linearized) -> Iterator[str]:
     """The answers in lines."""
     case = f", case #{found.case}" if found.case else ""
     states = count(len(found.states), "state")
-    yield f"{found.experiment}{case}: linear at t = {found.time:.6g} s, a period of {_time(found.seconds)}, {states}"
+    yield f"{found.experiment}{case}: linear {found.where}, a period of {_time(found.seconds)}, {states}"
     for name in found.held:
         yield f"  {name} sticks, and is held"
     for each in found.creeping:
@@ -155,6 +155,7 @@ def as_data(found: Linearized) -> dict[str, Any]:
         "experiment": found.experiment,
         "case": found.case,
         "time": found.time,
+        "stands": found.stands,
         "period": found.seconds,
         "states": list(found.states),
         "inputs": list(found.inputs),
