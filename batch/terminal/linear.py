@@ -23,7 +23,7 @@ def linear_lines(found: Linearized) -> Iterator[str]:
     states = count(len(found.states), "state")
     yield f"{found.experiment}{case}: linear {found.where}, a period of {_time(found.seconds)}, {states}"
     for name in found.held:
-        yield f"  {name} sticks, and is held"
+        yield f"  {name} {'is locked' if name in found.locked else 'sticks, and is held'}"
     for each in found.creeping:
         yield f"  {each.name} creeps at {abs(each.rate):.3g} {each.unit}: the answer holds for moves slower than that"
     for path in found.at_limit:
@@ -161,6 +161,7 @@ def as_data(found: Linearized) -> dict[str, Any]:
         "inputs": list(found.inputs),
         "outputs": list(found.outputs),
         "held": list(found.held),
+        "locked": list(found.locked),
         "creeping": [{"name": each.name, "rate": each.rate} for each in found.creeping],
         "at_limit": list(found.at_limit),
         "poles": [pole(each) for each in found.poles],

@@ -109,7 +109,8 @@ class Linearized:
     states    by name;  inputs, outputs: channels
     A .. D    x+ = A x + B u, y = C x + D u, from period to period, inputs added to at all ticks of one
     plant     the arm without its computers, in continuous time
-    held      what sticks;  creeping: what slides so slowly that it nearly does;  at_limit: paths of limits
+    held      what sticks, or is locked;  locked: joints that are
+    creeping  what slides so slowly that it nearly does;  at_limit: paths of limits
     joints    of each state, the joint or body or computer that it belongs to
     stands    whether it stands still there, and `time` is none of the run's
     """
@@ -132,6 +133,7 @@ class Linearized:
     at_limit: tuple[str, ...]
     joints: Mapping[str, str]
     stands: bool = False
+    locked: tuple[str, ...] = ()
 
     @property
     def where(self) -> str:
@@ -230,7 +232,7 @@ class LinearQuestion:
             self.experiment.name, case, tick / program.schedule.base_hz, found.seconds, states, inputs,
             found.outputs, lifted.A, summed(lifted.B), lifted.C, summed(found.D), plant(program, flow, states),
             tuple(lifted.opened(each) for each in self.loops), found.held, slow, found.at_limit,
-            {name: program.joint_of(name) for name in program.states}, self.stands,
+            {name: program.joint_of(name) for name in program.states}, self.stands, found.locked,
         )  # fmt: skip
 
 
