@@ -216,3 +216,36 @@ def test_the_remedy_for_a_bare_index_keeps_it_and_no_edit_is_of_one_turn_alone(t
     assert [edit.text for _, edit in edits(told["D060"], found.sources)] == ["i kg"]
     assert told["D094"].help[0] == "did you mean `b_1`?"
     assert tuple(edits(told["D094"], found.sources)) == ()
+
+
+def test_a_block_that_every_turn_writes_is_told_to_hold_the_loop(tmp_path: Path) -> None:
+    text = ARM + RUN.format("", "for side in [left, right] {\n        initial { j_{side}.q = 1 rad; }\n    }")
+    assert (
+        told(tmp_path, text)
+        == """\
+error[D040]: `initial` is written twice
+  --> deck.ic:16:9
+   |
+16 |         initial { j_{side}.q = 1 rad; }
+   |         ^^^^^^^ again
+  ::: deck.ic:16:9  first
+   = help: each turn writes it: put the loop inside, `initial { for side in ... { ... } }`
+   = note: in `for side` at deck.ic:15:5, side = right
+
+1 error
+"""
+    )
+
+
+def test_values_of_lists_and_loops_stand_in_signals_requirements_and_sweeps(tmp_path: Path) -> None:
+    inside = "for i in 0 .. 1 { signal lag_{i} = j_left.q - limits[i];  metric top_{i} = max { of = signals.lag_{i}; } "
+    inside += "require top_{i} < limits[i]; }"
+    text = "let limits = [3, 4] rad;\n" + ARM + RUN.format("", inside)
+    text += "sweep s of it { for side in [left, right] { vary links.{side}.mass = [1, 2, 3] kg; } "
+    text += "exclude when links.left.mass > 2 kg and limits[0] > 1 rad; }"
+    found = checked(tmp_path, text, "all")
+    assert found.plan is not None and found.diagnostics == ()
+    run, sweep = found.plan.experiments
+    assert [each.text for each in run.requirements] == ["top_0 < limits[0]", "top_1 < limits[1]"]
+    assert [each.limit for each in run.requirements] == [3, 4]
+    assert sweep.cases.count == 6
