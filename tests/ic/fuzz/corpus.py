@@ -128,7 +128,7 @@ def end_of_entry(text: str, start: int) -> int:
 @cache
 def words() -> tuple[str, ...]:
     """Units, directives, models with their parameters, and every word that the compiler itself compares with."""
-    found = [*units.UNITS, *(f"#{name}" for name in DIRECTIVES), *SYMBOLS, *NUMBERS]
+    found = [*units.ALL_UNITS, *(f"#{name}" for name in DIRECTIVES), *SYMBOLS, *NUMBERS]
     for kind in KINDS:
         for name, model in models.available(kind).items():
             found += [name, *(parameter.name for parameter in models.written(model))]
