@@ -137,6 +137,10 @@ class Editor:
         """Wait until all that was sent is checked."""
         self.ask("met/settled", None)
 
+    def next(self) -> None:
+        """Wait for the next message."""
+        self._wait(lambda message: True)
+
     def of(self, path: Path) -> list[Any]:
         """What the editor shows in a file, once all is checked."""
         self.settle()
