@@ -14,7 +14,7 @@ from typing import Any
 
 from met.host import interpreter
 
-WAIT = 30.0
+WAIT = 120.0
 """Seconds until an answer counts as lacking."""
 
 
