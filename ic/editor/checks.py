@@ -19,6 +19,9 @@ from ic.editor.index import DeckIndex
 from ic.editor.positions import file_named, path_of
 from met.frozen import frozen
 
+NO_DECKS = (".csv", ".urdf")
+"""The endings of files that decks name and that are none."""
+
 PAUSE = 0.04
 """Seconds without a change before a check begins."""
 
@@ -166,6 +169,8 @@ class Checks:
         roots = []
         order = list(self.texts)
         for n, uri in enumerate(order):
+            if uri.endswith(NO_DECKS):
+                continue
             identity = self.texts[uri].identity
             for m, other in enumerate(order):
                 includes = other != uri and other in self.checked and identity in self.checked[other].files

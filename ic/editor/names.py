@@ -15,7 +15,7 @@ BASE_WORDS = {"like": None, "of": "run"}
 _KIND_OF_KEY = {"arm": "arm", "parent": "link", "child": "link"}
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=32)
 def deck_text(name: str, text: str) -> DeckText:
     """The structure of a text; of one that is known, the same."""
     return DeckText(name, text)
