@@ -15,7 +15,7 @@ from ic.grammar.cursor import OPENING
 from ic.text.lexer import BAD, SPACE, Text, Token, logical_lines
 from ic.text.limits import CONDITION_DEPTH, DEPTH, LONGEST_LINE, MOST_TOKENS, Findings
 from ic.text.preprocess import CONDITIONALS
-from ic.text.strays import complain_of_stray
+from ic.text.strays import complain_of_stray, complain_of_unseen
 from met.diagnostic import Diagnostic, Label, Problem, error
 
 _CLOSING = {closing: opening for opening, closing in OPENING.items()}
@@ -133,6 +133,8 @@ def _match(row: Row, stack: list[_OpenBracket]) -> Diagnostic | None:
         if token.kind == BAD:
             findings = Findings()
             complain_of_stray(token, findings)
+            if not findings.all:  # a character that is not seen
+                complain_of_unseen(token.source, findings)
             return findings.all[0]
         if token.text in OPENING:
             if len(stack) >= DEPTH:

@@ -135,3 +135,8 @@ def test_a_large_or_odd_deck_takes_seconds(text: str) -> None:
 def test_a_deck_that_is_more_than_a_reader_takes_is_refused(text: str) -> None:
     with pytest.raises(Problem, match=r"D029|D018"):
         formatted("a.ic", text)
+
+
+def test_a_character_that_is_not_seen_is_refused_where_a_deck_is_read_as_one() -> None:
+    with pytest.raises(Problem, match=r"D038\]: U\+202E"):
+        formatted("a.ic", "run a \u202e b = 3; }\n")
