@@ -43,6 +43,7 @@ ORDER = (
     "show",
     "plot",
     "report",
+    "view",
     "best",
     "diff",
     "sensitivity",

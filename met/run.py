@@ -141,7 +141,7 @@ class Prepared:
     @property
     def _linear_keys(self) -> dict[str, str]:
         """Keys of the metrics of linear answers: of the motion, which they are derived of, and of what is asked."""
-        asked = {use.name: (use.at, use.inputs, use.outputs, use.opened) for use in self.experiment.linear}
+        asked = {use.name: (use.at, use.inputs, use.outputs, use.opened, use.pose) for use in self.experiment.linear}
         return {
             f"metrics.{use.name}": _code_key(
                 hashlib.sha256(f"{self.code_key} {LINEAR_VERSION} {use.model} {asked[use.of]}".encode()).hexdigest()
@@ -399,7 +399,7 @@ def _unanswered(experiment: Experiment, out: Mapping[str, np.ndarray], failed: n
         why = out.get(WHY_ANSWER + use.name)
         for case in np.flatnonzero(~failed & (why != ANSWERED)).tolist() if why is not None else ():
             reason = WHY_NONE.get(int(why[case]), "") if why is not None else ""
-            found.setdefault(case, []).append(f"no answer of `{use.name}` at {use.at:.9g} s: {reason}")
+            found.setdefault(case, []).append(f"no answer of `{use.name}` {use.where}: {reason}")
     return {case: "; ".join(each) for case, each in found.items()}
 
 

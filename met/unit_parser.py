@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from met.units import ONE, UNITS, Measure
+from met.units import ALL_UNITS, ONE, Measure
 
 BIGGEST_EXPONENT = 9
 
@@ -71,8 +71,8 @@ class _UnitReader:
             result = ONE
         elif piece in self.names:
             result = self.names[piece]
-        elif piece in UNITS:
-            result = UNITS[piece].measure
+        elif piece in ALL_UNITS:
+            result = ALL_UNITS[piece].measure
         else:
             from met.messages.other_units import suggest  # for a message alone
 

@@ -5,7 +5,8 @@ A dimension is six small integers, the exponents of m, kg, s, A, K and rad. Angl
 radian counts as one, since N*m/A and V*s/rad are the same thing.
 
 Units exist only until a plan is made; the plan is SI (angles in rad). There are no offsets (no degree Celsius) and no
-prefixes beyond the table, so that a unit's name is known to be one wherever a deck writes it.
+prefixes beyond the tables. The names of `UNITS` are units wherever a deck writes values, and name nothing else there.
+Those of `FURTHER_UNITS` came later: they are units only behind a number or a unit, and a deck may call a value so.
 """
 
 from __future__ import annotations
@@ -209,14 +210,40 @@ _ROWS: tuple[tuple[str, str, Dimension, int, int], ...] = (
 )
 """Name, word, dimension, and what one is in SI units: over and under the line. Some angles are that many times pi."""
 
-_OF_PI = frozenset({"deg", "arcmin", "arcsec", "cycle", "rpm"})
-
-UNITS: Mapping[str, NamedUnit] = MappingProxyType(
-    {
-        name: NamedUnit(name, word, Measure(dimension, over, under, int(name in _OF_PI), int(name in ("Hz", "kHz"))))
-        for name, word, dimension, over, under in _ROWS
-    }
+_FURTHER_ROWS: tuple[tuple[str, str, Dimension, int, int], ...] = (
+    ("inch", "inch", _LENGTH, 254, 10_000),
+    ("ft", "foot", _LENGTH, 3048, 10_000),
+    ("mg", "milligram", _MASS, 1, 1_000_000),
+    ("rev", "revolution, a cycle", _ANGLE, 2, 1),
+    ("MHz", "megahertz", _TIME**-1, 1_000_000, 1),
+    ("lbf", "pound of force", _FORCE, 44_482_216_152_605, 10**13),
+    ("mW", "milliwatt", _POWER, 1, 1000),
+    ("kPa", "kilopascal", _PRESSURE, 1000, 1),
+    ("MPa", "megapascal", _PRESSURE, 1_000_000, 1),
+    ("GPa", "gigapascal", _PRESSURE, 10**9, 1),
 )
+"""The same of units that names of a deck come before. Inch and pound are those of 1959, which are exact."""
+
+_OF_PI = frozenset({"deg", "arcmin", "arcsec", "cycle", "rpm", "rev"})
+_OF_HERTZ = frozenset({"Hz", "kHz", "MHz"})
+
+
+def _named(rows: Iterable[tuple[str, str, Dimension, int, int]]) -> Mapping[str, NamedUnit]:
+    return MappingProxyType(
+        {
+            name: NamedUnit(name, word, Measure(dimension, over, under, int(name in _OF_PI), int(name in _OF_HERTZ)))
+            for name, word, dimension, over, under in rows
+        }
+    )
+
+
+UNITS = _named(_ROWS)
+"""Units whose names are reserved where values stand."""
+
+FURTHER_UNITS = _named(_FURTHER_ROWS)
+"""Units only behind a number or a unit, where the deck does not use the name otherwise."""
+
+ALL_UNITS: Mapping[str, NamedUnit] = MappingProxyType({**UNITS, **FURTHER_UNITS})
 
 _SPOKEN: Mapping[Dimension, str] = MappingProxyType(
     {
@@ -253,9 +280,9 @@ def measure(factors: Iterable[tuple[str, int]]) -> Measure:
     """The meaning of a product of units, (name, exponent) each; ValueError for a name that is no unit."""
     result = ONE
     for name, exponent in factors:
-        if name not in UNITS:
+        if name not in ALL_UNITS:
             raise ValueError(f"`{name}` is not a unit")
-        result = result * UNITS[name].measure ** exponent
+        result = result * ALL_UNITS[name].measure ** exponent
     return result
 
 

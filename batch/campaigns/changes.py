@@ -28,6 +28,7 @@ from met.plan import (
 )
 from met.plan.columns import CaseValues, different
 from met.plan.keys import in_key, inputs, structure_key
+from met.plan.linear_uses import LinearUse
 from met.plan.searches import Search
 from met.plan.swept import blocks
 
@@ -92,10 +93,13 @@ def _linear(before: Experiment, now: Experiment) -> Iterator[str]:
 
 
 def _answers(experiment: Experiment) -> dict[str, str]:
-    return {
-        use.name: ", ".join((f"at {use.at:.9g} s", *use.inputs, *use.outputs, *(f"open {path}" for path in use.opened)))
-        for use in experiment.linear
-    }
+    return {use.name: ", ".join(_asked(use)) for use in experiment.linear}
+
+
+def _asked(use: LinearUse) -> Iterator[str]:
+    yield use.where
+    yield from (f"{number:.9g}" for number in use.pose or ())
+    yield from (*use.inputs, *use.outputs, *(f"open {path}" for path in use.opened))
 
 
 def _figures(experiment: Experiment) -> dict[str, str]:

@@ -122,5 +122,5 @@ def _question(experiment: Experiment, options: dict[str, Any]) -> LinearQuestion
     asked = {key: options[key] for key in ("at", "inputs", "outputs", "opened")}
     if options["of"] is not None or (experiment.linear and not any(asked.values()) and asked["at"] is None):
         return of_deck(experiment, options["of"])
-    signals = (tuple(asked[key]) for key in ("inputs", "outputs", "opened"))
-    return LinearQuestion(experiment, asked["at"] or 0.0, *signals)
+    inputs, outputs, opened = (tuple(asked[key]) for key in ("inputs", "outputs", "opened"))
+    return LinearQuestion(experiment, asked["at"] or 0.0, inputs, outputs, opened)

@@ -62,9 +62,7 @@ def figure(found: Linearized) -> Any:
         first = len(rows) - len(found.outputs)
         for row, name in enumerate(found.outputs):
             _step(made.add_subplot(grid[first + row]), found, row, name, last=row == len(found.outputs) - 1)
-    made.suptitle(
-        f"{found.experiment} at t = {found.time:.6g} s, a period of {1e3 * found.seconds:g} ms", x=0.01, ha="left"
-    )
+    made.suptitle(f"{found.experiment} {found.where}, a period of {1e3 * found.seconds:g} ms", x=0.01, ha="left")
     return made
 
 

@@ -9,7 +9,9 @@ import numpy as np
 from met.backends.wasm.module import WasmModule
 from met.plan import REPEAT, Experiment
 from met.plan.outputs import metric_units
-from met.program.build import METRIC
+from met.program import plausible
+from met.program.build import METRIC, UNHELD
+from met.program.step import FAILURE
 from met.run import Prepared, inputs
 from met.version import VERSION
 
@@ -29,6 +31,7 @@ def described(prepared: Prepared, module: WasmModule) -> dict[str, Any]:
     inputs       of each the name, what it is (coordinate, repeat, seed); a value is shown as `value / scale` in `unit`
     columns      of each recorded number the channel, the signal that it is of, the SI unit
     metrics      of each the name, the SI unit, and its place among the outputs
+    failure      places among the outputs by which a case has failed (`METKernel.failed` in kernel.js reads them)
     requirements of each its text, its metric, and the comparison with a limit in SI
     cases        how many there are, and the inputs of the first ones, a list each
     """
@@ -50,12 +53,22 @@ def described(prepared: Prepared, module: WasmModule) -> dict[str, Any]:
             {"name": use.name, "unit": units[use.name], "output": outputs.index(METRIC + use.name)}
             for use in structure.metrics
         ],
+        "failure": {
+            "failure": outputs.index(FAILURE[0]),
+            "tick": outputs.index(FAILURE[2]),
+            "too_fast": _place(outputs, plausible.FAILED_TICK),
+            "unheld": _place(outputs, UNHELD),
+        },
         "requirements": [
             {"text": each.text, "metric": each.metric, "comparison": each.comparison, "limit": each.limit}
             for each in experiment.requirements
         ],
         "cases": {"count": experiment.cases.count, "inputs": inputs(experiment, rows).tolist()},
     }
+
+
+def _place(outputs: tuple[str, ...], name: str) -> int | None:
+    return outputs.index(name) if name in outputs else None
 
 
 def _inputs(experiment: Experiment) -> list[dict[str, Any]]:

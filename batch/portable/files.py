@@ -10,6 +10,7 @@ from batch.archive.read import ArchiveFile
 from batch.campaigns.choosing import experiments_named
 from batch.campaigns.plans import read_plan
 from batch.portable.description import FORMAT, described
+from batch.portable.page import GENERATOR
 from met.backends.wasm.module import compiled
 from met.diagnostic import Problem, error
 from met.frozen import frozen
@@ -92,6 +93,32 @@ def write(experiment: Experiment, output: Path) -> ModuleFiles:
     return ModuleFiles(output, beside, told)
 
 
+def check_page(output: Path) -> None:
+    """Refuse a place for a page before anything is computed. Raises Problem E474, E475."""
+    if output.suffix.lower() not in (".html", ".htm") and not output.is_dir():
+        helps = [f"`-o {quoted(output.with_suffix('.html'))}`"] if output.name else []
+        raise Problem(error("E475", f"cannot write {output}: pages are HTML files", help=helps))
+    try:
+        check_place(output, code="E474", inside=output / "view.html")
+        check_overwrite(output, _is_page, code="E474", because=" and was not written by `met view`")
+    except OSError as reason:
+        raise _cannot_write(output, reason, code="E474") from reason
+
+
+def write_page(text: str, output: Path) -> None:
+    """The page under its name, whole or not at all. Raises Problem E474."""
+    try:
+        with whole_file(output) as file:
+            file.write(text.encode())
+    except OSError as reason:
+        raise _cannot_write(output, reason, code="E474") from reason
+
+
+def _is_page(path: Path) -> bool:
+    with open_regular(path) as file:
+        return f'<meta name="generator" content="{GENERATOR}">'.encode() in file.read(400)
+
+
 def _is_module(path: Path) -> bool:
     with open_regular(path) as file:
         return file.read(4) == b"\0asm"
@@ -102,5 +129,5 @@ def _is_description(path: Path) -> bool:
         return f'"format": "{FORMAT}"'.encode() in file.read(100)
 
 
-def _cannot_write(path: Path, reason: OSError) -> Problem:
-    return cannot_write(path, reason, code="E470", help="`-o FILE` names another place")
+def _cannot_write(path: Path, reason: OSError, code: str = "E470") -> Problem:
+    return cannot_write(path, reason, code=code, help="`-o FILE` names another place")

@@ -21,9 +21,9 @@ def linear_lines(found: Linearized) -> Iterator[str]:
     """The answers in lines."""
     case = f", case #{found.case}" if found.case else ""
     states = count(len(found.states), "state")
-    yield f"{found.experiment}{case}: linear at t = {found.time:.6g} s, a period of {_time(found.seconds)}, {states}"
+    yield f"{found.experiment}{case}: linear {found.where}, a period of {_time(found.seconds)}, {states}"
     for name in found.held:
-        yield f"  {name} sticks, and is held"
+        yield f"  {name} {'is locked' if name in found.locked else 'sticks, and is held'}"
     for each in found.creeping:
         yield f"  {each.name} creeps at {abs(each.rate):.3g} {each.unit}: the answer holds for moves slower than that"
     for path in found.at_limit:
@@ -155,11 +155,13 @@ def as_data(found: Linearized) -> dict[str, Any]:
         "experiment": found.experiment,
         "case": found.case,
         "time": found.time,
+        "stands": found.stands,
         "period": found.seconds,
         "states": list(found.states),
         "inputs": list(found.inputs),
         "outputs": list(found.outputs),
         "held": list(found.held),
+        "locked": list(found.locked),
         "creeping": [{"name": each.name, "rate": each.rate} for each in found.creeping],
         "at_limit": list(found.at_limit),
         "poles": [pole(each) for each in found.poles],

@@ -32,7 +32,8 @@ def answered(question: LinearQuestion) -> list[Answer]:
 def case_lines(question: LinearQuestion, found: Sequence[Answer]) -> Iterator[str]:
     """The rows in lines: of each opened loop a table; of none, the least damped pole of each case."""
     name, cases = question.experiment.name, count(len(found), "case")
-    yield f"{name}: linear at t = {question.at:.6g} s, {cases}"
+    where = "where it stands still" if question.stands else f"at t = {question.at:.6g} s"
+    yield f"{name}: linear {where}, {cases}"
     several = [(path,) for path in question.opened] + ([question.opened] if len(question.opened) > 1 else [])
     for number_of, paths in enumerate(several):
         yield ""

@@ -7,7 +7,8 @@ A check that is outdated is killed. One that crashes takes nothing with it.
 
 On the socket, from the server, a byte each: `b"c"`, with two file descriptors, of a memory file that holds a pickled
 `CheckRequest` and of the pipe for the answers; or `b"s"`, which stops the check that runs, as the next one does too.
-The answers are pickled, each behind its length: a `CheckReply`; or a `Crash`.
+The answers are pickled, each behind its length: a `CheckReply`, then a `DeckIndex`
+where the deck could be compiled; or a `Crash`.
 """
 
 from __future__ import annotations
@@ -19,12 +20,15 @@ import signal
 import socket
 import sys
 
-from ic.editor.checking import CheckRequest, answer, check_reply
+from ic.editor.checking import CheckRequest, answer, compiled_with_reply
 
 
 def _warm_up() -> None:
     """Import what a check imports, by a check; what is there from now on is shared by all children."""
-    check_reply(CheckRequest(os.getcwd(), "", "#include <two_link.ic>\n", (), (), {}))
+    from ic.editor.index import index_of
+
+    compiled, _ = compiled_with_reply(CheckRequest(os.getcwd(), "", "#include <two_link.ic>\n", (), (), {}))
+    index_of(compiled)
     gc.collect()
     gc.freeze()
 

@@ -27,11 +27,12 @@ class CheckerProcess:
         if self._process is not None and self._process.poll() is None:
             return
         self.close()
+        folders = filter(None, os.environ.get("MET_DECK_PATH", "").split(os.pathsep))  # checks run in their decks' own
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(
                 interpreter.command("ic.editor.checker", str(theirs.fileno())),
-                env=interpreter.environment(),
+                env={**interpreter.environment(), "MET_DECK_PATH": os.pathsep.join(map(os.path.abspath, folders))},
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
                 stdout=2,  # standard output is the editor's: nothing but the protocol may go there

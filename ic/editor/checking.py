@@ -7,10 +7,14 @@ import pickle
 import struct
 import traceback
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from met.diagnostic import Diagnostic
 from met.frozen import frozen
 from met.messages.edits import Edit
+
+if TYPE_CHECKING:
+    from ic.driver.compile import Compiled
 
 LENGTH = struct.Struct("!Q")
 """The length of a pickled answer, which stands before it."""
@@ -59,13 +63,18 @@ def answer(request: CheckRequest, out: int) -> None:
     """Check, and write what there is to say into the file descriptor."""
     os.chdir(request.folder)
     try:
-        _send(out, check_reply(request))
+        compiled, reply = compiled_with_reply(request)
+        _send(out, reply)
+        if compiled.plan is not None:
+            from ic.editor.index import index_of
+
+            _send(out, index_of(compiled))
     except Exception:
         _send(out, Crash(traceback.format_exc()))
 
 
-def check_reply(request: CheckRequest) -> CheckReply:
-    """The reply to a request, made in this process."""
+def compiled_with_reply(request: CheckRequest) -> tuple[Compiled, CheckReply]:
+    """A deck compiled, and the reply to the request, made in this process."""
     from ic.driver.compile import check
     from met.messages.edits import edits
 
@@ -78,7 +87,8 @@ def check_reply(request: CheckRequest) -> CheckReply:
         unsaved=request.unsaved,
     )
     found = compiled.diagnostics
-    return CheckReply(found, tuple(tuple(edits(each, compiled.sources)) for each in found), dict(compiled.sources))
+    beside = tuple(tuple(edits(each, compiled.sources)) for each in found)
+    return compiled, CheckReply(found, beside, dict(compiled.sources))
 
 
 def _send(out: int, answer: object) -> None:

@@ -15,8 +15,12 @@ from collections.abc import Callable, Iterable
 
 from ic.editor.checker_process import CheckerProcess
 from ic.editor.checking import CheckReply, CheckRequest, Crash
+from ic.editor.index import DeckIndex
 from ic.editor.positions import file_named, path_of
 from met.frozen import frozen
+
+NO_DECKS = (".csv", ".urdf")
+"""The endings of files that decks name and that are none."""
 
 PAUSE = 0.04
 """Seconds without a change before a check begins."""
@@ -74,6 +78,7 @@ class Checks:
         self.texts: dict[str, OpenText] = {}
         self.checked: dict[str, CheckedDeck] = {}
         self._stale: dict[str, None] = {}  # addresses of decks to be checked, in the order of changes
+        self.indexes: dict[str, DeckIndex] = {}  # of each deck, when it could last be compiled
         self._failed: set[str] = set()  # decks whose last check has died; nothing is known of what they are now
         self._running: str | None = None
         self._outdated = False
@@ -96,6 +101,7 @@ class Checks:
         """An editor has closed a text: its file counts again."""
         self.texts.pop(uri, None)
         self.checked.pop(uri, None)
+        self.indexes.pop(uri, None)
         self._stale.pop(uri, None)
         self.all_changed()
         self._tell(self.decks())
@@ -104,6 +110,10 @@ class Checks:
         """Check all decks anew: files may have changed that no editor has open."""
         for uri in self.texts:
             self._make_stale(uri)
+
+    def unsaved(self) -> dict[str, str]:
+        """The open texts that are of files, by the files' real paths."""
+        return {each.identity: each.text for each in self.texts.values() if each.path is not None}
 
     def deck_of(self, uri: str) -> CheckedDeck | None:
         """The deck that a text is part of, as it was last checked."""
@@ -159,6 +169,8 @@ class Checks:
         roots = []
         order = list(self.texts)
         for n, uri in enumerate(order):
+            if uri.endswith(NO_DECKS):
+                continue
             identity = self.texts[uri].identity
             for m, other in enumerate(order):
                 includes = other != uri and other in self.checked and identity in self.checked[other].files
@@ -188,7 +200,7 @@ class Checks:
             deck.text if deck.path is None else None,
             self.include_dirs,
             self.defines,
-            {each.identity: each.text for each in texts.values() if each.path is not None},
+            self.unsaved(),
         )
         self._running, self._outdated = uri, False
         self._stale.pop(uri, None)
@@ -213,6 +225,8 @@ class Checks:
                 f"{deck.path or deck.uri}:\n{answer.traceback}"
             )
             self._failed.add(deck.uri)
+        if isinstance(answer, DeckIndex):
+            self.indexes[deck.uri] = answer
         if not isinstance(answer, CheckReply):
             return
         paths = (file_named(name, request.folder) for name in answer.sources)

@@ -11,6 +11,7 @@ from typing import Any
 from lsprotocol import types
 from pygls.lsp.server import LanguageServer
 
+from ic.editor.answers import Asked
 from ic.editor.checker_process import CheckerProcess
 from ic.editor.checks import CheckedDeck, Checks, OpenText
 from ic.editor.fixes import QuickFix, actions, quick_fixes
@@ -133,6 +134,11 @@ class DeckServer(LanguageServer):
 
         return position
 
+    def asked(self, parameters: types.TextDocumentPositionParams | Any) -> Asked:
+        """The position that a request is about."""
+        codec = self.workspace.position_codec
+        return Asked(self.checks, codec, self.address, parameters.text_document.uri, parameters.position)
+
     def publish(self, decks: Iterable[CheckedDeck]) -> None:
         """Tell the editor what is wrong in which file, where that is another than it knows."""
         found: dict[str, list[types.Diagnostic]] = {}
@@ -213,6 +219,24 @@ def make(include_dirs: Sequence[str] = (), defines: Sequence[str] = ()) -> DeckS
     @server.feature(types.TEXT_DOCUMENT_FOLDING_RANGE)
     def folding_range(parameters: types.FoldingRangeParams) -> list[types.FoldingRange]:
         return folds(server.text(parameters.text_document.uri))
+
+    @server.feature(
+        types.TEXT_DOCUMENT_COMPLETION, types.CompletionOptions(trigger_characters=[".", "<", '"', "#", "="])
+    )
+    def complete(parameters: types.CompletionParams) -> list[types.CompletionItem]:
+        return server.asked(parameters).complete()
+
+    @server.feature(types.TEXT_DOCUMENT_HOVER)
+    def hover(parameters: types.HoverParams) -> types.Hover | None:
+        return server.asked(parameters).hover()
+
+    @server.feature(types.TEXT_DOCUMENT_DEFINITION)
+    def definition(parameters: types.DefinitionParams) -> list[types.Location]:
+        return server.asked(parameters).definitions()
+
+    @server.feature(types.TEXT_DOCUMENT_REFERENCES)
+    def references(parameters: types.ReferenceParams) -> list[types.Location]:
+        return server.asked(parameters).references(parameters.context.include_declaration)
 
     @server.feature("met/settled")
     async def settled(parameters: None) -> bool:

@@ -69,6 +69,11 @@ class TextDirective:
         return self.tokens[1].text if len(self.tokens) > 1 else ""
 
 
+def _is_call(words: list[Token]) -> bool:
+    """True for `NAME(...)` and nothing else."""
+    return len(words) > 2 and words[1].text == "(" and words[-1].text == ")" and words[0].kind == NAME
+
+
 class DeckText:
     """A text with its tokens, entries and preprocessor lines."""
 
@@ -104,6 +109,9 @@ class DeckText:
                     self._end(around, token.end, True)
                     around = around.within
                 continue
+            if entry is not None and not rounds and token.kind == NAME and _is_call(entry.words):
+                self._end(entry, entry.words[-1].end, True)  # a macro's, that stands alone
+                entry = None
             if entry is None:
                 if text == ";":
                     continue

@@ -128,7 +128,7 @@ def _unit(parser: Expressions, at: int, before: RowPiece) -> int:
     over = None
     if token.kind == WHOLE and token.text == "1" and following.text == "/":
         over = parser.unit_factor(at + 2, -1, 0)
-    if over is None and not ((token.kind == NAME or token.text == "%") and units.is_unit(token.text)):
+    if over is None and not ((token.kind == NAME or token.text == "%") and token.text in units.ALL_UNITS):
         return 0
     if before.kind == "name" and following.text not in ("*", "/", "^"):  # a macro's name, perhaps: `TEETH V*s/rad`
         return 0

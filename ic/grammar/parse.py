@@ -16,6 +16,7 @@ import re
 from collections.abc import Sequence
 from contextlib import suppress
 from itertools import takewhile
+from typing import NoReturn
 
 from ic.grammar.cursor import OPENING, SHOWN, EndedInsideBlock, Unreadable, span, token_in_words
 from ic.grammar.loops import Loops
@@ -144,7 +145,7 @@ class _Parser(Loops):
                 self.misindented = (opening, closing)
         return tuple(body)
 
-    def never_closed(self) -> None:
+    def never_closed(self) -> NoReturn:
         also = [Label(self.behind(self.previous), "the deck ends here")]
         opening = self.open[-1]
         if self.misindented is not None:

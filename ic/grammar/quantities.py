@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import cached_property
 
 from ic.grammar.cursor import Cursor, span
 from ic.grammar.syntax import Expression, Number, Unit, Word
@@ -60,7 +61,8 @@ class Quantities(Cursor):
         if token.kind == WHOLE and token.text == "1" and self.following.text == "/":
             over = self.unit_factor(self.at + 2, -1, 0)
             named = self.tokens[self.at + 2]
-            if over is None and named.kind == NAME and not units.is_unit(named.text) and not self.on_new_line(self.at):
+            named_unit = self.reads_as_unit(self.at + 2)
+            if over is None and named.kind == NAME and not named_unit and not self.on_new_line(self.at):
                 self.fail(
                     "D028",
                     f"`{named.text}` is not a unit",
@@ -71,7 +73,7 @@ class Quantities(Cursor):
             return None
         if self.begins_entry(self.at) or self.is_word_of_requirement():
             return None
-        if over is None and token.text != "(" and not units.is_unit(token.text):
+        if over is None and token.text != "(" and not self.reads_as_unit(self.at, first=True):
             self.unknown_unit()
             return None
         start = self.at
@@ -93,6 +95,31 @@ class Quantities(Cursor):
         taken = self.tokens[start : self.at]
         return Unit(tuple(factors), span(taken[0], taken[-1]), "".join(t.text for t in taken))
 
+    def reads_as_unit(self, at: int, *, first: bool = False) -> bool:
+        """Return True if the name at token `at`, which stands behind a number or a unit, is one.
+
+        first  it stands behind the number, where no other name may stand
+        """
+        name = self.tokens[at].text
+        if name not in units.FURTHER_UNITS:
+            return units.is_unit(name)
+        if first:
+            return not self.on_new_line(at) and self.tokens[at + 1].text not in ("=", "+=", "{", "(")
+        return name not in self.names_of_units
+
+    @cached_property
+    def names_of_units(self) -> frozenset[str]:
+        """Names of further units that the deck uses for something else: they stand where no unit can stand."""
+        pairs = zip(self.tokens, self.tokens[1:], strict=False)
+        return frozenset(
+            token.text
+            for before, token in pairs
+            if token.text in units.FURTHER_UNITS
+            and token.kind == NAME
+            and before.kind not in NUMBERS
+            and before.text not in ("*", "/", "(", ")", "]")
+        )
+
     def is_word_of_requirement(self) -> bool:
         """Return True at `in 99 %`, `of cases`, `with 90 %` or `confidence`, of which none is a unit."""
         text, following = self.token.text, self.following
@@ -104,7 +131,7 @@ class Quantities(Cursor):
         self, at: int, sign: int, depth: int, first: tuple[list[tuple[Word, int]], int] | None = None
     ) -> tuple[list[tuple[Word, int]], int] | None:
         """Factors from token `at` on, and the token behind them; None where no unit begins there. first: was read."""
-        first = self.unit_factor(at, sign, depth) if first is None else first
+        first = self.unit_factor(at, sign, depth, first=at == self.at) if first is None else first
         if first is None:
             return None
         factors, at = first
@@ -116,14 +143,18 @@ class Quantities(Cursor):
             at = more[1]
         return factors, at
 
-    def unit_factor(self, at: int, sign: int, depth: int) -> tuple[list[tuple[Word, int]], int] | None:
+    def unit_factor(
+        self, at: int, sign: int, depth: int, *, first: bool = False
+    ) -> tuple[list[tuple[Word, int]], int] | None:
         token = self.tokens[at]
         if token.text == "(" and depth < _UNIT_DEPTH:
             inner = self.unit_product(at + 1, sign, depth + 1)
             if inner is None or self.tokens[inner[1]].text != ")":
                 return None
             factors, at = inner[0], inner[1] + 1
-        elif units.is_unit(token.text) and token.kind != STRING and self.tokens[at + 1].text not in ("{", "."):
+        elif (
+            token.kind != STRING and self.tokens[at + 1].text not in ("{", ".") and self.reads_as_unit(at, first=first)
+        ):
             factors, at = [(Word(token.text, token.place), sign)], at + 1
         else:
             return None
@@ -146,7 +177,7 @@ class Quantities(Cursor):
 
     def not_a_second_unit(self, start: int) -> None:
         token = self.token
-        if token.kind == NAME and units.is_unit(token.text) and not self.on_new_line(self.at):
+        if token.kind == NAME and token.text in units.ALL_UNITS and not self.on_new_line(self.at):
             written = "".join(t.text for t in self.tokens[start : self.at])
             helps = self.write(f"{written}*{token.text}", self.tokens[start], token)
             self.fail("D030", "units are multiplied with `*`", token, help=helps)
@@ -161,7 +192,7 @@ class Quantities(Cursor):
         near = other_units.suggest(named.text)
         if (
             near
-            and named.text not in ("n", "k", "v", "M", "S")
+            and named.text not in ("n", "k", "v", "M", "S", *self.names_of_units)
             and self.tokens[self.at + 2].text in (";", ",", ")", "]")
         ):
             # `rad/sec`: said here, since after a unit this is what was meant more often than a name of one's own
@@ -214,4 +245,4 @@ class Quantities(Cursor):
 
 
 def _units_known() -> str:
-    return "the units: " + ", ".join(units.UNITS)
+    return "the units: " + ", ".join(units.ALL_UNITS)

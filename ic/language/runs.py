@@ -117,7 +117,8 @@ LINEAR = BlockDeclaration(
     "of them.",
     entries=(
         Entry(name="at", written="at = 2 s;", default="0 s", parameter=LINEAR_AT,
-              doc="the instant: the last begin of a period up to it counts"),
+              doc="the instant: the last begin of a period up to it counts; or `equilibrium(q = [30, -60] deg)`: "
+                  "where the arm stands still in this pose, without `q` in that of the run's begin"),
         Entry(name="inputs", written="inputs = pan.servo.command;", default="none",
               doc="columns of B: commands of servos that tick, and what their laws put out; one, or a list"),
         Entry(name="outputs", written="outputs = [pan.q, tau];", default="none",

@@ -386,7 +386,7 @@ def _linear(experiment: Experiment) -> Iterator[str]:
     for use in experiment.linear:
         parts = [("of", use.inputs), ("to", use.outputs), ("open at", use.opened)]
         told = "; ".join(f"{word} {', '.join(paths)}" for word, paths in parts if paths)
-        rows.append((use.name, f"at {use.at:.9g} s", told))
+        rows.append((use.name, use.where, told))
     yield from columns(rows)
 
 

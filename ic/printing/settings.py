@@ -66,11 +66,15 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
     number("duration", schedule.duration, "s", f"{schedule.ticks} base ticks")
     word("record", ", ".join(recorded.name for recorded in structure.record) or "none")
     number("seed", float(experiment.cases.seed), "1")
-    for use in experiment.linear:
-        number(f"linear.{use.name}.at", use.at, "s")
-        for key, paths in (("inputs", use.inputs), ("outputs", use.outputs), ("open", use.opened)):
+    for asked in experiment.linear:
+        head = f"linear.{asked.name}"
+        if asked.pose is None:
+            number(f"{head}.at", asked.at, "s")
+        else:
+            word(f"{head}.at", "equilibrium", asked.place)
+        for entry, paths in (("inputs", asked.inputs), ("outputs", asked.outputs), ("open", asked.opened)):
             if paths:
-                word(f"linear.{use.name}.{key}", ", ".join(paths), use.place)
+                word(f"{head}.{entry}", ", ".join(paths), asked.place)
     for metric in experiment.metrics:
         word(f"metrics.{metric.name}.model", metric.model, metric.place)
         word(f"metrics.{metric.name}.of", metric.of, metric.place)

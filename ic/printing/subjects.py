@@ -162,7 +162,7 @@ def unit_table() -> list[dict[str, Any]]:
     """Every unit: its name, its word, and what one of it is in SI."""
     return [
         {"name": name, "word": unit.word, "scale": unit.measure.scale, "si": units.text(unit.measure.dimension)}
-        for name, unit in units.UNITS.items()
+        for name, unit in units.ALL_UNITS.items()
     ]
 
 

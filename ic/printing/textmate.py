@@ -145,7 +145,7 @@ def _preprocessor() -> dict[str, Any]:
 
 def _unit() -> str:
     """A unit, with brackets one deep, as they are written: `N*m/(rad/s)^2`."""
-    letters = _any(name for name in units.UNITS if name.isalpha())
+    letters = _any(name for name in units.ALL_UNITS if name.isalpha())
     one = rf"(?:{letters}(?![A-Za-z0-9_])(?!\s*[.{{])(?:\s*\^\s*(?:-?[0-9]|\(\s*-?[0-9]\s*\)))?|%)"
     joined = rf"{one}(?:\s*[*/]\s*{one})*"
     bracket = rf"\(\s*{joined}\s*\)(?:\s*\^\s*-?[0-9])?"

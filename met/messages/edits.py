@@ -63,7 +63,13 @@ def _edit(change: TextChange, place: Place, sources: Mapping[str, str]) -> Edit 
     found = _stretch(change, text, (line_at, line_end), min(first, line_end), last)
     if found is None or text[found[0] : found[1]] == found[2]:  # what stands there is what would be written
         return None
+    if any(turn.macro in _names(text[found[0] : found[1]]) - _names(found[2]) for turn in place.turns):
+        return None  # it would be of this turn alone
     return _between(place.file, starts, *found)
+
+
+def _names(text: str) -> set[str]:
+    return set(re.findall(r"[A-Za-z_]\w*", text))
 
 
 def _stretch(

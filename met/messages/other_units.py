@@ -29,7 +29,7 @@ _SAME: Mapping[str, str] = MappingProxyType({
     "newton": "N", "newtons": "N", "watt": "W", "watts": "W", "joule": "J", "joules": "J", "kgs": "kg", "KG": "kg",
     "Kg": "kg", "gram": "g", "grams": "g", "tonnes": "t", "percent": "%", "pct": "%", "v": "V", "mv": "mV", "n": "N",
     "M": "m", "MM": "mm", "VA": "W", "coulomb": "A*s", "coulombs": "A*s", "Wb": "V*s", "weber": "V*s", "degK": "K",
-    "asec": "arcsec", "amin": "arcmin",
+    "asec": "arcsec", "amin": "arcmin", "in": "inch", "inches": "inch", "foot": "ft", "feet": "ft",
 })  # fmt: skip
 
 _SIZES: Mapping[str, int] = MappingProxyType({
@@ -45,8 +45,6 @@ _PREFIXED: Mapping[str, tuple[str, int]] = MappingProxyType(
 """Units that take prefixes, as units of the table and a power of ten."""
 
 _OTHERS: Mapping[str, tuple[str, str, str]] = MappingProxyType({
-    "in": ("an inch", "0.0254", "m"), "inch": ("an inch", "0.0254", "m"), "inches": ("an inch", "0.0254", "m"),
-    "ft": ("a foot", "0.3048", "m"), "foot": ("a foot", "0.3048", "m"), "feet": ("a foot", "0.3048", "m"),
     "yd": ("a yard", "0.9144", "m"), "mil": ("a thousandth of an inch", "2.54e-5", "m"),
     "thou": ("a thousandth of an inch", "2.54e-5", "m"), "mi": ("a mile", "1609.344", "m"),
     "mile": ("a mile", "1609.344", "m"), "miles": ("a mile", "1609.344", "m"), "nmi": ("a nautical mile", "1852", "m"),
@@ -63,7 +61,7 @@ _OTHERS: Mapping[str, tuple[str, str, str]] = MappingProxyType({
     "kip": ("a thousand pounds of force", "4448.2216152605", "N"), "ksi": ("a thousand psi", "6894757.293168", "Pa"),
     **dict.fromkeys(("g0", "gee", "gn"), ("standard gravity", "9.80665", "m/s^2")),
     "slug": ("a slug", "14.59390294", "kg"), "ton": ("a ton of 2000 pounds", "907.18474", "kg"),
-    "tons": ("a ton of 2000 pounds", "907.18474", "kg"), "lbf": ("a pound of force", "4.4482216152605", "N"),
+    "tons": ("a ton of 2000 pounds", "907.18474", "kg"),
     "ozf": ("an ounce of force", "0.27801385095378125", "N"), "kgf": ("a kilogram of force", "9.80665", "N"),
     "kp": ("a kilogram of force", "9.80665", "N"), "gf": ("a gram of force", "9.80665e-3", "N"),
     "dyn": ("a dyne", "1e-5", "N"), "psi": ("a pound of force on a square inch", "6894.757293168", "Pa"),

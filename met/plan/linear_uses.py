@@ -24,6 +24,8 @@ class LinearUse:
     inputs   channels of servos that tick: commands, outputs of laws
     outputs  what can be recorded
     opened   outputs of laws, at which loops are opened: each by itself, and all at once
+    pose     rad (m), of each moving joint: where the arm is to stand still, in place of the instant; none of them:
+             where the run begins. None: it is as the run has it at the instant
     """
 
     name: str
@@ -31,7 +33,13 @@ class LinearUse:
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     opened: tuple[str, ...] = ()
+    pose: tuple[float, ...] | None = None
     place: Place | None = keyed("never", default=None)
+
+    @property
+    def where(self) -> str:
+        """Where the answers are, in words: `at 2 s`, `at equilibrium`."""
+        return f"at {self.at:.9g} s" if self.pose is None else "at equilibrium"
 
 
 @frozen
@@ -76,12 +84,13 @@ WHY_ANSWER = "linear:"
 """Before the name of a `LinearUse`: the output that says why a case has no answer, a key of `WHY_NONE`; 0 where it
 has one."""
 
-ANSWERED, NOT_ASKED, EVENT, OPEN, SEVERAL_TICKS = range(5)
+ANSWERED, NOT_ASKED, EVENT, OPEN, SEVERAL_TICKS, NO_EQUILIBRIUM = range(6)
 
 WHY_NONE: Mapping[int, str] = {
     NOT_ASKED: "it is not computed of a case that is driven on beds, or run by itself",
     EVENT: "an event is in the period there",
     OPEN: "nothing comes back where the loop is opened, as its joint is held, or its law at its limit",
     SEVERAL_TICKS: "its law ticks several times in a period, and has no phase, delay or disk of one rate",
+    NO_EQUILIBRIUM: "its servos cannot hold it there, or something moves that no servo holds",
 }
 """Reasons for which a case has no answer, in words."""

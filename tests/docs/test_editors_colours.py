@@ -61,7 +61,7 @@ def test_every_piece_of_a_standard_deck_has_a_scope_and_numbers_and_comments_hav
 
 
 def test_what_units_are_is_coloured_as_one() -> None:
-    for unit in units.UNITS:
+    for unit in units.ALL_UNITS:
         assert scopes(f"let a = 3 {unit};")[unit] == "keyword.other.unit"
     for unit in ("V*s/rad", "N*m/(rad/s)", "kg*m^2", "s^-1", "1/s", "rad/s^2"):
         assert scopes(f"let a = 3 {unit};")[unit] == "keyword.other.unit", unit

@@ -35,7 +35,7 @@ def test_the_page_shows_what_is_printed(tmp_path: Path) -> None:
     for name, text in decks:
         (tmp_path / name).write_text(text)
     consoles = re.findall(r"```console\n(.*?)```", PAGE, re.DOTALL)
-    assert [name for name, _ in decks] == ["hand.ic", "firm.ic"] and len(consoles) == 8
+    assert [name for name, _ in decks] == ["hand.ic", "firm.ic", "up.ic"] and len(consoles) == 10
     for console in consoles:
         lines = console.splitlines(keepends=True)
         commands = [line.removeprefix("$ met ") for line in lines if line.startswith("$ met ")]

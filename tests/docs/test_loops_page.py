@@ -13,6 +13,7 @@ import ic
 from ic.formatting.formatter import formatted
 from met.plan import Experiment
 from met.plan.keys import structure_key
+from tests.oracles.random_deck import random_loops
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "loops.md").read_text(encoding="utf-8")
@@ -85,6 +86,15 @@ def test_seven_joints_of_a_loop_are_those_of_a_list_of_macro_calls(tmp_path: Pat
     of_loop, of_macros = (experiment(tmp_path, name, DECKS[name]) for name in ("seven_loop.ic", "seven_macros.ic"))
     assert len(of_loop.structure.joints) == 7
     assert same(of_loop, of_macros)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_random_deck_of_loops_is_the_same_deck_without(tmp_path: Path, seed: int) -> None:
+    one, other = (
+        experiment(tmp_path, name, text) for name, text in zip(("a.ic", "b.ic"), random_loops(seed), strict=True)
+    )
+    assert same(one, other)
+    assert one.requirements and [each.text for each in one.requirements] == [each.text for each in other.requirements]
 
 
 @pytest.mark.slow

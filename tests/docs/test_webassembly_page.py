@@ -28,10 +28,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captu
     """A folder with the page's deck, in which its command was run."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "quick.ic").write_text(shown("quick.ic"), encoding="utf-8")
-    console = re.search(r"```console\n\$ met (.*?)\n(.*?)```", PAGE, re.DOTALL)
-    assert console is not None
-    assert cli.main(console[1].split()) == 0
-    assert re.sub(r"\([\d.]+ KiB\)", "(SIZE)", capsys.readouterr().out) == console[2]
+    consoles = re.findall(r"```console\n(.*?)```", PAGE, re.DOTALL)
+    assert len(consoles) == 2
+    for console in consoles:
+        said = [line for line in console.splitlines(keepends=True) if not line.startswith("$")]
+        for command in re.findall(r"^\$ met (.*)", console, re.MULTILINE):
+            assert cli.main(command.split()) == 0
+        assert re.sub(r"\([\d.]+ KiB\)", "(SIZE)", capsys.readouterr().out) == "".join(said)
     return tmp_path
 
 

@@ -14,6 +14,72 @@ GEARBOX = """servo {name} {{
 """
 
 
+def random_loops(seed: int) -> tuple[str, str]:
+    """A deck with loops, lists by index and names taken together, and one of the same meaning without; each has a run.
+
+    Chains of 1 to 4 links on each of 1 to 3 sides, revolute or prismatic, of which some joints have servos.
+    """
+    pick = random.Random(seed)
+    sides = pick.sample(["left", "right", "mid"], pick.randint(1, 3))
+    count, first = pick.randint(1, 4), pick.randint(-1, 3)
+    lengths = [round(pick.uniform(0.2, 0.9), 3) for _ in range(count)]
+    masses = pick.choice([f"(5 + i * {pick.randint(1, 3)}) kg", "2.5 kg"])
+    kind = pick.choice(["revolute", "prismatic"])
+    unit = "rad" if kind == "revolute" else "m"
+    last, step = first + count - 1, pick.choice([1, -1])
+    shift = 1 - first  # names count from 1
+    turns = [first + n for n in range(count)]
+    link = "link {name} {{ mass = {mass};  shape = rod(length = {length}, along = x); }}"
+    joint = "joint {name} " + kind + " {{ parent = {parent};  child = {child};  axis = z;  at = {at}; }}"
+    with_loops, without = [], []
+    with_loops.append(f"for i in {first} .. {last} {{ for side in [{', '.join(sides)}] {{")
+    with_loops.append(link.format(name=f"{{side}}_{{i+{shift}}}", mass=masses, length=f"lengths[i + {shift - 1}]"))
+    with_loops.append("} }")
+    for i in turns:
+        for side in sides:
+            mass = masses.replace("i *", f"{i} *")
+            without.append(link.format(name=f"{side}_{i + shift}", mass=mass, length=f"{lengths[i - first]} m"))
+    with_loops.append(f"for side in [{', '.join(sides)}] {{")
+    with_loops.append(joint.format(name="j_{side}_1", parent="base", child="{side}_1", at="[0 m, 0 m, 0 m]"))
+    with_loops.append(f"for n in 2 .. {count} {{")
+    with_loops.append(
+        joint.format(
+            name="j_{side}_{n}", parent="{side}_{n-1}", child="{side}_{n}", at="[lengths[n - 2], 0 m, (n * 5) cm]"
+        )
+    )
+    with_loops.append("} }")
+    for side in sides:
+        without.append(joint.format(name=f"j_{side}_1", parent="base", child=f"{side}_1", at="[0 m, 0 m, 0 m]"))
+        for n in range(2, count + 1):
+            at = f"[{lengths[n - 2]} m, 0 m, {n * 5} cm]"
+            parent, child = f"{side}_{n - 1}", f"{side}_{n}"
+            without.append(joint.format(name=f"j_{side}_{n}", parent=parent, child=child, at=at))
+    joints = [f"j_{side}_{n}" for side in sides for n in range(1, count + 1)]
+    own = pick.sample(joints, pick.randint(0, len(joints) - 1))
+    order = range(count, 0, -1) if step < 0 else range(1, count + 1)
+    ends = f"{count} .. 1 by -1" if step < 0 else f"1 .. {count}"
+    peaks = "metric peak_{0} = max {{ of = j_{1}_{0}.q; }} require peak_{0} < {0} {2};"
+    run = "rates {{ dynamics = 500 Hz;  servos = 250 Hz;  record = 50 Hz; }} duration = 0.2 s;  record = [q]; {}"
+    servo = f"servo {{}} {{{{ model = ideal;  bandwidth = 20 1/s;  command = rate({{}} {unit}/s); }}}}"
+    servos = [servo.format("one", 0.1), servo.format("two", 0.2)]
+    start = f"0.1 {unit}"
+    looped = peaks.format("{n}", sides[0], unit).replace("{n} " + unit, f"n {unit}")
+    named = f"[{', '.join(own)}]"
+    two, begun = (f"{named} = two;", f"{named}.q = {start};") if own else ("", "")
+    one = "\n".join([
+        f"let lengths = [{', '.join(map(str, lengths))}] m;", *servos, "arm made {", *with_loops, "}",
+        f"run it {{ arm = made;  servos {{ * = one;  {two} }}",
+        f"initial {{ {begun} }}", run.format(f"for n in {ends} {{ {looped} }}"), "}", "",
+    ])  # fmt: skip
+    uses = " ".join(f"{each} = {'two' if each in own else 'one'};" for each in joints)
+    begins = " ".join(f"{each}.q = {start};" for each in own)
+    other = "\n".join([
+        *servos, "arm made {", *without, "}", f"run it {{ arm = made;  servos {{ {uses} }} initial {{ {begins} }}",
+        run.format(" ".join(peaks.format(n, sides[0], unit) for n in order)), "}", "",
+    ])  # fmt: skip
+    return one, other
+
+
 def random_deck(seed: int, *, friction: bool = True) -> str:
     """A deck with one run; the same text for the same seed.
 

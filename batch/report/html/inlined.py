@@ -31,9 +31,15 @@ def style() -> str:
 
 @cache
 def script() -> str:
-    """All scripts, after the licence that uPlot's wants to go with it."""
+    """All scripts, in their order."""
+    return licensed(*SCRIPTS)
+
+
+@cache
+def licensed(*names: str) -> str:
+    """Scripts of these names, after the licence that uPlot's wants to go with it."""
     licence = (FOLDER / "uPlot.LICENSE").read_text(encoding="utf-8").strip()
-    parts = (_read(name) for name in SCRIPTS)
+    parts = (_read(name) for name in names)
     return "\n".join([f"/*! uPlot:\n{licence}\n*/", *parts])
 
 

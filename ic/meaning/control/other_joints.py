@@ -12,21 +12,22 @@ from met.diagnostic import leave_out
 
 
 def with_other_joints(body: MergedBlock, arm: ResolvedArm, complaints: Complaints) -> MergedBlock:
-    """The servos with an entry for each joint that moves, where `*` stands for those that have none.
+    """The servos, with an entry for each joint that moves, in the arm's order; `*` stands for those that have none.
 
     An entry that only changes its servo, `lift { kp = ...; }`, changes that of `*`.
     """
     every = body.get(EVERY_JOINT)
     if every is None:
         return body
-    items = {key: item for key, item in body.items.items() if item is not every}
-    used = False
+    others = {key: item for key, item in body.items.items() if item is not every}
+    items, used = {}, False
     for joint in arm.moving:
-        own = items.get(joint.name)
-        if own is not None and own.value is not None:
-            continue
-        used = True
-        items[joint.name] = replace(every, name=joint.name) if own is None else _changed(every, own, complaints)
+        own = others.pop(joint.name, None)
+        if own is None:
+            items[joint.name] = replace(every, name=joint.name)
+        else:
+            items[joint.name] = own if own.value is not None else _changed(every, own, complaints)
+        used = used or own is None or own.value is None
     if not used and arm.moving and not arm.failed:
         complaints.remark(
             "D287",
@@ -34,7 +35,7 @@ def with_other_joints(body: MergedBlock, arm: ResolvedArm, complaints: Complaint
             every.place,
             help=leave_out("leave it out"),
         )
-    return replace(body, items=items)
+    return replace(body, items={**items, **others})
 
 
 def _changed(every: Item, own: Item, complaints: Complaints) -> Item:

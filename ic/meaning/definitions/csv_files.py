@@ -265,7 +265,7 @@ def _meaning(column: CsvColumn, remedy: str, also: Iterable[Label], dimension: D
         near = suggest(column.unit)
         if near is not None and (dimension is None or units.same(parse_unit(near).dimension, dimension)):
             remedy = write(near, f"did you mean `{column.name} [{near}]`?", old=column.unit)
-        known = remedy or f"the units: {', '.join(units.UNITS)}"
+        known = remedy or f"the units: {', '.join(units.ALL_UNITS)}"
         raise Problem(error("D193", f"`{column.unit}` is not a unit", column.place, also=also, help=known)) from None
 
 

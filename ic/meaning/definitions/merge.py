@@ -423,7 +423,10 @@ def defined_twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnos
         once = "its file is included twice: begin that file with `#pragma once`"
         helps = [write("#pragma once\n", once, at=Place(place.file, 1, 1, 0), where="before")]
         if place.turns != earlier.turns:
-            helps = [f"each turn writes it: name it by the index, as in `{name}_{{{place.turns[0].macro}}}`"]
+            index = place.turns[0].macro
+            helps = [f"each turn writes it: name it by the index, as in `{name}_{{{index}}}`"]
+            if not kind:
+                helps = [f"each turn writes it: put the loop inside, `{name} {{ for {index} in ... {{ ... }} }}`"]
         elif place.macros and place.expansions != earlier.expansions:
             helps = [
                 f"macro `{place.macros[-1].macro}` is used twice here: give it the name as an argument, "

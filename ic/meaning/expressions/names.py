@@ -161,7 +161,7 @@ class Names:
         helps = list(did_you_mean(name.text, (*self.definitions.lets, *CONSTANTS)))
         if name.text in FUNCTIONS:
             helps = [f"`{name.text}` is a function: write `{name.text}(...)`"]
-        elif not rest and units.is_unit(first):
+        elif not rest and first in units.ALL_UNITS:
             helps = [f"`{first}` is a unit: it follows a number, or closing brackets"]
         elif not helps and rest:
             helps = ["a value names a `let`, or what a servo's definition writes, such as `SERVO.kp`"]

@@ -46,7 +46,7 @@ class ValueList:
 def measure_of(unit: Unit) -> units.Measure:
     """The measure of a unit. Raises D074 where a factor is no unit."""
     for word, _ in unit.factors:
-        if not units.is_unit(word.text):
+        if word.text not in units.ALL_UNITS:
             raise Problem(error("D074", f"`{word.text}` is not a unit", word.place, help=other_units.remedy(word.text)))
     try:
         measure = units.measure((word.text, exponent) for word, exponent in unit.factors)

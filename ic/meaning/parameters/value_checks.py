@@ -50,7 +50,10 @@ class ValueChecks:
         if value.dimension == PURE:
             wrote: Help | str = f"write a number in {text}"
             if not isinstance(value.number, Scalar):
-                wrote = write_either((f"{value.number:.12g} {each}" for each in in_degrees(text)), where="value")
+                written = f"{value.number:.12g}"
+                stands = (turn.macro for turn in value.place.turns if turn.turn == written)
+                index = next((each for each in stands if len(each) == value.place.length), written)
+                wrote = write_either((f"{index} {each}" for each in in_degrees(text)), where="value")
             if value.bare and any(source.name == value.place.file for source in self.definitions.csv_files.sources):
                 wrote = f"write the unit in square brackets behind the column's name: `[{text}]`"
             raise Problem(

@@ -4,24 +4,31 @@ them."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression, List, Name
 from ic.language.runs import LINEAR, LINEAR_AT
 from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.expressions.quantity import Value, ValueList
 from ic.meaning.parameters.models import check_keys, refuse_values, word_of
 from ic.meaning.parameters.not_sweepable import NotSweepable
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.record import nearest_channels, of_lost
 from ic.text.complaints import known_words
-from met.diagnostic import Place, did_you_mean, write
-from met.plan import MetricUse, Structure
+from met.diagnostic import Place, Problem, did_you_mean, error, write
+from met.parameter import Parameter
+from met.plan import Joint, MetricUse, Structure
 from met.plan.channel import recordable
 from met.plan.linear_signals import InputSignal, input_signals
 from met.plan.linear_uses import FIGURES, LinearUse
+from met.trace import Scalar
 
 ONE_INSTANT = NotSweepable("is one for the whole sweep", "write a `linear` block for each instant")
+
+EQUILIBRIUM = "equilibrium"
+"""The word for an arm that stands still, in place of an instant."""
 
 LISTS = {"inputs": "inputs", "outputs": "outputs", "open": "opened"}
 """Keys of a block that are lists of signals, and the fields that hold them."""
@@ -53,7 +60,8 @@ def _answer(scope: Scope, item: Item, structure: Structure, known: Mapping[str, 
     owner = Owner(f"`linear {item.name}`", item.place, f"linear.{item.name}")
     check_keys(scope, body, list(LINEAR.keys), owner)
     at, duration = body.get("at"), structure.schedule.duration
-    time = 0.0 if at is None else scope.constant(owner, LINEAR_AT, at)
+    pose = _pose(scope, owner, at, structure) if at is not None and _is_equilibrium(at.value) else None
+    time = 0.0 if at is None or _is_equilibrium(at.value) else scope.constant(owner, LINEAR_AT, at)
     for path in owner.paths(LINEAR_AT.name, () if at is None else at.homes):
         scope.not_sweepable[path] = ONE_INSTANT
     if at is not None and time is not None and time > duration:
@@ -61,18 +69,61 @@ def _answer(scope: Scope, item: Item, structure: Structure, known: Mapping[str, 
         helps = "ask at an instant of the run, or let it last longer"
         scope.complaints.error("D375", message, place_of(at.value) if at.value else at.place, help=helps)
     signals: dict[str, tuple[str, ...]] = {}
+    lost = False
     for key, field in LISTS.items():
         entry = body.get(key)
         names = [] if entry is None else list(_names(scope, entry, key))
         good = [name for name in names if _is_known(scope, name, key, structure, known)]
+        lost = lost or len(good) < len(names)
         for name in [name for place, name in enumerate(good) if name.text in {one.text for one in good[:place]}]:
             scope.complaints.error("D040", f"`{name.text}` is there twice", name.place, help="leave one out")
         signals[field] = tuple(name.text for name in good)
         if entry is not None and signals[field]:
             scope.keep_setting(f"{owner.path}.{key}", ", ".join(signals[field]), item=entry)
-    if time is None or scope.complaints.error_count > before:
+    if time is None or lost or scope.complaints.error_count > before:
         return None
-    return LinearUse(item.name, time, place=item.place, **signals)
+    return LinearUse(item.name, time, place=item.place, pose=pose, **signals)
+
+
+def _is_equilibrium(expression: Expression | None) -> bool:
+    return word_of(expression) == EQUILIBRIUM
+
+
+def _pose(scope: Scope, owner: Owner, item: Item, structure: Structure) -> tuple[float, ...]:
+    """The positions of `equilibrium(q = [...])`, rad (m), of each moving joint; none for the run's first."""
+    body, joints = item.body or MergedBlock(), structure.moving
+    if refuse_values(scope, item.value, ["q"]):
+        return ()
+    check_keys(scope, body, ["q"], replace(owner, label=f"`{EQUILIBRIUM}` of {owner.label}"))
+    entry, found = body.get("q"), tuple[float, ...]()
+    scope.keep_setting(owner.join("at"), EQUILIBRIUM, item=item)
+    if entry is None:
+        return ()
+    with scope.complaints.gather():
+        given = scope.evaluate(entry)
+        values = given.items if isinstance(given, ValueList) else (given,)
+        if len(values) != len(joints) or any(isinstance(each, ValueList) for each in values):
+            message = f"`q` of an {EQUILIBRIUM} is a position of each moving joint, {len(joints)} in all"
+            helps = f"write `q = [...] deg`, in the order {', '.join(joint.name for joint in joints)}"
+            raise Problem(error("D375", message, given.place, help=helps))
+        found = tuple(
+            _position(scope, owner, joint, value)
+            for joint, value in zip(joints, values, strict=True)
+            if isinstance(value, Value)
+        )
+    return found
+
+
+def _position(scope: Scope, owner: Owner, joint: Joint, value: Value) -> float:
+    """The position of a joint in SI. Raises D122 where it varies with the sweep."""
+    wanted = Parameter(name="q", unit="joint", doc="position of a joint that stands still")
+    scope.value_checks.dimension(
+        replace(owner, joint=joint.kind, called=f"the position of `{joint.name}`"), wanted, value
+    )
+    if isinstance(value.number, Scalar):
+        helps = "a pose is one for all cases: write a `linear` block for each"
+        raise Problem(error("D122", f"the position of `{joint.name}` varies with the sweep", value.place, help=helps))
+    return float(value.number)
 
 
 def _names(scope: Scope, item: Item, key: str) -> Iterator[Name]:
@@ -136,8 +187,7 @@ def _metric(scope: Scope, item: Item, block: MergedBlock, answers: Sequence[Line
         return None  # it failed (already reported)
     if figure.of_loops and not use.opened:
         message = f"`linear {use.name}` opens no loop, so it has no `{figure.name}`"
-        helps = f"write `{LINEAR['open'].written}` in it"
-        scope.complaints.error("D376", message, _place(item, of), help=helps)
+        scope.complaints.error("D376", message, _place(item, of), help=f"write `{LINEAR['open'].written}` in it")
         return None
     scope.keep_setting(f"metrics.{item.name}.model", figure.name, item=item)
     scope.keep_setting(f"metrics.{item.name}.of", use.name, item=of)

@@ -9,12 +9,14 @@ from functools import cached_property
 
 import numpy as np
 
+from met import run as engine
 from met.analysis.linear.creeping import CreepingRate, creeping
 from met.analysis.linear.flow import Flow
 from met.analysis.linear.jacobian import PeriodMap, at_instant, period_map
 from met.analysis.linear.margins import STABLE, LoopMargins, ScalarLoop, comes_back, gain_limits, margins
 from met.analysis.linear.period import PeriodProgram
 from met.analysis.linear.plant import PlantModel, plant
+from met.analysis.linear.standing import moves, refusal, settled, standing, weak
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.messages.alike import nearest
@@ -107,8 +109,10 @@ class Linearized:
     states    by name;  inputs, outputs: channels
     A .. D    x+ = A x + B u, y = C x + D u, from period to period, inputs added to at all ticks of one
     plant     the arm without its computers, in continuous time
-    held      what sticks;  creeping: what slides so slowly that it nearly does;  at_limit: paths of limits
+    held      what sticks, or is locked;  locked: joints that are
+    creeping  what slides so slowly that it nearly does;  at_limit: paths of limits
     joints    of each state, the joint or body or computer that it belongs to
+    stands    whether it stands still there, and `time` is none of the run's
     """
 
     experiment: str
@@ -128,6 +132,13 @@ class Linearized:
     creeping: tuple[CreepingRate, ...]
     at_limit: tuple[str, ...]
     joints: Mapping[str, str]
+    stands: bool = False
+    locked: tuple[str, ...] = ()
+
+    @property
+    def where(self) -> str:
+        """The instant, or that it stands still, in words."""
+        return "where it stands still" if self.stands else f"at t = {self.time:.6g} s"
 
     @property
     def poles(self) -> tuple[Pole, ...]:
@@ -156,6 +167,7 @@ class LinearQuestion:
     inputs   channels of servos that tick: commands, outputs of laws
     outputs  channels, or what records several (`q`, `links.tip.position`)
     opened   outputs of laws, at which loops are opened: each by itself, and all of them at once
+    stands   whether the experiment is one that is to stand still (`standing`)
     """
 
     experiment: Experiment
@@ -163,6 +175,7 @@ class LinearQuestion:
     inputs: tuple[str, ...] = ()
     outputs: tuple[str, ...] = ()
     opened: tuple[str, ...] = ()
+    stands: bool = False
 
     @cached_property
     def program(self) -> PeriodProgram:
@@ -172,7 +185,8 @@ class LinearQuestion:
         if not 0.0 <= self.at <= experiment.structure.schedule.duration:
             raise _outside(experiment, self.at)
         every = input_signals(experiment.structure)
-        named = _named(every, tuple(dict.fromkeys((*self.inputs, *self.opened))), self.opened)
+        solved = [each.path for each in every if not each.is_output] if self.stands else []
+        named = _named(every, tuple(dict.fromkeys((*self.inputs, *self.opened, *solved))), self.opened)
         program = PeriodProgram(experiment, named, _records(experiment, self.outputs))
         if program.ticks > MOST_TICKS:
             raise _too_long(program)
@@ -195,9 +209,16 @@ class LinearQuestion:
 
     def of(self, case: int) -> Linearized:
         """The answers about a row of the case table. Raises Problem D370 where an event is in the period, D371 where
-        the run has failed before, and as `program` does."""
+        the run has failed before, D377 where the arm does
+        not stand, and as `program` does."""
         program, inputs = self.program, self.inputs
         flow = at_instant(program, case, program.begin(self.at))
+        if self.stands:
+            solved = settled(program, flow)
+            if solved is None:
+                too_weak = weak(self.experiment, engine.inputs(self.experiment, np.array([case])))[0]
+                raise refusal(self.experiment, too_weak or moves(program, flow))
+            flow = solved
         slow, tick = creeping(flow), flow.tick
         lifted = self.lifted(flow)
         found, states = lifted.found, lifted.states
@@ -211,7 +232,7 @@ class LinearQuestion:
             self.experiment.name, case, tick / program.schedule.base_hz, found.seconds, states, inputs,
             found.outputs, lifted.A, summed(lifted.B), lifted.C, summed(found.D), plant(program, flow, states),
             tuple(lifted.opened(each) for each in self.loops), found.held, slow, found.at_limit,
-            {name: program.joint_of(name) for name in program.states},
+            {name: program.joint_of(name) for name in program.states}, self.stands, found.locked,
         )  # fmt: skip
 
 
@@ -242,7 +263,8 @@ def of_deck(experiment: Experiment, name: str | None = None) -> LinearQuestion:
         helps += ["there are " + ", ".join(f"`{each}`" for each in known)] if known else []
         raise Problem(error("D376", message, experiment.place, help=tuple(helps)))
     use = known[name]
-    return LinearQuestion(experiment, use.at, use.inputs, use.outputs, use.opened)
+    asked = experiment if use.pose is None else standing(experiment, use.pose)
+    return LinearQuestion(asked, use.at, use.inputs, use.outputs, use.opened, use.pose is not None)
 
 
 @frozen

@@ -12,6 +12,9 @@ from met.analysis.linear.period import PeriodProgram
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.program import cell_names
+from met.program.system import Actuator
+from met.program.values import NamedValues, answer
+from met.servos.servo import JointMotion
 from met.trace.nodes import Node, live
 from met.trace.program import Every, Unless0
 from met.trace.recording import Branch, RecordedControl, RecordSection
@@ -82,6 +85,27 @@ class Flow:
         self._recording = recording
         self._follow(self.program.rest)
         self._recording = False
+
+    def locked(self) -> tuple[str, ...]:
+        """Joints at rest that a servo without a law keeps there for the whole period that begins here, whatever the arm
+        does, as `locked` does until its release."""
+        system, begin = self.program.system, self.tick / self.program.schedule.base_hz
+        return tuple(
+            actuator.use.joint
+            for actuator in system.working
+            if actuator.servo.at_rest is not None
+            and actuator.servo.control is None
+            and self.cells[f"{actuator.use.joint}.qd"] == 0.0
+            and all(self._is_kept(actuator, time) for time in (begin, begin + self.program.seconds))
+        )
+
+    def _is_kept(self, actuator: Actuator, time: float) -> bool:
+        """True where a servo gives its joint no acceleration in a step that begins at a time, s."""
+        p, none = self.program.system.servo_values(actuator, self.cells.__getitem__), NamedValues(actuator.owner, {})
+        q, qd = (self.cells[f"{actuator.use.joint}.{part}"] for part in ("q", "qd"))
+        joint = JointMotion(q, qd, time, time, actuator.command_kind)
+        drive = answer(actuator.owner, actuator.servo.drive, p, none, none, joint)
+        return bool(drive.given) and float(drive.qdd) == 0.0
 
     def tangent(self, name: str) -> Any:
         """The tangent of a cell, [direction]; 0 of one that does not move."""

@@ -46,7 +46,7 @@ class PeriodMap:
     outputs   names of y
     A, B      [state, state], [state, tick];  C, D: [output, state], [output, tick]
     Wx, Wu    what the inputs themselves come to at each of their ticks, by states and by what is added: [tick, ...]
-    held      names of what sticks
+    held      names of what sticks, and of joints that are locked;  locked: these alone
     at_limit  paths of the limits that it is at, all the time
     """
 
@@ -63,6 +63,7 @@ class PeriodMap:
     Wu: np.ndarray
     held: tuple[str, ...]
     at_limit: tuple[str, ...]
+    locked: tuple[str, ...] = ()
 
 
 def at_instant(program: PeriodProgram, case: int, tick: int) -> Flow:
@@ -125,7 +126,8 @@ def period_map(program: PeriodProgram, flow: Flow) -> PeriodMap:
     start = flow.copy()
     flow = start.copy()
     flow.ticks()
-    held = tuple(name for name, mode in flow.modes().items() if mode == 0.0)
+    locked = start.locked()
+    held = (*(name for name, mode in flow.modes().items() if mode == 0.0), *locked)
     if going := flow.breaking_away():
         raise flow.event(f"{listed(going)} {'breaks' if len(going) == 1 else 'break'} away")
     stuck = {f"{name}.{part}" for name in held for part in ("q", "qd")} | set(held)
@@ -144,7 +146,7 @@ def period_map(program: PeriodProgram, flow: Flow) -> PeriodMap:
             raise start.event("a derivative is no number")
     return PeriodMap(
         start.tick, program.seconds, states, ticks, program.columns,
-        found.A, found.B, found.C, found.D, found.Wx, found.Wu, held, found.at_limit,
+        found.A, found.B, found.C, found.D, found.Wx, found.Wu, held, found.at_limit, locked,
     )  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from met import run as engine
 from met.analysis.linear.answers import LiftedPeriod, LinearQuestion, OpenLoop, of_deck
 from met.analysis.linear.flow import Flow
 from met.analysis.linear.jacobian import at_instants
+from met.analysis.linear.standing import settled
 from met.diagnostic import Problem
 from met.passing import Memories
 from met.plan import MetricUse
@@ -23,6 +24,7 @@ from met.plan.linear_uses import (
     ANSWERED,
     EVENT,
     FIGURES,
+    NO_EQUILIBRIUM,
     OPEN,
     SEVERAL_TICKS,
     WHY_ANSWER,
@@ -85,7 +87,8 @@ def question(prepared: engine.Prepared, use: LinearUse) -> LinearQuestion:
     key = QUESTION + use.name
     if key not in prepared.companions:
         made = of_deck(prepared.experiment, use.name)
-        made.program.prepared = prepared
+        if use.pose is None:
+            made.program.prepared = prepared
         prepared.companions[key] = made
     found: LinearQuestion = prepared.companions[key]
     return found
@@ -105,7 +108,8 @@ def _answer(
     columns, why = [names.index(METRIC + each.name) for each in wanted], names.index(WHY_ANSWER + use.name)
     done = np.flatnonzero(outputs[:, names.index("failure")] == 0.0)
     tick, given = asked.program.begin(use.at), engine.inputs(prepared.experiment, rows[done])
-    for place, flow in zip(done.tolist(), at_instants(asked.program, given, tick, threads), strict=True):
+    flows = at_instants(asked.program, given, tick, threads)
+    for place, flow in zip(done.tolist(), flows, strict=True):
         if flow is not None:
             outputs[place, columns], outputs[place, why] = _figures(asked, wanted, flow)
         if progress is not None:
@@ -115,7 +119,10 @@ def _answer(
 def _figures(asked: LinearQuestion, wanted: Sequence[MetricUse], flow: Flow) -> tuple[list[float], float]:
     """The figures of a case, and why one or all of them are none: `ANSWERED` where they all are."""
     try:
-        lifted = asked.lifted(flow)
+        solved = settled(asked.program, flow) if asked.stands else flow
+        if solved is None:
+            return [math.nan] * len(wanted), float(NO_EQUILIBRIUM)
+        lifted = asked.lifted(solved)
     except Problem:
         return [math.nan] * len(wanted), float(EVENT)
     loops = [lifted.opened(each) for each in asked.loops] if any(FIGURES[e.model].of_loops for e in wanted) else []

@@ -121,7 +121,18 @@ const METKernel = (() => {
     }
   }
 
-  return { make, fuses };
+  // The tick at which a case has failed, null where it has not: what its program tells, and what it only watches. outputs:
+  // of the case; of: places among them, as the JSON file's `failure` has them.
+  function failed(outputs, of) {
+    let tick = outputs[of.failure] !== 0 ? outputs[of.tick] : null;
+    for (const [place, at] of [[of.too_fast, (seen) => seen], [of.unheld, () => 0]]) {
+      if (place === null || outputs[place] === 0) continue;
+      if (tick === null || tick > at(outputs[place])) tick = at(outputs[place]);
+    }
+    return tick;
+  }
+
+  return { make, fuses, failed };
 })();
 
 if (typeof module !== "undefined") module.exports = METKernel;

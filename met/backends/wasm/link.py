@@ -266,10 +266,10 @@ def _code(found: _ObjectFile, places: list[int], fused: int) -> tuple[bytes, lis
         made += read.take(end - read.at)
         bodies.append((bytes(made), calls))
     out, sites = number(count), []
-    for made, calls in bodies:
-        out += number(len(made))
+    for one, calls in bodies:
+        out += number(len(one))
         sites += [len(out) + call for call in calls]
-        out += made
+        out += one
     return out, sites
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from met.host import interpreter
 
-WAIT = 30.0
+WAIT = 120.0
 """Seconds until an answer counts as lacking."""
 
 
@@ -136,6 +136,10 @@ class Editor:
     def settle(self) -> None:
         """Wait until all that was sent is checked."""
         self.ask("met/settled", None)
+
+    def next(self) -> None:
+        """Wait for the next message."""
+        self._wait(lambda message: True)
 
     def of(self, path: Path) -> list[Any]:
         """What the editor shows in a file, once all is checked."""

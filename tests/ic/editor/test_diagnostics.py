@@ -115,6 +115,8 @@ def test_a_table_that_a_deck_names_counts_as_the_editor_has_it(tmp_path: Path, e
     editor.open(table, "links.upper.mass [kg]\n40\n5O\n")
     assert messages(editor.of(table)) == ["`5O` is not a number"]
     assert editor.diagnostics[uri(table)][0]["range"]["start"] == {"line": 2, "character": 0}
+    editor.close(deck)
+    assert editor.of(table) == [], "a table alone is no deck"
     editor.close(table)
     assert editor.of(table) == [] and editor.of(deck) == []
 

@@ -31,6 +31,7 @@ STRANGE = (
     "// comment\n", "/* comment */", "/*", '"', "'", "\\\n", "\n", "\t", "#if 1\n", "#if 0\n", "#endif\n", "#else\n",
     '#include "deck.ic"\n', "#include <two_link.ic>\n", "#include <servos/rigid_gearbox.ic>\n", "\n#undef X\n",
     "param size = 1 m;\n", "with links.bar.mass = 2 kg;", "with size = [1, 2];",
+    "for i in 0 .. 2 {", "for side in [left, right] {", "by -1", "_{i}", "{i}", "{side}_x", "[i]", "[a, b] = ", "* = ",
     "#define X ", "floor(", "round(1.5)", "sign(", ".x", "* [1, 2, 3] m", "-[1, 2, 3]", "/ 2",
     "#define FN(a, ...) a __VA_ARGS__\n", "FN(", "#pragma once\n", "__LINE__", "__FILE__", "__DATE__", '"x.csv"',
     '"../deck.ic"', "\u00b5", "\u00a0", "\u202e", "\x00", "\x1b", "\ufeff", "\U0001f600",
@@ -127,7 +128,7 @@ def end_of_entry(text: str, start: int) -> int:
 @cache
 def words() -> tuple[str, ...]:
     """Units, directives, models with their parameters, and every word that the compiler itself compares with."""
-    found = [*units.UNITS, *(f"#{name}" for name in DIRECTIVES), *SYMBOLS, *NUMBERS]
+    found = [*units.ALL_UNITS, *(f"#{name}" for name in DIRECTIVES), *SYMBOLS, *NUMBERS]
     for kind in KINDS:
         for name, model in models.available(kind).items():
             found += [name, *(parameter.name for parameter in models.written(model))]

@@ -160,6 +160,25 @@ def through_macro(rng: random.Random, text: str) -> str:
     return rng.choice(forms)
 
 
+def in_a_loop(rng: random.Random, text: str) -> str:
+    """An entry or block repeated by a loop; some of its names and numbers have the index."""
+    ends = [match.end() for match in re.finditer(r"[;{}]", text)]
+    if not ends:
+        return text
+    start = rng.choice(ends)
+    end = corpus.end_of_entry(text, start)
+    entry = pieces_of(text[start:end])
+    for at, piece in enumerate(entry):
+        if piece[:1].isalpha() and rng.random() < 0.4:
+            entry[at] = rng.choice([piece + "_{i}", "{i}", "i", piece + "{i-1}", piece + "_{i/2}", piece + "[i]"])
+        elif piece[:1].isdigit() and rng.random() < 0.5:
+            entry[at] = rng.choice(["i", "(i * 0.1)", "-i", f"i{piece}"])
+    turns = rng.choice(
+        ["0 .. 2", "1 .. 1", "3 .. 1 by -1", "1 .. 0", "[left, right]", "[1, 2]", "0 .. 500", "[]", "1 .. m"]
+    )
+    return f"{text[:start]} for i in {turns} {{ {''.join(entry)} }}{text[end:]}"
+
+
 def nested(rng: random.Random, text: str) -> str:
     """Something repeated very often, or very deep."""
     spots = [match.start() for match in re.finditer(r"[=;{]", text)] or [0]
@@ -195,8 +214,9 @@ def _solid(pieces: Sequence[str]) -> list[int]:
 
 
 GENTLE: Sequence[Callable[[random.Random, str], str]] = (
-    word_of_its_kind, word_of_its_kind, changed_number, changed_entry, other_block, other_block,
+    word_of_its_kind, word_of_its_kind, changed_number, changed_entry, other_block, other_block, in_a_loop,
 )  # fmt: skip
 _WILD: Sequence[Callable[[random.Random, str], str]] = (
     *GENTLE, changed_word, changed_word, changed_word, through_macro, through_macro, nested, long_line, spliced,
+    in_a_loop, in_a_loop,
 )  # fmt: skip

@@ -91,7 +91,7 @@ def test_every_model_has_all_of_its_parameters(found: dict[str, Any]) -> None:
 def test_every_word_that_a_value_may_use_is_there(found: dict[str, Any]) -> None:
     assert sorted(names(found["functions"])) == sorted(FUNCTIONS)
     assert all(each["arguments"] for each in found["functions"])
-    assert names(found["units"]) == list(units.UNITS)
+    assert names(found["units"]) == list(units.ALL_UNITS)
     assert sorted(names(found["shapes"])) == sorted(SHAPES)
     assert set(names(found["designs"])) == set(DESIGNS)
     assert set(names(found["distributions"])) >= set(DISTRIBUTIONS)
@@ -125,4 +125,4 @@ def test_the_overview_counts_what_is_there(capsys: pytest.CaptureFixture[str], f
     assert cli.main(["doc", "language"]) == cli.YES
     said = capsys.readouterr().out
     assert said.startswith("language: all of it, for programs: `met doc language --format json`, met.language 1\n")
-    assert re.search(rf"^ *units +{len(units.UNITS)} entries$", said, re.MULTILINE)
+    assert re.search(rf"^ *units +{len(units.ALL_UNITS)} entries$", said, re.MULTILINE)

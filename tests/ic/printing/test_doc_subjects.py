@@ -44,7 +44,7 @@ def test_substitute_says_its_keys_defaults_models_and_what_is_the_servos(capsys:
 
 def test_units_lists_them_all_with_what_they_are_in_si(capsys: pytest.CaptureFixture[str]) -> None:
     rows = {line.split()[0]: line.split() for line in printed(capsys, "units").splitlines() if line.startswith("  ")}
-    assert set(units.UNITS) <= set(rows)
+    assert set(units.ALL_UNITS) <= set(rows)
     assert rows["km"] == ["km", "kilometre", "1000", "m"] and rows["rpm"][-2:] == ["0.10471975511965978", "rad/s"]
 
 

@@ -87,7 +87,8 @@ def test_what_is_proposed_has_the_size_and_the_kind_that_pint_gives_the_word(
     ("kPa", "the table has no such prefix: write `2e3 Pa`"),
     ("mW", "the table has no such prefix: write `2e-3 W`"),
     ("mg", "the table has no such prefix: write `2e-6 kg`"),
-    ("in", "an inch is not in the table: write `0.0508 m`"),
+    ("in", "did you mean `inch`?"),
+    ("yd", "a yard is not in the table: write `1.8288 m`"),
     ("psi", "a pound of force on a square inch is not in the table: write `13789.514586336 Pa`"),
     ("T", "a tesla is not in the table: write `2 V*s/m^2`"),
     ("S", "a siemens is not in the table: write `2 ohm^-1`"),
@@ -100,7 +101,7 @@ def test_what_is_said_of_a_word_behind_a_2(word: str, told: str) -> None:
 
 def test_of_a_word_without_its_number_the_size_is_said() -> None:
     assert remedy("MHz", "2", alone=False) == ("1 MHz is `1e6 Hz`: put that into the number",)
-    assert remedy("in") == ("an inch is `0.0254 m`: put that into the number",)
+    assert remedy("yd") == ("a yard is `0.9144 m`: put that into the number",)
     assert remedy("degC", "20")[0] == "temperatures are in K: 0 degrees Celsius are 273.15 K"
 
 

@@ -46,6 +46,16 @@ def test_a_plan_keeps_what_is_asked_and_metrics_of_it(tmp_path: Path) -> None:
     assert kept.linear == made.linear and kept.linear_metrics == made.linear_metrics
 
 
+@pytest.mark.parametrize(
+    ("written", "pose"), [("", ()), ("(q = [30] deg)", (0.523599,)), ("(q = 30 deg)", (0.523599,))]
+)
+def test_a_pose_is_kept_in_si(written: str, pose: tuple[float, ...], tmp_path: Path) -> None:
+    made = experiment(tmp_path, ARM, SERVO, run_with(f"linear b {{ at = equilibrium{written}; }}"))
+    (use,) = made.linear
+    assert use.pose is not None and tuple(round(each, 6) for each in use.pose) == pose
+    assert plan_file.loads(plan_file.dumps(Plan("deck.ic", (made,)))).experiments[0].linear == made.linear
+
+
 def test_a_plan_without_them_has_no_word_of_them(tmp_path: Path) -> None:
     assert "linear" not in plan_file.dumps(Plan("deck.ic", (experiment(tmp_path, ARM, SERVO, RUN),)))
 
@@ -67,6 +77,11 @@ WRONG = {
     "linear b { outputs = 3; }": "error[D375]: `outputs` is a list of signals",
     "linear b { outputs = [q, q]; }": "error[D040]: `q` is there twice",
     "linear b { opne = hinge.servo.voltage; }": "error[D141]: `linear b` has no `opne`",
+    "linear b { at = equilibrium(q = [1, 2] deg); }": "error[D375]: `q` of an equilibrium is a position of each moving "
+    "joint, 1 in all",
+    "linear b { at = equilibrium(q = 3 s); }": "error[D061]: the position of `hinge` is in rad, and this is in s",
+    "linear b { at = equilibrium(p = 3 deg); }": "error[D141]: `equilibrium` of `linear b` has no `p`",
+    "linear b { at = equilibrium(3 deg); }": "error[D153]: `equilibrium` takes its values by name",
     "linear b = 3;": "error[D375]: `linear b` is a block",
     f"{LOOP} require phase_margin(lop) > 30 deg;": "error[D376]: no `linear lop` in this run",
     f"{LOOP} require phase_margin(loop, 2) > 30 deg;": "error[D376]: `phase_margin` takes the name of a `linear` block",
@@ -116,6 +131,8 @@ def test_an_instant_is_one_for_a_sweep(tmp_path: Path) -> None:
 
 
 DAMAGED = {
+    "pose": (lambda of: of["linear"][0].update(at=0.0, pose=[0.5, 0.5]), "linear[0].pose"),
+    "pose and instant": (lambda of: of["linear"][0].update(pose=[0.5]), "linear[0].pose"),
     "at": (lambda of: of["linear"][0].update(at=3.0), "linear[0].at"),
     "opened": (lambda of: of["linear"][0].update(opened=["hinge.servo.command"]), "linear[0].opened"),
     "outputs": (lambda of: of["linear"][0].update(outputs=["nothing"]), "linear[0].outputs"),

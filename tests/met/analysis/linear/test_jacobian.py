@@ -208,3 +208,44 @@ def test_the_product_of_periods_is_the_monodromy_matrix_of_a_run(tmp_path: Path)
     found = np.array([[q - q_less, q_ - q_less_], [qd - qd_less, qd_ - qd_less_]]) / 2e-4
     np.testing.assert_allclose(product[:2, :2], found, rtol=1e-7, atol=1e-8)
     assert math.isclose(program.seconds, 0.004)
+
+
+LOCKED = """\
+arm pair {
+    link bar { mass = 2 kg; shape = rod(length = 1 m, along = x); }
+    link rod { mass = 1 kg; shape = rod(length = 1 m, along = x); }
+    joint hinge revolute { parent = base; child = bar; axis = -y; }
+    joint knee revolute { parent = bar; child = rod; axis = -y; at = [1, 0, 0] m; }
+}
+servo fixed { model = locked; release = 0.5 s; }
+run hold {
+    arm = pair; servos { knee = fixed; }
+    environment { g = gravity { g = [0, 0, -9.81] m/s^2; } }
+    rates { dynamics = 1 kHz; } duration = 1 s; record = [];
+    initial { hinge.q = 20 deg; }
+}
+"""
+
+
+def test_a_locked_joint_is_held_until_it_is_released(tmp_path: Path) -> None:
+    """Then it is named, and no two poles of it stay; the rest moves as before."""
+    made = experiment(tmp_path, LOCKED)
+    before, after = mapped(made, 0.25), mapped(made, 0.75)
+    assert before.held == before.locked == ("knee",) and before.states == ("hinge.q", "hinge.qd")
+    assert after.held == after.locked == () and len(after.states) == 4
+    program = PeriodProgram(made)
+    flow = at_instant(program, 0, 250)
+    for place, name in enumerate(before.states):
+        sides = []
+        for size in (1e-6, -1e-6):
+            moved = flow.copy()
+            moved.cells[name] += size
+            moved.ticks()
+            moved.finish()
+            sides.append(np.array([moved.cells[each] for each in before.states]))
+        assert before.A[:, place] == pytest.approx((sides[0] - sides[1]) / 2e-6, abs=1e-8)
+
+
+def test_a_joint_that_is_released_within_the_period_is_none_that_is_locked(tmp_path: Path) -> None:
+    made = experiment(tmp_path, LOCKED.replace("release = 0.5 s", "release = 0.2505 s"))
+    assert mapped(made, 0.25).locked == ()

@@ -1,0 +1,131 @@
+// A page that simulates: a slider for each number that the sweep varies; each time one moves, the run is computed here, by
+// the archive's own module, and its signals, metrics and verdicts are shown. What stands in the archive is compared.
+// Texts of a deck come into the page as text nodes alone.
+"use strict";
+
+(() => {
+  const { node, number, ticks, palette } = MET;
+  const data = MET_PAGE;
+  const { description: told } = data;
+  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const kernel = METKernel.make(bytes(data.module), told.kernel);
+  const cases = told.cases.inputs;
+  const archived = data.metrics.map((text) => new Float64Array(bytes(text).buffer));
+  const NEAR = 0.01;  // of a slider's way, within which it takes a value of the archive's
+  const time = Float64Array.from({ length: told.rows }, (_, n) => (n * told.kernel.record_divisor) / told.kernel.base_hz);
+  const main = document.querySelector("main");
+  const came = node("p", { class: "came", role: "status" });
+  const answers = node("tbody");
+  const panels = node("div");
+  let values = cases[0].slice();
+  let plots = [];
+  let lines = [];
+
+  // Sliders, and which case of the archive they stand at.
+  const knobs = told.inputs.map((input, n) => {
+    const own = [...new Set(cases.map((each) => each[n]))].sort((a, b) => a - b);
+    if (input.is !== "coordinate" || own.length < 2) return null;
+    const [low, high] = [own[0], own[own.length - 1]];
+    const slider = node("input", { type: "range", min: 0, max: 1, step: 0.001, "aria-label": data.labels[n], input: () => {
+      const at = low + Number(slider.value) * (high - low);
+      const nearest = own.reduce((a, b) => (Math.abs(b - at) < Math.abs(a - at) ? b : a));
+      values[n] = Math.abs(nearest - at) <= NEAR * (high - low) ? nearest : at;
+      update();
+    } });
+    const shown = node("output");
+    const put = () => {
+      slider.value = (values[n] - low) / (high - low);
+      shown.textContent = `${number(values[n] / input.scale)} ${data.units[n]}`;
+    };
+    return { put, shown, input, n, box: node("label", { class: "knob" }, node("code", null, data.labels[n]), slider, shown) };
+  }).filter(Boolean);
+  const chosen = node("select", { "aria-label": "Case of the archive", change: () => {
+    values = cases[chosen.value].slice();
+    knobs.forEach((knob) => knob.put());
+    update();
+  } }, node("option", { value: "", disabled: true }, "none of the archive's"), ...cases.map((_, n) => node("option", { value: n }, `#${data.positions[n]}`)));
+
+  const same = (a, b) => a.every((value, n) => Object.is(value, b[n]));
+
+  function update() {
+    const begun = performance.now();
+    const found = kernel.run([values], told.ticks);
+    const took = performance.now() - begun;
+    const tick = METKernel.failed(found.outputs, told.failure);
+    const failed = tick !== null;
+    const rows = failed ? Math.ceil(tick / told.kernel.record_divisor) : told.rows;
+    const width = told.columns.length;
+    lines = told.columns.map((_, c) => Array.from(time, (_t, row) => (row < rows ? found.rows[row * width + c] : null)));
+    draw();
+    const which = cases.findIndex((each) => same(each, values));
+    chosen.value = which < 0 ? "" : which;
+    knobs.forEach(({ shown, input, n }) => { shown.textContent = `${number(values[n] / input.scale)} ${data.units[n]}`; });
+    const measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
+    tell(which, measured, failed, tick, took);
+  }
+
+  // Whose numbers these are: the archive's, where every metric has the bits that stand there.
+  function tell(which, measured, failed, tick, took) {
+    const speed = `computed here in ${number(took)} ms, ${kernel.fused ? "with this machine's multiply-add" : "with the module's own multiply-add"}`;
+    const wrong = which < 0 || data.status[which] !== 0 ? [] : told.metrics.filter((_, m) => !Object.is(measured[m], archived[m][which]));
+    const bad = wrong.length > 0 || (which >= 0 && failed !== (data.status[which] !== 0));
+    let words = "Not in the archive: ";
+    if (bad) words = `Other numbers than the archive has for case #${data.positions[which]}${wrong.length ? ` (${wrong.map((metric) => metric.name).join(", ")})` : ""}: `;
+    else if (which >= 0 && failed) words = `Case #${data.positions[which]} fails, as in the archive: `;
+    else if (which >= 0) words = measured.length ? `Case #${data.positions[which]}, with the archive's bits in ${measured.length === 1 ? "its metric" : `all ${measured.length} metrics`}: ` : `Case #${data.positions[which]}; it has no metric to compare: `;
+    const end = failed ? `; it fails at ${number(tick / told.kernel.base_hz)} s` : "";
+    came.classList.toggle("bad", bad);
+    came.textContent = `${words}${speed}${end}.`;
+    answers.replaceChildren(...told.metrics.map((metric, m) => {
+      const asked = told.requirements.filter((each) => each.metric === metric.name);
+      const verdicts = asked.map((each) => {
+        const met = !failed && { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b }[each.comparison](measured[m], each.limit);
+        return node("div", { class: met ? "met" : "missed" }, `${each.text}: ${met ? "met" : "missed"}`);
+      });
+      return node("tr", null, node("td", null, node("code", null, metric.name)), node("td", null, `${number(measured[m])} ${data.metricUnits[m]}`), node("td", null, verdicts));
+    }));
+  }
+
+  // A plot a signal.
+  const signals = [...new Set(told.columns.map((column) => column.signal))];
+  const of = (signal) => told.columns.flatMap((column, n) => (column.signal === signal ? [n] : []));
+  const drawn = (signal) => [time, ...of(signal).map((n) => lines[n])];
+
+  function draw() {
+    if (plots.length) plots.forEach((plot, n) => plot.setData(drawn(signals[n])));
+    else make();
+  }
+
+  function make() {
+    const colours = palette();
+    plots.forEach((plot) => plot.destroy());
+    panels.replaceChildren();
+    const font = "12px " + getComputedStyle(document.body).fontFamily;
+    const axis = { stroke: colours.muted, font, grid: { stroke: colours.line, width: 1 }, ticks: { stroke: colours.faint, width: 1, size: 4 } };
+    plots = signals.map((signal) => {
+      const columns = of(signal);
+      const frame = node("div", { class: "frame", role: "img", "aria-label": `${signal} against time` });
+      const names = columns.map((n, nth) => {
+        const { channel } = told.columns[n];
+        const name = node("span", null, `— ${channel.endsWith(`.${signal}`) ? channel.slice(0, -signal.length - 1) : channel}`);
+        name.style.color = colours.lines[nth % colours.lines.length];
+        return name;
+      });
+      panels.append(node("div", { class: "panel" }, node("div", { class: "head" }, node("b", null, node("code", null, signal), data.columnUnits[columns[0]] ? ` (${data.columnUnits[columns[0]]})` : ""),
+        node("div", { class: "reading" }, names)), frame));
+      return new uPlot({ width: MET.width(frame), height: 190, padding: [8, 14, 0, 0], legend: { show: false },
+        scales: { x: { time: false } }, cursor: { y: false, sync: { key: "time" } },
+        series: [{}, ...columns.map((_, nth) => ({ stroke: colours.lines[nth % colours.lines.length], width: 1.6, points: { show: false }, spanGaps: false }))],
+        axes: [{ ...axis, size: 26, values: (self, v) => ticks(v) }, { ...axis, size: 62, space: 32, values: (self, v) => ticks(v) }],
+      }, drawn(signal), frame);
+    });
+  }
+
+  main.replaceChildren(
+    node("div", { class: "knobs" }, node("label", { class: "knob" }, "Case", chosen, node("output", null, `of ${data.count}`)), knobs.map((knob) => knob.box)),
+    came, node("table", { class: "answers" }, answers), panels);
+  knobs.forEach((knob) => knob.put());
+  update();
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", make);
+  addEventListener("resize", make);
+})();

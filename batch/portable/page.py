@@ -1,0 +1,143 @@
+"""A run or sweep of an archive as one HTML page that computes its cases, and any between them, where it is opened.
+
+All is in the page: the module, its description, what the archive has of the cases. The page allows itself one script,
+by its digest, and WebAssembly; module and numbers stand in that script, so that the digest is of them too.
+"""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from batch.archive.read import ArchiveFile, ArchiveGroup, reading
+from batch.archive.stored import Unlike
+from batch.portable.description import MOST_CASES, described
+from batch.queries.groups import groups_named
+from batch.queries.signals import pretty_unit
+from batch.report.html import inlined
+from batch.report.html.markup import Html, el, lines
+from batch.report.html.payload import script_json
+from met.backends.wasm.module import KERNEL_JS, compiled
+from met.diagnostic import Problem, error
+from met.messages.visible import visible
+from met.plan import Experiment
+from met.run import inputs, prepare
+from met.version import VERSION
+
+GENERATOR = "MET view"
+"""The name in a page's `generator`, by which it is known as one of ours, which may be written over."""
+
+OTHER_CODE = "by other code than the archive was made with, so that numbers may differ"
+
+_ASSETS = Path(__file__).with_name("assets")
+_CODE = "'wasm-unsafe-eval'"
+
+
+def view(archive: str | Path, names: tuple[str, ...] = ()) -> str:
+    """The page of the archive's only run or sweep, or of the one that is named. Raises Problem E473 where several are
+    meant."""
+    with ArchiveFile(archive) as file:
+        file.need_every_row("a page that simulates")
+        groups = groups_named(file, names)
+        if len(groups) > 1:
+            helps = f"name one: {', '.join(group.name for group in groups)}"
+            raise Problem(
+                error("E473", f"a page is of one run or sweep, and {file.path} has {len(groups)}", help=helps)
+            )
+        (group,) = groups
+        experiment = next(each for each in file.plan().experiments if each.name == group.name)
+        return page_of(experiment, data_of(experiment, group))
+
+
+def data_of(experiment: Experiment, group: ArchiveGroup) -> dict[str, Any]:
+    """What the script needs: the module, its description, and what the archive has of the first cases."""
+    prepared = prepare(experiment)
+    module = compiled(prepared.recording)
+    told = described(prepared, module)
+    positions = group.values("case")[:MOST_CASES]
+    rows = np.searchsorted(experiment.cases.table, positions)
+    told["cases"]["inputs"] = inputs(experiment, np.asarray(rows, np.int64)).tolist()
+    stored = {variable.name: variable for variable in group.role("metric")}
+    known = {name.removeprefix("metrics."): name for name in stored}
+    shown: dict[str, Any] = _visible(told)
+    lacking = [each["name"] for each in told["metrics"] if each["name"] not in known]
+    with reading(group.path):
+        if lacking:
+            raise Unlike(f"the plan of `{experiment.name}` has a metric `{lacking[0]}`, and it has none")
+    return {
+        "module": base64.b64encode(module.code).decode("ascii"),
+        "description": shown,
+        "same_code": prepared.code_key == group.attributes.get("code_key"),
+        "positions": positions.tolist(),
+        "count": group.count,
+        "status": group.stretch("status", 0, len(positions)).tolist(),
+        "metrics": [
+            _doubles(group.stretch(known[each["name"]], 0, len(positions))) for each in told["metrics"]
+        ],
+        "labels": [visible(each["name"]) for each in told["inputs"]],
+        "units": [_unit(each["unit"]) for each in told["inputs"]],
+        "metricUnits": [_unit(each["unit"]) for each in told["metrics"]],
+        "columnUnits": [_unit(each["unit"]) for each in told["columns"]],
+    }  # fmt: skip
+
+
+def _unit(unit: str) -> str:
+    """A unit as the page writes it; nothing where there is none."""
+    return "" if unit == "1" else visible(pretty_unit(unit))
+
+
+def _visible(value: Any) -> Any:
+    """The same data, with what cannot be seen in its texts as escapes."""
+    if isinstance(value, str):
+        return visible(value)
+    if isinstance(value, dict):
+        return {visible(key): _visible(each) for key, each in value.items()}
+    return [_visible(each) for each in value] if isinstance(value, list) else value
+
+
+def _doubles(values: np.ndarray) -> str:
+    """Numbers as base64 of their bytes."""
+    return base64.b64encode(np.ascontiguousarray(values, "<f8").tobytes()).decode("ascii")
+
+
+def page_of(experiment: Experiment, data: dict[str, Any]) -> str:
+    """The whole file. The same data give the same text."""
+    script = "\n".join(
+        [
+            inlined.licensed("uPlot.iife.min.js", "core.js"),
+            KERNEL_JS.read_text(encoding="utf-8"),
+            f"const MET_PAGE = {script_json(data)};",
+            (_ASSETS / "view.js").read_text(encoding="utf-8"),
+        ]
+    )
+    style = f"{inlined.style()}\n{(_ASSETS / 'view.css').read_text(encoding='utf-8')}"
+    rules = (
+        f"default-src 'none'; script-src {inlined.digest(script)} {_CODE}; style-src {inlined.digest(style)}; "
+        "img-src data:; base-uri 'none'; form-action 'none'"
+    )
+    head = lines(
+        [
+            el("meta", charset="utf-8"),
+            el("meta", name="generator", content=GENERATOR),
+            Html(f'<meta http-equiv="Content-Security-Policy" content="{rules}">'),
+            el("meta", name="viewport", content="width=device-width, initial-scale=1"),
+            el("meta", name="color-scheme", content="light dark"),
+            el("meta", name="referrer", content="no-referrer"),
+            el("link", rel="icon", href="data:,"),
+            el("title", experiment.name),
+            Html(f"<style>{style}</style>"),
+        ]
+    )
+    by = "by the code that the archive was made with" if data["same_code"] else f"{OTHER_CODE} (MET {VERSION})"
+    header = el(
+        "header",
+        el("p", "A page that simulates", cls="kicker"),
+        el("h1", experiment.name),
+        el("p", f"Move a slider: the run is computed again, here, {by}.", cls="lede"),
+    )
+    none = el("p", "This page needs scripts and WebAssembly, which this reader does not run.")
+    body = lines([header, el("main", none), Html(f"<script>{script}</script>")])
+    return f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{head}\n</head>\n<body>\n{body}\n</body>\n</html>\n'

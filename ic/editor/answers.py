@@ -1,0 +1,157 @@
+"""Answers to what an editor asks about a position: completion, hover, definition, references."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+
+from lsprotocol import types
+from pygls.workspace import PositionCodec
+
+from ic.editor import completion
+from ic.editor.checks import CheckedDeck, Checks
+from ic.editor.hover import about, entry_of, markdown
+from ic.editor.index import DeckIndex
+from ic.editor.names import DeckNames, NameInText, deck_text
+from ic.editor.positions import Texts, lines_of, uri_of
+from ic.editor.structure import DeckText
+from ic.text.files import LIBRARY, Files, FoundFile, file_at
+from ic.text.lexer import NAME, Token
+
+NO_INDEX = DeckIndex((), ())
+
+
+class Asked:
+    """A position in an open text, with the deck that the text is part of, as far as that is known.
+
+    text   the text as it is now;  file: its name in the deck's places
+    names  those of all texts of the deck, open ones as they are now
+    """
+
+    def __init__(
+        self,
+        checks: Checks,
+        codec: PositionCodec,
+        address: Callable[[CheckedDeck, str], str | None],
+        uri: str,
+        position: types.Position,
+    ) -> None:
+        self._checks, self._codec = checks, codec
+        deck = checks.deck_of(uri)
+        opened = checks.texts.get(uri)
+        self._path = opened.path if opened is not None else None
+        current = normal(opened.text if opened is not None else "")
+        texts: dict[str, DeckText] = {}
+        self._addresses: dict[str, str] = {}
+        for name, source in deck.reply.sources.items() if deck is not None else ():
+            where = address(deck, name) if deck is not None else None
+            if where is None or (not name.rstrip(">").endswith(".ic") and where not in checks.texts):
+                continue
+            now = checks.texts.get(where)
+            texts[name] = deck_text(name, source if now is None else normal(now.text))
+            self._addresses[name] = where
+        self.file = next((name for name, where in self._addresses.items() if where == uri), uri)
+        self._addresses[self.file] = uri
+        self.text = texts.setdefault(self.file, deck_text(self.file, current))
+        self.names = DeckNames(texts.values())
+        self.index = checks.indexes.get(deck.deck.uri, NO_INDEX) if deck is not None else NO_INDEX
+        lines = lines_of(current)
+        line = lines[position.line] if position.line < len(lines) else ""
+        self.offset = self.text.offset(position.line, characters(codec, line, position.character))
+
+    @property
+    def token(self) -> Token | None:
+        return self.text.token_at(self.offset)
+
+    def location(self, token: Token) -> types.Location:
+        texts = Texts({token.source.name: token.source.text}, self._codec)
+        return types.Location(self._addresses[token.source.name], texts.range(token.place))
+
+    def complete(self) -> list[types.CompletionItem]:
+        """The words that may stand here."""
+        found = completion.offers(self.text, self.offset, self.names, self.index, self._files_beside())
+        return [
+            types.CompletionItem(each.word, kind=each.kind, detail=each.about or None, sort_text=f"{n:04d}")
+            for n, each in enumerate(found)
+        ]
+
+    def hover(self) -> types.Hover | None:
+        """What is known of the word here."""
+        token = self.token
+        if token is None:
+            return None
+        found = about(self.text, token, entry_of(self.text, token), self.names, self.index, self.file)
+        if not found:
+            return None
+        shown = types.MarkupContent(types.MarkupKind.Markdown, markdown(found))
+        return types.Hover(shown, self.location(token).range)
+
+    def definitions(self) -> list[types.Location]:
+        """Where the word here is defined, or the file that an include names."""
+        included = self._included()
+        if included is not None:
+            beginning = types.Position(0, 0)
+            return [types.Location(included, types.Range(beginning, beginning))]
+        token = self.token
+        if token is None or token.kind != NAME:
+            return []
+        return [self.location(each.token) for each in self.names.meant(token, entry_of(self.text, token))]
+
+    def references(self, also_definitions: bool) -> list[types.Location]:
+        """Where what the word here means is used: words that may mean the same definition."""
+        token = self.token
+        if token is None or token.kind != NAME or token.text not in self.names.by_name:
+            return []
+        meant = self.names.meant(token, entry_of(self.text, token))
+        defined = {id(each.token) for each in self.names.by_name[token.text]}
+        return [
+            self.location(each) for each in self._uses(token.text, meant) if also_definitions or id(each) not in defined
+        ]
+
+    def _uses(self, name: str, meant: list[NameInText]) -> Iterator[Token]:
+        texts = {text.source.name: text for text in self.names.texts}
+        for use in self.names.uses(name):
+            found = self.names.meant(use, entry_of(texts[use.source.name], use))
+            if any(each in meant for each in found):
+                yield use
+
+    def _included(self) -> str | None:
+        """The address of the file that the include at the position names."""
+        for line in self.text.directives:
+            if line.name != "include" or not line.tokens[0].offset <= self.offset <= line.tokens[-1].end:
+                continue
+            written = self.text.source.text[line.tokens[1].end : line.tokens[-1].end].strip()
+            found = self._files().find(written[1:-1], self._files().where(self._found_file(), written[:1] == "<"))
+            return None if found is None else uri_of(os.path.abspath(found.path))
+        return None
+
+    def _files(self) -> Files:
+        return Files(self._checks.include_dirs, unsaved=self._checks.unsaved())
+
+    def _found_file(self) -> FoundFile:
+        if self._path is None:
+            return FoundFile("", "")
+        inside = os.path.relpath(self._path, LIBRARY)
+        return file_at(self._path) if inside.startswith("..") else FoundFile(self._path, f"<{inside}>")
+
+    def _files_beside(self) -> Iterator[str]:
+        """The names of decks that an include in quotes finds, but for the library's and the text's own."""
+        files = self._files()
+        own = os.path.basename(self._path or "")
+        folders = files.where(self._found_file(), False)[:-1]
+        yield from (name for name in files.listed(folders) if name != own)
+
+
+def normal(text: str) -> str:
+    """A text with its lines ended by newlines alone."""
+    return "\n".join(lines_of(text))
+
+
+def characters(codec: PositionCodec, line: str, units: int) -> int:
+    """How many characters of a line stand before a position in an editor's units."""
+    taken = 0
+    for n, character in enumerate(line):
+        if taken >= units:
+            return n
+        taken += codec.client_num_units(character)
+    return len(line)

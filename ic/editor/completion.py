@@ -1,0 +1,278 @@
+"""What may stand where an editor's cursor is: keys, models, names, paths, units, files, directives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from lsprotocol import types
+
+from ic.editor.index import DeckIndex
+from ic.editor.names import DeckNames
+from ic.editor.structure import DeckText, TextEntry
+from ic.find import library_files
+from ic.language import BLOCKS, DEFINITIONS, BlockDeclaration
+from ic.language.unit_words import units_of
+from ic.text.lexer import NAME, NUMBERS, STRING, Token
+from ic.text.preprocess import DIRECTIVES
+from met import models
+from met.frozen import frozen
+from met.parameter import Parameter
+from met.unit_parser import parse_unit
+from met.units import UNITS
+
+FUNCTIONS = ("sqrt", "sin", "cos", "min", "max", "linspace", "logspace", "pi")
+_PATHS = ("vary", "require", "record", "exclude", "of", "against", "choose", "maximise", "minimise", "signal")
+
+
+@frozen
+class Offer:
+    """A word that may stand here, what kind of thing it is, and what it means in a line."""
+
+    word: str
+    kind: types.CompletionItemKind
+    about: str = ""
+
+
+def offers(text: DeckText, offset: int, names: DeckNames, index: DeckIndex, files: Iterable[str]) -> list[Offer]:
+    """The words that may stand at an offset of a text.
+
+    files  the names of decks that an include in quotes finds
+    """
+    line = text.source.text[text.source.text.rfind("\n", 0, offset) + 1 : offset]
+    if line.lstrip().startswith("#"):
+        return list(_of_directive(line, files))
+    if _is_in_comment_or_string(text, offset):
+        return []
+    words, around = _before(text, offset)
+    found = {offer.word: offer for offer in reversed(list(_of_entry(words, around, names, index, offset)))}
+    return list(reversed(found.values()))
+
+
+def _of_directive(line: str, files: Iterable[str]) -> Iterator[Offer]:
+    word, _, rest = line.lstrip().removeprefix("#").lstrip().partition(" ")
+    if word == "include" or word.startswith(("include<", 'include"')):
+        rest = rest or word.removeprefix("include")
+        if "<" in rest:
+            yield from (Offer(each, types.CompletionItemKind.File, "standard library") for each in library_files())
+        elif '"' in rest:
+            yield from (Offer(each, types.CompletionItemKind.File) for each in files)
+    elif not rest and " " not in line.lstrip():
+        yield from (Offer(each, types.CompletionItemKind.Keyword) for each in DIRECTIVES)
+
+
+def _is_in_comment_or_string(text: DeckText, offset: int) -> bool:
+    for token in text.comments:
+        written = text.source.text[token.offset : token.end]
+        if token.offset < offset < token.end or (offset == token.end and not written.endswith("*/")):
+            return True
+    return any(each.kind == STRING and each.offset < offset < each.end for each in text.tokens)
+
+
+def _before(text: DeckText, offset: int) -> tuple[list[Token], TextEntry | None]:
+    """The words of the entry before the one that is written, and the entry whose block that is in."""
+    around = text.around(offset)
+    entries = text.entries if around is None else around.entries
+    for entry in entries:
+        last = entry.words[-1].end if entry.words else 0
+        opened = entry.opened.offset if entry.opened is not None else None
+        if (
+            entry.words
+            and entry.words[0].offset < offset
+            and (offset <= (opened if opened is not None else max(last, entry.closed - entry.complete)))
+        ):
+            words = [word for word in entry.words if word.end <= offset]
+            return words[:-1] if words and words[-1].end == offset and words[-1].kind == NAME else words, around
+    return [], around
+
+
+def _of_entry(
+    words: list[Token], around: TextEntry | None, names: DeckNames, index: DeckIndex, offset: int
+) -> Iterator[Offer]:
+    if not words:
+        yield from _beginnings(around, names)
+        return
+    last = words[-1]
+    texts = [word.text for word in words]
+    if last.text == ".":
+        yield from _rest_of_path(words, names, index)
+        return
+    if last.kind in NUMBERS or (last.text == "]" and "=" in texts):
+        yield from _units(_parameter(texts, around, names))
+        return
+    if last.text == "like":
+        kind = texts[1] if texts[0] == "default" else texts[0]
+        yield from (offer for offer in _named(names, kind) if offer.word not in texts)
+        return
+    if last.text == "of" and texts[0] in ("sweep", "search", "tune"):
+        yield from _named(names, "run")
+        return
+    if last.text in ("*", "/") and len(words) > 1 and words[-2].text in UNITS:
+        yield from _units(None)
+        return
+    if texts[-1:] == ["revolute"] or (len(texts) == 1 and texts[0] in BLOCKS):
+        return
+    if len(texts) == 2 and texts[0] == "joint":
+        yield from (Offer(each, types.CompletionItemKind.Keyword) for each in ("revolute", "prismatic", "fixed"))
+        return
+    yield from _values(texts, around, names, index)
+
+
+def _beginnings(around: TextEntry | None, names: DeckNames) -> Iterator[Offer]:
+    """The words that an entry of a block may begin with."""
+    if around is None:
+        yield from (Offer(each, types.CompletionItemKind.Keyword, BLOCKS[each].doc) for each in DEFINITIONS)
+        yield Offer("let", types.CompletionItemKind.Keyword, "a name for a value: `let reach = 2 m;`")
+        yield Offer("default", types.CompletionItemKind.Keyword, "marks the run that `met run` takes")
+        yield from _named(names, "macro")
+        return
+    block = _block(around)
+    if around.kind == "servos" or around.kind == "initial":
+        yield from _named(names, "joint")
+    if block is not None:
+        for entry in block.entries:
+            about = f"{entry.doc}; {entry.default}" if entry.default else entry.doc
+            yield Offer(entry.name, types.CompletionItemKind.Property, about)
+    yield from (_of_parameter(each) for each in parameters_of(around, names))
+    if around.kind == "environment":
+        for name in models.available("environment"):
+            yield Offer(name, types.CompletionItemKind.Class, first_line(models.available("environment")[name]))
+    yield from _named(names, "macro")
+
+
+def _block(around: TextEntry) -> BlockDeclaration | None:
+    return BLOCKS.get(around.kind)
+
+
+def parameters_of(entry: TextEntry, names: DeckNames) -> tuple[Parameter, ...]:
+    """The parameters of the model that an entry is of."""
+    name = names.model_of(entry)
+    for kind in models.GROUPS:
+        found = models.available(kind).get(name)
+        wanted = kind == entry.kind or (entry.kind not in models.GROUPS and kind not in ("servo", "metric"))
+        if found is not None and wanted:
+            return models.written(found)
+    return ()
+
+
+def _parameter(texts: list[str], around: TextEntry | None, names: DeckNames) -> Parameter | None:
+    """The parameter that an entry sets, where it is declared."""
+    if around is None or not texts:
+        return None
+    if "(" in texts:  # an argument: `trapezoid(max_rate = 5 deg/s)`
+        opened = len(texts) - 1 - texts[::-1].index("(")
+        name = texts[opened - 1] if opened else ""
+        key = texts[len(texts) - 1 - texts[::-1].index("=") - 1] if "=" in texts[opened:] else ""
+        for kind in models.GROUPS:
+            if name in models.available(kind):
+                return models.parameter(models.available(kind)[name], key)
+        return None
+    for each in parameters_of(around, names):
+        if each.name == texts[0]:
+            return each
+    block = _block(around)
+    entries = [entry for entry in block.entries if entry.name == texts[0]] if block is not None else []
+    return entries[0].parameter if entries else None
+
+
+def _units(wanted: Parameter | None) -> Iterator[Offer]:
+    """The units of the table, those that fit first; where a compound one is wanted it stands before all."""
+    fit: list[str] = []
+    if wanted is not None and wanted.unit not in ("", "1"):
+        try:
+            fit = units_of(parse_unit(wanted.unit).dimension)
+        except (ValueError, KeyError):
+            fit = []
+        shown = wanted.unit
+        if shown not in ("joint", "effort", "of", "command") and not any(
+            word in shown for word in ("joint", "effort", "of", "command")
+        ):
+            yield Offer(shown, types.CompletionItemKind.Unit, f"the unit of `{wanted.name}`")
+        if fit:
+            yield from (Offer(each, types.CompletionItemKind.Unit, UNITS[each].word) for each in fit)
+            return
+    yield from (Offer(each, types.CompletionItemKind.Unit, UNITS[each].word) for each in UNITS)
+
+
+def _rest_of_path(words: list[Token], names: DeckNames, index: DeckIndex) -> Iterator[Offer]:
+    """The words that follow the beginning of a path: parts of parameters, of signals, and of definitions."""
+    parts: list[str] = []
+    for word in reversed(words):
+        if word.text != "." and (word.kind != NAME or (parts and parts[-1] != ".")):
+            break
+        parts.append(word.text)
+    head = "".join(reversed(parts))
+    about: dict[str, str] = {}
+    for each in index.values:
+        if each.path.startswith(head):
+            part, _, more = each.path[len(head) :].partition(".")
+            about.setdefault(part, "" if more else f"{each.value}; {each.doc}")
+    for path in index.signals:
+        if path.startswith(head):
+            part, _, more = path[len(head) :].partition(".")
+            about.setdefault(part, "" if more else "signal")
+    yield from (Offer(part, types.CompletionItemKind.Field, said) for part, said in about.items())
+    for found in names.by_name.get(head[:-1], ()):
+        if found.kind == "servo" and found.entry is not None:
+            yield from (_of_parameter(each) for each in parameters_of(found.entry, names))
+
+
+def _values(texts: list[str], around: TextEntry | None, names: DeckNames, index: DeckIndex) -> Iterator[Offer]:
+    """The words that a value may begin with."""
+    key = texts[0]
+    wanted = _parameter(texts, around, names)
+    if wanted is not None and wanted.words:
+        yield from (Offer(each, types.CompletionItemKind.EnumMember, wanted.doc) for each in wanted.words)
+        return
+    where = around.kind if around is not None else ""
+    if where == "servos":
+        yield from _named(names, "servo")
+        return
+    kinds = {"parent": "link", "child": "link", "arm": "arm"}
+    if key in kinds and where in ("joint", "run"):
+        if kinds[key] == "link":
+            yield Offer("base", types.CompletionItemKind.Constant, "what the arm stands on")
+        yield from _named(names, kinds[key])
+        return
+    model_kinds: dict[str, models.Kind] = {
+        "model": "servo", "command": "command", "integrator": "integrator", "metric": "metric", "bed": "bed",
+        "law": "law", "guide": "guide", "sensor": "sensor",
+    }  # fmt: skip
+    kind = model_kinds.get(key)
+    if kind is not None and "=" in texts:
+        for name, model in models.available(kind).items():
+            yield Offer(name, types.CompletionItemKind.Class, first_line(model))
+        if key != "command":
+            return
+    if key in _PATHS or "vary" in texts:
+        heads = dict.fromkeys(each.path.partition(".")[0] for each in index.values)
+        heads |= dict.fromkeys(path.partition(".")[0] for path in index.signals)
+        yield from (Offer(each, types.CompletionItemKind.Field, "of a path") for each in heads)
+        yield from _named(names, "servo", "joint", "metric")
+    if "(" in texts:
+        opened = len(texts) - 1 - texts[::-1].index("(")
+        for each in models.GROUPS:
+            model = models.available(each).get(texts[opened - 1])
+            if model is not None and texts[-1] in ("(", ",", ";"):
+                yield from (_of_parameter(parameter) for parameter in models.written(model))
+    yield from _named(names, "let", "macro")
+    yield from (Offer(each, types.CompletionItemKind.Function) for each in FUNCTIONS)
+
+
+def _named(names: DeckNames, *kinds: str) -> Iterator[Offer]:
+    shown = {
+        "let": types.CompletionItemKind.Variable,
+        "macro": types.CompletionItemKind.Constant,
+        "run": types.CompletionItemKind.Function,
+    }
+    for kind in kinds:
+        for name in names.of_kind(kind):
+            yield Offer(name, shown.get(kind, types.CompletionItemKind.Reference), kind)
+
+
+def _of_parameter(parameter: Parameter) -> Offer:
+    unit = f" in {parameter.unit}" if parameter.unit not in ("", "1") else ""
+    return Offer(parameter.name, types.CompletionItemKind.Property, f"{parameter.doc}{unit}")
+
+
+def first_line(model: object) -> str:
+    return (type(model).__doc__ or getattr(model, "doc", "") or "").strip().split("\n")[0]

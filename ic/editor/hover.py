@@ -1,0 +1,116 @@
+"""What an editor shows of a word: what a key, a model, a unit or a name means, and what a value came to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from ic.editor.completion import first_line, parameters_of
+from ic.editor.index import DeckIndex, ValueInDeck
+from ic.editor.names import DeckNames
+from ic.editor.structure import DeckText, TextEntry
+from ic.language import BLOCKS
+from ic.text.lexer import NAME, Token
+from met import models
+from met.diagnostic import Place
+from met.messages.message import shown_place
+from met.units import UNITS
+
+MOST_VALUES = 4  # values that are shown of one place; of more, how many there are
+
+
+def about(
+    text: DeckText, token: Token, entry: TextEntry | None, names: DeckNames, index: DeckIndex, file: str
+) -> list[str]:
+    """Paragraphs, in Markdown, about a word of a text; none where nothing is known of it.
+
+    file  the name that places of the deck give the text's file
+    """
+    found = [*_of_key(token, entry, names), *_of_model(token), *_of_unit(text, token), *_of_name(token, entry, names)]
+    return [*found, *_of_values(index, token, entry, file)]
+
+
+def entry_of(text: DeckText, token: Token) -> TextEntry | None:
+    """The entry that a word of a text stands in, before its block."""
+    for entry in text.all_entries():
+        if entry.words and entry.words[0].offset <= token.offset <= entry.words[-1].offset:
+            return entry
+    return None
+
+
+def _of_key(token: Token, entry: TextEntry | None, names: DeckNames) -> Iterator[str]:
+    if entry is None or not entry.words:
+        return
+    first = entry.words[0] if entry.texts and entry.words[0].text == entry.texts[0] else entry.words[-1]
+    if token.offset != first.offset and token.text not in BLOCKS:
+        return
+    around = entry.within
+    block = BLOCKS.get(around.kind) if around is not None else None
+    for each in block.entries if block is not None else ():
+        if each.name.split()[0] == token.text:
+            unit = f" in {each.unit}" if each.unit not in ("", "1") else ""
+            yield f"`{each.written}`\n\n{each.doc}{unit}; default: {each.default}"
+            return
+    for parameter in parameters_of(around, names) if around is not None else ():
+        if parameter.name == token.text:
+            unit = f" in {parameter.unit}" if parameter.unit not in ("", "1") else ""
+            default = "needed" if parameter.default is None else f"default: {parameter.default}"
+            yield f"`{parameter.name}`{unit}: {parameter.doc}; {default}"
+            return
+    if token.text in BLOCKS and token.offset == entry.words[0].offset:
+        yield f"`{BLOCKS[token.text].written}`\n\n{BLOCKS[token.text].doc}"
+
+
+def _of_model(token: Token) -> Iterator[str]:
+    for kind in models.GROUPS:
+        model = models.available(kind).get(token.text)
+        if model is not None:
+            yield f"{kind} model `{token.text}`: {first_line(model)}"
+
+
+def _of_unit(text: DeckText, token: Token) -> Iterator[str]:
+    unit = UNITS.get(token.text)
+    before = text.source.text[: token.offset].rstrip()[-1:]
+    if unit is not None and (before.isdigit() or before in "*/.])^"):
+        yield f"unit `{token.text}`: {unit.word}, {unit.measure.scale:g} in SI"
+
+
+def _of_name(token: Token, entry: TextEntry | None, names: DeckNames) -> Iterator[str]:
+    for found in names.meant(token, entry)[:2] if token.kind == NAME else ():
+        source = found.token.source
+        line = source.text.split("\n")[source.line(found.token.offset) - 1].strip()
+        yield f"{found.kind} `{found.token.text}`\n\n```met\n{line}\n```"
+
+
+def _of_values(index: DeckIndex, token: Token, entry: TextEntry | None, file: str) -> Iterator[str]:
+    """The values that are written in the entry of a word, or at it."""
+    lines = _lines(token, entry)
+    found = [each for each in index.values if each.place is not None and _is_at(each.place, file, lines, token)]
+    for value in found[:MOST_VALUES]:
+        yield _words(value)
+    if len(found) > MOST_VALUES:
+        yield f"and {len(found) - MOST_VALUES} more values are written here"
+
+
+def _lines(token: Token, entry: TextEntry | None) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Where the entry begins and ends, up to its block: lines and columns from 1."""
+    words = entry.words if entry is not None and entry.words else [token]
+    first, last = words[0].place, words[-1].place
+    return (first.line, first.column), (last.line, last.column + last.length)
+
+
+def _is_at(place: Place, file: str, lines: tuple[tuple[int, int], tuple[int, int]], token: Token) -> bool:
+    return any(
+        each.file == file and lines[0] <= (each.line, each.column) < lines[1] for each in {place, shown_place(place)}
+    )
+
+
+def _words(value: ValueInDeck) -> str:
+    said = "; ".join(value.said)
+    return (
+        f"`{value.path}` = {value.value}" + (f"  \n{said}" if said else "") + (f"  \n{value.doc}" if value.doc else "")
+    )
+
+
+def markdown(paragraphs: Iterable[str]) -> str:
+    """The paragraphs, parted by rules."""
+    return "\n\n---\n\n".join(paragraphs)

@@ -1,0 +1,96 @@
+"""The values of a deck as it was last compiled: for completion, and for what an editor shows of a word."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+
+from ic.driver.compile import Compiled
+from ic.driver.explain import explanations_of
+from ic.meaning.parameters.owner import Settled
+from ic.printing.columns import quantity, vector
+from met.diagnostic import Place
+from met.frozen import frozen
+from met.messages.message import shown_place
+from met.plan.channel import recordable
+from met.trace import Scalar
+
+MOST_VALUES = 20_000  # of a deck
+MOST_NUMBERS = 6  # of a list, that are shown
+
+
+@frozen
+class ValueInDeck:
+    """A value that a run has, where the deck writes it.
+
+    path   the parameter's, or the name of a `let`
+    value  in SI, as a person reads it
+    said   where it comes from: what it overrode, in which run
+    doc    what the parameter means
+    place  where it is written; None for a default
+    """
+
+    path: str
+    value: str
+    said: tuple[str, ...]
+    doc: str
+    place: Place | None
+
+
+@frozen
+class DeckIndex:
+    """The values of a deck, and the signals that its runs can record, with their units."""
+
+    values: tuple[ValueInDeck, ...]
+    signals: tuple[str, ...]
+
+
+def index_of(compiled: Compiled) -> DeckIndex:
+    """The index of a deck that has a plan."""
+    assert compiled.plan is not None
+    signals = {path: None for experiment in compiled.plan.experiments for path in recordable(experiment.structure)}
+    return DeckIndex(tuple(islice(_values(compiled), MOST_VALUES)), tuple(signals))
+
+
+def _values(compiled: Compiled) -> Iterator[ValueInDeck]:
+    """The values, of several runs those that are written elsewhere too."""
+    assert compiled.plan is not None
+    seen: set[tuple[str, Place | None]] = set()
+    for number, (experiment, scope) in enumerate(zip(compiled.plan.experiments, compiled.scopes, strict=True)):
+        for path, settled in {**scope.parameters, **scope.auxiliary}.items():
+            place = settled.origin.place
+            key = path, place and shown_place(place)
+            if key in seen:
+                continue
+            seen.add(key)
+            yield ValueInDeck(path, _shown(settled), tuple(_said(settled, experiment.name)), settled.doc, place)
+        for name in scope.definitions.lets if number == 0 else ():
+            for found in explanations_of(compiled, name):
+                if found.path == name and found.place is not None:
+                    value = found.value
+                    text = _text(value if not found.varies else None, found.unit)
+                    yield ValueInDeck(name, text, (f"written `{found.written}`",), found.doc, found.place)
+                    break
+
+
+def _shown(settled: Settled) -> str:
+    return _text(None if isinstance(settled.value, Scalar) else settled.value, settled.unit)
+
+
+def _text(value: float | tuple[float, ...] | str | None, unit: str) -> str:
+    if value is None:
+        return f"in {unit}, and varies with the case" if unit not in ("", "1") else "varies with the case"
+    if isinstance(value, str):
+        return f"`{value}`"
+    if isinstance(value, tuple):
+        more = f", ... ({len(value)} in all)" if len(value) > MOST_NUMBERS else ""
+        return vector(value[:MOST_NUMBERS], unit) + more
+    return quantity(float(value), unit)
+
+
+def _said(settled: Settled, run: str) -> Iterator[str]:
+    origin = settled.origin
+    words = {"case": "a sweep varies it", "default": "the default", "derived": "computed"}.get(origin.kind, "")
+    note = ", ".join(each for each in (words, origin.note) if each)
+    yield f"in `{run}`" + (f": {note}" if note else "")
+    yield from (f"overrides {shown_place(place)}" for place in origin.overrides)

@@ -1,0 +1,141 @@
+"""Operating points that are solved for: an arm that stands still in a pose, held by its servos.
+
+It starts from a run that begins `balanced` (docs/physics.md): each servo asked to stay where it is, its states and its
+law's memory what keeps its joint from accelerating. From there it is solved for: nothing changes from one period to the
+next. Where a motor is too weak for that, or something moves that no servo holds, there is no operating point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from met.analysis.linear.flow import Flow
+from met.analysis.linear.injected import ADDED
+from met.analysis.linear.jacobian import period_map
+from met.analysis.linear.period import PeriodProgram
+from met.diagnostic import Problem, error
+from met.plan import Command, Experiment, Origin, Quantity, Structure
+from met.program.unheld import Unheld, unheld
+
+CLOSE = 1e-11
+"""Change of a number over a period, as a share of it and at most this itself, that is none."""
+
+MOST_STEPS = 8
+"""Steps of Newton's method: what it starts from is nearly there, or there is nothing."""
+
+Reason = str
+"""Why an arm does not stand in a pose, in words."""
+
+
+def standing(experiment: Experiment, q: Sequence[float] = ()) -> Experiment:
+    """The experiment begun at rest at these positions of its moving joints, rad (m), in their order; none: those
+    that it begins with. Servos are asked to stay; guides are gone, and signals that are made of them."""
+    structure = experiment.structure
+    lost = tuple(f"guides.{each.name}." for each in structure.guides)
+    servos = tuple(
+        use if use.command is None else replace(use, command=Command(use.command.kind, "constant"))
+        for use in structure.servos
+    )
+    commanded = tuple(f"{use.joint}.servo.command." for use in servos if use.command is not None)
+    parameters = {path: of for path, of in experiment.parameters.items() if not path.startswith((*commanded, *lost))}
+    places = dict(zip((joint.name for joint in structure.moving), q, strict=True)) if q else {}
+    for joint in structure.moving:
+        at = parameters[f"initial.{joint.name}.q"]
+        at = replace(at, value=places[joint.name]) if q else at
+        still = replace(parameters[f"initial.{joint.name}.qd"], value=0.0)
+        parameters |= {f"initial.{joint.name}.q": at, f"initial.{joint.name}.qd": still}
+    for use in servos:
+        if use.command is not None:
+            stays = parameters[f"initial.{use.joint}.q"] if use.command.kind == "position" else _ZERO
+            parameters[f"{use.joint}.servo.command.value"] = stays
+    for path in [path for path in parameters if path.startswith(("initial.base.velocity.", "initial.base.rate."))]:
+        parameters[path] = replace(parameters[path], value=0.0)
+    kept = tuple(
+        each for each in structure.expressions if not any(path.startswith(lost) for path in each.channels)
+    ) if lost else structure.expressions  # fmt: skip
+    stood: Structure = replace(
+        structure, servos=servos, guides=(), metrics=(), record=(), expressions=kept, balanced=True
+    )  # fmt: skip
+    return replace(
+        experiment, structure=stood, parameters=parameters, requirements=(), linear=(), linear_metrics=(),
+        step_errors=(), tolerances=(), search=None,
+    )  # fmt: skip
+
+
+_ZERO = Quantity(0.0, "", Origin("default"))
+
+
+def weak(experiment: Experiment, given: np.ndarray) -> list[Reason]:
+    """For each of these inputs, [case, input], why servos cannot hold an arm that is to stand; "" where they can."""
+    return ["; ".join(map(_of_unheld, joints)) for joints in unheld(experiment, given)]
+
+
+def _of_unheld(of: Unheld) -> str:
+    takes = f"`{of.joint.name}` takes {of.wanted:.3g} {of.unit}, and its servo can hold {of.there:.3g} {of.unit}"
+    return f"{takes}: {of.reason}"
+
+
+def settled(program: PeriodProgram, flow: Flow) -> Flow | None:
+    """The flow where nothing changes over a period, by Newton's method with the exact derivative; None: there is none.
+
+    The joints stay where they are; what is sought is all else that the arm and its laws remember, and what is added to
+    each servo's command: behind a gear that is wound up, a law sees another position than the joint's.
+    """
+    if program.bodies:
+        return None
+    commands = [number for number, each in enumerate(program.inputs) if not each.is_output]
+    flow = flow.copy()
+    for _ in range(MOST_STEPS):
+        try:
+            found = period_map(program, flow)
+        except Problem:  # a limit that is reached, or something breaks away: it does not stand
+            return None
+        after = flow.copy()
+        for _ in range(program.ticks):
+            after.ticks()
+            after.finish()
+        now = np.array([flow.cells[name] for name in found.states])
+        change = np.array([after.cells[name] for name in found.states]) - now
+        if not np.isfinite(change).all():
+            return None
+        if np.all(np.abs(change) <= CLOSE * np.maximum(np.abs(now), 1.0)):
+            return flow
+        sought = [place for place, name in enumerate(found.states) if name not in program.positions]
+        added = [[k for k, each in enumerate(found.ticks) if each.entry == number] for number in commands]
+        columns = [(found.A - np.eye(len(now)))[:, sought], *(found.B[:, ticks].sum(1)[:, None] for ticks in added)]
+        moves_by = np.hstack(columns)
+        sizes = np.linalg.norm(moves_by, axis=0)
+        sizes[sizes == 0.0] = 1.0  # what moves nothing stays as it is, as the integral of a joint that sticks
+        step = np.linalg.lstsq(moves_by / sizes, -change, rcond=1e-13)[0] / sizes
+        for place, size in zip(sought, step, strict=False):
+            flow.cells[found.states[place]] += float(size)
+        for number, size in zip(commands, step[len(sought) :], strict=True):
+            cell = ADDED + program.inputs[number].path
+            flow.cells[cell] = flow.cells.get(cell, 0.0) + float(size)
+    return None
+
+
+def moves(program: PeriodProgram, flow: Flow) -> Reason:
+    """What of an arm that begins where a flow stands changes its rate most within a period, in words."""
+    if program.bodies:
+        return f"`{program.bodies[0].name}` moves freely"
+    after = flow.copy()
+    for _ in range(program.ticks):
+        after.ticks()
+        after.finish()
+    found = {name: abs(after.cells[name] - flow.cells[name]) / program.seconds for name in program.rates}
+    name = max(found, key=lambda each: found[each])
+    first = name.removesuffix(".qd")
+    sliding = {joint.name for joint in program.experiment.structure.moving if joint.kind == "prismatic"}
+    size = f"{found[name]:.3g} {'m/s^2' if first in sliding else 'rad/s^2'}"
+    return f"`{first}` begins to move, by {size}, and no constant command and no state of its servo stop it"
+
+
+def refusal(experiment: Experiment, why: Reason) -> Problem:
+    """The refusal of an operating point that is none."""
+    message = f"`{experiment.name}` has no operating point in this pose: {why}"
+    helps = "another pose or a stronger servo; `at = TIME` asks of a motion instead"
+    return Problem(error("D377", message, experiment.place, help=helps))

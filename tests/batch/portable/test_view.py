@@ -1,0 +1,249 @@
+"""`met view`: a page whose sliders run the archive's cases again, in a browser, with the archive's bits."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import pytest
+import xarray
+
+from batch.archive.read import ArchiveFile
+from batch.portable import page as portable_page
+from met import cli
+from tests.batch.report.browser import INK, PACKAGE, Chromium, browser, program, quiet
+
+DECK = """\
+#include <two_link.ic>
+run brief like nominal {
+    duration = 2 s;
+    remove settle;
+    require volts < 3.55 V;
+}
+sweep tuned of brief { vary gearbox.kp = [0.005, 0.01, 0.02] V*s/rad; vary links.upper.mass = [45000, 90000] g; }
+sweep ways of brief { vary integrator = [modified_euler, rk4]; }
+"""
+
+
+@pytest.fixture(scope="module")
+def sent(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a page, its archive, and an archive of two groups."""
+    folder = tmp_path_factory.mktemp("sent")
+    (folder / "deck.ic").write_text(DECK, encoding="utf-8")
+    for name in ("tuned", "ways"):
+        words = ["run", folder / "deck.ic", name, "-q", "--no-picture", "-o", folder / f"{name}.h5"]
+        assert cli.main([str(word) for word in words]) in (cli.YES, cli.NO)
+    assert cli.main(["view", str(folder / "tuned.h5"), "-q"]) == 0
+    return folder
+
+
+def test_a_page_is_whole_and_allows_itself_one_script_and_webassembly(sent: Path) -> None:
+    page = (sent / "tuned.view.html").read_text(encoding="utf-8")
+    rules = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
+    assert rules is not None
+    digest = r"'sha256-[\w+/=]{44}'"
+    expected = (
+        rf"default-src 'none'; script-src {digest} 'wasm-unsafe-eval'; style-src {digest}; img-src data:; "
+        r"base-uri 'none'; form-action 'none'"
+    )
+    assert re.fullmatch(expected, rules[1])
+    assert page.count("<script") == 1 and not re.search(
+        r"https?://(?!www\.w3\.org/2000/svg)[\w.]+/", page.split("<script>")[0]
+    )
+    again = sent / "again.html"
+    assert cli.main(["view", str(sent / "tuned.h5"), "-q", "-o", str(again)]) == 0
+    assert again.read_text(encoding="utf-8") == page
+
+
+def test_pages_are_refused_before_anything_is_computed(
+    sent: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(sent)
+    (sent / "mine.html").write_text("<p>mine")
+    for output, said in (
+        ("mine.html", "error[E474]: mine.html exists and was not written by `met view`: it is not written over\n"),
+        ("view.pdf", "error[E475]: cannot write view.pdf: pages are HTML files\n = help: `-o view.html`\n"),
+    ):
+        assert cli.main(["view", "tuned.h5", "-o", output]) == 2
+        assert said in capsys.readouterr().err
+    assert cli.main(["view", "ways.h5"]) == 2
+    assert capsys.readouterr().err.startswith(
+        "error[E473]: a page is of one run or sweep, and ways.h5 has 2\n"
+        " = help: name one: ways.modified_euler, ways.rk4\n"
+    )
+    assert cli.main(["view", "ways.h5", "ways.rk4", "-q", "-o", "rk4.html"]) == 0
+    assert (sent / "mine.html").read_text() == "<p>mine"
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Chromium]:
+    if program() is None:
+        pytest.skip(f"no chromium; on Debian or Ubuntu: apt-get install {PACKAGE}")
+    with browser() as started:
+        yield started
+
+
+SAID = "document.querySelector('.came').textContent"
+CHOOSE = """(n => { const e = document.querySelector('select'); e.value = n; e.dispatchEvent(new Event('change'));
+    return document.querySelector('.came').textContent; })"""
+MOVE = """((n, at) => { const e = document.querySelectorAll('.knob input')[n]; e.value = at;
+    e.dispatchEvent(new Event('input')); return document.querySelector('.came').textContent; })"""
+
+
+@pytest.mark.browser
+def test_each_case_has_the_archives_bits_and_says_so(chromium: Chromium, sent: Path) -> None:
+    page = chromium.open(sent / "tuned.view.html")
+    page.settle()
+    for n in range(6):
+        assert page.run(f"{CHOOSE}({n})").startswith(
+            f"Case #{n}, with the archive's bits in its metric: computed here in "
+        )
+    assert all(share > 0.005 for share in page.run(f"{INK}('main canvas')"))
+    quiet(page)
+    page.close()
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("machine", ["false", "METKernel.fuses()"])
+def test_every_recorded_number_in_the_browser_has_the_archives_bits(
+    chromium: Chromium, sent: Path, machine: str
+) -> None:
+    page = chromium.open(sent / "tuned.view.html")
+    found = page.run(f"""(() => {{
+        const told = MET_PAGE.description, code = Uint8Array.from(atob(MET_PAGE.module), c => c.charCodeAt(0));
+        const kernel = METKernel.make(code, told.kernel, {machine});
+        const {{ rows }} = kernel.run(told.cases.inputs, told.ticks);
+        return {{ columns: told.columns, rows: told.rows, bits: Array.from(new BigInt64Array(rows.buffer), String) }};
+    }})()""")
+    with xarray.open_dataset(sent / "tuned.h5") as data:
+        count = 0
+        for n, column in enumerate(found["columns"]):
+            joint = column["channel"].removesuffix(f".{column['signal']}")
+            values = (
+                data[column["signal"]].sel(joint=joint).values
+                if "joint" in data[column["signal"]].dims
+                else data[column["signal"]].values
+            )
+            bits = [str(b) for b in values.reshape(-1).view("int64").tolist()]
+            assert found["bits"][n :: len(found["columns"])] == bits, column
+            count += len(bits)
+    assert count == len(found["bits"]) == 6 * found["rows"] * len(found["columns"])
+    page.close()
+
+
+@pytest.mark.browser
+def test_a_slider_runs_the_case_again_and_turns_the_verdict(chromium: Chromium, sent: Path) -> None:
+    page = chromium.open(sent / "tuned.view.html")
+    page.settle()
+    before = page.picture(sent / "before.png").read_bytes()
+    assert page.run("document.querySelector('.answers .met, .answers .missed').className") == "missed"
+    assert page.run(f"{MOVE}(0, 0.93)").startswith("Not in the archive: computed here in ")
+    assert page.run("document.querySelector('select').value") == ""
+    assert page.run("document.querySelector('.answers .met, .answers .missed').className") == "met"
+    page.settle()
+    assert page.picture(sent / "after.png").read_bytes() != before
+    assert page.run(f"{MOVE}(0, 0.995)").startswith("Case #4, with the archive's bits")  # near what the archive has
+    assert page.run("document.querySelectorAll('.knob output')[2].textContent") == "45000 g"
+    quiet(page)
+    page.close()
+
+
+@pytest.mark.browser
+def test_an_archive_that_holds_other_numbers_is_told_apart(chromium: Chromium, sent: Path, tmp_path: Path) -> None:
+    text = (sent / "tuned.view.html").read_text(encoding="utf-8")
+    changed = re.sub(r'"metrics":\["[^"]{8}', lambda found: found[0][:-8] + "AAAAAAAA", text)
+    assert changed != text
+    loose = re.sub(r"script-src '[^']*'", "script-src 'unsafe-inline'", changed)
+    (tmp_path / "changed.html").write_text(loose, encoding="utf-8")
+    page = chromium.open(tmp_path / "changed.html")
+    assert page.run(SAID).startswith("Other numbers than the archive has for case #0 (volts): ")
+    page.close()
+    (tmp_path / "unsigned.html").write_text(changed, encoding="utf-8")
+    page = chromium.open(tmp_path / "unsigned.html")
+    assert page.run("document.querySelector('.came')") is None  # no script runs that is not the page's own
+    page.close()
+
+
+RUNAWAY = """\
+arm rail {
+    link cart { mass = 1 kg; shape = box(size = [0.1, 0.1, 0.1] m); }
+    joint slide prismatic { parent = base; child = cart; axis = x; }
+}
+run it {
+    arm = rail;  initial { slide.qd = 1 m/s; }
+    environment { drag = joint_damping { sliding = 50 N*s/m; } }
+    rates { dynamics = 100 Hz; record = 100 Hz; }  duration = 3200 ms;
+    record = [qd];  metric late = final { of = slide.qd; }
+}
+sweep damped of it { vary environment.drag.sliding = [50, 220] N*s/m; }
+"""
+
+
+@pytest.mark.browser
+def test_a_case_that_runs_away_fails_in_the_page_as_in_the_archive(chromium: Chromium, tmp_path: Path) -> None:
+    (tmp_path / "deck.ic").write_text(RUNAWAY, encoding="utf-8")
+    archive = tmp_path / "a.h5"
+    assert cli.main(["run", str(tmp_path / "deck.ic"), "damped", "-q", "--no-picture", "-o", str(archive)]) == cli.NO
+    assert cli.main(["view", str(archive), "-q"]) == 0
+    with xarray.open_dataset(archive) as data:
+        valid = data["n_valid"].values.tolist()
+    page = chromium.open(tmp_path / "a.view.html")
+    page.settle()
+    assert page.run(SAID).startswith("Case #0, with the archive's bits in its metric: ")
+    said = page.run(f"{CHOOSE}(1)")
+    assert said.startswith("Case #1 fails, as in the archive: ")
+    assert said.endswith(f"; it fails at {valid[1] / 100:g} s.") and valid[1] < valid[0]
+    assert "no value" in page.run("document.querySelector('.answers').innerText")
+    quiet(page)
+    page.close()
+
+
+def test_an_archive_without_a_metric_of_its_plan_is_damaged(
+    sent: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(sent / "tuned.h5", tmp_path / "a.h5")
+    with h5py.File(tmp_path / "a.h5", "r+") as file:
+        del file["volts"]
+    assert cli.main(["view", str(tmp_path / "a.h5")]) == 2
+    assert "error[E302]: the archive " in capsys.readouterr().err
+
+
+HOSTILE = "</script><img src=x onerror=\"document.title='hurt'\">\u202e"
+
+
+@pytest.mark.browser
+def test_texts_of_an_archive_are_texts_whatever_they_hold(chromium: Chromium, sent: Path, tmp_path: Path) -> None:
+    with ArchiveFile(sent / "tuned.h5") as file:
+        experiment = file.plan().experiments[0]
+        data = portable_page.data_of(experiment, file.groups[0])
+    assert data["same_code"] and "by the code that the archive was made with" in portable_page.page_of(experiment, data)
+    data["same_code"] = False
+    data["labels"] = data["units"] = data["metricUnits"] = data["columnUnits"] = [HOSTILE] * 9
+    for key in ("inputs", "columns", "metrics", "requirements"):
+        for each in data["description"][key]:
+            each.update({name: HOSTILE for name in ("name", "channel", "signal", "metric", "text") if name in each})
+    text = portable_page.page_of(replace(experiment, name=HOSTILE), data)
+    assert portable_page.OTHER_CODE in text
+    (tmp_path / "hostile.html").write_text(text, encoding="utf-8")
+    page = chromium.open(tmp_path / "hostile.html")
+    page.settle()
+    assert "onerror" in page.run("document.querySelector('main').innerText")
+    assert "\\u202e" in page.run("document.title") and "onerror" in page.run("document.querySelector('h1').innerText")
+    assert page.run("document.querySelectorAll('img').length") == 0
+    quiet(page)
+    page.close()
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("dark", [False, True])
+def test_nothing_is_wider_than_a_phone(chromium: Chromium, sent: Path, dark: bool) -> None:
+    page = chromium.open(sent / "tuned.view.html", width=400, dark=dark)
+    page.settle()
+    assert page.run("document.documentElement.scrollWidth") <= 400
+    assert json.dumps(page.said) == "[]"
+    page.close()

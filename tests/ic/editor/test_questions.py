@@ -1,0 +1,193 @@
+"""What an editor is told of a position: what may stand there, what stands there, where it comes from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ic.find import library_files
+from ic.language import BLOCKS, DEFINITIONS
+from ic.text.files import LIBRARY
+from met import models
+from met.units import UNITS
+from tests.ic.editor.client import Editor, uri
+
+ARM = """#include <servos/rigid_gearbox.ic>
+#include "lengths.ic"
+#define ROD(NAME, MASS) link NAME { mass = MASS; shape = rod(length = reach, along = x); }
+
+arm two {
+    ROD(upper, 40 kg)
+    ROD(lower, 20 kg)
+    joint shoulder revolute { parent = base;   child = upper;  axis = z; }
+    joint elbow    revolute { parent = upper;  child = lower;  axis = z;  at = [reach, 0 m, 0 m]; }
+}
+servo gearbox like rigid_gearbox { kp = 0.03 V*s/rad;  command = rate(slow); }
+let slow = 3 deg/s;
+default run nominal {
+    arm         = two;
+    servos      { shoulder = gearbox;  elbow = gearbox; }
+    initial     { q = 0 rad; }
+    environment { velocity_products = off; }
+    rates       { dynamics = 25 Hz;  servos = 100 Hz;  record = 25 Hz; }
+    duration    = 20 s;
+    record      = [q, shoulder.servo.voltage];
+    allow D105 because "slow rates";
+}
+sweep gains of nominal { vary gearbox.kp = [0.02, 0.03] V*s/rad; }
+"""
+LENGTHS = "let reach = 2 m;\n"
+
+
+def at(text: str, mark: str, n: int = 0) -> tuple[int, int]:
+    """The line and column of a mark in a text."""
+    where = -1
+    for _ in range(n + 1):
+        where = text.index(mark, where + 1)
+    return text.count("\n", 0, where), where - (text.rfind("\n", 0, where) + 1)
+
+
+@pytest.fixture
+def deck(tmp_path: Path, editor: Editor) -> Path:
+    """A deck that is open, and whose values are known."""
+    (tmp_path / "lengths.ic").write_text(LENGTHS)
+    path = tmp_path / "arm.ic"
+    path.write_text(ARM)
+    editor.open(path)
+    assert editor.of(path) == []
+    return path
+
+
+def words(editor: Editor, deck: Path, text: str) -> list[str]:
+    """What may stand at the `|` of a text."""
+    line, column = at(text, "|")
+    editor.change(deck, text.replace("|", ""))
+    found: list[Any] = editor.about("textDocument/completion", deck, line, column)
+    return [each["label"] for each in found]
+
+
+def test_an_entry_of_a_block_begins_with_what_the_language_declares_for_it(editor: Editor, deck: Path) -> None:
+    for written, kind in (("run more like nominal { | }", "run"), ("arm other { link a { | } }", "link")):
+        found = words(editor, deck, ARM + written)
+        assert found[: len(BLOCKS[kind].entries)] == [entry.name for entry in BLOCKS[kind].entries]
+    found = words(editor, deck, ARM + "run more like nominal { rates { dy|")
+    assert found[:4] == ["dynamics", "servos", "record", "base"]
+    assert words(editor, deck, ARM + "|")[: len(DEFINITIONS)] == list(DEFINITIONS)
+
+
+def test_a_servo_has_the_parameters_of_its_model_through_what_it_is_like(editor: Editor, deck: Path) -> None:
+    declared = [each.name for each in models.written(models.find("servo", "rigid_gearbox"))]
+    found = words(editor, deck, ARM + "servo further like gearbox { | }")
+    assert [name for name in found if name in declared] == list(dict.fromkeys(declared))
+
+
+@pytest.mark.parametrize(
+    ("written", "first"),
+    [
+        ("servo further like |", ["gearbox", "rigid_gearbox"]),
+        ("sweep more of |", ["nominal"]),
+        ("run more like nominal { servos { elbow = |", ["gearbox", "rigid_gearbox"]),
+        ("run more like nominal { servos { |", ["shoulder", "elbow"]),
+        ("run more like nominal { arm = |", ["two"]),
+        ("joint wrist |", ["revolute", "prismatic", "fixed"]),
+        ("servo f { model = |", list(models.available("servo"))),
+        ("run more like nominal { integrator = |", list(models.available("integrator"))),
+        ("run more like nominal { duration = 5 |", ["s", "ms", "us", "min", "h"]),
+        ("servo further like gearbox { kp = 5 |", ["V*s/rad"]),
+        ("run more like nominal { metric m = |", list(models.available("metric"))),
+        ("sweep s of nominal { vary links.|", ["upper", "lower"]),
+        ("sweep s of nominal { vary links.upper.|", ["mass"]),
+        ("run more like nominal { record = [elbow.|", ["axis"]),
+        ("// comment |", []),
+        ('run more like nominal { allow D105 because "|" }', []),
+        ("#|", ["if", "ifdef", "ifndef"]),
+        ("#include <|", library_files()),
+        ('#include "|"', ["lengths.ic"]),
+    ],
+)
+def test_what_may_stand_here_comes_first(editor: Editor, deck: Path, written: str, first: list[str]) -> None:
+    found = words(editor, deck, ARM + written)
+    if "links" in written or "elbow." in written:
+        assert set(first) <= set(found)
+    else:
+        assert found[: len(first)] == first and (first or not found)
+
+
+def test_parts_of_a_signal_are_offered(editor: Editor, deck: Path) -> None:
+    assert {"q", "qd", "tau", "servo"} <= set(words(editor, deck, ARM + "run more like nominal { record = [elbow.|"))
+
+
+def hovered(editor: Editor, deck: Path, mark: str, n: int = 0) -> str:
+    found = editor.about("textDocument/hover", deck, *at(ARM, mark, n))
+    return "" if found is None else str(found["contents"]["value"])
+
+
+def test_a_value_is_shown_with_its_path_in_si_and_what_it_overrode(editor: Editor, deck: Path) -> None:
+    found = hovered(editor, deck, "kp = 0.03")
+    declared = models.parameter(models.find("servo", "rigid_gearbox"), "kp")
+    assert declared is not None and f"`kp` in V*s/rad: {declared.doc}" in found
+    assert "`shoulder.servo.kp` = 0.03 V*s/rad" in found and "`elbow.servo.kp` = 0.03 V*s/rad" in found
+    assert "overrides <servos/rigid_gearbox.ic>:" in found
+
+
+def test_a_word_is_shown_with_what_it_means(editor: Editor, deck: Path) -> None:
+    assert BLOCKS["run"]["duration"].doc in hovered(editor, deck, "duration")
+    assert "unit `kg`: kilogram, 1 in SI" in hovered(editor, deck, "kg")
+    assert f"unit `deg`: {UNITS['deg'].word}" in hovered(editor, deck, "deg/s")
+    assert "let slow = 3 deg/s;" in hovered(editor, deck, "slow")
+    assert "`slow` = 0.0523599 rad/s" in hovered(editor, deck, "slow =")
+    assert "#define ROD(NAME, MASS)" in hovered(editor, deck, "ROD(upper")
+    assert "let reach = 2 m;" in hovered(editor, deck, "reach, 0")
+
+
+def places(found: list[Any]) -> list[tuple[str, int, int]]:
+    return [(each["uri"], *each["range"]["start"].values()) for each in found]
+
+
+@pytest.mark.parametrize(
+    ("mark", "n", "defined"),
+    [
+        ("gearbox;", 0, "gearbox like"),
+        ("nominal {", 1, "nominal {"),
+        ("slow)", 0, "slow ="),
+        ("ROD(lower", 0, "ROD(NAME"),
+        ("two;", 0, "two {"),
+        ("elbow = gearbox", 0, "elbow    rev"),
+        ("gearbox.kp", 0, "gearbox like"),
+    ],
+)
+def test_a_word_leads_to_its_definition(editor: Editor, deck: Path, mark: str, n: int, defined: str) -> None:
+    found = editor.about("textDocument/definition", deck, *at(ARM, mark, n))
+    assert places(found) == [(uri(deck), *at(ARM, defined))]
+
+
+def test_definitions_are_found_in_included_files_and_in_the_library(editor: Editor, deck: Path) -> None:
+    lengths = deck.parent / "lengths.ic"
+    assert places(editor.about("textDocument/definition", deck, *at(ARM, "reach, along"))) == [(uri(lengths), 0, 4)]
+    library = LIBRARY / "servos" / "rigid_gearbox.ic"
+    line, column = at(library.read_text(), "rigid_gearbox {")
+    found = editor.about("textDocument/definition", deck, *at(ARM, "rigid_gearbox {"))
+    assert places(found) == [(uri(library), line, column)]
+    assert places(editor.about("textDocument/definition", deck, *at(ARM, "lengths.ic"))) == [(uri(lengths), 0, 0)]
+    assert places(editor.about("textDocument/definition", deck, *at(ARM, "<servos"))) == [(uri(library), 0, 0)]
+
+
+def test_all_uses_of_a_name_are_found_in_all_files(editor: Editor, deck: Path) -> None:
+    context = {"context": {"includeDeclaration": True}}
+    found = editor.about("textDocument/references", deck, *at(ARM, "reach, 0"), **context)
+    lengths = deck.parent / "lengths.ic"
+    assert sorted(places(found)) == sorted(
+        [(uri(lengths), 0, 4), (uri(deck), *at(ARM, "reach, along")), (uri(deck), *at(ARM, "reach, 0"))]
+    )
+    context = {"context": {"includeDeclaration": False}}
+    found = editor.about("textDocument/references", deck, *at(ARM, "gearbox like"), **context)
+    assert places(found) == [(uri(deck), *at(ARM, mark)) for mark in ("gearbox;", "gearbox; }", "gearbox.kp")]
+
+
+def test_what_is_known_outlives_a_text_that_cannot_be_compiled(editor: Editor, deck: Path) -> None:
+    editor.change(deck, ARM + "run broken like nominal { record = [q")
+    assert editor.of(deck) != []
+    assert "`shoulder.servo.kp` = 0.03 V*s/rad" in hovered(editor, deck, "kp = 0.03")
+    assert "voltage" in words(editor, deck, ARM + "run broken like nominal { record = [elbow.servo.|")
