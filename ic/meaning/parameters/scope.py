@@ -464,11 +464,8 @@ class Scope:
         path = owner.join(name)
         for known in owner.paths(name, homes):
             self.known.setdefault(known, []).append(path)
-        given_before: CommandLineValue | None = None
-        for given in self._given(owner, name, homes):
-            before, given_before = given_before, given
-            here = is_on_command_line(given.value.place)
-            if before is not None and here == is_on_command_line(before.value.place):
+        for number, given in enumerate(self._given(owner, name, homes)):  # those of the run first
+            if origin.note == ON_COMMAND_LINE if is_on_command_line(given.value.place) else number > 0:
                 self.complaints.error(
                     "D232",
                     f"this sets `{path}`, which is set already",
