@@ -9,10 +9,10 @@ from lsprotocol import types
 from pygls.workspace import PositionCodec
 
 from ic.editor import completion
-from ic.editor.checks import CheckedDeck, Checks
+from ic.editor.checks import CheckedDeck, DeckChecks
 from ic.editor.hover import about, entry_of, markdown
 from ic.editor.index import DeckIndex
-from ic.editor.names import DeckNames, NameInText, deck_text
+from ic.editor.names import NameInText, NamesInTexts, deck_text
 from ic.editor.positions import Texts, lines_of, uri_of
 from ic.editor.structure import DeckText
 from ic.text.files import LIBRARY, Files, FoundFile, file_at
@@ -30,7 +30,7 @@ class Asked:
 
     def __init__(
         self,
-        checks: Checks,
+        checks: DeckChecks,
         codec: PositionCodec,
         address: Callable[[CheckedDeck, str], str | None],
         uri: str,
@@ -53,7 +53,7 @@ class Asked:
         self.file = next((name for name, where in self._addresses.items() if where == uri), uri)
         self._addresses[self.file] = uri
         self.text = texts.setdefault(self.file, deck_text(self.file, current))
-        self.names = DeckNames(texts.values())
+        self.names = NamesInTexts(texts.values())
         self.index = checks.indexes.get(deck.deck.uri, NO_INDEX) if deck is not None else NO_INDEX
         lines = lines_of(current)
         line = lines[position.line] if position.line < len(lines) else ""
@@ -76,7 +76,7 @@ class Asked:
         ]
 
     def hover(self) -> types.Hover | None:
-        """What is known of the word here."""
+        """All that is known of the word here."""
         token = self.token
         if token is None:
             return None
@@ -148,7 +148,7 @@ def normal(text: str) -> str:
 
 
 def characters(codec: PositionCodec, line: str, units: int) -> int:
-    """How many characters of a line stand before a position in an editor's units."""
+    """The number of characters of a line that stand before a position in an editor's units."""
     taken = 0
     for n, character in enumerate(line):
         if taken >= units:

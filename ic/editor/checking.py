@@ -40,7 +40,7 @@ class CheckRequest:
 
 @frozen
 class CheckReply:
-    """What a check found.
+    """The findings of a check.
 
     diagnostics  as `met check` prints them
     edits        of each, with the number of its help

@@ -1,4 +1,4 @@
-"""Which decks are checked when: those an editor has open, again after each change that concerns them.
+"""The order of checks: of the decks that an editor has open, again after each change that concerns them.
 
 An open text is a deck of its own unless another open deck includes it. A check waits until nothing was typed for a
 moment; a change while it runs ends it. So what is told is never older than what was told before, and once nothing
@@ -61,7 +61,7 @@ class CheckedDeck:
     reply: CheckReply
 
 
-class Checks:
+class DeckChecks:
     """The open texts, what is known of each, and the one check that runs."""
 
     def __init__(
@@ -123,7 +123,7 @@ class Checks:
         return next((each for each in self.decks() if text is not None and text.identity in each.files), None)
 
     def decks(self) -> list[CheckedDeck]:
-        """What is known of the open texts that no other one includes."""
+        """All that is known of the open texts that no other one includes."""
         return [self.checked[uri] for uri in self._roots() if uri in self.checked]
 
     async def rest(self) -> None:

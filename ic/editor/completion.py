@@ -1,4 +1,4 @@
-"""What may stand where an editor's cursor is: keys, models, names, paths, units, files, directives."""
+"""Completion, the words that may stand where a cursor is: keys, models, names, paths, units, files, directives."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from lsprotocol import types
 
 from ic.editor.index import DeckIndex
-from ic.editor.names import DeckNames
+from ic.editor.names import NamesInTexts
 from ic.editor.structure import DeckText, TextEntry
 from ic.find import library_files
 from ic.language import BLOCKS, DEFINITIONS, BlockDeclaration
@@ -33,7 +33,7 @@ class Offer:
     about: str = ""
 
 
-def offers(text: DeckText, offset: int, names: DeckNames, index: DeckIndex, files: Iterable[str]) -> list[Offer]:
+def offers(text: DeckText, offset: int, names: NamesInTexts, index: DeckIndex, files: Iterable[str]) -> list[Offer]:
     """The words that may stand at an offset of a text.
 
     files  the names of decks that an include in quotes finds
@@ -86,7 +86,7 @@ def _before(text: DeckText, offset: int) -> tuple[list[Token], TextEntry | None]
 
 
 def _of_entry(
-    words: list[Token], around: TextEntry | None, names: DeckNames, index: DeckIndex, offset: int
+    words: list[Token], around: TextEntry | None, names: NamesInTexts, index: DeckIndex, offset: int
 ) -> Iterator[Offer]:
     if not words:
         yield from _beginnings(around, names)
@@ -117,7 +117,7 @@ def _of_entry(
     yield from _values(texts, around, names, index)
 
 
-def _beginnings(around: TextEntry | None, names: DeckNames) -> Iterator[Offer]:
+def _beginnings(around: TextEntry | None, names: NamesInTexts) -> Iterator[Offer]:
     """The words that an entry of a block may begin with."""
     if around is None:
         yield from (Offer(each, types.CompletionItemKind.Keyword, BLOCKS[each].doc) for each in DEFINITIONS)
@@ -143,7 +143,7 @@ def _block(around: TextEntry) -> BlockDeclaration | None:
     return BLOCKS.get(around.kind)
 
 
-def parameters_of(entry: TextEntry, names: DeckNames) -> tuple[Parameter, ...]:
+def parameters_of(entry: TextEntry, names: NamesInTexts) -> tuple[Parameter, ...]:
     """The parameters of the model that an entry is of."""
     name = names.model_of(entry)
     for kind in models.GROUPS:
@@ -154,7 +154,7 @@ def parameters_of(entry: TextEntry, names: DeckNames) -> tuple[Parameter, ...]:
     return ()
 
 
-def _parameter(texts: list[str], around: TextEntry | None, names: DeckNames) -> Parameter | None:
+def _parameter(texts: list[str], around: TextEntry | None, names: NamesInTexts) -> Parameter | None:
     """The parameter that an entry sets, where it is declared."""
     if around is None or not texts:
         return None
@@ -193,7 +193,7 @@ def _units(wanted: Parameter | None) -> Iterator[Offer]:
     yield from (Offer(each, types.CompletionItemKind.Unit, UNITS[each].word) for each in UNITS)
 
 
-def _rest_of_path(words: list[Token], names: DeckNames, index: DeckIndex) -> Iterator[Offer]:
+def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
     """The words that follow the beginning of a path: parts of parameters, of signals, and of definitions."""
     parts: list[str] = []
     for word in reversed(words):
@@ -216,7 +216,7 @@ def _rest_of_path(words: list[Token], names: DeckNames, index: DeckIndex) -> Ite
             yield from (_of_parameter(each) for each in parameters_of(found.entry, names))
 
 
-def _values(texts: list[str], around: TextEntry | None, names: DeckNames, index: DeckIndex) -> Iterator[Offer]:
+def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
     """The words that a value may begin with."""
     key = texts[0]
     wanted = _parameter(texts, around, names)
@@ -258,7 +258,7 @@ def _values(texts: list[str], around: TextEntry | None, names: DeckNames, index:
     yield from (Offer(each, types.CompletionItemKind.Function) for each in FUNCTIONS)
 
 
-def _named(names: DeckNames, *kinds: str) -> Iterator[Offer]:
+def _named(names: NamesInTexts, *kinds: str) -> Iterator[Offer]:
     shown = {
         "let": types.CompletionItemKind.Variable,
         "macro": types.CompletionItemKind.Constant,

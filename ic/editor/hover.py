@@ -1,4 +1,4 @@
-"""What an editor shows of a word: what a key, a model, a unit or a name means, and what a value came to."""
+"""The text that an editor shows of a word: what a key, model, unit or name means, and what a value came to."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from ic.editor.completion import first_line, parameters_of
 from ic.editor.index import DeckIndex, ValueInDeck
-from ic.editor.names import DeckNames
+from ic.editor.names import NamesInTexts
 from ic.editor.structure import DeckText, TextEntry
 from ic.language import BLOCKS
 from ic.text.lexer import NAME, Token
@@ -19,7 +19,7 @@ MOST_VALUES = 4  # values that are shown of one place; of more, how many there a
 
 
 def about(
-    text: DeckText, token: Token, entry: TextEntry | None, names: DeckNames, index: DeckIndex, file: str
+    text: DeckText, token: Token, entry: TextEntry | None, names: NamesInTexts, index: DeckIndex, file: str
 ) -> list[str]:
     """Paragraphs, in Markdown, about a word of a text; none where nothing is known of it.
 
@@ -37,7 +37,7 @@ def entry_of(text: DeckText, token: Token) -> TextEntry | None:
     return None
 
 
-def _of_key(token: Token, entry: TextEntry | None, names: DeckNames) -> Iterator[str]:
+def _of_key(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Iterator[str]:
     if entry is None or not entry.words:
         return
     first = entry.words[0] if entry.texts and entry.words[0].text == entry.texts[0] else entry.words[-1]
@@ -74,7 +74,7 @@ def _of_unit(text: DeckText, token: Token) -> Iterator[str]:
         yield f"unit `{token.text}`: {unit.word}, {unit.measure.scale:g} in SI"
 
 
-def _of_name(token: Token, entry: TextEntry | None, names: DeckNames) -> Iterator[str]:
+def _of_name(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Iterator[str]:
     for found in names.meant(token, entry)[:2] if token.kind == NAME else ():
         source = found.token.source
         line = source.text.split("\n")[source.line(found.token.offset) - 1].strip()

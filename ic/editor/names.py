@@ -34,7 +34,7 @@ class NameInText:
         return self.token.source.name
 
 
-class DeckNames:
+class NamesInTexts:
     """The definitions of some texts, by name."""
 
     def __init__(self, texts: Iterable[DeckText]) -> None:

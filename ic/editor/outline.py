@@ -1,4 +1,4 @@
-"""What an editor lists of a text and folds in it: definitions, blocks, comments, `#if`."""
+"""The outline of a text, and the stretches that fold in it: definitions, blocks, comments, `#if`."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from pygls.lsp.server import LanguageServer
 
 from ic.editor.answers import Asked
 from ic.editor.checker_process import CheckerProcess
-from ic.editor.checks import CheckedDeck, Checks, OpenText
+from ic.editor.checks import CheckedDeck, DeckChecks, OpenText
 from ic.editor.fixes import QuickFix, actions, quick_fixes
 from ic.editor.outline import folds, symbols
 from ic.editor.positions import Texts, file_named, lines_of, uri_of
@@ -23,7 +23,7 @@ from met.diagnostic import Problem
 from met.version import VERSION
 
 OPTIONS = ("includeDirs", "defines", "helpInMessage")
-"""What an editor may give as `initializationOptions`."""
+"""The keys that an editor may give in its `initializationOptions`."""
 
 
 class DeckServer(LanguageServer):
@@ -32,7 +32,7 @@ class DeckServer(LanguageServer):
     def __init__(self, include_dirs: Iterable[str], defines: Iterable[str]) -> None:
         super().__init__("met", VERSION, text_document_sync_kind=types.TextDocumentSyncKind.Full)
         self.process = CheckerProcess()
-        self.checks = Checks(
+        self.checks = DeckChecks(
             self.process,
             self.publish,
             self.log,

@@ -142,7 +142,7 @@ class Editor:
         self._wait(lambda message: True)
 
     def of(self, path: Path) -> list[Any]:
-        """What the editor shows in a file, once all is checked."""
+        """The diagnostics that the editor shows in a file, once all is checked."""
         self.settle()
         return self.diagnostics.get(uri(path), [])
 

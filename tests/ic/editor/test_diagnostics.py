@@ -1,4 +1,4 @@
-"""What an editor shows while a deck is written is what `met check` prints of it."""
+"""Diagnostics in an editor, while a deck is written, are those that `met check` prints of it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BARE = "`duration` of run `more` is in s, and this is a bare number"
 
 
 def printed(folder: Path, name: str) -> Any:
-    """What `met check` prints of a deck, as JSON."""
+    """The diagnostics that `met check` prints of a deck, as JSON."""
     words = [*interpreter.command("met.cli", "check"), name, "--format", "json"]
     done = subprocess.run(words, cwd=folder, env=interpreter.environment(), capture_output=True, text=True)
     found = json.loads(done.stdout)

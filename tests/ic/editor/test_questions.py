@@ -1,4 +1,4 @@
-"""What an editor is told of a position: what may stand there, what stands there, where it comes from."""
+"""Answers about a position in a deck: what may stand there, what stands there, where it comes from."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def deck(tmp_path: Path, editor: Editor) -> Path:
 
 
 def words(editor: Editor, deck: Path, text: str) -> list[str]:
-    """What may stand at the `|` of a text."""
+    """The words that may stand at the `|` of a text."""
     line, column = at(text, "|")
     editor.change(deck, text.replace("|", ""))
     found: list[Any] = editor.about("textDocument/completion", deck, line, column)

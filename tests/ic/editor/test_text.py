@@ -1,4 +1,4 @@
-"""What an editor does with a deck's text: quick fixes, layout, the list of definitions, folding."""
+"""An editor and a deck's text: quick fixes, layout, the list of definitions, folding."""
 
 from __future__ import annotations
 
