@@ -238,8 +238,7 @@ def _refuse(experiment: Experiment, metrics: Sequence[str], paths: Sequence[str]
     for name in metrics:
         if name in linear:
             message = f"`{name}` is a metric of a linear answer, which has no gradient"
-            helps = "sweep the number, and compare"
-            raise Problem(error("D379", message, experiment.place, help=helps))
+            raise Problem(error("D379", message, experiment.place, help="sweep the number, and compare"))
         if name not in known:
             helps = did_you_mean(name, known) or [
                 f"there are {', '.join(f'`{each}`' for each in known)}" if known else "a run's `metrics` name them"
