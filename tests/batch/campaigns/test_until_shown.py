@@ -404,7 +404,7 @@ def test_it_is_said_beforehand_and_afterwards_everywhere(here: Path, capsys: pyt
     deck(here)
     assert main(["cases", "d.ic", "built"]) == 0
     said = capsys.readouterr().out
-    assert said.startswith(f"built: at most {MOST * len(GAINS)} cases")
+    assert said.startswith(f"built: at most {MOST * len(GAINS):,} cases")
     stops = f"stops at 53 cases for each design point if none misses; at most {MOST}"
     assert f"  cases for a confidence: {stops}\n" in said
     assert main(["run", "d.ic", "built", "-o", "a.h5", "--no-picture"]) == 1

@@ -190,7 +190,7 @@ class TestWhatIsVendored:
 
     def test_is_installed_with_the_package(self) -> None:
         text = (Path(inlined.__file__).parents[3] / "setup.cfg").read_text(encoding="utf-8")
-        assert "\nbatch = py.typed, report/html/assets/*\n" in text
+        assert "\nbatch = py.typed, report/html/assets/*, " in text
 
 
 class TestNumbers:

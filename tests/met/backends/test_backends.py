@@ -12,10 +12,9 @@ from met import backends
 from met.backends.backend import Kernel
 from met.run import inputs, prepare
 from met.trace.recording import Recording
+from tests.met.backends.marked import NAMES
 
 DECK = Path(ic.__file__).parent / "decks" / "two_link.ic"
-MARKS = {"c": [pytest.mark.compiler], "wasm": [pytest.mark.node]}
-NAMES = [pytest.param(name, marks=MARKS.get(name, [])) for name in backends.HOMES]
 
 
 def two_link(run: str = "nominal") -> tuple[Recording, np.ndarray]:

@@ -16,6 +16,7 @@ from met.trace.program import Every, Phase, Program, RunPhase, Tape, WhileAny
 from met.trace.recorder import record
 from met.trace.recording import CodeSection
 from met.trace.tangents import HEAD
+from tests.met.backends.marked import NAMES
 
 DECKS = Path(ic.__file__).parent / "decks"
 
@@ -69,7 +70,7 @@ def plain(x: complex, y: complex) -> complex:
     return x
 
 
-@pytest.mark.parametrize("name", backends.HOMES)
+@pytest.mark.parametrize("name", NAMES)
 def test_tangents_are_those_of_a_step_in_the_imaginary_direction(name: str) -> None:
     made = differentiated(record(winding()), ("x", "y"), never)
     assert made.program.inputs == ("x", "y", "d:x", "d:y")
