@@ -52,7 +52,11 @@ class Instant(click.ParamType):
     help="Open the loop here: `pan.servo.voltage`; may be repeated.",
 )
 @click.option("-o", "--to", "output", metavar="FILE", help="Write A, B, C, D with names: .npz, .h5 or .csv.")
-@click.option("--picture", metavar="FILE", help="Draw loops (Bode, Nichols) and steps: .png, .svg or .pdf.")
+@click.option(
+    "--picture",
+    metavar="FILE",
+    help="Draw loops (Bode, Nichols) and steps, of all cases a root locus: .png, .svg or .pdf.",
+)
 @deck_options
 @format_option
 def linear(source: str, name: str | None, form: str, **options: Any) -> int:
@@ -66,7 +70,7 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
 
     from batch.campaigns.choosing import experiments_named, select_rows
     from batch.campaigns.plans import read_plan
-    from batch.linearized import files, picture
+    from batch.linearized import files, locus, picture
     from batch.plotting import output as places
     from batch.terminal.linear import as_data, linear_lines
     from batch.terminal.linear_cases import answered, case_lines
@@ -77,7 +81,7 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
             if options[key] not in (None, ()):
                 raise click.UsageError(f"{option} asks, and so does --of {options['of']}: leave one of them out")
     if options["all_cases"]:
-        for option, key in (("--case", "case"), ("-o", "output"), ("--picture", "picture")):
+        for option, key in (("--case", "case"), ("-o", "output")):
             if options[key] is not None:
                 raise click.UsageError(f"{option} is of one case, and --all-cases of all")
     names = (name,) if name is not None else ()
@@ -98,6 +102,8 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
     question = _question(experiment, options)
     if options["all_cases"]:
         every = answered(question)
+        if drawn is not None:
+            locus.draw(question, every, drawn)
         data = [
             as_data(each) if isinstance(each, Linearized) else {"case": n, "why_not": each}
             for n, each in enumerate(every)

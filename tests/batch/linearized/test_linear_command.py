@@ -8,7 +8,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+import ic
 from batch.cli.linear import linear
+from batch.linearized import locus
+from batch.terminal.linear_cases import answered
+from met.analysis.linear.answers import Linearized, LinearQuestion
+from met.diagnostic import Problem
 from tests.batch.linearized.test_linear_data import DECK
 from tests.docs.mended_servo import met
 
@@ -88,6 +93,25 @@ def test_a_case_without_an_answer_says_why_in_its_row(folder: Path) -> None:
     said = met(folder, "linear", "deck.ic", "loads", "--all-cases", *OPEN, status=0)
     assert said.count("`hinge` breaks away, t = 0 s") == 2
     assert said.endswith("  2 cases of 2 without an answer: an event is on the way, or the run failed\n")
+
+
+def test_a_picture_of_all_cases_is_a_root_locus(folder: Path) -> None:
+    path = folder / swept(folder)
+    question = LinearQuestion(ic.compile(path, select=["gains"]).experiments[0], 0.0, (), (), OPEN[1:])
+    found = answered(question)
+    drawn = locus.figure(question, [*found[:2], "`hinge` breaks away, t = 0 s"])
+    z_plane, s_plane, bar = drawn.axes
+    assert "3 cases, 1 of them without an answer" in drawn.get_suptitle() and bar.get_ylabel() == "drive.kp, V*s/rad"
+    shown = [line.get_xydata() for line in z_plane.get_lines() if line.get_marker() == "."]
+    for case, at in zip(found, shown, strict=False):
+        assert isinstance(case, Linearized)
+        assert at.tolist() == [[pole.z.real, pole.z.imag] for pole in case.poles]
+    assert len(shown) == 2 and [line.get_marker() for line in s_plane.get_lines()].count("x") == 1
+    with pytest.raises(Problem, match="E450") as refused:
+        locus.figure(question, ["`hinge` breaks away, t = 0 s"])
+    assert refused.value.diagnostics[0].message == "there is nothing to draw: no case has an answer"
+    met(folder, "linear", "deck.ic", "gains", "--all-cases", *OPEN, "--picture", "locus.svg", status=1)
+    assert (folder / "locus.svg").read_text(encoding="utf-8").count("<svg") == 1
 
 
 def test_a_file_is_of_one_case(folder: Path) -> None:
