@@ -24,6 +24,7 @@ from ic.sweeps.axes import Sweep, read_sweep, varied_paths, whole_number
 from ic.sweeps.choices import Choices, with_choices
 from ic.sweeps.confidences import check_confidences
 from ic.sweeps.effects import Effects
+from ic.sweeps.overridden import check_overridden
 from ic.sweeps.reach import check_coordinates, check_effects, plan_coordinates
 from ic.sweeps.searches import check_goal, each_case, read_search, with_corners
 from ic.sweeps.settings import Settings
@@ -85,6 +86,7 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
             source.effects.examine(scope, run, made)
             own.examine(scope, run, made)
             own.report(source.complaints, [run.name])
+            check_overridden(scope, run, made_here)
             if not source.complaints.errors:
                 check_stops(source.complaints, made)
                 check_balance(source.complaints, made)
@@ -262,6 +264,7 @@ class _Sweep:
         self.complaints.settle()
         self.source.effects.examine(scope, run, made, self.definition.group.body)
         self.own.examine(scope, run, made, self.definition.group.body)
+        check_overridden(scope, run, self.source.settings.of_run(read.definitions, read.base))
         return ((made, scope), rows), dropped
 
     def _with_macros(self, sweep: Sweep, choices: Choices) -> _Read:

@@ -249,3 +249,10 @@ def test_values_of_lists_and_loops_stand_in_signals_requirements_and_sweeps(tmp_
     assert [each.text for each in run.requirements] == ["top_0 < limits[0]", "top_1 < limits[1]"]
     assert [each.limit for each in run.requirements] == [3, 4]
     assert sweep.cases.count == 6
+
+
+def test_a_star_that_a_run_takes_over_may_stand_for_no_joint_there(tmp_path: Path) -> None:
+    text = ARM + RUN.format("* = one;", "") + "run other like it { servos { [j_left, j_right] = two; } }\n"
+    assert told(tmp_path, text) == ""
+    text = ARM + RUN.format("* = one; [j_left, j_right] = two;", "")
+    assert "warning[D287]" in told(tmp_path, text)
