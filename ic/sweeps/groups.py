@@ -70,12 +70,15 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
     if definition.kind == "run":
         definitions, run = source.settings.in_run(source.definitions, definition)
         allowances = allowances_of(definitions, run, source.complaints)
+        made_here = source.settings.of_run(definitions, run)
+        before = source.complaints.error_count
+        made_here.check_lets(source.definitions, source.complaints)
+        if source.complaints.error_count > before:  # wherever the value stands it would be told again
+            return []
         with source.complaints.allowing(places_of(allowances)):
             scope = Scope(definitions, source.complaints, settings=source.settings.numbers(definitions, run))
             resolved = resolve_run(scope, run)
             source.effects.note_run(scope, run)
-            made_here = source.settings.of_run(definitions, run)
-            made_here.check_lets(source.definitions, source.complaints)
             own = Effects(made_here)
             own.note_run(scope, run)
             if resolved is None:
@@ -135,6 +138,8 @@ class _Sweep:
         self.read_so_far[()] = read
         made_here = self.source.settings.of_run(read.definitions, read.base)
         made_here.check_lets(self.definitions, self.complaints)
+        if self.complaints.error_count > before:
+            return []
         self.own = Effects(made_here)
         found = structures(sweep)
         made: list[tuple[ScopedExperiment, SweptRows]] = []

@@ -430,6 +430,10 @@ def defined_twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnos
         if place.turns != earlier.turns:
             index = place.turns[0].macro
             helps = [f"each turn writes it: name it by the index, as in `{name}_{{{index}}}`"]
+            if kind == WITH:
+                helps = [
+                    f"each turn writes it: put the index into the path, `{{{index}}}`, or write it outside of the loop"
+                ]
             if not kind:
                 helps = [f"each turn writes it: put the loop inside, `{name} {{ for {index} in ... {{ ... }} }}`"]
         elif place.macros and place.expansions != earlier.expansions:

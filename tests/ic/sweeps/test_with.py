@@ -249,6 +249,25 @@ error[D232]: this counts for nothing: `with` sets `initial.hinge.q`
  ::: deck.ic:2:49  set here
   = help: leave one of the two out
 """),
+    ("for i in 1 .. 2 { with links.bar.mass = i * 1 kg; }", """\
+error[D040]: with `links.bar.mass` is written twice
+ --> deck.ic:2:38
+  |
+2 | run it like hold { for i in 1 .. 2 { with links.bar.mass = i * 1 kg; } }
+  |                                      ^^^^^^^^^^^^^^^^^^^ again
+ ::: deck.ic:2:38  first
+  = help: each turn writes it: put the index into the path, `{i}`, or write it outside of the loop
+  = note: in `for i` at deck.ic:2:20, i = 2
+"""),
+    ("with reach = 2 s;", """\
+error[D061]: `reach` is in m, and this is in s
+ --> deck.ic:2:33
+  |
+2 | run it like hold { with reach = 2 s; }
+  |                                 ^^^
+ ::: swing.ic:2:7  defined here
+  = help: write it in m, km, cm, mm or um
+"""),
     ("with links.bar.mass = 3 kg; } run them like it { links.bar.mass += 4 kg;", """\
 error[D056]: nothing is in `links.bar.mass` yet to append to
  --> deck.ic:2:69
