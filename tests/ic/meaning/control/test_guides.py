@@ -196,7 +196,7 @@ error[D108]: no `guides` in a run
 11 |     guides tip = resolved_rate {
    |     ^^^^^^^^^^
    = help: did you mean `guide`?
-   = help: a run has: arm, base, servos, initial, environment, rates, integrator, duration, record, tolerances, seed, guide NAME, substitute JOINT, sensor NAME, payload NAME, with PATH, signal NAME, metric NAME, require, allow
+   = help: a run has: arm, base, servos, initial, environment, rates, integrator, duration, record, tolerances, seed, guide NAME, substitute JOINT, sensor NAME, payload NAME, with PATH, signal NAME, metric NAME, linear NAME, require, allow
 
 2 errors
 """,
