@@ -218,6 +218,15 @@ def test_the_remedy_for_a_bare_index_keeps_it_and_no_edit_is_of_one_turn_alone(t
     assert tuple(edits(told["D094"], found.sources)) == ()
 
 
+def test_the_remedy_for_a_number_that_is_as_the_index_keeps_the_number(tmp_path: Path) -> None:
+    wrong = ARM.replace("for side in [left, right]", "for i in 1 .. 2").replace("{side}", "b_{i}")
+    wrong = wrong.replace("mass = 1 kg", "mass = 1").replace("child = side", "child = b_{i}")
+    found = check(tmp_path, wrong + RUN.format("", ""))
+    (told,) = found.diagnostics
+    assert told.help == ("write `1 kg`",)
+    assert [edit.text for _, edit in edits(told, found.sources)] == ["1 kg"]
+
+
 def test_a_block_that_every_turn_writes_is_told_to_hold_the_loop(tmp_path: Path) -> None:
     text = ARM + RUN.format("", "for side in [left, right] {\n        initial { j_{side}.q = 1 rad; }\n    }")
     assert (
