@@ -429,7 +429,8 @@ def defined_twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnos
         helps = [write("#pragma once\n", once, at=Place(place.file, 1, 1, 0), where="before")]
         if place.turns != earlier.turns:
             index = place.turns[0].macro
-            helps = [f"each turn writes it: name it by the index, as in `{name}_{{{index}}}`"]
+            stem = name.removesuffix(index) if name.endswith(f"_{index}") else f"{name}_"  # its braces were forgotten
+            helps = [f"each turn writes it: name it by the index, as in `{stem}{{{index}}}`"]
             if kind == WITH:
                 helps = [
                     f"each turn writes it: put the index into the path, `{{{index}}}`, or write it outside of the loop"

@@ -265,3 +265,11 @@ def test_a_star_that_a_run_takes_over_may_stand_for_no_joint_there(tmp_path: Pat
     assert told(tmp_path, text) == ""
     text = ARM + RUN.format("* = one; [j_left, j_right] = two;", "")
     assert "warning[D287]" in told(tmp_path, text)
+
+
+def test_a_name_whose_braces_were_forgotten_is_told_with_them(tmp_path: Path) -> None:
+    wrong = ARM.replace("for side in [left, right]", "for i in 1 .. 2").replace("link {side}", "link b_i")
+    wrong = wrong.replace("{side}", "{i}").replace("child = side", "child = b_i")
+    assert "error[D040]: link `b_i` is written twice" in told(tmp_path, wrong) and "as in `b_{i}`\n" in told(
+        tmp_path, wrong
+    )
