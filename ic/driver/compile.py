@@ -97,8 +97,8 @@ def compile_deck(
         try:
             names = None if select == "all" else select
             among = EXPERIMENTS if names is not None else ("run",)
-            asked = asked_definitions(written, complaints, names, among, help=_NO_NAME if select == "all" else ())
-            sweep = command_line_sweep(written, asked, varied)
+            chosen = asked_definitions(written, complaints, names, among, help=_NO_NAME if select == "all" else ())
+            sweep = command_line_sweep(written, chosen, varied)
         except Problem as problem:
             complaints.add(*problem.diagnostics)
         else:
