@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import partial
 from os import PathLike
@@ -67,6 +67,9 @@ def check(
     return compile_deck(deck, select=select, defines=defines, settings=settings)
 
 
+_NO_NAME = ("`met check` takes no name: `met cases DECK NAME --vary ...` does, and says what is wrong",)
+
+
 def compile_deck(
     deck: Deck,
     *,
@@ -93,7 +96,9 @@ def compile_deck(
     if varied:
         try:
             names = None if select == "all" else select
-            sweep = command_line_sweep(written, asked_definitions(written, complaints, names), varied)
+            among = EXPERIMENTS if names is not None else ("run",)
+            chosen = asked_definitions(written, complaints, names, among, help=_NO_NAME if select == "all" else ())
+            sweep = command_line_sweep(written, chosen, varied)
         except Problem as problem:
             complaints.add(*problem.diagnostics)
         else:
@@ -167,12 +172,22 @@ def _with_settings(deck: Deck, settings: Sequence[str], complaints: Complaints) 
     return deck, ()
 
 
-def asked_definitions(definitions: Definitions, complaints: Complaints, select: Select) -> list[Definition]:
+def asked_definitions(
+    definitions: Definitions,
+    complaints: Complaints,
+    select: Select,
+    kinds: Collection[str] = EXPERIMENTS,
+    *,
+    help: Sequence[str] = (),
+) -> list[Definition]:
     """The runs and sweeps that are asked for: by name, all, or the deck's only one, or the one marked `default`.
+
+    kinds  those among which it is chosen where no name is given
+    help   what to write besides where that cannot be said
 
     A deck's own come before those of files that it includes, whatever these mark.
     """
-    known = {d.name: d for kind in EXPERIMENTS for d in definitions.of_kind(kind).values()}
+    known = {d.name: d for kind in kinds for d in definitions.of_kind(kind).values()}
     if select == "all":
         return list(known.values())
     if select is not None:
@@ -187,6 +202,7 @@ def asked_definitions(definitions: Definitions, complaints: Complaints, select: 
         return [known[name] for name in names if name in known]
     own = {name: definition for name, definition in known.items() if definitions.writes(definition)}
     default = definitions.default() if not own or any(d.default for d in own.values()) else None
+    default = default if default is None or default.kind in kinds else None
     known = own or known
     if len(known) == 1 or default is not None:
         return [default] if default is not None else list(known.values())
@@ -202,8 +218,8 @@ def asked_definitions(definitions: Definitions, complaints: Complaints, select: 
     raise Problem(
         error(
             "D162",
-            f"this deck has {len(known)} runs and sweeps, and {none}",
+            f"this deck has {len(known)} {'runs and sweeps' if 'sweep' in kinds else 'runs'}, and {none}",
             also=[Label(d.place, d.name) for d in known.values()],
-            help=[known_words("name one", known), "or write `default run ...` for one of them"],
+            help=[known_words("name one", known), "or write `default run ...` for one of them", *help],
         )
     )

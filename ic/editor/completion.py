@@ -122,6 +122,7 @@ def _beginnings(around: TextEntry | None, names: NamesInTexts) -> Iterator[Offer
     if around is None:
         yield from (Offer(each, types.CompletionItemKind.Keyword, BLOCKS[each].doc) for each in DEFINITIONS)
         yield Offer("let", types.CompletionItemKind.Keyword, "a name for a value: `let reach = 2 m;`")
+        yield Offer("param", types.CompletionItemKind.Keyword, "the same, which others may set: `param reach = 2 m;`")
         yield Offer("default", types.CompletionItemKind.Keyword, "marks the run that `met run` takes")
         yield from _named(names, "macro")
         return

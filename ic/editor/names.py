@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 
-from ic.editor.structure import DeckText, TextEntry
+from ic.editor.structure import LETS, DeckText, TextEntry
 from ic.text.lexer import NAME, Token
 from met.frozen import frozen
 
 BASE_WORDS = {"like": None, "of": "run"}
 """Words that name a definition: of the same kind where it is None."""
+
+_BRACES = re.compile(r"\{[^{}]*\}")
 
 _KIND_OF_KEY = {"arm": "arm", "parent": "link", "child": "link"}
 
@@ -50,12 +53,22 @@ class NamesInTexts:
 
     def meant(self, token: Token, entry: TextEntry | None) -> list[NameInText]:
         """The definitions that a word in an entry means: those of the kind that is wanted there, or else all."""
-        found = self.by_name.get(token.text, [])
+        found = self.by_name.get(token.text) or self._made_by_loops(token.text)
         if any(each.token is token for each in found):
             return [each for each in found if each.token is token]
         wanted = _wanted(token, entry)
         of_kind = [each for each in found if each.kind in wanted]
         return of_kind or found
+
+    def _made_by_loops(self, name: str) -> list[NameInText]:
+        """The definitions whose names with braces may be this one: `seg_{i}` of `seg_7` and of `seg_{i-1}`."""
+        plain = _BRACES.sub("0", name)
+        return [
+            each
+            for written, found in self.by_name.items()
+            if "{" in written and re.fullmatch(_BRACES.sub(r"\\w+", written), plain)
+            for each in found
+        ]
 
     def uses(self, name: str) -> Iterator[Token]:
         """All tokens of a name in the texts, those that define it too."""
@@ -86,7 +99,7 @@ def _defined(text: DeckText) -> Iterator[NameInText]:
     for entry in text.all_entries():
         name = entry.named
         if name is not None:
-            yield NameInText(entry.kind, name, entry)
+            yield NameInText("let" if entry.kind in LETS else entry.kind, name, entry)
     for line in text.directives:
         if line.name == "define" and len(line.tokens) > 2:
             yield NameInText("macro", line.tokens[2], None)

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from lsprotocol import types
 
-from ic.editor.structure import DeckText, TextEntry
+from ic.editor.structure import LOOP, DeckText, TextEntry
 from ic.language import BLOCKS
 from ic.text.lexer import Token
 
@@ -18,6 +18,7 @@ _KINDS: Mapping[str, types.SymbolKind] = MappingProxyType({
     "arm": types.SymbolKind.Class, "servo": types.SymbolKind.Class, "link": types.SymbolKind.Struct,
     "joint": types.SymbolKind.Field, "run": types.SymbolKind.Function, "sweep": types.SymbolKind.Array,
     "search": types.SymbolKind.Array, "tune": types.SymbolKind.Array, "let": types.SymbolKind.Variable,
+    "param": types.SymbolKind.Variable,
     "metric": types.SymbolKind.Property, "require": types.SymbolKind.Boolean,
 })  # fmt: skip
 
@@ -37,6 +38,9 @@ def symbols(text: DeckText, position: Position) -> list[types.DocumentSymbol]:
 def _symbols(entries: Iterable[TextEntry], position: Position) -> Iterator[types.DocumentSymbol]:
     for entry in entries:
         name = entry.named
+        if entry.kind == LOOP and entry.opened is not None:
+            yield from _symbols(entry.entries, position)
+            continue
         if name is None and (entry.opened is None or entry.kind not in BLOCKS):
             continue
         shown = name if name is not None else entry.words[0]

@@ -11,14 +11,21 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from ic.grammar.braced_names import name_length
 from ic.text.lexer import NAME, SPACE, Text, Token, logical_lines
+
+LETS = ("let", "param")
+"""Words that give a value a name."""
+
+LOOP = "for"
 
 
 @dataclass
 class TextEntry:
     """An entry of a block: from its first token to its `;`, `}` or the end of the text.
 
-    words     the tokens before its block, its `;`, or all there are
+    words     the tokens before its block, its `;`, or all there are; a name with an index in braces is one
+    within    the entry in whose block it stands, through loops
     opened    the `{` of its block; None where it has none
     closed    the offset behind its last token
     entries   those in its block
@@ -45,9 +52,9 @@ class TextEntry:
     def named(self) -> Token | None:
         """The token of the name that it defines: `reach` of `let reach = 2 m;`, `motor` of `servo motor { ... }`."""
         words = self.words[len(self.words) - len(self.texts) :]
-        if len(words) < 2 or words[0].kind != NAME or words[1].kind != NAME:
+        if len(words) < 2 or words[0].kind != NAME or words[1].kind != NAME or words[0].text == LOOP:
             return None
-        if words[0].text == "let" or self.opened is not None or "like" in self.texts[2:3]:
+        if words[0].text in LETS or self.opened is not None or "like" in self.texts[2:3]:
             return words[1]
         behind = words[2].text if len(words) > 2 else ""
         return words[1] if behind in ("=", ":") and words[0].text in ("metric", "require", "sweep") else None
@@ -67,6 +74,11 @@ class TextDirective:
     @property
     def name(self) -> str:
         return self.tokens[1].text if len(self.tokens) > 1 else ""
+
+
+def _no_loop(entry: TextEntry | None) -> TextEntry | None:
+    """The entry, or the one around it where it is a loop."""
+    return entry.within if entry is not None and entry.kind == LOOP and "in" in entry.texts[2:3] else entry
 
 
 def _is_call(words: list[Token]) -> bool:
@@ -97,17 +109,18 @@ class DeckText:
     def _structure(self) -> None:
         around: TextEntry | None = None
         entry: TextEntry | None = None
+        blocks: list[TextEntry] = []  # that are open, loops among them
         rounds = 0
-        for token in self.tokens:
+        for token in self._in_loops_as_names():
             text = token.text
             rounds = max(rounds + (text in ("(", "[")) - (text in (")", "]")), 0)
             if text == "}":
                 rounds = 0
                 self._end(entry, token.offset, False)
                 entry = None
-                if around is not None:
-                    self._end(around, token.end, True)
-                    around = around.within
+                if blocks:
+                    self._end(blocks.pop(), token.end, True)
+                    around = blocks[-1] if blocks else None
                 continue
             if entry is not None and not rounds and token.kind == NAME and _is_call(entry.words):
                 self._end(entry, entry.words[-1].end, True)  # a macro's, that stands alone
@@ -115,7 +128,7 @@ class DeckText:
             if entry is None:
                 if text == ";":
                     continue
-                entry = TextEntry([], around)
+                entry = TextEntry([], _no_loop(around))
                 (self.entries if around is None else around.entries).append(entry)
             if text == ";" and not rounds:
                 self._end(entry, token.end, True)
@@ -123,14 +136,40 @@ class DeckText:
             elif text == "{":
                 rounds = 0
                 entry.opened = token
+                blocks.append(entry)
                 around, entry = entry, None
             else:
                 entry.words.append(token)
         last = len(self.source.text)
         self._end(entry, last, False)
-        while around is not None:
-            self._end(around, last, False)
-            around = around.within
+        for block in blocks:
+            self._end(block, last, False)
+
+    def _in_loops_as_names(self) -> Iterator[Token]:
+        """The tokens, of a name with braces in a loop all in one, which it also keeps in `tokens`."""
+        seen, self.tokens = self.tokens, []
+        indices: list[str] = [""]  # of each block that is open; "" where it is no loop's
+        index, at = "", 0
+        while at < len(seen):
+            token, length = seen[at], 1
+            if token.kind == NAME or token.text == "{":
+                length = max(1, name_length(seen, at))
+                inside = seen[at : at + length]
+                if not any(each.text in indices for each in inside[1:] if each.kind == NAME):
+                    length = 1
+            if length > 1:
+                text = "".join(each.text for each in seen[at : at + length])
+                token = Token(NAME, text, token.source, token.offset, seen[at + length - 1].end - token.offset)
+            elif token.text == LOOP and at + 2 < len(seen) and seen[at + 2].text == "in":
+                index = seen[at + 1].text
+            elif token.text == "{":
+                indices.append(index)
+                index = ""
+            elif token.text == "}" and len(indices) > 1:
+                indices.pop()
+            at += length
+            self.tokens.append(token)
+            yield token
 
     @staticmethod
     def _end(entry: TextEntry | None, at: int, complete: bool) -> None:
@@ -146,14 +185,14 @@ class DeckText:
             waiting += reversed(entry.entries)
 
     def around(self, offset: int) -> TextEntry | None:
-        """The innermost entry in whose block an offset is; None outside all blocks."""
+        """The innermost entry in whose block an offset is, through loops; None outside all blocks."""
         found: TextEntry | None = None
         entries = self.entries
         while True:
             inside = [e for e in entries if e.opened is not None and e.opened.end <= offset < max(e.closed, 1)]
             inside += [e for e in entries if e.opened is not None and not e.complete and offset == e.closed]
             if not inside:
-                return found
+                return _no_loop(found)
             found, entries = inside[-1], inside[-1].entries
 
     def token_at(self, offset: int) -> Token | None:

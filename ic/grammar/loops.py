@@ -185,13 +185,18 @@ class Loops(Expressions):
     def listed(self) -> Sequence[str]:
         """The turns of `[left, right]`: names, or whole numbers."""
         opening = self.enter()
-        values = []
+        values: dict[str, None] = {}
         while self.token.text != "]":
+            first = self.token
             if self.token.kind == NAME and self.following.text in (",", "]"):
                 token = self.advance()
-                values.append(self.indices.get(token.text, token.text))
+                value = self.indices.get(token.text, token.text)
             else:
-                values.append(str(self.whole(_LISTED)))
+                value = str(self.whole(_LISTED))
+            if value in values:
+                place = span(first, self.previous)
+                self.tell("D283", f"this loop goes over `{value}` twice", place, help="leave it out")
+            values[value] = None
             if not self.another("]"):
                 break
         self.leave("`,` or ")
@@ -208,7 +213,7 @@ class Loops(Expressions):
                 opening,
                 help="write two loops",
             )
-        return values
+        return tuple(values)
 
     # turns
 

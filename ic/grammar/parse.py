@@ -247,6 +247,10 @@ class _Parser(Loops):
             self.fail("D022", f"this `{token.text}` closes nothing", token, help=_NOT_OPEN)
         if token.text == "{":
             self.unexpected("a name before the block", help="a block is written `kind name { ... }`")
+        if token.text == "*=":
+            self.fail(
+                "D020", "`*=` is one sign", token, help=write("* =", "the servo of all other joints is `* = SERVO;`")
+            )
         self.unexpected("an entry, such as `name = value;`")
 
     def begins_value_on_this_line(self) -> bool:

@@ -24,6 +24,7 @@ from ic.sweeps.axes import Sweep, read_sweep, varied_paths, whole_number
 from ic.sweeps.choices import Choices, with_choices
 from ic.sweeps.confidences import check_confidences
 from ic.sweeps.effects import Effects
+from ic.sweeps.overridden import check_overridden
 from ic.sweeps.reach import check_coordinates, check_effects, plan_coordinates
 from ic.sweeps.searches import check_goal, each_case, read_search, with_corners
 from ic.sweeps.settings import Settings
@@ -69,12 +70,15 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
     if definition.kind == "run":
         definitions, run = source.settings.in_run(source.definitions, definition)
         allowances = allowances_of(definitions, run, source.complaints)
+        made_here = source.settings.of_run(definitions, run)
+        before = source.complaints.error_count
+        made_here.check_lets(source.definitions, source.complaints)
+        if source.complaints.error_count > before:  # wherever the value stands it would be told again
+            return []
         with source.complaints.allowing(places_of(allowances)):
             scope = Scope(definitions, source.complaints, settings=source.settings.numbers(definitions, run))
             resolved = resolve_run(scope, run)
             source.effects.note_run(scope, run)
-            made_here = source.settings.of_run(definitions, run)
-            made_here.check_lets(source.definitions, source.complaints)
             own = Effects(made_here)
             own.note_run(scope, run)
             if resolved is None:
@@ -85,6 +89,7 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
             source.effects.examine(scope, run, made)
             own.examine(scope, run, made)
             own.report(source.complaints, [run.name])
+            check_overridden(scope, run, made_here)
             if not source.complaints.errors:
                 check_stops(source.complaints, made)
                 check_balance(source.complaints, made)
@@ -133,6 +138,8 @@ class _Sweep:
         self.read_so_far[()] = read
         made_here = self.source.settings.of_run(read.definitions, read.base)
         made_here.check_lets(self.definitions, self.complaints)
+        if self.complaints.error_count > before:
+            return []
         self.own = Effects(made_here)
         found = structures(sweep)
         made: list[tuple[ScopedExperiment, SweptRows]] = []
@@ -262,6 +269,7 @@ class _Sweep:
         self.complaints.settle()
         self.source.effects.examine(scope, run, made, self.definition.group.body)
         self.own.examine(scope, run, made, self.definition.group.body)
+        check_overridden(scope, run, self.source.settings.of_run(read.definitions, read.base))
         return ((made, scope), rows), dropped
 
     def _with_macros(self, sweep: Sweep, choices: Choices) -> _Read:

@@ -28,7 +28,8 @@ def with_other_joints(body: MergedBlock, arm: ResolvedArm, complaints: Complaint
         else:
             items[joint.name] = own if own.value is not None else _changed(every, own, complaints)
         used = used or own is None or own.value is None
-    if not used and arm.moving and not arm.failed:
+    taken_over = len(every.homes) > 1  # from a run that needs it itself
+    if not used and arm.moving and not arm.failed and not taken_over:
         complaints.remark(
             "D287",
             "`*` stands for no joint: each of them has a servo of its own",

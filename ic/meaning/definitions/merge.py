@@ -236,12 +236,16 @@ class _Merger:
         upon = entry.place if earlier.value is not None else None
         return replace(earlier, body=body, detail=detail or earlier.detail, upon=upon)
 
-    def _earlier(self, kind: str, name: str, place: Place) -> Item | None:
+    def _earlier(self, kind: str, name: str, place: Place, *, removed: bool = False) -> Item | None:
+        """The entry that one of this kind and name replaces. A value that `with` sets, whose path may be the name of
+        another entry, is replaced by `with` alone. removed: what is removed is such a value before a plain entry."""
         if kind:
             return self.items.get(f"{kind} {name}")
+        keys = [key for key in self.names.get(name, []) if removed or self.items[key].kind != WITH]
+        if removed and [self.items[key].kind for key in keys if key != name] == [WITH]:
+            return self.items[f"{WITH} {name}"]
         if name in self.items:
             return self.items[name]
-        keys = self.names.get(name, [])
         if len(keys) > 1:
             both = [self.items[key] for key in keys]
             raise Problem(
@@ -258,13 +262,14 @@ class _Merger:
     def _append(self, entry: Setting, name: str) -> None:
         earlier = self._earlier("", name, entry.place)
         if earlier is None or earlier.value is None:
-            lists = [item.name for item in self.items.values() if item.value is not None]
+            lists = [item.name for item in self.items.values() if item.value is not None and item.kind != WITH]
+            anew = f"{WITH} {name}" if f"{WITH} {name}" in self.items else name
             raise Problem(
                 error(
                     "D056",
                     f"nothing is in `{name}` yet to append to",
                     entry.place,
-                    help=did_you_mean(name, lists) or f"write `{name} = ...;`",
+                    help=did_you_mean(name, lists) or f"write `{anew} = ...;`",
                 )
             )
         self.items[earlier.key] = replace(earlier, appended=(*earlier.appended, entry.value))
@@ -276,7 +281,7 @@ class _Merger:
                 error("D057", "`remove` takes a name, and nothing else", entry.place, help=f"write `remove {meant};`")
             )
         name = entry.value.text
-        earlier, stated = self._earlier("", name, entry.value.place), self._stated(name)
+        earlier, stated = self._earlier("", name, entry.value.place, removed=True), self._stated(name)
         if earlier is not None and stated is not None:
             message = f"`{name}` may be the {earlier.kind or 'entry'} `{name}` or the {REQUIREMENT} `{name}`"
             also = [Label(earlier.place, earlier.kind or "entry"), Label(stated.place, REQUIREMENT)]
@@ -424,7 +429,12 @@ def defined_twice(kind: str, name: str, place: Place, earlier: Place) -> Diagnos
         helps = [write("#pragma once\n", once, at=Place(place.file, 1, 1, 0), where="before")]
         if place.turns != earlier.turns:
             index = place.turns[0].macro
-            helps = [f"each turn writes it: name it by the index, as in `{name}_{{{index}}}`"]
+            stem = name.removesuffix(index) if name.endswith(f"_{index}") else f"{name}_"  # its braces were forgotten
+            helps = [f"each turn writes it: name it by the index, as in `{stem}{{{index}}}`"]
+            if kind == WITH:
+                helps = [
+                    f"each turn writes it: put the index into the path, `{{{index}}}`, or write it outside of the loop"
+                ]
             if not kind:
                 helps = [f"each turn writes it: put the loop inside, `{name} {{ for {index} in ... {{ ... }} }}`"]
         elif place.macros and place.expansions != earlier.expansions:

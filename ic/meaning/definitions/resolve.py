@@ -61,6 +61,7 @@ class Definitions:
         self._meant: dict[tuple[str, str], str] = {}  # by kind and name that there is not, the name that was meant
         self._complaints = complaints
         self._file = deck.file
+        self._texts = {source.name: source.text for source in deck.sources}
         for entry in deck.entries:
             try:
                 self._enter(entry)
@@ -80,6 +81,11 @@ class Definitions:
         for each in changed:
             other._by_kind[each.kind][each.name] = each
         return other
+
+    def text_at(self, place: Place) -> str:
+        """The characters that a place covers; "" where its text is not known."""
+        lines = self._texts.get(place.file, "").splitlines()[place.line - 1 : place.line]
+        return lines[0][place.column - 1 : place.column - 1 + place.length] if lines else ""
 
     def of_kind(self, kind: str) -> Mapping[str, Definition]:
         return self._by_kind[kind]

@@ -133,7 +133,7 @@ class Names:
                 and worth.place != value.place
                 and value.place.length == len(text)
             ):
-                return [Label(let.name.place, f"`{text}` is defined here")]
+                return [Label(let.given_at, f"`{text}` is {'defined' if let.set_at is None else 'set'} here")]
         return []
 
     def _expression(self, name: Name) -> Expression:

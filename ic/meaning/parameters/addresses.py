@@ -28,8 +28,12 @@ def in_run(definitions: Definitions, block: MergedBlock, item: Item, rates: tupl
             return [_write(item, f"initial {{ {joint}.{key} = {value}; }}")]
         case ["environment", model, key]:
             return [_write(item, f"environment {{ {model} {{ {key} = {value}; }} }}")]
-        case ["links", thing, key] if thing in links:
-            return _in_arm(arm, thing, key, value)
+        case ["links", thing, key] if thing in links and key in LINK.keys:
+            return [_write(item, f"with {item.name} = {value};")]
+        case [name] if name in definitions.lets:
+            return [_write(item, f"with {name} = {value};")]
+        case [servo, _] if servo in definitions.of_kind("servo"):
+            return [_write(item, f"with {item.name} = {value};")]
         case [thing, key] if (thing in joints and key in OF_JOINT) or (thing in links and key in LINK.keys):
             return _in_arm(arm, thing, key, value)
         case [rate] if rate in rates:

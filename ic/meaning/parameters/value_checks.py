@@ -52,7 +52,7 @@ class ValueChecks:
             if not isinstance(value.number, Scalar):
                 written = f"{value.number:.12g}"
                 stands = (turn.macro for turn in value.place.turns if turn.turn == written)
-                index = next((each for each in stands if len(each) == value.place.length), written)
+                index = next((each for each in stands if each == self.definitions.text_at(value.place)), written)
                 wrote = write_either((f"{index} {each}" for each in in_degrees(text)), where="value")
             if value.bare and any(source.name == value.place.file for source in self.definitions.csv_files.sources):
                 wrote = f"write the unit in square brackets behind the column's name: `[{text}]`"

@@ -240,7 +240,7 @@ def _keep_settings(
 
 
 def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> None:
-    metrics = [item.name for kind in RUN.named for item in block.of_kind(kind)]
+    metrics = [item.name for kind in RUN.named if kind != WITH for item in block.of_kind(kind)]
     for item in block.items.values():
         if item.kind == WITH and (item.value is None or item.detail):
             example = "write `with PATH = VALUE;`, such as `with links.boom.mass = 7 kg;`"

@@ -61,12 +61,25 @@ def test_what_the_help_says_to_write(tmp_path: Path, name: str) -> None:
     assert [each.code for each in compiled.diagnostics] == [], messages(compiled)
 
 
-def test_a_links_number_in_a_run_goes_to_an_arm_like_the_runs(tmp_path: Path) -> None:
-    text = "run it like hold { links.bar.mass = 3 kg; }\n"
+@pytest.mark.parametrize("wrong", ["links.bar.mass = 3 kg;", "drive.kp = 0.2 V*s/rad;", "reach = 2 m;"])
+def test_a_path_in_a_run_is_set_by_with(tmp_path: Path, wrong: str) -> None:
+    text, arm = (
+        f"run it like hold {{ {wrong} }}\n",
+        "let reach = 1 m;\n" + ARM.replace("length = 1 m", "length = reach"),
+    )
+    (found,) = check(tmp_path, arm, SERVO, RUN, text, select="all").diagnostics
+    assert found.help == (f"write `with {wrong}`",)
+    assert check(tmp_path, arm, SERVO, RUN, text.replace(wrong, f"with {wrong}"), select="all").diagnostics == ()
+
+
+def test_a_joints_vector_in_a_run_goes_to_an_arm_like_the_runs(tmp_path: Path) -> None:
+    text = "run it like hold { hinge.at = [1, 0, 0] m; }\n"
     (found,) = check(tmp_path, ARM, SERVO, RUN, text, select="all").diagnostics
-    assert found.help == ("it is the arm's: `arm OTHER like swing { bar { mass = 3 kg; } }`, and `arm = OTHER;` here",)
+    assert found.help == (
+        "it is the arm's: `arm OTHER like swing { hinge { at = [1, 0, 0] m; } }`, and `arm = OTHER;` here",
+    )
     arm, use = re.findall("`(.*?)`", found.help[0])
-    followed = f"{arm}\n" + text.replace("links.bar.mass = 3 kg;", use)
+    followed = f"{arm}\n" + text.replace("hinge.at = [1, 0, 0] m;", use)
     assert check(tmp_path, ARM, SERVO, RUN, followed, select="all").diagnostics == ()
 
 

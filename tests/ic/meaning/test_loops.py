@@ -218,6 +218,15 @@ def test_the_remedy_for_a_bare_index_keeps_it_and_no_edit_is_of_one_turn_alone(t
     assert tuple(edits(told["D094"], found.sources)) == ()
 
 
+def test_the_remedy_for_a_number_that_is_as_the_index_keeps_the_number(tmp_path: Path) -> None:
+    wrong = ARM.replace("for side in [left, right]", "for i in 1 .. 2").replace("{side}", "b_{i}")
+    wrong = wrong.replace("mass = 1 kg", "mass = 1").replace("child = side", "child = b_{i}")
+    found = check(tmp_path, wrong + RUN.format("", ""))
+    (told,) = found.diagnostics
+    assert told.help == ("write `1 kg`",)
+    assert [edit.text for _, edit in edits(told, found.sources)] == ["1 kg"]
+
+
 def test_a_block_that_every_turn_writes_is_told_to_hold_the_loop(tmp_path: Path) -> None:
     text = ARM + RUN.format("", "for side in [left, right] {\n        initial { j_{side}.q = 1 rad; }\n    }")
     assert (
@@ -249,3 +258,18 @@ def test_values_of_lists_and_loops_stand_in_signals_requirements_and_sweeps(tmp_
     assert [each.text for each in run.requirements] == ["top_0 < limits[0]", "top_1 < limits[1]"]
     assert [each.limit for each in run.requirements] == [3, 4]
     assert sweep.cases.count == 6
+
+
+def test_a_star_that_a_run_takes_over_may_stand_for_no_joint_there(tmp_path: Path) -> None:
+    text = ARM + RUN.format("* = one;", "") + "run other like it { servos { [j_left, j_right] = two; } }\n"
+    assert told(tmp_path, text) == ""
+    text = ARM + RUN.format("* = one; [j_left, j_right] = two;", "")
+    assert "warning[D287]" in told(tmp_path, text)
+
+
+def test_a_name_whose_braces_were_forgotten_is_told_with_them(tmp_path: Path) -> None:
+    wrong = ARM.replace("for side in [left, right]", "for i in 1 .. 2").replace("link {side}", "link b_i")
+    wrong = wrong.replace("{side}", "{i}").replace("child = side", "child = b_i")
+    assert "error[D040]: link `b_i` is written twice" in told(tmp_path, wrong) and "as in `b_{i}`\n" in told(
+        tmp_path, wrong
+    )

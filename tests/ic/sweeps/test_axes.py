@@ -188,7 +188,7 @@ def test_a_definition_and_one_of_its_joints_on_one_parameter_is_an_error(tmp_pat
         ("vary drive.kp = (1 .. 2 by 0) V*s/rad;", "D072"),
         ("vary drive.kp = (1 .. 2 by -1) V*s/rad;", "D072"),
         ("vary drive.kp = (1 .. 2 by 1e-9) V*s/rad;", "D072"),
-        ("vary drive.kp = 1 .. 2 by 1 V*s/rad;", "D063"),
+        ("vary drive.kp = 1 .. 2 V*s/rad by 1;", "D063"),
         ("repeat 1; vary drive.kp = [1, 2] V*s/rad;", "D113"),
         ("repeat 5; repeat 5;", "D040"),
         ("repeat = 5;", "D136"),

@@ -79,6 +79,30 @@ def test_the_run_is_the_one_that_is_taken_without_a_name(tmp_path: Path) -> None
     assert made.structure.schedule.duration == 2.0
 
 
+@pytest.mark.parametrize("mark", ["", "default "])
+def test_the_only_run_is_taken_beside_sweeps_of_it(mark: str, tmp_path: Path) -> None:
+    text = f"{DECK}{mark}sweep gains of hold {{ vary drive.kp = [1, 2] V*s/rad; }}\n"
+    assert [each.name for each in plan(tmp_path, text, None, vary=["long=[1, 2] m"]).experiments] == ["hold_varied"]
+
+
+def test_met_check_takes_no_name_and_says_what_does(deck: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path(deck).write_text(DECK + TWO, encoding="utf-8")
+    assert cli.main(["check", deck, "--vary", "long=[1, 2] m"]) == cli.BAD_INPUT
+    assert (
+        capsys.readouterr().err
+        == """\
+error[D162]: this deck has 2 runs, and none is marked `default`
+::: deck.ic:12:1  hold
+::: deck.ic:20:1  longer
+ = help: name one: hold, longer
+ = help: or write `default run ...` for one of them
+ = help: `met check` takes no name: `met cases DECK NAME --vary ...` does, and says what is wrong
+
+1 error
+"""
+    )
+
+
 def test_all_that_is_set_holds_in_the_sweep_too(tmp_path: Path) -> None:
     found = plan(tmp_path, DECK, vary=["drive.kp=[0.2, 0.3] V*s/rad"], set=["drive.ki=2 V/rad", "duration=2 s"])
     text = DECK.replace("ki = 1", "ki = 2").replace("duration = 1 s", "duration = 2 s")

@@ -196,6 +196,110 @@ def test_a_run_sets_what_vary_and_set_name(entry: str, old: str, new: str) -> No
     assert identity(compiled(text, ["hold"])[0]) == identity(compiled(SWING)[0])
 
 
+@pytest.mark.parametrize("word", ["rk4", "midpoint"])
+def test_what_no_run_writes_otherwise_may_be_set(word: str) -> None:
+    text = f'#include "swing.ic"\nrun other like hold {{ with integrator = {word}; }}\n'
+    assert compiled(text, ["other"])[0].structure.integrator == word
+    text += (
+        "run again like other { with integrator = semi_implicit_euler; }\nrun plain like again { remove integrator; }\n"
+    )
+    assert compiled(text, ["again"])[0].structure.integrator == "semi_implicit_euler"
+    assert compiled(text, ["plain"])[0].structure.integrator == "modified_euler"
+
+
+def test_a_metric_may_be_called_as_what_is_set() -> None:
+    text = '#include "swing.ic"\nrun far like hold { with reach = 2 m; metric reach = final { of = hinge.q; } }\n'
+    text += "run later like far { reach { of = hinge.qd; } }\n"
+    (made,) = compiled(text, ["later"])
+    assert [each.of for each in made.structure.metrics] == ["hinge.qd"]
+    assert length(text, ["later"]) == 2.0
+
+
+def test_remove_takes_away_what_is_set_before_what_is_written() -> None:
+    text = '#include "swing.ic"\nrun far like hold { with duration = 2 s; }\nrun near like far { remove duration; }\n'
+    far, near = (identity(compiled(text, [run])[0]) for run in ("far", "near"))
+    assert far != near == identity(compiled(text, ["hold"])[0])
+
+
+IN_VAIN = [
+    ("duration = 3 s; with duration = 2 s;", """\
+error[D232]: this counts for nothing: `with` sets `duration`
+ --> deck.ic:2:20
+  |
+2 | run it like hold { duration = 3 s; with duration = 2 s; }
+  |                    ^^^^^^^^
+ ::: deck.ic:2:36  set here
+  = help: leave one of the two out
+"""),
+    ("with hinge.servo.kp = 2 V*s/rad; } run them like it { servos { hinge { kp = 3 V*s/rad; } }", """\
+error[D232]: this counts for nothing: `with` sets `hinge.servo.kp`
+ --> deck.ic:2:96
+  |
+2 | run it like hold { with hinge.servo.kp = 2 V*s/rad; } run them like it { servos { hinge { kp = 3 V*s/rad; } } }
+  |                                                                                                ^^^^^^^^^
+ ::: deck.ic:2:20  set here
+  = help: write `with hinge.servo.kp = ...;` here, or leave it out
+"""),
+    ("initial { hinge.q = 1 deg; } with initial.hinge.q = 2 deg;", """\
+error[D232]: this counts for nothing: `with` sets `initial.hinge.q`
+ --> deck.ic:2:40
+  |
+2 | run it like hold { initial { hinge.q = 1 deg; } with initial.hinge.q = 2 deg; }
+  |                                        ^^^^^
+ ::: deck.ic:2:49  set here
+  = help: leave one of the two out
+"""),
+    ("for i in 1 .. 2 { with links.bar.mass = i * 1 kg; }", """\
+error[D040]: with `links.bar.mass` is written twice
+ --> deck.ic:2:38
+  |
+2 | run it like hold { for i in 1 .. 2 { with links.bar.mass = i * 1 kg; } }
+  |                                      ^^^^^^^^^^^^^^^^^^^ again
+ ::: deck.ic:2:38  first
+  = help: each turn writes it: put the index into the path, `{i}`, or write it outside of the loop
+  = note: in `for i` at deck.ic:2:20, i = 2
+"""),
+    ("with reach = 2 s;", """\
+error[D061]: `reach` is in m, and this is in s
+ --> deck.ic:2:33
+  |
+2 | run it like hold { with reach = 2 s; }
+  |                                 ^^^
+ ::: swing.ic:2:7  defined here
+  = help: write it in m, km, cm, mm or um
+"""),
+    ("with links.bar.mass = 3 kg; } run them like it { links.bar.mass += 4 kg;", """\
+error[D056]: nothing is in `links.bar.mass` yet to append to
+ --> deck.ic:2:69
+  |
+2 | run it like hold { with links.bar.mass = 3 kg; } run them like it { links.bar.mass += 4 kg; }
+  |                                                                     ^^^^^^^^^^^^^^
+  = help: write `with links.bar.mass = ...;`
+"""),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("entries", "message"), IN_VAIN)
+def test_what_a_run_writes_in_vain_is_refused(entries: str, message: str) -> None:
+    assert refused(f'#include "swing.ic"\nrun it like hold {{ {entries} }}\n') == f"{message}\n1 error\n"
+
+
+def test_a_sweep_is_told_of_what_its_run_writes_in_vain() -> None:
+    text = '#include "swing.ic"\nrun it like hold { duration = 3 s; with duration = 2 s; }\n'
+    Path("deck.ic").write_text(f"{text}sweep them of it {{ vary reach = [1, 2] m; }}\n", encoding="utf-8")
+    found = ic.check("deck.ic", select=["them"])
+    assert [each.code for each in found.diagnostics] == ["D232"]
+
+
+def test_a_general_entry_may_stand_beside_what_is_set_of_one() -> None:
+    two = ARM.replace("}\n}", "}\n link b { mass = 1 kg; shape = rod(length = 1 m, along = x); }\n"
+                      " joint second revolute { parent = bar; child = b; axis = z; }\n}")  # fmt: skip
+    text = two + SERVO + RUN.replace("hinge = drive;", "* = drive;")
+    text += "run it like hold { initial { q = 1 rad; } with initial.hinge.q = 2 rad; }\n"
+    (made,) = compiled(text, ["it"])
+    assert [made.parameters[f"initial.{joint}.q"].value for joint in ("hinge", "second")] == [2.0, 1.0]
+
+
 def test_a_sweep_of_the_run_has_it_and_varies_it() -> None:
     text = '#include "swing.ic"\nrun heavy like hold { with links.bar.mass = 3 kg; with drive.kp = 0.2 V*s/rad; }\n'
     (swept,) = compiled(f"{text}sweep it of heavy {{ vary links.bar.mass = [4, 5] kg; }}\n", ["it"])
