@@ -169,6 +169,43 @@ def test_an_archive_that_holds_other_numbers_is_told_apart(chromium: Chromium, s
     page.close()
 
 
+MARGINS = """\
+#include <two_link.ic>
+run held like nominal {
+    duration = 0.4 s;  remove settle;
+    linear loop { at = 360 ms;  open = shoulder.servo.voltage; }
+    require gain_margin(loop) > 20;
+}
+sweep tuned of held { vary gearbox.kp = [0.005, 0.02] V*s/rad; }
+"""
+
+
+@pytest.mark.browser
+def test_a_margin_is_shown_as_the_archive_has_it_and_is_not_known_elsewhere(chromium: Chromium, tmp_path: Path) -> None:
+    (tmp_path / "deck.ic").write_text(MARGINS, encoding="utf-8")
+    archive = tmp_path / "a.h5"
+    assert cli.main(["run", str(tmp_path / "deck.ic"), "tuned", "-q", "--no-picture", "-o", str(archive)]) == cli.NO
+    assert cli.main(["view", str(archive), "-q"]) == 0
+    with xarray.open_dataset(archive) as data:
+        margins = data["loop_gain_margin"].values.tolist()
+    assert margins[0] > 20.0 > margins[1]
+    page = chromium.open(tmp_path / "a.view.html")
+    page.settle()
+    row = "document.querySelector('.answers tr:last-child').innerText"
+    for case, verdict in enumerate(("met", "missed")):
+        page.run(f"{CHOOSE}({case})")
+        name, value, told = page.run(row).split("\t")
+        assert name.strip() == "loop_gain_margin" and value.strip().endswith(", from the archive")
+        assert float(value.split()[0].rstrip(",")) == pytest.approx(margins[case], rel=1e-3)
+        assert told.strip() == f"gain_margin(loop) > 20: {verdict}"
+    assert page.run(f"{MOVE}(0, 0.5)").startswith("Not in the archive: ")
+    assert [cell.strip() for cell in page.run(row).split("\t")] == [
+        "loop_gain_margin", "not computed here", "gain_margin(loop) > 20: not known",
+    ]  # fmt: skip
+    quiet(page)
+    page.close()
+
+
 RUNAWAY = """\
 arm rail {
     link cart { mass = 1 kg; shape = box(size = [0.1, 0.1, 0.1] m); }
