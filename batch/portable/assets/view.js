@@ -79,14 +79,15 @@
     // Metrics of linear answers are not computed here: the archive's cases have them from the archive.
     const given = [...measured, ...told.not_computed.map((_, n) => (which < 0 ? null : archived[measured.length + n][which]))];
     answers.replaceChildren(...[...told.metrics, ...told.not_computed].map((metric, m) => {
-      const asked = told.requirements.filter((each) => each.metric === metric.name);
-      const unknown = m >= measured.length && !failed && !(given[m] === given[m]);
-      const verdicts = asked.map((each) => {
-        if (given[m] === null || unknown) return node("div", null, `${each.text}: not known`);
-        const met = !failed && { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b }[each.comparison](given[m], each.limit);
+      const unknown = given[m] === null || Number.isNaN(given[m]);
+      const verdicts = told.requirements.filter((each) => each.metric === metric.name).map((each) => {
+        if (unknown) return node("div", null, `${each.text}: not known`);
+        const met = { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b }[each.comparison](given[m], each.limit);
         return node("div", { class: met ? "met" : "missed" }, `${each.text}: ${met ? "met" : "missed"}`);
       });
-      return node("tr", null, node("td", null, node("code", null, metric.name)), node("td", null, given[m] === null ? "not computed here" : `${number(given[m])} ${data.metricUnits[m]}${m < measured.length ? "" : ", from the archive"}`), node("td", null, verdicts));
+      const value = given[m] === null ? "not computed here" : `${number(given[m])} ${data.metricUnits[m]}`.trim();
+      const whose = given[m] === null || m < measured.length ? "" : ", from the archive";
+      return node("tr", null, node("td", null, node("code", null, metric.name)), node("td", null, value + whose), node("td", null, verdicts));
     }));
   }
 
