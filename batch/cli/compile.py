@@ -55,5 +55,7 @@ def compile(
         of = done.described
         what = f"{len(of['inputs'])} inputs, {len(of['columns'])} recorded numbers, {len(of['metrics'])} metrics"
         say(f"{done.module}  ({size(done.module.stat().st_size)})  {what}")
+        if of["not_computed"]:
+            say(f"  not computed in it: {', '.join(each['name'] for each in of['not_computed'])}, of linear answers")
         say(f"{done.description}  ({size(done.description.stat().st_size)})")
     return YES

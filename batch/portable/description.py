@@ -31,13 +31,14 @@ def described(prepared: Prepared, module: WasmModule) -> dict[str, Any]:
     inputs       of each the name, what it is (coordinate, repeat, seed); a value is shown as `value / scale` in `unit`
     columns      of each recorded number the channel, the signal that it is of, the SI unit
     metrics      of each the name, the SI unit, and its place among the outputs
+    not_computed metrics of linear answers, which a module does not compute: of each the name and the SI unit
     failure      places among the outputs by which a case has failed (`METKernel.failed` in kernel.js reads them)
     requirements of each its text, its metric, and the comparison with a limit in SI
     cases        how many there are, and the inputs of the first ones, a list each
     """
     experiment = prepared.experiment
-    structure, schedule = experiment.structure, experiment.structure.schedule
-    units, outputs = metric_units(structure), prepared.program.outputs
+    structure, schedule, linear = experiment.structure, experiment.structure.schedule, experiment.linear_metrics
+    units, outputs = metric_units(structure, linear), prepared.program.outputs
     rows = np.arange(min(experiment.cases.count, MOST_CASES))
     return {
         "format": FORMAT,
@@ -53,6 +54,7 @@ def described(prepared: Prepared, module: WasmModule) -> dict[str, Any]:
             {"name": use.name, "unit": units[use.name], "output": outputs.index(METRIC + use.name)}
             for use in structure.metrics
         ],
+        "not_computed": [{"name": use.name, "unit": units[use.name]} for use in linear],
         "failure": {
             "failure": outputs.index(FAILURE[0]),
             "tick": outputs.index(FAILURE[2]),

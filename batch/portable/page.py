@@ -63,7 +63,8 @@ def data_of(experiment: Experiment, group: ArchiveGroup) -> dict[str, Any]:
     stored = {variable.name: variable for variable in group.role("metric")}
     known = {name.removeprefix("metrics."): name for name in stored}
     shown: dict[str, Any] = _visible(told)
-    lacking = [each["name"] for each in told["metrics"] if each["name"] not in known]
+    metrics = [*told["metrics"], *told["not_computed"]]
+    lacking = [each["name"] for each in metrics if each["name"] not in known]
     with reading(group.path):
         if lacking:
             raise Unlike(f"the plan of `{experiment.name}` has a metric `{lacking[0]}`, and it has none")
@@ -75,11 +76,11 @@ def data_of(experiment: Experiment, group: ArchiveGroup) -> dict[str, Any]:
         "count": group.count,
         "status": group.stretch("status", 0, len(positions)).tolist(),
         "metrics": [
-            _doubles(group.stretch(known[each["name"]], 0, len(positions))) for each in told["metrics"]
+            _doubles(group.stretch(known[each["name"]], 0, len(positions))) for each in metrics
         ],
         "labels": [visible(each["name"]) for each in told["inputs"]],
         "units": [_unit(each["unit"]) for each in told["inputs"]],
-        "metricUnits": [_unit(each["unit"]) for each in told["metrics"]],
+        "metricUnits": [_unit(each["unit"]) for each in metrics],
         "columnUnits": [_unit(each["unit"]) for each in told["columns"]],
     }  # fmt: skip
 

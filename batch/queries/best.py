@@ -295,7 +295,7 @@ class Designs:
         order = np.lexsort(numbers.T[::-1])
         kept: list[int] = []
         for i in order.tolist():
-            if np.isfinite(numbers[i]).all() and not any((numbers[j] <= numbers[i]).all() for j in kept):
+            if (numbers[i] < np.inf).all() and not any((numbers[j] <= numbers[i]).all() for j in kept):
                 kept.append(i)
         return good[kept]
 

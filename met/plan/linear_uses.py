@@ -84,13 +84,15 @@ WHY_ANSWER = "linear:"
 """Before the name of a `LinearUse`: the output that says why a case has no answer, a key of `WHY_NONE`; 0 where it
 has one."""
 
-ANSWERED, NOT_ASKED, EVENT, OPEN, SEVERAL_TICKS, NO_EQUILIBRIUM = range(6)
+ANSWERED, NOT_ASKED, EVENT, OPEN, SEVERAL_TICKS, NO_EQUILIBRIUM, AT_LIMIT, NOTHING_DECAYS = range(8)
 
 WHY_NONE: Mapping[int, str] = {
     NOT_ASKED: "it is not computed of a case that is driven on beds, or run by itself",
     EVENT: "an event is in the period there",
     OPEN: "nothing comes back where the loop is opened, as its joint is held, or its law at its limit",
     SEVERAL_TICKS: "its law ticks several times in a period, and has no phase, delay or disk of one rate",
+    AT_LIMIT: "something is at its limit there, so that its poles are not those of its loops",
+    NOTHING_DECAYS: "nothing decays or grows there: all of it stays, or is held",
     NO_EQUILIBRIUM: "its servos cannot hold it there, or something moves that no servo holds",
 }
 """Reasons for which a case has no answer, in words."""

@@ -76,13 +76,18 @@
     const end = failed ? `; it fails at ${number(tick / told.kernel.base_hz)} s` : "";
     came.classList.toggle("bad", bad);
     came.textContent = `${words}${speed}${end}.`;
-    answers.replaceChildren(...told.metrics.map((metric, m) => {
-      const asked = told.requirements.filter((each) => each.metric === metric.name);
-      const verdicts = asked.map((each) => {
-        const met = !failed && { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b }[each.comparison](measured[m], each.limit);
+    // Metrics of linear answers are not computed here: the archive's cases have them from the archive.
+    const given = [...measured, ...told.not_computed.map((_, n) => (which < 0 ? null : archived[measured.length + n][which]))];
+    answers.replaceChildren(...[...told.metrics, ...told.not_computed].map((metric, m) => {
+      const unknown = given[m] === null || Number.isNaN(given[m]);
+      const verdicts = told.requirements.filter((each) => each.metric === metric.name).map((each) => {
+        if (unknown) return node("div", null, `${each.text}: not known`);
+        const met = { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b }[each.comparison](given[m], each.limit);
         return node("div", { class: met ? "met" : "missed" }, `${each.text}: ${met ? "met" : "missed"}`);
       });
-      return node("tr", null, node("td", null, node("code", null, metric.name)), node("td", null, `${number(measured[m])} ${data.metricUnits[m]}`), node("td", null, verdicts));
+      const value = given[m] === null ? "not computed here" : `${number(given[m])} ${data.metricUnits[m]}`.trim();
+      const whose = given[m] === null || m < measured.length ? "" : ", from the archive";
+      return node("tr", null, node("td", null, node("code", null, metric.name)), node("td", null, value + whose), node("td", null, verdicts));
     }));
   }
 

@@ -170,8 +170,9 @@ class Scope:
         ]
         return None if any(number is None for number in numbers) else tuple(numbers)  # type: ignore[arg-type]
 
-    def constant(self, owner: Owner, wanted: Parameter, item: Item) -> float | None:
-        """A compile-time constant: another value is another program."""
+    def constant(self, owner: Owner, wanted: Parameter, item: Item, *, instead: str = "") -> float | None:
+        """A compile-time constant: another value is another program. instead: the remedy where it varies, if it is
+        another than varying it itself."""
         path = owner.join(wanted.name)
         for known in owner.paths(wanted.name, item.homes):
             self.not_sweepable[known] = not_sweepable.COMPILED
@@ -185,7 +186,7 @@ class Scope:
                         "D122",
                         f"`{wanted.name}` of {owner.label} varies with the sweep",
                         found.place,
-                        help=f"it decides the program: vary `{path}` itself",
+                        help=instead or f"it decides the program: vary `{path}` itself",
                     )
                 )
             before = self.complaints.error_count

@@ -61,7 +61,9 @@ def _answer(scope: Scope, item: Item, structure: Structure, known: Mapping[str, 
     check_keys(scope, body, list(LINEAR.keys), owner)
     at, duration = body.get("at"), structure.schedule.duration
     pose = _pose(scope, owner, at, structure) if at is not None and _is_equilibrium(at.value) else None
-    time = 0.0 if at is None or _is_equilibrium(at.value) else scope.constant(owner, LINEAR_AT, at)
+    time: float | None = 0.0
+    if at is not None and not _is_equilibrium(at.value):
+        time = scope.constant(owner, LINEAR_AT, at, instead=ONE_INSTANT.sweep)
     for path in owner.paths(LINEAR_AT.name, () if at is None else at.homes):
         scope.not_sweepable[path] = ONE_INSTANT
     if at is not None and time is not None and time > duration:

@@ -22,9 +22,11 @@ from met.passing import Memories
 from met.plan import MetricUse
 from met.plan.linear_uses import (
     ANSWERED,
+    AT_LIMIT,
     EVENT,
     FIGURES,
     NO_EQUILIBRIUM,
+    NOTHING_DECAYS,
     OPEN,
     SEVERAL_TICKS,
     WHY_ANSWER,
@@ -132,10 +134,14 @@ def _figures(asked: LinearQuestion, wanted: Sequence[MetricUse], flow: Flow) -> 
 
 def _figure(figure: LinearFigure, lifted: LiftedPeriod, loops: Sequence[OpenLoop]) -> tuple[float, int]:
     if not figure.of_loops:
+        if lifted.found.at_limit:
+            return math.nan, AT_LIMIT
         poles = [each for each in lifted.poles if not each.stays(lifted.found.seconds)]
+        if not poles:
+            return math.nan, NOTHING_DECAYS
         if figure.name == "damping":
-            return min((each.damping for each in poles), default=1.0), ANSWERED
-        return max((math.inf if each.s.real > 0.0 else each.seconds for each in poles), default=0.0), ANSWERED
+            return min(each.damping for each in poles), ANSWERED
+        return max(math.inf if each.s.real > 0.0 else each.seconds for each in poles), ANSWERED
     if any(loop.unstable for loop in loops):
         return figure.unstable, ANSWERED
     if not all(loop.returns for loop in loops):

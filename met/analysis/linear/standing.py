@@ -88,6 +88,8 @@ def settled(program: PeriodProgram, flow: Flow) -> Flow | None:
         return None
     commands = [number for number, each in enumerate(program.inputs) if not each.is_output]
     flow = flow.copy()
+    for name in program.states:
+        flow.cells.setdefault(name, 0.0)  # what the run has not written yet
     for _ in range(MOST_STEPS):
         try:
             found = period_map(program, flow)

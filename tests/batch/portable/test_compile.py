@@ -40,6 +40,25 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+MARGINS = """\
+#include <two_link.ic>
+run held like nominal {
+    duration = 0.4 s;  remove settle;
+    linear loop { at = equilibrium();  open = shoulder.servo.voltage; }
+    require phase_margin(loop) > 40 deg;
+}
+"""
+
+
+def test_a_module_says_which_metrics_it_does_not_compute(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "margins.ic").write_text(MARGINS, encoding="utf-8")
+    assert met("compile", "margins.ic", "held") == 0
+    assert "\n  not computed in it: loop_phase_margin, of linear answers\n" in capsys.readouterr().out
+    told = json.loads((folder / "held.json").read_text())
+    assert told["not_computed"] == [{"name": "loop_phase_margin", "unit": "rad"}]
+    assert "loop_phase_margin" not in [each["name"] for each in told["metrics"]]
+
+
 def test_a_module_and_its_description_belong_together(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert met("compile", "deck.ic", "tuned") == 0
     said = re.sub(r"\([\d.]+ KiB\)", "(SIZE)", capsys.readouterr().out)

@@ -169,6 +169,43 @@ def test_an_archive_that_holds_other_numbers_is_told_apart(chromium: Chromium, s
     page.close()
 
 
+MARGINS = """\
+#include <two_link.ic>
+run held like nominal {
+    duration = 0.4 s;  remove settle;
+    linear loop { at = 360 ms;  open = shoulder.servo.voltage; }
+    require gain_margin(loop) > 20;
+}
+sweep tuned of held { vary gearbox.kp = [0.005, 0.02] V*s/rad; }
+"""
+
+
+@pytest.mark.browser
+def test_a_margin_is_shown_as_the_archive_has_it_and_is_not_known_elsewhere(chromium: Chromium, tmp_path: Path) -> None:
+    (tmp_path / "deck.ic").write_text(MARGINS, encoding="utf-8")
+    archive = tmp_path / "a.h5"
+    assert cli.main(["run", str(tmp_path / "deck.ic"), "tuned", "-q", "--no-picture", "-o", str(archive)]) == cli.NO
+    assert cli.main(["view", str(archive), "-q"]) == 0
+    with xarray.open_dataset(archive) as data:
+        margins = data["loop_gain_margin"].values.tolist()
+    assert margins[0] > 20.0 > margins[1]
+    page = chromium.open(tmp_path / "a.view.html")
+    page.settle()
+    row = "document.querySelector('.answers tr:last-child').innerText"
+    for case, verdict in enumerate(("met", "missed")):
+        page.run(f"{CHOOSE}({case})")
+        name, value, told = page.run(row).split("\t")
+        assert name.strip() == "loop_gain_margin" and value.strip().endswith(", from the archive")
+        assert float(value.partition(",")[0]) == pytest.approx(margins[case], rel=1e-3)
+        assert told.strip() == f"gain_margin(loop) > 20: {verdict}"
+    assert page.run(f"{MOVE}(0, 0.5)").startswith("Not in the archive: ")
+    assert [cell.strip() for cell in page.run(row).split("\t")] == [
+        "loop_gain_margin", "not computed here", "gain_margin(loop) > 20: not known",
+    ]  # fmt: skip
+    quiet(page)
+    page.close()
+
+
 RUNAWAY = """\
 arm rail {
     link cart { mass = 1 kg; shape = box(size = [0.1, 0.1, 0.1] m); }
@@ -178,7 +215,7 @@ run it {
     arm = rail;  initial { slide.qd = 1 m/s; }
     environment { drag = joint_damping { sliding = 50 N*s/m; } }
     rates { dynamics = 100 Hz; record = 100 Hz; }  duration = 3200 ms;
-    record = [qd];  metric late = final { of = slide.qd; }
+    record = [qd];  metric late = final { of = slide.qd; }  require late < 1 m/s;
 }
 sweep damped of it { vary environment.drag.sliding = [50, 220] N*s/m; }
 """
@@ -198,7 +235,8 @@ def test_a_case_that_runs_away_fails_in_the_page_as_in_the_archive(chromium: Chr
     said = page.run(f"{CHOOSE}(1)")
     assert said.startswith("Case #1 fails, as in the archive: ")
     assert said.endswith(f"; it fails at {valid[1] / 100:g} s.") and valid[1] < valid[0]
-    assert "no value" in page.run("document.querySelector('.answers').innerText")
+    answer = page.run("document.querySelector('.answers').innerText")
+    assert "no value" in answer and answer.endswith("late < 1 m/s: not known")
     quiet(page)
     page.close()
 

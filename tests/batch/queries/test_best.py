@@ -151,6 +151,13 @@ def test_the_front_has_those_that_none_is_better_than(seed: int) -> None:
     assert (np.diff(a[found]) > 0).all()
 
 
+def test_what_is_infinite_is_the_best_where_the_largest_is_wanted() -> None:
+    a, b = np.array([1.0, 2.0, np.inf, np.nan]), np.array([3.0, 4.0, np.inf, np.nan])
+    designs = Designs(made({"n": np.arange(4.0)}, np.ones(4, bool), a=a, b=b))
+    assert designs.front([designs.goal("a:largest"), designs.goal("b:largest")]).tolist() == [2]
+    assert designs.front([designs.goal("a"), designs.goal("b:largest")]).tolist() == [0, 1]
+
+
 def test_a_value_is_written_in_as_few_digits_as_give_it_again() -> None:
     assert written(0.33, "V*s/rad") == "0.33 V*s/rad" and written(20.0, "kg") == "20 kg" and written(3.0, "1") == "3"
     assert written(parse_unit("deg").to_si(0.1), "deg") == "0.1 deg" and written(0.05, "%") == "5 %"

@@ -128,6 +128,11 @@ def test_an_instant_is_one_for_a_sweep(tmp_path: Path) -> None:
     found = messages(check(tmp_path, ARM, SERVO, run_with(LOOP), swept, select=["when"]))
     assert "error[D122]: `linear.loop.at` cannot vary\n  --> deck.ic:19:27\n" in found
     assert "= help: it is one for the whole sweep: write a `linear` block for each instant" in found
+    when = "let when = 0.25 s;\n"
+    swept = "sweep later of hold { vary when = [0.25, 0.5] s; }\n"
+    found = messages(check(tmp_path, when, ARM, SERVO, run_with("linear b { at = when; }"), swept, select=["later"]))
+    assert "error[D122]: `at` of `linear b` varies with the sweep\n" in found
+    assert "\n   = help: write a `linear` block for each instant\n" in found
 
 
 DAMAGED = {

@@ -112,6 +112,19 @@ def test_a_case_without_an_answer_says_why_and_its_requirement_is_open(tmp_path:
     assert (found.status == engine.DONE).all()
 
 
+def test_poles_of_an_arm_at_a_limit_or_at_rest_meet_no_requirement(tmp_path: Path) -> None:
+    """A motor at its limit pushes whatever comes, and what sticks does not move: nothing there decays in no time."""
+    rubs = SERVO.replace("command", "f_c = 0.02 N*m; command")
+    asked = "    linear loop { at = 10 ms; }\n    require decay_time(loop) < 1 s;\n    require damping(loop) > 0.5;\n"
+    swept = "sweep asked of hold { vary drive.command.value = [0, 1000] rad/s; }\n"
+    found = answers(tmp_path, ARM, rubs, with_entries(RUN, asked), swept, select="asked")
+    assert np.isnan(found.metrics["loop_decay_time"]).all() and np.isnan(found.metrics["loop_damping"]).all()
+    assert found.warning == [
+        "no answer of `loop` at 0.01 s: nothing decays or grows there: all of it stays, or is held",
+        "no answer of `loop` at 0.01 s: something is at its limit there, so that its poles are not those of its loops",
+    ]
+
+
 def test_a_law_that_ticks_several_times_in_a_period_has_a_gain_alone(tmp_path: Path) -> None:
     slow = (
         with_entries(RUN, ASKED).replace("dynamics = 1 kHz", "dynamics = 500 Hz").replace("record = 100", "record = 50")
