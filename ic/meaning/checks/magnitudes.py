@@ -297,8 +297,9 @@ def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[Weigh
         found = []
         for body, first, last in zip(bodies, [0, *ends], ends, strict=False):
             mass, largest, sizes = rows[:, first], rows[:, first + 1 : first + 4].max(axis=1), rows[:, first + 4 : last]
-            radius = np.sqrt(np.maximum(largest, 0.0) / np.where(mass > 0.0, mass, np.inf))
-            length = np.sqrt((sizes * sizes).sum(axis=1)) if body.sizes else arm
+            with np.errstate(over="ignore"):  # a body of 1e-320 kg likewise
+                radius = np.sqrt(np.maximum(largest, 0.0) / np.where(mass > 0.0, mass, np.inf))
+                length = np.sqrt((sizes * sizes).sum(axis=1)) if body.sizes else arm
             least = GYRATION * length if body.sizes else np.maximum(GYRATION * length, LEAST_GYRATION)
             bad = (length > 0.0) & (radius > least)
             if bad.any():

@@ -53,6 +53,14 @@ def test_an_inertia_in_square_millimetres_is_told_with_the_unit(tmp_path: Path) 
     assert "  = help: it would be of 0.1732 m, were it in kg*mm^2: `30000 kg*mm^2` is 0.03 kg*m^2\n" in said
 
 
+def test_a_body_of_next_to_no_mass_is_endlessly_large_and_no_defect(tmp_path: Path) -> None:
+    body = "mass = 1 kg; com = [0.3, 0, 0] m; inertia = [0.2, 0.2, 0.2] kg*m^2;"
+    found = check(
+        tmp_path, arm(body), SERVO, RUN, "sweep it of hold { vary links.bar.mass = [1e-320, 1] kg; }", select="it"
+    )
+    assert [each.code for each in found.diagnostics] == ["D298", "D297"] and found.plan is not None
+
+
 @pytest.mark.parametrize(
     ("body", "said", "cure"),
     [
