@@ -155,8 +155,8 @@ def growths(
     ticks  of a frame; else of the arm with all laws continuous, without delays of ticks
     """
     if ticks:
-        sizes = np.abs(_eigenvalues(frame(found, lanes, gains, direct=direct)))
-        with np.errstate(divide="ignore"):
+        with np.errstate(all="ignore"):  # what overflows is no number
+            sizes = np.abs(_eigenvalues(frame(found, lanes, gains, direct=direct)))
             return np.asarray(np.log(sizes) / seconds(found))
     try:
         return _eigenvalues(_over(found, lanes, gains, direct, found.laws)[0]).real

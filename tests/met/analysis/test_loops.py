@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -203,3 +204,10 @@ def test_steps_and_noise_of_a_sensor_are_no_change_of_its_slope(sensor: str, tmp
         assert [each.gain for each in loops(experiment(tmp_path, coarse))] == pytest.approx(
             [each.gain for each in loops(experiment(tmp_path, made))], rel=2e-3
         )
+
+
+def test_slopes_whose_step_overflows_are_no_defect(tmp_path: Path) -> None:
+    deck_of = "#include <two_link.ic>\nsweep stiff of nominal { vary elbow.servo.f_v = [2.58e295] N*m*s/rad; }\n"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert check(tmp_path, deck_of, select="stiff").plan is not None
