@@ -193,7 +193,7 @@ def gradient(
     cases: Sequence[int | str] | None = None,
     metrics: Sequence[str] = (),
 ) -> xarray.Dataset:
-    """How metrics of a sweep's cases move with the numbers that it varies: exact, of the program that runs.
+    """Slopes of metrics of a sweep's cases by the numbers that it varies: exact, of the program that runs.
 
     experiment  name of a sweep; None: the plan's first
     cases       rows of the case table, `"#7"`, beginnings of case_ids; None: all

@@ -53,7 +53,7 @@ def view(archive: str | Path, names: tuple[str, ...] = ()) -> str:
 
 
 def data_of(experiment: Experiment, group: ArchiveGroup) -> dict[str, Any]:
-    """What the script needs: the module, its description, and what the archive has of the first cases."""
+    """Data that the script needs: the module, its description, and what the archive has of the first cases."""
     prepared = prepare(experiment)
     module = compiled(prepared.recording)
     told = described(prepared, module)

@@ -144,7 +144,7 @@ class SearchAnswer:
         return out + (self._border() if found.serves and search.kind == "tune" else [])
 
     def _border(self) -> list[str]:
-        """How near a candidate was tried that does not serve, in lines."""
+        """The nearest candidate that was tried and does not serve, in lines."""
         miss = self.found.miss
         if miss is None:
             return ["  none of the candidates that were tried misses a requirement"] if self.required else []

@@ -55,7 +55,7 @@ class Complaints:
 
     @property
     def all(self) -> tuple[Diagnostic, ...]:
-        """What was found; of what turns of a loop all get wrong, that of the first, which names the others."""
+        """All findings; of a mistake that several turns of a loop make, the first, which names the others."""
         return tuple(map(self._with_turns, self._found))
 
     @property

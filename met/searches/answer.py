@@ -29,7 +29,7 @@ class Room:
 
 @frozen
 class NearestMiss:
-    """Of the candidates that were tried, and miss a requirement, the one that is nearest to the answer.
+    """The candidate nearest to the answer among those that were tried and miss a requirement.
 
     case      the place of the first of its cases that does;  text: the requirement, empty where the case failed
     distance  from the answer, as a share of the parameter's range, by the parameter that is farthest

@@ -121,7 +121,7 @@ def settled(program: PeriodProgram, flow: Flow) -> Flow | None:
 
 
 def moves(program: PeriodProgram, flow: Flow) -> Reason:
-    """What of an arm that begins where a flow stands changes its rate most within a period, in words."""
+    """The part of an arm that changes its rate most within a period that begins where a flow stands, in words."""
     if program.bodies:
         return f"`{program.bodies[0].name}` moves freely"
     after = flow.copy()

@@ -48,7 +48,7 @@ class WasmModule:
 
     @property
     def description(self) -> dict[str, Any]:
-        """What a caller must know, as JSON has it.
+        """Description of the module for its callers, as JSON has it.
 
         module   SHA-256 of the module;  entry, heap: its function, and the first byte of memory that is free
         lanes    cases a block;  numbers are doubles, [block][number][lane], from a multiple of 64 bytes on

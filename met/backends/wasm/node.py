@@ -24,8 +24,9 @@ _ROWS = 1 << 24
 
 @frozen
 class NodeRun:
-    """What a module computed, and how. rows [case, row, column], outputs [case, output], state [cell, lane]; fused:
-    whether the machine's multiply-add was used; compile_ms, run_ms: time to begin, and of each time it ran."""
+    """Results of a module, and how they were computed. rows [case, row, column], outputs [case, output], state [cell,
+    lane]; fused: whether the machine's multiply-add was used; compile_ms, run_ms: time to begin, and of each time it
+    ran."""
 
     rows: np.ndarray
     outputs: np.ndarray
