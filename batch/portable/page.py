@@ -18,6 +18,7 @@ from batch.portable.description import MOST_CASES, described
 from batch.queries.groups import groups_named
 from batch.queries.signals import pretty_unit
 from batch.report.html import inlined
+from batch.report.html.head import page_head
 from batch.report.html.markup import Html, el, lines
 from batch.report.html.payload import script_json
 from met.backends.wasm.module import KERNEL_JS, compiled
@@ -115,23 +116,7 @@ def page_of(experiment: Experiment, data: dict[str, Any]) -> str:
         ]
     )
     style = f"{inlined.style()}\n{(_ASSETS / 'view.css').read_text(encoding='utf-8')}"
-    rules = (
-        f"default-src 'none'; script-src {inlined.digest(script)} {_CODE}; style-src {inlined.digest(style)}; "
-        "img-src data:; base-uri 'none'; form-action 'none'"
-    )
-    head = lines(
-        [
-            el("meta", charset="utf-8"),
-            el("meta", name="generator", content=GENERATOR),
-            Html(f'<meta http-equiv="Content-Security-Policy" content="{rules}">'),
-            el("meta", name="viewport", content="width=device-width, initial-scale=1"),
-            el("meta", name="color-scheme", content="light dark"),
-            el("meta", name="referrer", content="no-referrer"),
-            el("link", rel="icon", href="data:,"),
-            el("title", experiment.name),
-            Html(f"<style>{style}</style>"),
-        ]
-    )
+    head = page_head(experiment.name, generator=GENERATOR, style=style, script=script, allowed=_CODE)
     by = "by the code that the archive was made with" if data["same_code"] else f"{OTHER_CODE} (MET {VERSION})"
     header = el(
         "header",

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from batch.report.contents.parts import Report, ReportSection
 from batch.report.html import blocks, changes, designs, inlined, tables
+from batch.report.html.head import page_head
 from batch.report.html.markup import Child, Html, el, join, lines
 from batch.report.html.payload import script_json, section_data
 
@@ -17,23 +18,7 @@ def page(report: Report) -> str:
     """The whole file. The same report gives the same text."""
     anchors = {file.name: (n, file.text.count("\n") + 1) for n, file in enumerate(report.sources)}
     style, script = inlined.style(), inlined.script()
-    rules = (
-        f"default-src 'none'; script-src {inlined.digest(script)}; style-src {inlined.digest(style)}; img-src data:; "
-        "base-uri 'none'; form-action 'none'"
-    )
-    head = lines(
-        [
-            el("meta", charset="utf-8"),
-            el("meta", name="generator", content=GENERATOR),
-            Html(f'<meta http-equiv="Content-Security-Policy" content="{rules}">'),
-            el("meta", name="viewport", content="width=device-width, initial-scale=1"),
-            el("meta", name="color-scheme", content="light dark"),
-            el("meta", name="referrer", content="no-referrer"),
-            el("link", rel="icon", href="data:,"),
-            el("title", report.title),
-            Html(f"<style>{style}</style>"),
-        ]
-    )
+    head = page_head(report.title, generator=GENERATOR, style=style, script=script)
     data = [
         el(
             "script",
