@@ -330,7 +330,7 @@ def check_start(scope: Scope, use: Use) -> None:
             f"{begins.value / scale:g} {unit}: it jumps",
             places[0] if places else use.place,
             also=also,
-            help=f"write `{use.joint}.q = {value / scale:.12g} {unit};` in `initial`, or begin the command elsewhere",
+            help=f"write `{use.joint}.q = command;` in `initial`, or begin the command elsewhere",
         )
 
 
