@@ -32,6 +32,9 @@ from met.plan.defaults import component
 from met.trace import Real, Scalar
 
 KIND: Final = "guide"
+COURSES_BEHIND_GUIDES: Final = frozenset({"pulse"})
+"""Courses whose names guides may bear, in decks that are older than they are: there the guide is meant."""
+
 USAGE = "write `guide NAME = MODEL { ... }`"
 
 
@@ -95,7 +98,8 @@ def _meaning(scope: Scope, name: str) -> str:
     """The other meaning of a name where a command's value stands; "" where it may be a guide's name."""
     if name in scope.definitions.lets:
         return "a value"
-    return "a unit" if units.is_unit(name) else "a course in time" if name in models.available("command") else ""
+    courses = set(models.available("command")) - COURSES_BEHIND_GUIDES
+    return "a unit" if units.is_unit(name) else "a course in time" if name in courses else ""
 
 
 def resolve_guides(

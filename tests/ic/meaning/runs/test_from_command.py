@@ -22,6 +22,7 @@ COURSES = (
     "step(start = 0.1 rad, to = 0.3 rad, at = 0.5 s)",
     "ramp(start = -0.2 rad, to = 0.3 rad, over = 0.7 s)",
     "ramp(start = -0.2 rad, to = 0.3 rad, begin = 0.3 s, over = 0.7 s)",
+    "pulse(start = 0.1 rad, to = 0.3 rad, slope = 1 rad/s, over = 0.7 s)",
     "sine(amplitude = 0.3 rad, frequency = 0.7 Hz, offset = 0.1 rad, phase = 40 deg)",
     "chirp(amplitude = 20 deg, f0 = 0.2 Hz, f1 = 2 Hz, over = 8 s)",
     "trapezoid(start = 0.2 rad, to = 0.9 rad, max_rate = 1 rad/s, max_acceleration = 4 rad/s^2)",
