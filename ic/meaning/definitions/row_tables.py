@@ -12,7 +12,7 @@ and so are `inertia.xx` to `inertia.yz`, in the order that `inertia` of a link h
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final, TypeGuard
 
 from ic.grammar.syntax import Call, Expression, Name, String, Word
@@ -43,9 +43,9 @@ class RowTable:
 
     def cells(self, name: Name) -> tuple[CsvCell, ...]:
         """What a path means, `bodies.boom.mass`: one cell, or those of a vector. Raises Problem, placed."""
-        _, row, *words = (*name.path, *(None,) * (3 - len(name.path)))
-        if row is None or words[0] is None:
+        if len(name.path) < 3:
             raise self._no_value(name)
+        _, row, *words = name.path
         number = self.rows.get(row.text)
         if number is None:
             message = f"`{self.csv.file}` has no row `{row.text}`"
@@ -60,10 +60,9 @@ class RowTable:
                 raise Problem(error("D383", f"row `{row.text}` has no value here", cell.place, also=also, help=helps))
         return found
 
-    def _columns(self, words: list[Word | None]) -> tuple[CsvColumn, ...]:
+    def _columns(self, words: Sequence[Word]) -> tuple[CsvColumn, ...]:
         """The column of this name, or those of the vector of this name."""
-        written = [word for word in words if word is not None]
-        text = ".".join(word.text for word in written)
+        text = ".".join(word.text for word in words)
         one = self.csv.column(text)
         if one is not None and one.number > 0:
             return (one,)
@@ -72,7 +71,7 @@ class RowTable:
             columns = tuple(column for column in several if column is not None)
             if len(columns) == len(parts):
                 return columns
-        raise missing_column(self.csv, text, written[0].place)
+        raise missing_column(self.csv, text, words[0].place)
 
     def _no_value(self, name: Name) -> Problem:
         """Says that a path names the table, or a row of it, and no value."""

@@ -356,8 +356,8 @@ def _call(call: Call, lookup: Lookup) -> Value | ValueList:
     name = call.name.text
     if is_row_table(call):
         message = f"`{CSV}(...)` is a table of values, and no value"
-        helps = [USAGE_OF_TABLES, "a value of it is `NAME.ROW.COLUMN`"]
-        raise Problem(error("D381", message, call.name.place, help=helps))
+        usage = [USAGE_OF_TABLES, "a value of it is `NAME.ROW.COLUMN`"]
+        raise Problem(error("D381", message, call.name.place, help=usage))
     if name not in FUNCTIONS:
         raise Problem(
             error(

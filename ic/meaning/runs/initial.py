@@ -70,13 +70,13 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
             )
             if own is not None and is_from_command(scope, own):
                 report_others(scope, name, own, [joint], servos)
-            item = own or general
-            if item is not None and is_from_command(scope, item):
-                taken = value_of_command(scope, owner, wanted, item, servos.get(joint.name))
+            written = own or general
+            if written is not None and is_from_command(scope, written):
+                taken = value_of_command(scope, owner, wanted, written, servos.get(joint.name))
                 if taken is None:
                     scope.checks.fail(owner.join(name))
                 else:
-                    scope.number(owner, wanted, item, value=taken)
+                    scope.number(owner, wanted, written, value=taken)
                 continue
             value = listed.items[n] if listed is not None and own is None else None
             if isinstance(value, ValueList):
@@ -84,7 +84,7 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
                 continue
             if general is not None and own is None and listed is None and _mixed(scope, owner, wanted, general, arm):
                 break
-            scope.number(owner, wanted, item, value=value)
+            scope.number(owner, wanted, written, value=value)
 
 
 def check_balanced(scope: Scope, item: Item | None, uses: Sequence[Use], balanced: bool) -> None:
