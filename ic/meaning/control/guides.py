@@ -198,7 +198,7 @@ def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration
             )
     joints = tuple(use.joint for use in follow)
     owner = Owner(f"guide `{item.name}`", item.place, f"guides.{item.name}", homes=item.homes)
-    scope.keep_setting(f"{owner.path}.model", guide.name, item=item)
+    scope.keep_in_deck(f"{owner.path}.model", guide.name, item)
     known = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
     named = check_names(scope, owner, guide.parameters, body, arm=arm.name, known=known, failed=arm.failed)
     paths = list(COMPONENTS) if guide.components is not None else []
@@ -342,7 +342,7 @@ def _course(scope: Scope, owner: Owner, item: Item) -> str | None:
     inner = course_named(scope, item.value)
     model = use_course(scope, spot, inner, item, doc=f"{item.name} of the path", column=item.name, body=item.body)
     if model is not None:
-        scope.keep_setting(f"{path}.model", model, item=item)
+        scope.keep_in_deck(f"{path}.model", model, item)
         scope.not_sweepable[path] = not_sweepable.model("a course in time", path)
     return model
 

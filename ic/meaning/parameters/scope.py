@@ -296,6 +296,11 @@ class Scope:
         kept[path] = Settled(word, "", origin, wanted.doc, item.value if item else None)
         return word
 
+    def keep_in_deck(self, path: str, value: str, item: Item) -> None:
+        """Keeps a setting that the deck alone writes, neither a sweep nor `--set`."""
+        self.keep_setting(path, value, item=item)
+        self.not_sweepable[path] = not_sweepable.COMPILED_ALONE
+
     def keep_setting(
         self, path: str, value: Real | str, unit: str = "", item: Item | None = None, note: str = ""
     ) -> None:
