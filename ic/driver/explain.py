@@ -86,7 +86,7 @@ def with_all_settings(compiled: Compiled, number: int = 0) -> Experiment:
     assert compiled.plan is not None
     experiment, scope = compiled.plan.experiments[number], compiled.scopes[number]
     parameters, outputs = scope.quantities(auxiliary=True)
-    for name in scope.definitions.lets:
+    for name in (*scope.definitions.lets, *scope.names.cells):
         let = _let(scope, name)
         if let is None or name in parameters or any(path.startswith(f"{name}.") for path in parameters):
             continue
@@ -121,6 +121,8 @@ def _let(scope: Scope, name: str) -> Settled | None:
     """A `let` as if it were a parameter; None where it is none, or no number or list of numbers."""
     let = scope.definitions.lets.get(name)
     if let is None:
+        return _cells(scope, name)
+    if scope.names.row_table(name) is not None:
         return None
     varied = scope.varied.get(name)
     origin = written_origin(place_of(let.value), let.overrides)
@@ -134,6 +136,17 @@ def _let(scope: Scope, name: str) -> Settled | None:
         return None
     unit = units.text(numbers[0].dimension)
     return Settled(tuple(float(value.number) for value in numbers), unit, origin, "", let.value)
+
+
+def _cells(scope: Scope, path: str) -> Settled | None:
+    """The value of a table by row name that the run asked for, `bodies.boom.mass`; None where it asked for none."""
+    cells, table = scope.names.cells.get(path), scope.names.row_table(path.partition(".")[0])
+    if cells is None or table is None:
+        return None
+    found = [table.csv.quantity(cell) for cell in cells]
+    origin = Origin("deck", cells[0].place, (), f"row and column of {table.csv.file}")
+    unit = units.text(found[0][1].dimension)
+    return Settled(found[0][0] if len(found) == 1 else tuple(number for number, _ in found), unit, origin)
 
 
 def _explanation(experiment: Experiment, scope: Scope, path: str, settled: Settled) -> Explanation:
@@ -169,6 +182,11 @@ def _names(scope: Scope, expression: Expression) -> Iterator[Label]:
         below = []
         for each in level:
             for name in names_in(each):
+                cells = scope.names.cells.get(name.text)
+                if cells is not None and name.text not in seen:
+                    seen.add(name.text)
+                    written = ", ".join(f"{cell.text} {cell.column.unit or ''}".rstrip() for cell in cells)
+                    yield Label(cells[0].place, f"{name.text} = {written}")
                 let = scope.definitions.lets.get(name.text)
                 if let is not None and name.text not in seen:
                     seen.add(name.text)

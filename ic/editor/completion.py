@@ -20,7 +20,7 @@ from met.parameter import Parameter
 from met.unit_parser import parse_unit
 from met.units import UNITS
 
-FUNCTIONS = ("sqrt", "sin", "cos", "min", "max", "linspace", "logspace", "pi")
+FUNCTIONS = ("sqrt", "sin", "cos", "min", "max", "linspace", "logspace", "csv", "pi")
 _PATHS = ("vary", "require", "record", "exclude", "of", "against", "choose", "maximise", "minimise", "signal")
 
 

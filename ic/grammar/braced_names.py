@@ -1,7 +1,8 @@
 """Names with braces in them, `seg_{i-1}`, and the whole numbers that braces and the ends of a loop hold.
 
 What stands in braces is an index of a loop or whole numbers with `+ - * / %` and brackets; nothing that a block may
-hold looks so, since entries have a `;`. The opening brace and what follows it touch.
+hold looks so, since entries have a `;`. The opening brace touches the name before it, and where there is none, what
+follows it: `seg_{ i }` is a name and so is `{i}`, and `{ i }_seg`, whose end shows it.
 """
 
 from __future__ import annotations
@@ -50,9 +51,14 @@ def _may_touch(first: Token, second: Token) -> bool:
     return first.source.text[first.end : second.offset].strip() != ""
 
 
-def braces_length(tokens: Sequence[Token], at: int) -> int:
-    """The number of tokens of the braces at token `at` that belong to a name; 0 where there are none, or a block."""
-    if tokens[at].text != "{" or at + 2 >= len(tokens) or not _may_touch(tokens[at], tokens[at + 1]):
+def braces_length(tokens: Sequence[Token], at: int, *, touching: bool = False) -> int:
+    """The number of tokens of the braces at token `at` that belong to a name; 0 where there are none, or a block.
+
+    touching  whether the opening brace touches what follows it
+    """
+    if tokens[at].text != "{" or at + 2 >= len(tokens):
+        return 0
+    if touching and not _may_touch(tokens[at], tokens[at + 1]):
         return 0
     end = at + 1
     while end < len(tokens) and (tokens[end].kind in (NAME, WHOLE) or tokens[end].text in _SIGNS):
@@ -63,7 +69,7 @@ def braces_length(tokens: Sequence[Token], at: int) -> int:
 
 def name_length(tokens: Sequence[Token], at: int) -> int:
     """The number of tokens of the name that begins at token `at`, braces included; 0 where none begins there."""
-    end = at + (1 if tokens[at].kind == NAME else braces_length(tokens, at))
+    end = at + (1 if tokens[at].kind == NAME else _leading_length(tokens, at))
     while at < end < len(tokens):
         before, token = tokens[end - 1 : end + 1]
         more = braces_length(tokens, end) if _may_touch(before, token) else 0
@@ -73,6 +79,15 @@ def name_length(tokens: Sequence[Token], at: int) -> int:
             break
         end += more
     return end - at
+
+
+def _leading_length(tokens: Sequence[Token], at: int) -> int:
+    """The number of tokens of the braces at token `at` that a name begins with; 0 where a block begins."""
+    length = braces_length(tokens, at)
+    before, after = tokens[at + length - 1 : at + length + 1] if at + length < len(tokens) else (tokens[at],) * 2
+    if length and after.kind in (NAME, WHOLE) and adjacent(before, after):
+        return length
+    return braces_length(tokens, at, touching=True)
 
 
 def filled(tokens: Sequence[Token], known: Mapping[str, str]) -> str:

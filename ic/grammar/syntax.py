@@ -231,11 +231,17 @@ class Let:
 
 @frozen
 class Setting:
+    """`words path = value;`.
+
+    overrides  places of what it replaced of its kind, latest first: of `with`, in a run that is like another
+    """
+
     words: tuple[Word, ...]
     path: tuple[Word, ...]
     operator: str  # "=" or "+="
     value: Expression
     place: Place  # of the words and the path
+    overrides: tuple[Place, ...] = ()
 
 
 @frozen

@@ -55,9 +55,9 @@ INITIAL = BlockDeclaration(
     doc="The state at the start.",
     entries=(
         Entry(name="q", written="q = 0 rad;", default="0", varies="number", path="initial.JOINT.q",
-              doc="position of every joint, or of one: `swing.q = 5 deg;`"),
+              doc="position of every joint, or of one: `swing.q = 5 deg;` `q = command;`: where its command begins"),
         Entry(name="qd", written="qd = 0 rad/s;", default="0", varies="number", path="initial.JOINT.qd",
-              doc="rate of every joint, or of one"),
+              doc="rate of every joint, or of one; `qd = command;`: that of its command"),
         Entry.of_plan(BALANCED, "servos = balanced;"),
     ),
     free="`base.position`, `base.rpy`, `base.velocity` and `base.rate` of a base that is free",

@@ -59,8 +59,9 @@ def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[st
     (`gearbox`) means all that follows it, and a link or a metric may be named without `links.` or `metrics.`.
     """
     known = experiment.parameters
-    if path in known:
-        return [path]
+    if path in known:  # a word such as `elbow.servo` may be the head of others
+        words = isinstance(known[path].value, str)
+        return [path, *(name for name in known if words and name.startswith(f"{path}."))]
     gravity = path.replace("environment.gravity.", "environment.gravity.g.")
     meant = [name for name in also.get(path, [gravity]) if name in known]
     if meant:
@@ -116,7 +117,11 @@ def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[st
                 help=f"`met doc {path}` says what this message means",
             )
         )
-    near = _three_nearest(path, known)
+    joint, _, own = rest.partition(".")
+    as_run = (
+        ".".join(filter(None, (joint, "servo", own))) if definition == "servos" else ""
+    )  # as the run's block has it
+    near = [as_run] if as_run in known else _three_nearest(path, known)
     helps = [f"did you mean `{'`, `'.join(near)}`?"] if near else []
     last = path.rpartition(".")[2]
     same = [name for name in known if name.rpartition(".")[2] == last and name not in near]

@@ -35,7 +35,7 @@ def settings(experiment: Experiment) -> dict[str, Quantity]:
         word(f"{joint.name}.parent", joint.parent, joint.place)
         word(f"{joint.name}.child", joint.child, joint.place)
     for use in structure.servos:
-        word(f"servos.{use.joint}", use.definition, use.place)
+        word(f"{use.joint}.servo", use.definition, use.place)
         word(f"{use.joint}.servo.model", use.model, use.place)
         if use.continuous:
             word(f"{use.joint}.servo.rate", "continuous", use.place)

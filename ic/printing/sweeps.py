@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
 
+from ic.meaning.definitions.row_tables import CSV
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, USAGE
 from ic.printing.columns import columns, exactly
 from ic.sweeps.designs import AT_MOST, DESIGNS, DIGITS, DISTRIBUTIONS, UNTIL_SHOWN
@@ -48,7 +49,12 @@ OF_DISTRIBUTIONS: Mapping[str, str] = MappingProxyType({
 
 def _functions() -> list[Row]:
     calls = [(name, f"{name}({', '.join(USAGE[name])})", OF_FUNCTIONS[name]) for name in FUNCTIONS]
-    return [*calls, *((name, name, exactly(value)) for name, value in CONSTANTS.items())]
+    table = (
+        CSV,
+        f"{CSV}({', '.join(USAGE[CSV])})",
+        "of a `let`: values by the names of rows and columns, NAME.ROW.COLUMN",
+    )
+    return [*calls, table, *((name, name, exactly(value)) for name, value in CONSTANTS.items())]
 
 
 def _designs() -> list[Row]:

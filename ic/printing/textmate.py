@@ -19,6 +19,7 @@ from typing import Any
 from ic.language import BLOCKS, DEFINITIONS
 from ic.language.bodies import JOINT_KINDS
 from ic.language.runs import BASE_KINDS
+from ic.meaning.definitions.row_tables import CSV
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
 from ic.meaning.mechanics import dh
 from ic.meaning.mechanics.shapes import SHAPES
@@ -183,7 +184,13 @@ def _entries() -> dict[str, Any]:
 
 
 def _values() -> dict[str, Any]:
-    known = {*FUNCTIONS, *SHAPES, *COMMAND_UNIT, *(name for kind in models.GROUPS for name in models.find_own(kind))}
+    known = {
+        *FUNCTIONS,
+        CSV,
+        *SHAPES,
+        *COMMAND_UNIT,
+        *(name for kind in models.GROUPS for name in models.find_own(kind)),
+    }
     return _patterns(
         _groups(rf"\b({_any(known)})(?=\s*[({{])", "support.function"),
         _groups(rf"\b({_any(known)})(?=\s*[;,)])(?<![.])", "support.constant"),

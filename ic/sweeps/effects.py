@@ -15,6 +15,7 @@ import numpy as np
 from ic.grammar.settings import path_of
 from ic.grammar.syntax import Call, Entry, Expression, Group, Name, Setting, Statement, Word, children
 from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.definitions.row_tables import is_row_table
 from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.scope import Scope
@@ -241,8 +242,10 @@ def _named(definitions: Definitions, entries: Sequence[Entry]) -> set[str]:
             waiting += _expressions(expression.body)
         if isinstance(expression, Name) and expression.text not in found:
             found.add(expression.text)
-            if expression.text in definitions.lets:
-                waiting.append(definitions.lets[expression.text].value)
+            let = definitions.lets.get(expression.path[0].text)
+            if let is not None and (len(expression.path) == 1 or is_row_table(let.value)):
+                found.add(let.name.text)
+                waiting.append(let.value)
     return found
 
 

@@ -55,7 +55,8 @@ class Settings:
         lets = []
         for entry in self.for_destination(definitions, "let"):
             let = definitions.lets[path_of(entry)]
-            lets.append(replace(let, value=entry.value, overrides=(let.given_at, *let.overrides), set_at=entry.place))
+            overrides = (*entry.overrides, let.given_at, *let.overrides)
+            lets.append(replace(let, value=entry.value, overrides=overrides, set_at=entry.place))
         servos: dict[str, Definition] = {}
         for entry in self.for_destination(definitions, "servo"):
             name, *keys = (word.text for word in entry.path)
@@ -66,22 +67,21 @@ class Settings:
 
     def of_run(self, definitions: Definitions, run: Definition) -> Settings:
         """The settings that the run makes itself, or takes over from what it is like, without those made here."""
-        block = definitions.block(run)
-        runs = definitions.of_kind("run")
-        bodies = [run.group.body, *(runs[name].group.body for name in definitions.homes(run) if name in runs)]
-        written = {
-            entry.place: entry
-            for body in bodies
-            for entry in body
-            if isinstance(entry, Setting) and [word.text for word in entry.words] == [WITH]
-        }
-        made = [written[item.place] for item in block.of_kind(WITH) if item.place in written] if block else []
         here = {path_of(entry) for entry in self.entries}
-        return Settings(tuple(replace(entry, words=()) for entry in made if path_of(entry) not in here))
+        return Settings(tuple(entry for entry in _made_by(definitions, run) if path_of(entry) not in here))
+
+    def _over_those_of(self, definitions: Definitions, run: Definition) -> Settings:
+        """The settings made here, each with the places of those of the run that it replaces."""
+        made = {path_of(entry): entry for entry in _made_by(definitions, run)}
+        over = {path: (entry.place, *entry.overrides) for path, entry in made.items()}
+        return Settings(tuple(replace(entry, overrides=over.get(path_of(entry), ())) for entry in self.entries))
 
     def in_run(self, definitions: Definitions, run: Definition) -> tuple[Definitions, Definition]:
         """The definitions and the run with what is set here, and by the run itself."""
         own = self.of_run(definitions, run)
+        for entry in self._over_those_of(definitions, run).for_destination(definitions, "let"):
+            let = definitions.lets[path_of(entry)]  # which has the value that is set here already
+            definitions = definitions.replacing(lets=[replace(let, overrides=(*entry.overrides, *let.overrides))])
         return self._in_structure(*own._in_structure(own.in_definitions(definitions), run))
 
     def _in_structure(self, definitions: Definitions, run: Definition) -> tuple[Definitions, Definition]:
@@ -96,7 +96,7 @@ class Settings:
 
     def numbers(self, definitions: Definitions, run: Definition) -> dict[str, Setting]:
         """By path, what is settled in place of what the run settles: what it sets itself, then what is set here."""
-        both = (self.of_run(definitions, run), self)
+        both = (self.of_run(definitions, run), self._over_those_of(definitions, run))
         return {path_of(entry): entry for each in both for entry in each.for_destination(definitions, "number")}
 
     def check_lets(self, definitions: Definitions, complaints: Complaints) -> None:
@@ -132,6 +132,21 @@ class Settings:
                     help=VARIES,
                     also=[Label(column.place, f"`{column.path}` varies here")],
                 )
+
+
+def _made_by(definitions: Definitions, run: Definition) -> list[Setting]:
+    """The settings that a run makes itself, or takes over from what it is like, each with those that it replaced."""
+    block = definitions.block(run)
+    runs = definitions.of_kind("run")
+    bodies = [run.group.body, *(runs[name].group.body for name in definitions.homes(run) if name in runs)]
+    written = {
+        entry.place: entry
+        for body in bodies
+        for entry in body
+        if isinstance(entry, Setting) and [word.text for word in entry.words] == [WITH]
+    }
+    items = [item for item in block.of_kind(WITH) if item.place in written] if block else []
+    return [replace(written[item.place], words=(), overrides=item.overrides) for item in items]
 
 
 def check_params(definitions: Definitions, complaints: Complaints) -> None:

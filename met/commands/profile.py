@@ -33,6 +33,7 @@ class Profile:
     content     (p, duration) -> what it brings in a run of that length (s): a deck is warned where the instants that
                 sample it do not carry that, or the run ends before. Asked with numbers. None: nothing is known of it
     limits      those that it has, such as a table's ends: how much of a run is spent at each is kept of every case
+    shortest    (p) -> the least, s, that its parameter `over` may be, for all of it to find room; None: any
     from_file   the lists `times` and `values` are columns of a CSV file: a deck writes `file` and `column` for them
     """
 
@@ -43,6 +44,7 @@ class Profile:
     jumps: Jump | Callable[[Any], Jump] = "rate"
     content: Callable[[Any, float], Content] | None = None
     limits: tuple[Limit, ...] = ()
+    shortest: Callable[[Any], Real] | None = None
     from_file: bool = False
 
     def jump(self, p: Any) -> Jump:

@@ -37,7 +37,9 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 PIECES = re.findall(r"<!-- (?P<where>[\w. ]+?)(?:: (?P<code>D\d+))? -->\n```c\n(?P<text>.*?)```", PAGE, re.DOTALL)
 PICKER = "\n".join(text for where, _, text in PIECES if where == "picker.ic")
 TABLES = dict(re.findall(r"<!-- (\w+\.csv) -->\n```csv\n(.*?)```", PAGE, re.DOTALL))
-FRAGMENTS = [piece for piece in PIECES if piece[0] not in ("picker.ic", "chain.ic", "stick.ic", "swing.ic", "alone")]
+FRAGMENTS = [
+    piece for piece in PIECES if piece[0] not in ("picker.ic", "chain.ic", "stick.ic", "swing.ic", "twins.ic", "alone")
+]
 AROUND = {
     "more": "{}",
     "in arm": "arm another like picker {{ {} }} run other like pick {{ arm = another; }}",
@@ -71,8 +73,16 @@ def ticked(text: str) -> set[str]:
 
 def test_every_deck_of_the_page_says_where_it_belongs() -> None:
     assert PAGE.count("```c\n") == len(PIECES)
-    assert {where for where, _, _ in PIECES} == {"picker.ic", "chain.ic", "stick.ic", "swing.ic", "alone", *AROUND}
-    assert set(TABLES) == {"moves.csv", "cases.csv"}
+    assert {where for where, _, _ in PIECES} == {
+        "picker.ic",
+        "chain.ic",
+        "stick.ic",
+        "swing.ic",
+        "twins.ic",
+        "alone",
+        *AROUND,
+    }
+    assert set(TABLES) == {"moves.csv", "cases.csv", "bodies.csv"}
 
 
 def test_the_tutorials_deck_has_neither_errors_nor_warnings_and_as_many_cases_as_the_page_says(tmp_path: Path) -> None:
@@ -236,6 +246,16 @@ def test_every_function_shape_key_and_model_is_on_the_page() -> None:
 
 
 PATHS = [path for row in table("path") for path in re.findall(r"`([^`]+)`", row[0])]
+
+
+def test_the_deck_with_a_table_takes_its_numbers_from_there(tmp_path: Path) -> None:
+    with_tables(tmp_path)
+    (text,) = (text for where, _, text in PIECES if where == "twins.ic")
+    path = tmp_path / "twins.ic"
+    path.write_text(text, encoding="utf-8")
+    fall, heavy = ic.compile(path, select=["fall", "heavy"]).experiments
+    masses = [fall.parameters[f"links.{name}.mass"].value for name in ("pylon", "left_arm", "right_arm")]
+    assert masses == [6.0, 2.4, 2.5] and heavy.parameters["links.left_arm.mass"].value == 4.8
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ TEXT = (DECKS / "two_link.ic").read_text() + (DECKS / "servos" / "rigid_gearbox.
 ).replace("servo rigid_gearbox", "servo again")
 WORDS = re.findall(r"//[^\n]*\n|[A-Za-z_]\w*|\d[\d.e-]*|\s+|.", TEXT)
 STRANGE = """
-shape inertia com sphere table step ramp sine times values remove like gravity 1e308 -1 0 1e-308 [ ] rpm m s
+shape inertia com sphere table step ramp pulse sine times values remove like gravity 1e308 -1 0 1e-308 [ ] rpm m s
 zip vary joint_damping base none substitute sample linspace logspace ^ += and or not - + * / fixed prismatic continuous
 seed on off link joint record servos
 """

@@ -173,6 +173,7 @@ SMALLEST: dict[tuple[str, str], Small] = {
     ("guide", "together"): Small({"to": 0.3, "max_rate": 2.0, "max_acceleration": 50.0}),
     ("command", "constant"): Small({"value": 0.5}),
     ("command", "step"): Small({"to": 0.5, "at": 0.1}),
+    ("command", "pulse"): Small({"to": 0.5, "slope": 20.0, "over": 0.12}),
     ("command", "ramp"): Small({"to": 0.5, "over": 0.1}),
     ("command", "sine"): Small({"amplitude": 0.5, "frequency": 3.0}),
     ("command", "table"): Small({"times": (0.0, 0.1), "values": (0.0, 0.5)}),

@@ -26,6 +26,7 @@ def random_course(name: str, pick: random.Random) -> SimpleNamespace:
         at=pick.uniform(0.0, 4.0),
         begin=pick.uniform(0.0, 4.0) if name != "trajectory" else 0.5,
         over=pick.uniform(0.1, 3.0),
+        slope=pick.uniform(5.0, 60.0),
         max_rate=pick.uniform(0.2, 3.0),
         max_acceleration=pick.uniform(0.2, 3.0),
         frequency=pick.uniform(1.0, 20.0),
@@ -39,7 +40,7 @@ def random_course(name: str, pick: random.Random) -> SimpleNamespace:
 
 
 @pytest.mark.parametrize("seed", range(20))
-@pytest.mark.parametrize("name", ["ramp", "step", "sine", "chirp", "table", "trajectory", "trapezoid"])
+@pytest.mark.parametrize("name", ["ramp", "pulse", "step", "sine", "chirp", "table", "trajectory", "trapezoid"])
 def test_a_course_changes_from_its_beginning_to_its_end_and_not_outside(name: str, seed: int) -> None:
     profile, p = models.find_own("command")[name], random_course(name, random.Random(f"{name}{seed}"))
     content = profile.content(p, DURATION)

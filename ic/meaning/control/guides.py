@@ -32,6 +32,9 @@ from met.plan.defaults import component
 from met.trace import Real, Scalar
 
 KIND: Final = "guide"
+COURSES_BEHIND_GUIDES: Final = frozenset({"pulse"})
+"""Courses whose names guides may bear, in decks that are older than they are: there the guide is meant."""
+
 USAGE = "write `guide NAME = MODEL { ... }`"
 
 
@@ -95,7 +98,8 @@ def _meaning(scope: Scope, name: str) -> str:
     """The other meaning of a name where a command's value stands; "" where it may be a guide's name."""
     if name in scope.definitions.lets:
         return "a value"
-    return "a unit" if units.is_unit(name) else "a course in time" if name in models.available("command") else ""
+    courses = set(models.available("command")) - COURSES_BEHIND_GUIDES
+    return "a unit" if units.is_unit(name) else "a course in time" if name in courses else ""
 
 
 def resolve_guides(
@@ -194,7 +198,7 @@ def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration
             )
     joints = tuple(use.joint for use in follow)
     owner = Owner(f"guide `{item.name}`", item.place, f"guides.{item.name}", homes=item.homes)
-    scope.keep_setting(f"{owner.path}.model", guide.name, item=item)
+    scope.keep_in_deck(f"{owner.path}.model", guide.name, item)
     known = {"joint": [joint.name for joint in arm.moving], "link": [link.name for link in arm.links]}
     named = check_names(scope, owner, guide.parameters, body, arm=arm.name, known=known, failed=arm.failed)
     paths = list(COMPONENTS) if guide.components is not None else []
@@ -338,7 +342,7 @@ def _course(scope: Scope, owner: Owner, item: Item) -> str | None:
     inner = course_named(scope, item.value)
     model = use_course(scope, spot, inner, item, doc=f"{item.name} of the path", column=item.name, body=item.body)
     if model is not None:
-        scope.keep_setting(f"{path}.model", model, item=item)
+        scope.keep_in_deck(f"{path}.model", model, item)
         scope.not_sweepable[path] = not_sweepable.model("a course in time", path)
     return model
 

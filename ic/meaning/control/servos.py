@@ -33,8 +33,10 @@ from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from ic.text.files import add_include, library_defines
 from met import models
+from met.commands.profile import Profile
 from met.diagnostic import Label, Place, Problem, did_you_mean, error, leave_out, meant
 from met.frozen import frozen
+from met.instants import ROUNDING
 from met.parameter import Parameter
 from met.plan import Command, SensorUse, ServoUse
 from met.plan.channel import COMMAND_UNIT
@@ -330,7 +332,7 @@ def check_start(scope: Scope, use: Use) -> None:
             f"{begins.value / scale:g} {unit}: it jumps",
             places[0] if places else use.place,
             also=also,
-            help=f"write `{use.joint}.q = {value / scale:.12g} {unit};` in `initial`, or begin the command elsewhere",
+            help=f"write `{use.joint}.q = command;` in `initial`, or begin the command elsewhere",
         )
 
 
@@ -489,8 +491,31 @@ def use_course(
     if profile.from_file:
         use_file(scope, course, profile, opened, column, kind)
         return profile.name
-    use_model(scope, course, profile.parameters, opened)
+    values = use_model(scope, course, profile.parameters, opened)
+    if values is not None and profile.shortest is not None:
+        _check_room(scope, course, profile, values, opened)
     return profile.name
+
+
+def _check_room(scope: Scope, owner: Owner, profile: Profile, values: Mapping[str, Any], body: MergedBlock) -> None:
+    """A course that is made of parts has the time for all of them, in every case."""
+    assert profile.shortest is not None
+    path, item = owner.join("over"), body.get("over")
+
+    def test(times: np.ndarray) -> tuple[np.ndarray, list[str]]:
+        bad = ~(times[:, 0] >= times[:, 1] * (1.0 - ROUNDING))
+        return bad, [f"this is {over:.9g} s, and {least:.9g} s are needed" for over, least in times[bad][:1]]
+
+    scope.checks.require(
+        (values["over"], profile.shortest(SimpleNamespace(**values))),
+        test,
+        code="D384",
+        message=f"`over` of {owner.label} is too short for the way up and down",
+        place=place_of(item.value) if item is not None and item.value is not None else owner.place,
+        help="write a longer one, or a larger `slope`",
+        path=path,
+        needs=tuple(owner.join(name) for name in values),
+    )
 
 
 def _asked(scope: Scope, command: Call) -> Expression:

@@ -46,6 +46,15 @@ class CsvColumn:
 
 
 @frozen
+class CsvCell:
+    """A cell: its column, its text without spaces and quotes around it, and its place."""
+
+    column: CsvColumn
+    text: str
+    place: Place
+
+
+@frozen
 class CsvTable:
     """A file's columns, and its rows as written: number of the line (from 1) and its text."""
 
@@ -67,6 +76,27 @@ class CsvTable:
         """The column in SI, and what its own unit means. Raises Problem D193, D194."""
         measure = units.ONE if column.unit is None else _meaning(column, "", ())
         return self._numbers(column, measure), measure
+
+    def cell(self, column: CsvColumn, number: int) -> CsvCell:
+        """The cell of a column in the row of this number, from 0."""
+        line, row = self.rows[number]
+        return CsvCell(column, _stripped(row.split(",")[column.number])[0], self._cell(line, row, column.number))
+
+    def quantity(self, cell: CsvCell) -> tuple[float, Measure]:
+        """The number of a cell in SI, and what its column's unit means. Raises Problem D193, D194."""
+        measure = units.ONE if cell.column.unit is None else _meaning(cell.column, "", ())
+        number = _si(cell.text, measure)
+        if number is None:
+            raise _no_number(cell, measure)
+        return number, measure
+
+    def check_numbers(self, column: CsvColumn) -> None:
+        """Raises Problem D193, D194 where a cell of the column is neither a number nor empty."""
+        measure = _meaning(column, "", ())
+        for number in range(len(self.rows)):
+            text = self._text(column, number)
+            if text and _si(text, measure) is None:
+                raise _no_number(self.cell(column, number), measure)
 
     def words(self, column: CsvColumn) -> list[tuple[str, Place]] | None:
         """The column's cells and their places, where they are words and it has no unit; None where they are numbers.
@@ -92,27 +122,15 @@ class CsvTable:
 
     def _numbers(self, column: CsvColumn, measure: Measure) -> tuple[float, ...]:
         made = []
-        for line, row in self.rows:
-            cell = _stripped(row.split(",")[column.number])[0]
-            number = measure.to_si(float(cell), cell) if _NUMBER.fullmatch(cell) else math.inf
-            lost = number == 0.0 and any(digit in "123456789" for digit in cell.lower().partition("e")[0])
-            if lost or not math.isfinite(number):
-                found = f"`{cell[:40]}` is not a number" if cell else "there is no number here"
-                if _NUMBER.fullmatch(cell):
-                    found = "this number is too large: the largest is 1.8e308"
-                if lost:
-                    found = "this number is too small: it would become 0"
-                raise Problem(
-                    error(
-                        "D194",
-                        found,
-                        self._cell(line, row, column.number),
-                        also=[Label(column.place, f"column `{column.name}`")],
-                        help="a number is written as 12.5 or -1e-3, with a point and without a unit",
-                    )
-                )
-            made.append(number)
+        for number in range(len(self.rows)):
+            found = _si(self._text(column, number), measure)
+            if found is None:
+                raise _no_number(self.cell(column, number), measure)
+            made.append(found)
         return tuple(made)
+
+    def _text(self, column: CsvColumn, number: int) -> str:
+        return _stripped(self.rows[number][1].split(",")[column.number])[0]
 
     def rising(self, column: CsvColumn, times: tuple[float, ...]) -> None:
         """Raises Problem D195 where the column's numbers, its times, do not rise."""
@@ -134,6 +152,31 @@ class CsvTable:
         text, gap = _stripped(cells[number])
         start = sum(len(cell) + 1 for cell in cells[:number]) + gap
         return Place(self.file, line, start + 1, max(len(text), 1))
+
+
+def _si(text: str, measure: Measure) -> float | None:
+    """The number of a cell in SI; None where it is none, or one that no double holds."""
+    number = measure.to_si(float(text), text) if _NUMBER.fullmatch(text) else math.inf
+    lost = number == 0.0 and any(digit in "123456789" for digit in text.lower().partition("e")[0])
+    return None if lost or not math.isfinite(number) else number
+
+
+def _no_number(cell: CsvCell, measure: Measure) -> Problem:
+    """Says what a cell holds that `_si` finds no number in."""
+    text = cell.text
+    found = f"`{text[:40]}` is not a number" if text else "there is no number here"
+    if _NUMBER.fullmatch(text):
+        lost = measure.to_si(float(text), text) == 0.0
+        found = "this number is too " + ("small: it would become 0" if lost else "large: the largest is 1.8e308")
+    return Problem(
+        error(
+            "D194",
+            found,
+            cell.place,
+            also=[Label(cell.column.place, f"column `{cell.column.name}`")],
+            help="a number is written as 12.5 or -1e-3, with a point and without a unit",
+        )
+    )
 
 
 def csv_files(deck: Deck) -> NamedFiles[CsvTable]:

@@ -13,6 +13,7 @@ from ic.grammar.syntax import Binary, Call, Deck, Entry, Group, Let, Name, Setti
 from ic.language import DEFINITIONS, EXPERIMENTS, HEADS, OF_A_RUN
 from ic.meaning.definitions.csv_files import csv_files
 from ic.meaning.definitions.merge import MergedBlock, defined_twice, merge
+from ic.meaning.definitions.row_tables import RowTable, row_table
 from ic.robots.files import RobotFiles
 from ic.text.complaints import Complaints, known_words, where_it_belongs, with_article
 from ic.text.files import add_include, library_defines
@@ -55,6 +56,7 @@ class Definitions:
         self.lets: dict[str, Let] = {}
         self.csv_files = csv_files(deck)
         self.robot_files = RobotFiles(deck)
+        self._row_tables: dict[Place, RowTable | Problem] = {}
         self._by_kind: dict[str, dict[str, Definition]] = {kind: {} for kind in DEFINITIONS}
         self._merged: dict[tuple[str, str], MergedBlock] = {}
         self._failed: set[tuple[str, str]] = set()
@@ -86,6 +88,19 @@ class Definitions:
         """The characters that a place covers; "" where its text is not known."""
         lines = self._texts.get(place.file, "").splitlines()[place.line - 1 : place.line]
         return lines[0][place.column - 1 : place.column - 1 + place.length] if lines else ""
+
+    def row_table(self, call: Call) -> RowTable:
+        """The table of rows with names that `csv("FILE.csv")` means. Raises Problem, the same each time."""
+        found = self._row_tables.get(call.place)
+        if found is None:
+            try:
+                found = row_table(call, self.csv_files.get)
+            except Problem as problem:
+                found = problem
+            self._row_tables[call.place] = found
+        if isinstance(found, Problem):
+            raise found
+        return found
 
     def of_kind(self, kind: str) -> Mapping[str, Definition]:
         return self._by_kind[kind]

@@ -16,16 +16,20 @@ ON_COMMAND_LINE = "set on the command line"
 
 @frozen
 class CommandLineValue:
-    """A number that `--set`, or a run, puts in place of a deck's: its value, and the expression as written."""
+    """A number that `--set`, or a run, puts in place of a deck's: its value, and the expression as written.
+
+    overrides  places of what it replaced of its kind, latest first
+    """
 
     path: str
     value: Value
     expression: Expression
+    overrides: tuple[Place, ...] = ()
 
     def overriding(self, origin: Origin) -> Origin:
         """The origin of a value that this one overrides, made its own."""
         places = (origin.place,) if origin.place is not None else ()
-        return written_origin(self.value.place, (*places, *origin.overrides))
+        return written_origin(self.value.place, (*self.overrides, *places, *origin.overrides))
 
 
 def is_on_command_line(place: Place | None) -> bool:
@@ -45,4 +49,4 @@ def evaluate_setting(entry: Setting, path: str, names: Names) -> CommandLineValu
         raise Problem(
             error("D071", f"`{path}` is one number, and this is a list", found.place, help="leave the brackets out")
         )
-    return CommandLineValue(path, found, entry.value)
+    return CommandLineValue(path, found, entry.value, entry.overrides)

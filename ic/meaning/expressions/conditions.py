@@ -136,6 +136,7 @@ class Checks:
         path: str = "",
         needs: tuple[str, ...] = (),
         warns: bool = False,
+        also: Sequence[Label] = (),
     ) -> None:
         """Tests [n, k] values now, or once the cases are known where one of them varies.
 
@@ -153,7 +154,8 @@ class Checks:
         bad, causes = test(np.array([values], dtype=float))
         if bad[0]:
             self.fail(path)
-            self.complaints.error(code, message, Label(place, causes[0] if causes else ""), help=check.help)
+            at = Label(place, causes[0] if causes else "")
+            self.complaints.error(code, message, at, also=also, help=check.help)
 
     def observe(
         self, values: tuple[Real, ...], act: Callable[[np.ndarray], None], place: Place, needs: tuple[str, ...] = ()

@@ -23,6 +23,8 @@ from ic.grammar.syntax import (
     WithUnit,
     children,
 )
+from ic.meaning.definitions.row_tables import CSV, is_row_table
+from ic.meaning.definitions.row_tables import USAGE as USAGE_OF_TABLES
 from ic.meaning.expressions.lists import indexed, list_arithmetic, signed
 from ic.meaning.expressions.quantity import (
     Value,
@@ -352,6 +354,10 @@ def _items(written: List, lookup: Lookup) -> Iterable[Value | ValueList]:
 
 def _call(call: Call, lookup: Lookup) -> Value | ValueList:
     name = call.name.text
+    if is_row_table(call):
+        message = f"`{CSV}(...)` is a table of values, and no value"
+        usage = [USAGE_OF_TABLES, "a value of it is `NAME.ROW.COLUMN`"]
+        raise Problem(error("D381", message, call.name.place, help=usage))
     if name not in FUNCTIONS:
         raise Problem(
             error(
@@ -459,6 +465,7 @@ USAGE = {
     "ceil": ("x",),
     "round": ("x",),
     "sign": ("x",),
+    CSV: ('"FILE.csv"',),
 }
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 from ic.grammar.syntax import Expression, Name
+from ic.meaning.definitions.csv_files import CsvCell
 from ic.meaning.definitions.resolve import Definitions
+from ic.meaning.definitions.row_tables import RowTable, is_row_table
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, RESERVED, evaluate
 from ic.meaning.expressions.lists import COMPONENTS, component
 from ic.meaning.expressions.quantity import Value, ValueList
@@ -14,6 +16,7 @@ from ic.text.lexer import COMMAND_LINE
 from met import units
 from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error
 from met.messages import other_units
+from met.trace import Real
 
 DEEPEST = 64  # lets that need lets: far more than a deck has, far less than Python's recursion bears
 
@@ -46,6 +49,8 @@ class Names:
         self.followed: dict[str, None] = {}  # coordinates that an expression named
         self._worth: dict[str, Value | ValueList | Problem] = {}
         self._open: dict[str, Place] = {}
+        self.cells: dict[str, tuple[CsvCell, ...]] = {}  # of tables by row name, by the path that asked for them
+        self._read: dict[int, tuple[float, Label]] = {}  # the numbers of such cells, by identity
 
     def evaluate(self, expression: Expression) -> Value | ValueList:
         return evaluate(expression, self.find)
@@ -56,6 +61,9 @@ class Names:
 
     def find(self, name: Name) -> Value | ValueList:
         """The value of a name. Raises Problem D065 where there is none, D073 where it needs itself."""
+        table = self.row_table(name.path[0].text, len(name.path))
+        if table is not None:
+            return self._cells(table, name)
         text = self._reached(name)
         if self.names_a_component(name):
             let = name.path[0]
@@ -102,6 +110,31 @@ class Names:
         self._worth[text] = found
         return found
 
+    def row_table(self, let: str, words: int = 1) -> RowTable | None:
+        """The table that a `let` stands for; None where it stands for none, or a servo of its name is meant.
+
+        words: of the path that begins with it.  Raises Problem with what is wrong in its file.
+        """
+        written = self.definitions.lets.get(let)
+        if written is None or not is_row_table(written.value):
+            return None
+        if words > 1 and let in self.definitions.of_kind("servo"):
+            return None
+        return self.definitions.row_table(written.value)
+
+    def _cells(self, table: RowTable, name: Name) -> Value | ValueList:
+        """The value that a cell holds, or the vector of several."""
+        cells = table.cells(name)
+        self.cells[name.text] = cells
+        made = []
+        for cell in cells:
+            number, measure = table.csv.quantity(cell)
+            bare, place = cell.column.unit is None, name.place if len(cells) == 1 else cell.place
+            value = Value(number, measure.dimension, place, bare, hertz=measure.hertz)
+            self._read[id(number)] = number, Label(cell.place, f"`{name.text}` is read here")
+            made.append(value)
+        return made[0] if len(made) == 1 else ValueList(tuple(made), name.place)
+
     def names_a_component(self, name: Name) -> bool:
         """Return True for `v.x` of a `let`: a servo of that name, or a path that a sweep varies, comes before it."""
         return (
@@ -122,8 +155,16 @@ class Names:
         paths = [".".join((home, *rest)) for home in homes]
         return next((path for path in paths if path in self.varied or path in self.watched), name.text)
 
+    def label_of_cell(self, number: Real, place: Place) -> list[Label]:
+        """The cell of a table that this number is, as a label for messages about it at another place."""
+        found = self._read.get(id(number))
+        return [found[1]] if found is not None and found[1].place != place else []
+
     def label(self, value: Value) -> list[Label]:
         """The place that defines the name written for this value, as a label for messages about it."""
+        cell = self.label_of_cell(value.number, value.place)
+        if cell:
+            return cell
         for text, let in self.definitions.lets.items():
             worth = self._worth.get(text)
             if (
@@ -204,7 +245,8 @@ class Names:
                             help="give the value another name",
                         )
                     )
-                self.find(Name((let.name,), let.name.place))
+                if self.row_table(text) is None:
+                    self.find(Name((let.name,), let.name.place))
             except Problem as problem:
                 problems.append(problem)
         return problems

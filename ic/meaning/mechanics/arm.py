@@ -15,6 +15,7 @@ from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.dh import use_dh
 from ic.meaning.mechanics.foreign import refuse_foreign_joint
 from ic.meaning.mechanics.matter import use_matter
+from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.addresses import in_arm
 from ic.meaning.parameters.models import check_keys, value_place, word_of
 from ic.meaning.parameters.owner import Owner
@@ -183,6 +184,8 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str,
     else:
         _frame(scope, owner, kind, body)
     limits = _limits(scope, replace(owner, joint=kind), body)  # type: ignore[arg-type]  # a kind of joint by now
+    for end in ("parent", "child"):
+        scope.not_sweepable[f"{item.name}.{end}"] = not_sweepable.COMPILED_ALONE
     if parent is None or child is None:
         return None
     return Joint(item.name, kind, parent, child, item.place, limits)  # type: ignore[arg-type]

@@ -194,7 +194,7 @@ class Scope:
             number = float(found.number) if self.complaints.error_count == before else None
             if number is not None:
                 self.auxiliary[path] = Settled(
-                    number, owner.unit(wanted)[0], _origin(item, found.place), wanted.doc, item.value
+                    number, owner.unit(wanted)[0], self._origin(item, found.place), wanted.doc, item.value
                 )
         if number is None:
             self.checks.fail(path)
@@ -254,7 +254,7 @@ class Scope:
                 made.append(float(value.number))
             numbers = tuple(made)
             self.parameters[path] = Settled(
-                numbers, owner.unit(wanted)[0], _origin(item, found.place), wanted.doc, item.value
+                numbers, owner.unit(wanted)[0], self._origin(item, found.place), wanted.doc, item.value
             )
         if numbers is None:
             self.checks.fail(path)
@@ -295,6 +295,11 @@ class Scope:
         kept = self.parameters if record else self.auxiliary
         kept[path] = Settled(word, "", origin, wanted.doc, item.value if item else None)
         return word
+
+    def keep_in_deck(self, path: str, value: str, item: Item) -> None:
+        """Keeps a setting that the deck alone writes, neither a sweep nor `--set`."""
+        self.keep_setting(path, value, item=item)
+        self.not_sweepable[path] = not_sweepable.COMPILED_ALONE
 
     def keep_setting(
         self, path: str, value: Real | str, unit: str = "", item: Item | None = None, note: str = ""
@@ -438,7 +443,7 @@ class Scope:
             with self.complaints.gather():
                 self.value_checks.dimension(replace(owner, homes=homes), wanted, written)
                 value = self._plain(written.number)
-            origin = _origin(item, place)
+            origin = self._origin(item, place)
         coordinate = self._coordinate(owner, name, homes)
         if value is None and (item is not None or coordinate is None) and not self._given(owner, name, homes):
             if item is None:
@@ -565,7 +570,9 @@ class Scope:
             made[path] = Quantity(value, settled.unit, settled.origin)
         return made, outputs
 
-
-def _origin(item: Item, place: Place) -> Origin:
-    note = f"from `{item.value.text}`" if isinstance(item.value, Name) else ""
-    return written_origin(place, item.overrides, note)
+    def _origin(self, item: Item, place: Place) -> Origin:
+        """The origin of what an item writes; of a cell of a table with its line and column in the file."""
+        note = f"from `{item.value.text}`" if isinstance(item.value, Name) else ""
+        cells = self.names.cells.get(item.value.text, ()) if isinstance(item.value, Name) else ()
+        at = f" ({cells[0].place})" if len(cells) == 1 else ""
+        return written_origin(place, item.overrides, note + at)

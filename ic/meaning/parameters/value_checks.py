@@ -54,7 +54,9 @@ class ValueChecks:
                 stands = (turn.macro for turn in value.place.turns if turn.turn == written)
                 index = next((each for each in stands if each == self.definitions.text_at(value.place)), written)
                 wrote = write_either((f"{index} {each}" for each in in_degrees(text)), where="value")
-            if value.bare and any(source.name == value.place.file for source in self.definitions.csv_files.sources):
+            read = [value.place, *(label.place for label in self.names.label_of_cell(value.number, value.place))]
+            files = {source.name for source in self.definitions.csv_files.sources} if value.bare else set()
+            if any(place.file in files for place in read):
                 wrote = f"write the unit in square brackets behind the column's name: `[{text}]`"
             raise Problem(
                 error(
@@ -172,6 +174,7 @@ class ValueChecks:
             path=path,
             needs=needs,
             help=remedy + (f" ({wanted.doc})" if wanted.doc else ""),
+            also=self.names.label_of_cell(value, place),
         )
 
     def _of_another_command(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> list[str]:

@@ -238,7 +238,7 @@ def _course(scope: Scope, item: Item) -> str | None:
         scope, spot, inner, item, doc=f"{item.name} of the base", column=item.name, kind="component", body=item.body
     )
     if model is not None:
-        scope.keep_setting(f"{BASE}.{item.name}.model", model, item=item)
+        scope.keep_in_deck(f"{BASE}.{item.name}.model", model, item)
         path = f"{BASE}.{item.name}"
         scope.not_sweepable[path] = not_sweepable.model("a course in time", path)
         _check_jumps(scope, item, model, place_of(item.value))

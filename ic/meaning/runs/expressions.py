@@ -200,6 +200,7 @@ class ChannelTable:
         if (
             first in scope.definitions.of_kind("servo")
             or scope.names.names_a_component(name)
+            or scope.names.row_table(first, len(name.path)) is not None
             or (len(name.path) == 1 and name.text not in recordable(self.structure))
         ):
             return scope.names.find(name)

@@ -12,6 +12,7 @@ from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.base import INITIAL_OF_BASE
+from ic.meaning.runs.from_command import is_from_command, report_others, value_of_command
 from ic.text.complaints import known_words
 from met import models, units
 from met.diagnostic import did_you_mean
@@ -20,8 +21,9 @@ from met.plan import BASE
 from met.units import PURE
 
 
-def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> None:
-    """Settle the initial state of all joints."""
+def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Sequence[Use]) -> None:
+    """Settle the initial state of all joints. uses: their servos, whose commands it may be taken from."""
+    servos = {use.joint: use for use in uses}
     known = dict.fromkeys(("q", "qd"), "")
     known |= {f"{joint.name}.{name}": "" for joint in arm.moving for name in ("q", "qd")}
     known |= dict.fromkeys(INITIAL.keys, "")
@@ -41,7 +43,11 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> None:
         wanted = Parameter(name=name, unit=unit, default=0.0, doc=f"initial {name}")
         general = body.get(name)
         listed: ValueList | None = None
-        if general is not None:
+        commanded = is_from_command(scope, general)
+        if general is not None and commanded:
+            alone = [joint for joint in arm.moving if body.get(f"{joint.name}.{name}") is None]
+            report_others(scope, name, general, alone, servos)
+        elif general is not None:
             with scope.complaints.gather():
                 found = scope.evaluate(general)
                 listed = found if isinstance(found, ValueList) else None
@@ -62,13 +68,23 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> None:
                 f"initial.{joint.name}",
                 joint=joint.kind,
             )
+            if own is not None and is_from_command(scope, own):
+                report_others(scope, name, own, [joint], servos)
+            written = own or general
+            if written is not None and is_from_command(scope, written):
+                taken = value_of_command(scope, owner, wanted, written, servos.get(joint.name))
+                if taken is None:
+                    scope.checks.fail(owner.join(name))
+                else:
+                    scope.number(owner, wanted, written, value=taken)
+                continue
             value = listed.items[n] if listed is not None and own is None else None
             if isinstance(value, ValueList):
                 scope.complaints.error("D071", "a list inside a list", value.place)
                 continue
             if general is not None and own is None and listed is None and _mixed(scope, owner, wanted, general, arm):
                 break
-            scope.number(owner, wanted, own or general, value=value)
+            scope.number(owner, wanted, written, value=value)
 
 
 def check_balanced(scope: Scope, item: Item | None, uses: Sequence[Use], balanced: bool) -> None:

@@ -191,8 +191,8 @@ def _metric(scope: Scope, item: Item, block: MergedBlock, answers: Sequence[Line
         message = f"`linear {use.name}` opens no loop, so it has no `{figure.name}`"
         scope.complaints.error("D376", message, _place(item, of), help=f"write `{LINEAR['open'].written}` in it")
         return None
-    scope.keep_setting(f"metrics.{item.name}.model", figure.name, item=item)
-    scope.keep_setting(f"metrics.{item.name}.of", use.name, item=of)
+    scope.keep_in_deck(f"metrics.{item.name}.model", figure.name, item)
+    scope.keep_in_deck(f"metrics.{item.name}.of", use.name, of)
     return MetricUse(item.name, figure.name, use.name, item.place)
 
 

@@ -79,8 +79,8 @@ def _metric(scope: Scope, item: Item, signals: ChannelTable, made: dict[str, Sig
         channel = _watched(scope, of.value, metric, signals, made)
     if channel is None or of is None:
         return None
-    scope.keep_setting(f"metrics.{item.name}.model", metric.name, item=item)
-    scope.keep_setting(f"metrics.{item.name}.of", channel.path, item=of)
+    scope.keep_in_deck(f"metrics.{item.name}.model", metric.name, item)
+    scope.keep_in_deck(f"metrics.{item.name}.of", channel.path, of)
     use_model(scope, replace(owner, of=channel.unit), metric.parameters, body, ("of",))
     return MetricUse(item.name, metric.name, channel.path, item.place)
 

@@ -113,7 +113,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     sensors = resolve_link_sensors(scope, block, arm, payloads)
     environment = resolve_environment(scope, body_of(scope, block.get("environment")), arm, base, payloads, duration)
     initial = body_of(scope, block.get("initial"))
-    resolve_initial(scope, initial, arm)
+    resolve_initial(scope, initial, arm, uses)
     kept = resolve_run_keys(scope, run, block, Structure)
     check_balanced(scope, initial.get("servos"), uses, kept["balanced"])
     remark_beginnings(scope, environment)

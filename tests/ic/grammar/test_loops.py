@@ -45,6 +45,9 @@ def same(desk: Desk, one: str, other: str) -> bool:
     ("for i in 2 .. 3 { let a{i-1}_{i*i} = 1; }", "let a1_4 = 1; let a2_9 = 1;"),
     ("for i in 7 .. 8 { let a{i/(8-7)}_{i%2}{(i-7)*4} = 1; }", "let a7_10 = 1; let a8_04 = 1;"),
     ("for side in [left, right] { let {side}_x = 1; }", "let left_x = 1; let right_x = 1;"),
+    ("for i in 1 .. 2 { let a_{ i } = b_{ i - 1 }.x; let c{ i } = 0; }",
+     "let a_1 = b_0.x; let c1 = 0; let a_2 = b_1.x; let c2 = 0;"),
+    ("for s_ in [p, q] { let { s_ }_x = t_{ s_ }_{ s_ }; }", "let p_x = t_p_p; let q_x = t_q_q;"),
     ("for n in [3, 1 + 1] { let a{n} = 1; }", "let a3 = 1; let a2 = 1;"),
     ("arm a { for s_ in [p, q] { joint {s_} revolute { parent = s_;  child = {s_}; } } }",
      "arm a { joint p revolute { parent = p;  child = p; } joint q revolute { parent = q;  child = q; } }"),
@@ -158,6 +161,8 @@ def test_random_loops_are_what_they_stand_for_and_stay_so_laid_out(desk: Desk, s
     ("for i in -3..3{\nlet a_{i+4}=i*2 m;\n}\n", "for i in -3 .. 3 {\n    let a_{i+4} = i * 2 m;\n}\n"),
     ("for side in [ left,right ]{\n{side}_j.q=lengths[ i ];\n}\n",
      "for side in [left, right] {\n    {side}_j.q = lengths[i];\n}\n"),
+    ("for i in 0 .. 1 {\nlet a_{ i+1 } = b_{ i }.x;\nlink{ mass=1 kg; }\n}\n",
+     "for i in 0 .. 1 {\n    let a_{i+1} = b_{i}.x;\n    link { mass = 1 kg; }\n}\n"),
     ("servos {\na = b { x = 3; }\n* =spindle;\n[lift,swing]=turner;\n}\n",
      "servos {\n    a = b { x = 3; }\n    * = spindle;\n    [lift, swing] = turner;\n}\n"),
 ])  # fmt: skip

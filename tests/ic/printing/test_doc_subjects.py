@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from ic.meaning.definitions.row_tables import CSV
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
 from ic.meaning.mechanics.shapes import SHAPES
 from ic.printing import codes
@@ -55,7 +56,7 @@ def test_the_list_of_models_ends_with_what_else_there_is(capsys: pytest.CaptureF
     )
 
 
-WORDS = {"functions": FUNCTIONS, "designs": DESIGNS, "distributions": tuple(DISTRIBUTIONS)}
+WORDS = {"functions": (*FUNCTIONS, CSV), "designs": DESIGNS, "distributions": tuple(DISTRIBUTIONS)}
 
 
 @pytest.mark.parametrize("subject", WORDS)

@@ -42,7 +42,6 @@ def explained(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, obje
         ("hinge.servo.rate", 1000.0, "Hz", None),
         ("hinge.servo.model", "rigid_gearbox", "", 6),
         ("hinge.parent", "base", "", 3),
-        ("servos.hinge", "drive", "", 13),
         ("environment.velocity_products", "on", "", None),
         ("integrator", "modified_euler", "", None),
         ("record", "q", "", 16),
@@ -53,6 +52,13 @@ def test_a_setting_of_a_run_can_be_asked_for(
     path: str, value: object, unit: str, line: int | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert explained(capsys, "a.ic", path) == {path: (value, unit, line)}
+
+
+def test_the_servo_of_a_joint_is_the_head_of_its_parameters(capsys: pytest.CaptureFixture[str]) -> None:
+    found = explained(capsys, "a.ic", "hinge.servo")
+    assert found["hinge.servo"] == ("drive", "", 13) and found["hinge.servo.kp"] == (0.1, "V*s/rad", 7)
+    assert cli.main(["explain", "a.ic", "servos.hinge.kp"]) == cli.BAD_INPUT
+    assert "did you mean `hinge.servo.kp`?" in capsys.readouterr().err
 
 
 def test_a_metric_is_written_where_its_model_and_its_channel_are(capsys: pytest.CaptureFixture[str]) -> None:
@@ -114,7 +120,7 @@ def test_paths_that_a_deck_may_write_otherwise_are_understood(capsys: pytest.Cap
 def test_a_plan_file_knows_the_settings_too(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["plan", "a.ic", "-o", "p.json", "-q"]) == 0
     assert explained(capsys, "p.json", "duration") == {"duration": (1.0, "s", None)}
-    assert explained(capsys, "p.json", "servos.hinge") == {"servos.hinge": ("drive", "", 13)}
+    assert explained(capsys, "p.json", "hinge.servo")["hinge.servo"] == ("drive", "", 13)
     assert cli.main(["explain", "p.json", "integrator"]) == 0
     assert capsys.readouterr().out == "integrator = modified_euler\n  as the plan has it\n"
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import ic
 from ic.driver.compile import Select
-from ic.driver.explain import explain
+from ic.driver.explain import explain, explanations_of
 from met import cli
 from met.messages.render import render
 from met.plan import Experiment, keys
@@ -308,6 +309,22 @@ def test_a_sweep_of_the_run_has_it_and_varies_it() -> None:
     assert identity(swept) == identity(other)
     places = swept.parameters["links.bar.mass"].origin.overrides
     assert [place.file.rpartition("/")[2] for place in places] == ["deck.ic", "swing.ic"]
+
+
+def test_what_was_replaced_is_listed_latest_first() -> None:
+    text = '#include "swing.ic"\nrun far like hold { with reach = 2 m; with links.bar.mass = 3 kg; }\n'
+    text += "run farther like far { with reach = 3 m; with links.bar.mass = 4 kg; }\n"
+    Path("deck.ic").write_text(text, encoding="utf-8")
+
+    def replaced(path: str, **options: Any) -> list[tuple[str, int]]:
+        made = ic.check("deck.ic", select=["farther"], **options)
+        (found,) = explanations_of(made, path)
+        return [(place.file.rpartition("/")[2], place.line) for place in found.overrode]
+
+    for path, key, unit in (("reach", "reach =", "m"), ("links.bar.mass", "mass =", "kg")):
+        swing = next(n for n, line in enumerate(SWING.split("\n"), 1) if key in line)
+        assert replaced(path) == [("deck.ic", 2), ("swing.ic", swing)]
+        assert replaced(path, set={path: f"9 {unit}"}) == [("deck.ic", 3), ("deck.ic", 2), ("swing.ic", swing)]
 
 
 def test_it_may_be_taken_away_again() -> None:

@@ -103,6 +103,59 @@ def test_a_trapezoid_from_a_value_to_itself_stays_there(at: float) -> None:
     assert value.tolist() == [at] * 4 and slope.tolist() == [0.0] * 4
 
 
+# pulse
+
+
+PULSES = [
+    pytest.param(0.0, 2.0, 1.0, 7.0, id="up, on and down"),
+    pytest.param(0.1, -0.7, 0.4, 5.0, id="down, on and up"),
+    pytest.param(0.3, 0.4, 0.1, 2.0, id="a triangle"),
+    pytest.param(0.0, 1e-3, 1e6, 0.5, id="steep"),
+]
+
+
+@pytest.mark.parametrize(("start", "to", "slope", "over"), PULSES)
+def test_the_pulse_goes_along_straight_lines_through_its_four_corners(
+    start: float, to: float, slope: float, over: float
+) -> None:
+    begin, rise = 0.5, abs(to - start) / slope
+    corners = begin + np.array([0.0, rise, over - rise, over])
+    t = np.concatenate([np.linspace(0.0, begin + over + 1.0, 257), corners])
+    value, rate = values("pulse", t, start=start, to=to, slope=slope, over=over, begin=begin)
+    tolerance = 1e-15 * slope * (1.0 + over) * 4  # a corner is rounded, and the value is steep there
+    np.testing.assert_allclose(value, np.interp(t, corners, [start, to, to, start]), rtol=1e-14, atol=tolerance)
+    inner = np.abs(t[:, None] - corners).min(axis=1) > 1e-9
+    sign = math.copysign(1.0, to - start)
+    part = np.searchsorted(corners, t, side="right")
+    np.testing.assert_array_equal(rate[inner], (sign * slope * np.array([0.0, 1.0, 0.0, -1.0, 0.0])[part])[inner])
+    assert value.min() >= min(start, to) and value.max() <= max(start, to)  # to the last bit
+
+
+@pytest.mark.parametrize(("start", "to", "slope", "over"), PULSES)
+def test_the_pulse_begins_and_ends_exactly_and_a_kink_has_the_slope_of_what_follows(
+    start: float, to: float, slope: float, over: float
+) -> None:
+    given = {"start": start, "to": to, "slope": slope, "over": over}
+    value, rate = values("pulse", np.array([0.0, 0.5 * over, over, 100.0]), **given)
+    up = math.copysign(slope, to - start)
+    triangle = profile("pulse").shortest(filled("pulse", **given)) >= over
+    assert value.tolist() == [start, to, start, start]
+    assert rate.tolist() == [up, -up if triangle else 0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("to", "slope", "over"), [(0.2, 0.1, 9.0), (-0.2, 0.1, 9.0), (0.2, 0.1, 4.0)])
+def test_the_integral_of_a_pulse_is_what_its_docstring_says(to: float, slope: float, over: float) -> None:
+    way, _ = quad(lambda t: values("pulse", np.array([t]), to=to, slope=slope, over=over)[0][0], 0.0, over,
+                  points=[abs(to) / slope, over - abs(to) / slope])  # fmt: skip
+    assert way == pytest.approx(to * (over - abs(to) / slope), rel=1e-12)
+
+
+@pytest.mark.parametrize("at", [0.0, 0.3, -1e-300])
+def test_a_pulse_from_a_value_to_itself_stays_there(at: float) -> None:
+    value, slope = values("pulse", np.array([0.0, 0.2, 0.5, 3.0]), start=at, to=at, slope=1.0, over=0.3, begin=0.2)
+    assert value.tolist() == [at] * 4 and slope.tolist() == [0.0] * 4
+
+
 # chirp
 
 
@@ -214,6 +267,7 @@ def test_a_trajectory_begins_when_it_is_told() -> None:
 
 POINTS = points(np.random.default_rng(SEED), 50)
 RECORDED = [
+    ("pulse", {"to": (-2.0, 2.0), "slope": (2.0, 5.0), "over": (2.0, 3.0), "begin": (0.0, 1.0)}, {"start": 0.1}),
     ("trapezoid", {"to": (-2.0, 2.0), "max_rate": (0.2, 2.0), "max_acceleration": (0.2, 2.0), "begin": (0.0, 1.0)}, {}),
     ("trajectory", {"begin": (0.0, 1.0)}, dict(zip(("times", "values"), POINTS, strict=True))),
     (
@@ -259,6 +313,7 @@ JUMPS = [
     ("trajectory", {"times": (0.1, 0.4, 0.9), "values": (0.0, 1.0, 0.5)}, "rate"),
     ("table", {"times": (0.1, 0.4, 0.9), "values": (0.0, 1.0, 0.5)}, "rate"),
     ("ramp", {"to": 1.0, "over": 0.5}, "rate"),
+    ("pulse", {"to": 1.0, "slope": 5.0, "over": 0.6}, "rate"),
     ("chirp", {"amplitude": 1.0, "f0": 1.0, "f1": 3.0, "over": 0.6}, "rate"),
     ("step", {"to": 1.0, "at": 0.5}, "value"),
 ]
