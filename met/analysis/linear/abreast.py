@@ -51,7 +51,7 @@ class FlowAbreast(Flow):
         """The start of cases of which one has begun as these cells say, with all that loops have settled: of the others
         what differs from case to case."""
         self._follow(step for step in self.program.recording.start if not isinstance(step, Branch))
-        self.cells = dict(begun) | {name: each for name, each in self.cells.items() if each.__class__ is np.ndarray}
+        self.cells = dict(begun) | {name: each for name, each in self.cells.items() if np.ndim(each)}
 
     def run(self, number: int) -> None:
         """One section, of all cases."""
