@@ -158,7 +158,7 @@ def linear(
     *,
     case: int | str = 0,
     of: str | None = None,
-    at: float = 0.0,
+    at: float | None = None,
     inputs: Sequence[str] = (),
     outputs: Sequence[str] = (),
     opened: Sequence[str] = (),
@@ -167,23 +167,24 @@ def linear(
 
     experiment  name of a run or sweep; None: the plan's first
     case        row of the case table, `"#7"`, or the beginning of a case_id
-    of          what the run's `linear` block of this name asks, in place of what follows
-    at          s; the answers are of the last begin of a period up to it
+    of          what the run's `linear` block of this name asks, in place of what follows; where nothing is asked at
+                all, what its only block does
+    at          s, 0 unless given; the answers are of the last begin of a period up to it
     inputs      columns of B: commands of servos that tick, outputs of their laws
     outputs     rows of C: whatever can be recorded
     opened      outputs of laws, at which loops are opened: each alone, and all at once
 
     Raises Problem D370 where an event is on the way, D371 where the run has failed before, D372, D373 and D376 for
-    an instant or a name that is not there.
+    an instant or a name that is not there; ValueError where `of` and more are given.
     """
     from batch.campaigns.choosing import experiments_named, select_rows
     from batch.linearized import LinearAnswer
-    from met.analysis.linear.answers import LinearQuestion, of_deck
+    from met.analysis.linear.answers import question_of
 
     asked = experiments_named(_plan(plan, None), None if experiment is None else (experiment,))[:1]
     ((found, rows),) = select_rows(asked, [case])
-    question = LinearQuestion(found, at, tuple(inputs), tuple(outputs), tuple(opened))
-    return LinearAnswer((question if of is None else of_deck(found, of)).of(int(rows[0])))
+    question = question_of(found, of, at=at, inputs=inputs, outputs=outputs, opened=opened)
+    return LinearAnswer(question.of(int(rows[0])))
 
 
 def gradient(

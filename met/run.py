@@ -200,7 +200,7 @@ _OF_ANY_CASES = ("program", "recording", "outputs", "companions", "code_key", "r
 _OF_PROGRAM = (*_OF_ANY_CASES, "kernel", "limits", "extremes")
 """The parts of a `Prepared` that are the same whatever values its cases have."""
 
-LINEAR_VERSION = 2
+LINEAR_VERSION = 3
 """Raised where linear answers of the same program become other numbers."""
 
 

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from batch.cli.run import measured
 from met.cli import NO, YES, check_options, deck_options, format_option
 from met.messages.visible import say
-
-if TYPE_CHECKING:
-    from met.analysis.linear.answers import LinearQuestion
-    from met.plan import Experiment
 
 
 class Instant(click.ParamType):
@@ -74,7 +70,7 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
     from batch.plotting import output as places
     from batch.terminal.linear import as_data, linear_lines
     from batch.terminal.linear_cases import answered, case_lines
-    from met.analysis.linear.answers import Linearized
+    from met.analysis.linear.answers import Linearized, question_of
 
     if options["of"] is not None:
         for option, key in (("--at", "at"), ("--input", "inputs"), ("--output", "outputs"), ("--open", "opened")):
@@ -99,7 +95,9 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
         case = int(rows[0])
     else:
         experiment, case = asked[0], 0
-    question = _question(experiment, options)
+    question = question_of(
+        experiment, **{key: options[key] for key in ("of", "at", "inputs", "outputs", "opened")}
+    )  # fmt: skip
     if options["all_cases"]:
         every = answered(question)
         if drawn is not None:
@@ -118,15 +116,3 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
         picture.draw(found, drawn)
     say(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(linear_lines(found)))
     return NO if any(loop.unstable for loop in found.loops) else YES
-
-
-def _question(experiment: Experiment, options: dict[str, Any]) -> LinearQuestion:
-    """The question of a `linear` block where that is asked, or nothing is; else that of the options. Raises Problem
-    D376."""
-    from met.analysis.linear.answers import LinearQuestion, of_deck
-
-    asked = {key: options[key] for key in ("at", "inputs", "outputs", "opened")}
-    if options["of"] is not None or (experiment.linear and not any(asked.values()) and asked["at"] is None):
-        return of_deck(experiment, options["of"])
-    inputs, outputs, opened = (tuple(asked[key]) for key in ("inputs", "outputs", "opened"))
-    return LinearQuestion(experiment, asked["at"] or 0.0, inputs, outputs, opened)

@@ -141,7 +141,7 @@ def margin(
 ) -> int:
     """Predict, for each joint whose motor is on a bed, how heavy the arm may be for its law, rate and delay.
 
-    The loop of bed, servo and law is taken round once by the functions that run it, and its eigenvalues are looked at.
+    Bed, servo and law are linearised over a tick of the servo with arms of any inertia, and their poles are looked at.
     Exit status: 0 all joints are stable in all cases; 1 one is not; 2 the input is wrong, or no joint is on a bed.
     """
     from batch.terminal.margin import as_data, margin_lines

@@ -97,7 +97,7 @@ def _loop_lines(loop: OpenLoop, answers: Linearized) -> Iterator[str]:
         yield "  unstable as it is: a pole above grows" + (f", while at its limit: {limits}" if limits else "")
         return
     down, up = loop.gains
-    most = "no limit found" if up is None else f"{up:.4g} times{_at(loop.margins, 'at_gain_up')}"
+    most = no_limit(loop) if up is None else f"{up:.4g} times{_at(loop.margins, 'at_gain_up')}"
     least = "" if down is None else f"; down to {down:.4g} times{_at(loop.margins, 'at_gain_down')}"
     rows = [("gain", f"{most}{least}")]
     found = loop.margins
@@ -114,6 +114,11 @@ def _loop_lines(loop: OpenLoop, answers: Linearized) -> Iterator[str]:
     elif not several:
         rows.append(("phase", f"none is told: the law ticks {loop.ticks} times a period, which is no loop of one rate"))
     yield from columns(rows)
+
+
+def no_limit(loop: OpenLoop) -> str:
+    """What is told of a loop whose gain has no limit above, or none so near that it was looked at."""
+    return "no limit" if loop.searched is None else f"more than {loop.searched:,.0f} times"
 
 
 def _at(found: LoopMargins | None, name: str) -> str:
@@ -144,7 +149,7 @@ def as_data(found: Linearized) -> dict[str, Any]:
     def loop(each: OpenLoop) -> dict[str, Any]:
         found = each.margins
         told: dict[str, Any] = {"opened": list(each.paths), "stable": each.stable, "returns": each.returns}
-        told |= {"gain_down": each.gains[0], "gain_up": each.gains[1]}
+        told |= {"gain_down": each.gains[0], "gain_up": each.gains[1], "gain_searched_to": each.searched}
         if found is not None:
             told |= {"phase": found.phase, "delay": found.delay, "disk": found.disk}
             told |= {name: getattr(found, name) for name in ("at_gain_up", "at_gain_down", "at_phase", "at_delay")}

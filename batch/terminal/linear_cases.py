@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
+from batch.terminal.linear import no_limit
 from ic.printing.columns import columns, count, number
 from met.analysis.linear.answers import Linearized, LinearQuestion, OpenLoop
 from met.diagnostic import Problem
@@ -77,7 +78,7 @@ def _of_loop(place: int, found: Linearized) -> tuple[str, ...]:
         return ("nothing comes back",)
     if not loop.stable:
         return ("unstable",)
-    gain = "no limit" if loop.gains[1] is None else f"{loop.gains[1]:.4g}"
+    gain = no_limit(loop) if loop.gains[1] is None else f"{loop.gains[1]:.4g}"
     own = loop.margins
     if own is None:
         return (gain,)

@@ -1,43 +1,37 @@
 """Stability of a motor on a bed: how heavy, and how light, the arm may be for its law, rate and delay.
 
-The measure is r = J_eff/(N^2 J_m), the arm's inertia at the joint against the rotor's. The loop of bed, filter,
-converter-free wire, servo and law is taken round once by the functions that run it, at a steady rate of the shaft where
-no limit is reached and no friction changes its sign: there it is an affine map from tick to tick. It is stable where no
-eigenvalue of its matrix, found by differences, is larger than one. So there is no second model that could differ.
+The measure is r = J_eff/(N^2 J_m), the arm's inertia at the joint against the rotor's. Each r is a question to the
+linear analysis: of the joint's bed, servo and law by themselves, opened where the arm is felt (`linear.bed_loop`). The
+loop is stable where no pole of a tick is larger than one. What the linear analysis of a case has none of is here: r of
+that case as its run begins, of one joint and of motions of all of them, and the range of r around it that is stable.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from met.analysis.lanes import LaneTape
+from met.analysis.linear.bed_loop import BedLoop, CaseLoop
+from met.analysis.linear.margins import STABLE
 from met.backends.reference.plain import PlainTape, follow
 from met.frozen import frozen
 from met.plan import Experiment
 from met.program import cell_names
 from met.program.build import Builder
-from met.program.control.substituted import Mounted
 from met.program.system import System
-from met.servos.servo import Setpoint
-
-GROWS = 1.0 + 1e-6
-"""Eigenvalues above it grow; the slow modes of a servo with a heavy arm come that near to one."""
-
-SETTLED = 1e-12
-"""Share of its entries by which a turn changes the observer's covariance once no more turns are made."""
+from met.servos.motor import Motor
 
 LIGHTEST, HEAVIEST, STEPS = 0.05, 2000.0, 40
 """Range of r that is searched, wider for an arm that lies outside it; and how many values, a constant share apart."""
 
-_Stretches = tuple[tuple[float, float | None], ...]
+NARROW, AT_ONCE = 1e-3, 30
+"""Share to which an end of a range is found, and how many r are looked at side by side to find it."""
 
-# ends of the names of angles, which only add up and come back to nothing
-_ANGLES = ("angle",)
+_Stretches = tuple[tuple[float, float | None], ...]
 
 
 @frozen
@@ -127,12 +121,11 @@ def margins(
               arm has at the start of the case
     reach     the search goes on to arms so many times heavier, and lighter, than those, and twice that
     """
-    plain = _faultless(experiment)
-    known: dict[tuple[Any, ...], _Known] = {}
+    on_beds = BedExperiment(experiment)
     found = []
     for done, case in enumerate(range(experiment.cases.count) if cases is None else cases, start=1):
         with np.errstate(all="ignore"):  # a bed with no inertia has no finite loop
-            found.append(tuple(_margins(plain, case, known, span, reach)))
+            found.append(tuple(_margins(on_beds, case, span, reach)))
         if progress is not None:
             progress(done)
     return tuple(found)
@@ -140,9 +133,8 @@ def margins(
 
 def rotor_inertias(experiment: Experiment, case: int) -> np.ndarray:
     """N^2 J_m of the substituted joints of a case, kg m^2 (prismatic: kg): [joint]."""
-    builder, tape = _begun(_faultless(experiment), case)
-    motors = [builder.step.beds.motor(tape, each) for each in builder.step.beds.mounted]
-    return np.array([float(each.ratio * each.ratio * each.inertia) for each in motors])
+    on_beds = BedExperiment(experiment)
+    return np.array([_rotor(each) for each in on_beds.motors(on_beds.begun(case))])
 
 
 def ends_of_motion(Lambda: np.ndarray, rotors: np.ndarray) -> tuple[float, float]:
@@ -160,36 +152,72 @@ def ends_of_motion(Lambda: np.ndarray, rotors: np.ndarray) -> tuple[float, float
 
 @frozen
 class _Known:
-    """One loop's results: the stretches of r in which it is stable (from 0: any; to None: as far as searched), and
+    """A loop and its results: the stretches of r in which it is stable (from 0: any; to None: as far as searched), and
     whether it grows at the r of arms so far."""
 
+    loop: CaseLoop
     stretches: _Stretches
     grows: dict[float, bool]
 
     @classmethod
-    def of(cls, loop: _Loop, lightest: float, heaviest: float, own: Sequence[float]) -> _Known:
+    def of(cls, loop: CaseLoop, lightest: float, heaviest: float, own: Sequence[float]) -> _Known:
         """The results for a loop whose first arms have these r."""
         looked_at = np.geomspace(lightest, heaviest, STEPS).tolist()
-        growing = loop.grow([*looked_at, *own])
-        return cls(loop.stretches(looked_at, growing[:STEPS]), dict(zip(own, growing[STEPS:], strict=True)))
+        growing = grow(loop, [*looked_at, *own])
+        ranges = stretches(loop, looked_at, growing[:STEPS])
+        return cls(loop, ranges, dict(zip(own, growing[STEPS:], strict=True)))
 
 
-def _margins(
-    experiment: Experiment,
-    case: int,
-    known: dict[tuple[Any, ...], _Known],
-    span: tuple[float, float] | None,
-    reach: float,
-) -> Iterator[Margin]:
-    builder, tape = _begun(experiment, case)
-    beds = builder.step.beds
-    # All of them first: a loop is taken round over the same cells, with loads of its own.
+class BedExperiment:
+    """An experiment with beds that have no faults, whose noise and converters would be taken for slopes, and whose
+    current has no limit, at which there is none; and what is known of its loops."""
+
+    def __init__(self, experiment: Experiment) -> None:
+        self.experiment = _faultless(experiment)
+        self.builder = Builder(System(self.experiment))
+        self.program = self.builder.program()
+        self.beds = self.builder.step.beds
+        self.loops: dict[str, BedLoop] = {}
+        self.known: dict[tuple[Any, ...], _Known] = {}
+
+    def loop(self, joint: str, case: int, motor: Motor) -> CaseLoop:
+        """The loop of a joint in a case."""
+        if joint not in self.loops:
+            self.loops[joint] = BedLoop(self.experiment, joint)
+        return self.loops[joint].of_case(self.given(case), motor)
+
+    def given(self, case: int) -> dict[str, float]:
+        """The inputs of a case. Of what noise is its own any will do: beds are without faults here."""
+        cases = self.experiment.cases
+        values = {each.path: float(each.values[case]) for each in cases.coordinates}
+        return values | dict.fromkeys(cases.noise, 0.0)
+
+    def begun(self, case: int) -> PlainTape:
+        """A case after its first tick, in plain numbers; of no observer's covariance more than a turn is made."""
+        tape = PlainTape(self.program, self.given(case), 1)
+        with np.errstate(all="ignore"):
+            follow(tape, self.program.start, settled=np.inf)
+            follow(tape, self.program.tick)
+        return tape
+
+    def motors(self, tape: PlainTape) -> list[Motor]:
+        """The motors of the joints on beds."""
+        return [self.beds.motor(tape, each) for each in self.beds.mounted]
+
+
+def _rotor(motor: Motor) -> float:
+    return float(motor.ratio * motor.ratio * motor.inertia)
+
+
+def _margins(on_beds: BedExperiment, case: int, span: tuple[float, float] | None, reach: float) -> Iterator[Margin]:
+    experiment, builder, beds, known = on_beds.experiment, on_beds.builder, on_beds.beds, on_beds.known
+    tape = on_beds.begun(case)
     names = [each.joint for each in beds.mounted]
     Lambda = np.array([[float(tape.read(cell_names.ARM_INERTIA(a, b))) for b in names] for a in names])
-    loops = [_Loop(builder, tape, each) for each in beds.mounted]
-    rotors = np.array([loop.rotor for loop in loops])
+    motors = on_beds.motors(tape)
+    rotors = np.array([_rotor(each) for each in motors])
     least, together = ends_of_motion(Lambda, rotors) if span is None else span
-    for each, loop, r in zip(beds.mounted, loops, (Lambda.diagonal() / rotors).tolist(), strict=True):
+    for each, motor, r in zip(beds.mounted, motors, (Lambda.diagonal() / rotors).tolist(), strict=True):
         heads = (f"{each.joint}.servo.", f"{each.joint}.bed.", f"{each.joint}.law.")
         own = [path for path in experiment.parameters if path.startswith(heads) and ".command." not in path]
         # Its own r is always among those searched. Where a loop grows, or not, beyond them is not known.
@@ -198,8 +226,9 @@ def _margins(
             lightest, heaviest = min(lightest, 0.5 * least / reach), max(heaviest, 2.0 * reach * together)
         key = (each.joint, lightest, heaviest, *(builder.system.value(path, tape.read) for path in own))
         if key not in known:
+            loop = on_beds.loop(each.joint, case, motor)
             known[key] = _Known.of(loop, lightest, heaviest, _finite(least, together))
-        lower, limit = _around(known[key], loop, (least, together), (lightest, heaviest))
+        lower, limit = _around(known[key], (least, together), (lightest, heaviest))
         delay = float(builder.system.value(f"{each.joint}.bed.delay", tape.read))
         rate_hz = builder.schedule.base_hz / beds.divisor
         yield Margin(
@@ -207,21 +236,19 @@ def _margins(
         )
 
 
-def _around(
-    known: _Known, loop: _Loop, own: tuple[float, float], searched: tuple[float, float]
-) -> tuple[float, float | None]:
+def _around(known: _Known, own: tuple[float, float], searched: tuple[float, float]) -> tuple[float, float | None]:
     """The stretch around the heavier of the arm's own r, else the nearest to it; (0, 0): there is none.
 
     At its own r it is as the loop is there, also where the search has gone past a narrow stretch.
     """
-    stretches = known.stretches
-    numbers = _finite(*own)
+    found = known.stretches
+    numbers, loop = _finite(*own), known.loop
     unknown = [r for r in numbers if r not in known.grows]
     if unknown:
-        known.grows.update(zip(unknown, loop.grow(unknown), strict=True))
-    if any(known.grows[r] == any(_holds(each, r) for each in stretches) for r in numbers):
+        known.grows.update(zip(unknown, grow(loop, unknown), strict=True))
+    if any(known.grows[r] == any(_holds(each, r) for each in found) for r in numbers):
         looked_at = sorted({*np.geomspace(*searched, STEPS).tolist(), *numbers})
-        stretches = loop.stretches(looked_at, loop.grow(looked_at))
+        found = stretches(loop, looked_at, grow(loop, looked_at))
 
     def near(stretch: tuple[float, float | None]) -> float:
         lower, limit = stretch
@@ -229,7 +256,7 @@ def _around(
             return own[1] / lower if lower > 0.0 else 1.0
         return 1.0 if limit is None else min(1.0, limit / own[1])
 
-    return max(stretches, key=near, default=(0.0, 0.0))
+    return max(found, key=near, default=(0.0, 0.0))
 
 
 def _finite(*own: float) -> list[float]:
@@ -240,6 +267,34 @@ def _finite(*own: float) -> list[float]:
 def _holds(stretch: tuple[float, float | None], r: float) -> bool:
     lower, limit = stretch
     return lower < r and (limit is None or r < limit)
+
+
+def grow(loop: CaseLoop, ratios: Sequence[float]) -> list[bool]:
+    """Tells of each r whether the loop grows there."""
+    return (loop.radii(ratios) > 1.0 + STABLE).tolist()
+
+
+def stretches(loop: CaseLoop, looked_at: Sequence[float], growing: Sequence[bool]) -> _Stretches:
+    """The ranges of r in which a loop does not grow, rising, to a thousandth of r.
+
+    A range begins at 0 where the loop does not grow at the smallest r that was looked at, and ends at None where it
+    does not at the largest. looked_at: rising; growing: of each of them
+    """
+    found: list[tuple[float, float | None]] = []
+    lower = 0.0
+    for (low, high), (before, after) in zip(pairwise(looked_at), pairwise(growing), strict=True):
+        if before == after:
+            continue
+        while high > (1.0 + NARROW) * low:
+            between = np.geomspace(low, high, AT_ONCE + 2).tolist()
+            first = [*grow(loop, between[1:-1]), after].index(after)
+            low, high = between[first], between[first + 1]
+        end = (low * high) ** 0.5
+        if after:
+            found.append((lower, end))
+        else:
+            lower = end
+    return (*found, (lower, None)) if not growing[-1] else tuple(found)
 
 
 def _faultless(experiment: Experiment) -> Experiment:
@@ -257,123 +312,3 @@ def _faultless(experiment: Experiment) -> Experiment:
             path = f"{use.joint}.bed.i_max"
             parameters[path] = replace(parameters[path], value=np.inf)
     return replace(experiment, parameters=parameters)
-
-
-def _begun(experiment: Experiment, case: int) -> tuple[Builder, LaneTape]:
-    """The program after its first tick, in plain numbers, on a tape that takes arrays from then on."""
-    builder = Builder(System(experiment))
-    program = builder.program()
-    values = {each.path: float(each.values[case]) for each in experiment.cases.coordinates}
-    # of what noise is a case's own, any will do: beds are without faults here
-    tape = PlainTape(program, values | dict.fromkeys(experiment.cases.noise, 0.0), 1)
-    with np.errstate(all="ignore"):
-        follow(tape, program.start, settled=SETTLED)
-        follow(tape, program.tick)
-    lanes = LaneTape(program.base_hz, {name: np.asarray(value) for name, value in tape.inputs.items()}, 1)
-    lanes.cells.update(tape.cells)
-    return builder, lanes
-
-
-class _Noting(dict[str, Any]):
-    """Cells that note which of them are written."""
-
-    def __init__(self, cells: Mapping[str, Any]) -> None:
-        super().__init__(cells)
-        self.written: set[str] = set()
-
-    def __setitem__(self, name: str, value: Any) -> None:
-        self.written.add(name)
-        super().__setitem__(name, value)
-
-
-class _Loop:
-    """The loop of one joint at a tick, over the cells of a tape."""
-
-    def __init__(self, builder: Builder, tape: LaneTape, each: Mounted) -> None:
-        self.builder, self.tape, self.each = builder, tape, each
-        self.beds = builder.step.beds.alone(each)
-        self.motor = self.beds.motor(tape, each)
-        self.rotor = float(self.motor.ratio * self.motor.ratio * self.motor.inertia)
-        # back-EMF alone then takes half of the torque there is
-        self.rate = 0.5 * float(self.motor.tau_max * self.motor.resistance / (self.motor.kt * self.motor.kt))
-        own = (f"{each.joint}:", f"{each.joint}.bed.", f"{each.joint}.law.", f"{each.actuator.path}.")
-        cells = {name: value for name, value in tape.cells.items() if name.startswith(own)}
-        tape.k = self.beds.divisor
-        tape.cells = _Noting(tape.cells)
-        self._around(cells, np.float64(self.rotor))
-        # Under a position command the angle acts back; else it only adds up.
-        back = cell_names.SHAFT_ANGLE(each.joint) if each.actuator.command_kind == "position" else ""
-        written = tape.cells.written
-        self.names = [name for name in cells if name in written and (name == back or not name.endswith(_ANGLES))]
-        # The shaft turns on at one rate, and nothing else is under way.
-        tape.cells.update(dict.fromkeys(self.names, np.float64(0.0)))
-        tape.write(f"{each.joint}.qd", self.rate / self.motor.ratio)
-        tape.write(f"{each.joint}.q", 0.0)
-        self.beds.start(tape)
-        self.start = {name: float(tape.cells[name]) for name in cells}
-        self.cells = dict(tape.cells)
-
-    def _around(self, cells: Mapping[str, Any], load: Any) -> dict[str, Any]:
-        """The cells a tick later, with an arm of this inertia on the joint (kg m^2; kg); both may be arrays."""
-        tape, joint, actuator = self.tape, self.each.joint, self.each.actuator
-        tape.cells.update(cells)
-        tape.cells.update({cell_names.ARM_INERTIA(joint, joint): load, cell_names.ARM_TORQUE(joint): np.float64(0.0)})
-        self.beds.advance(tape)
-        self.beds.read(tape)
-        q, qd = self.beds.seen(tape, actuator) or (0.0, 0.0)
-        self.builder.compute(tape, actuator, self.builder.seen(actuator, q, qd, self._asked(), tape.time))
-        self.beds.act(tape)
-        return {name: tape.cells[name] for name in cells}
-
-    def _asked(self) -> Setpoint:
-        """The command, of the deck's kind, under which the shaft turns on at the steady rate."""
-        rate = self.rate / self.motor.ratio
-        kind = self.each.actuator.command_kind
-        value = {"position": self.beds.period * rate, "rate": rate}.get(kind, 0.0)
-        return Setpoint(kind, value, rate if kind == "position" else 0.0)
-
-    def radii(self, ratios: Sequence[float]) -> np.ndarray:
-        """The largest size of an eigenvalue of the map from tick to tick, at each r: all of them and all differences at
-        once."""
-        count, n = len(ratios), len(self.names)
-        start = np.array([self.start[name] for name in self.names])
-        sizes = 1e-4 * np.maximum(1.0, np.abs(start))
-        moved = np.repeat(start[:, None, None], count, 1) + np.hstack([np.zeros((n, 1)), np.diag(sizes)])[:, None, :]
-        cells: dict[str, Any] = {**self.start, **dict(zip(self.names, moved.reshape(n, -1), strict=True))}
-        self.tape.cells = dict(self.cells)
-        with np.errstate(all="ignore"):
-            ends = self._around(cells, np.repeat(np.asarray(ratios) * self.rotor, n + 1))
-            after = np.array([np.broadcast_to(ends[name], count * (n + 1)) for name in self.names])
-            after = after.reshape(n, count, n + 1)
-            maps = np.moveaxis((after[..., 1:] - after[..., :1]) / sizes, 1, 0)
-        found = np.full(count, np.inf)
-        numbers = np.isfinite(maps).all((1, 2))
-        found[numbers] = np.abs(np.linalg.eigvals(maps[numbers])).max(1)
-        return found
-
-    def grow(self, ratios: Sequence[float]) -> list[bool]:
-        """Tells of each r whether the loop grows there."""
-        return (self.radii(ratios) > GROWS).tolist()
-
-    def stretches(self, looked_at: Sequence[float], growing: Sequence[bool]) -> _Stretches:
-        """The ranges of r in which the loop does not grow, rising, to a hundredth of r.
-
-        A range begins at 0 where the loop does not grow at the smallest r that was looked at, and ends at None where it
-        does not at the largest. looked_at: rising; growing: of each of them
-        """
-        found: list[tuple[float, float | None]] = []
-        lower = 0.0
-        for (low, high), (before, after) in zip(pairwise(looked_at), pairwise(growing), strict=True):
-            if before == after:
-                continue
-            between = [low, high]
-            while between[1] > 1.005 * between[0]:
-                middles = [(a * b) ** 0.5 for a, b in pairwise(between)]
-                between = [r for two in zip(between, middles, strict=False) for r in two] + [high]
-            first = [*self.grow(between[1:-1]), after].index(after)
-            end = (between[first] * between[first + 1]) ** 0.5
-            if after:
-                found.append((lower, end))
-            else:
-                lower = end
-        return (*found, (lower, None)) if not growing[-1] else tuple(found)

@@ -1,4 +1,4 @@
-"""docs/substitution.md says what runs: its deck, its limits, what its laws are off."""
+"""docs/substitution.md says what runs: its deck, what its laws are off; and docs/linear.md its limits."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from met.plan import Experiment
 from tests.paper.stability_map import limits
 
 PAGE = (Path(__file__).parents[2] / "docs" / "substitution.md").read_text(encoding="utf-8")
+LINEAR = (Path(__file__).parents[2] / "docs" / "linear.md").read_text(encoding="utf-8")
 DECK, MOTORS = re.findall(r"```c\n(.*?)```", PAGE, re.DOTALL)
 RATIO, SLOW = 1570.0, 0.03
 LIGHT_TO_HEAVY = (0.5, 1.5, 5.0, 20.0)
@@ -49,7 +50,7 @@ def test_as_many_motors_pass_as_the_page_says(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", ["100 Hz", "200 Hz", "1 kHz", "2 kHz"])
 def test_the_limits_of_the_page_are_those_that_are_predicted(rate: str) -> None:
-    (row,) = re.findall(rf"^\| {rate} \| (\S+) \| (\S+) \| (\S+) \|$", PAGE, re.MULTILINE)
+    (row,) = re.findall(rf"^\| {rate} \| (\S+) \| (\S+) \| (\S+) \|$", LINEAR, re.MULTILINE)
     found = limits("measured_acceleration", float(rate.split()[0]) * (1000.0 if "kHz" in rate else 1.0))
     assert row == tuple(f"{limit:#.3g}" for limit in found if limit is not None)
 
@@ -60,7 +61,7 @@ def test_an_arm_that_is_too_light_rings_where_the_page_says(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("one.ic").write_text(DECK, encoding="utf-8")
-    [(command, said)] = re.findall(r"```\n\$ met (margin [^\n]*)\n(.*?)```", PAGE, re.DOTALL)
+    [(command, said)] = re.findall(r"```\n\$ met (margin [^\n]*)\n(.*?)```", LINEAR, re.DOTALL)
     assert main(shlex.split(command)) == 1
     assert capsys.readouterr().out == said
     more = """
@@ -69,7 +70,7 @@ def test_an_arm_that_is_too_light_rings_where_the_page_says(
     """
     voltage = engine.run(experiment(tmp_path, more, "arms")).signals["swing.servo.voltage"].reshape(5, -1)
     *ringing, smooth, heavy = voltage[:, -1000:].std(axis=1)
-    assert f"{' / '.join(f'{each:.1f}' for each in ringing)} V rms at r = 0.1 / 0.3 / 0.5" in PAGE
+    assert f"{' / '.join(f'{each:.1f}' for each in ringing)} V rms at r = 0.1 / 0.3 / 0.5" in LINEAR
     assert f"{smooth:.3f} {heavy:.3f}" == "0.004 0.004"
 
 

@@ -1,8 +1,8 @@
-"""How heavy an arm a law bears, by servo rate and delay: the map of docs/substitution.md, from `met margin`'s numbers.
+"""How heavy an arm a law bears, by servo rate and delay: the map of docs/linear.md, from `met margin`'s numbers.
 
     python -m tests.paper.stability_map          writes docs/figures/stability_map.png, and prints the limits
 
-Above the limit an eigenvalue of the loop from tick to tick is larger than one (met/analysis/margin.py).
+Above the limit a pole of the loop from tick to tick is larger than one (met/analysis/linear/bed_loop.py).
 """
 
 from __future__ import annotations

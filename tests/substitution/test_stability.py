@@ -108,6 +108,31 @@ def test_measured_acceleration_grows_from_where_the_margin_and_an_independent_mo
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("rate", [100, 200, 1000])
+def test_half_a_percent_to_each_side_of_a_limit_runs_die_away_and_grow(rate: int) -> None:
+    """Nine limits a rate: three delays, three filters. The shaft's second difference is the loop's swing; one that
+    grows comes to the motor's limits, some rad/s of the shaft."""
+    pairs = [(delay, cut) for delay in (0, 1, 2) for cut in (20, 50, 100)]
+    swept = ", ".join(str(delay) for delay, _ in pairs for _ in "-+")
+    cuts = ", ".join(str(cut) for _, cut in pairs for _ in "-+")
+    asked = f"shoulder.bed.delay = [{swept}];  shoulder.bed.f_cut = [{cuts}] Hz;"
+
+    def with_loads(ratios: Sequence[float]) -> str:
+        loads = ", ".join(f"{r * ROTOR * 3.0 / REACH**2:.12g}" for r in ratios)
+        law, zipped = "measured_acceleration", f"zip {{ {asked}  load = [{loads}] kg; }}"
+        return deck(law=law, servos=rate, dynamics=rate, duration=20.0, arm=ONE, swept=zipped)
+
+    limits = [one.limit for (one,) in margins(compiled(with_loads([1.0 + 0.01 * k for k in range(18)]), "bench"))]
+    ratios = [limit * side for limit, side in zip(limits, (0.995, 1.005) * 9, strict=True) if limit is not None]
+    bench = RATIO * shaft(ran(with_loads(ratios), "bench"), "shoulder")
+    bends = np.abs(np.diff(bench, 2, axis=-1))
+    quarters = np.array([part.mean(axis=-1) for part in np.array_split(bends, 4, axis=-1)]).T.reshape(9, 2, 4)
+    below, above = quarters[:, 0], quarters[:, 1]
+    assert (below[:, 3] < 0.6 * below[:, 1]).all() and (below[:, 3] < 0.1).all(), below
+    assert (above[:, 3] > 0.9 * above[:, 1]).all() and (above[:, 3] > 0.1).all(), above
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["velocity_tracking", "torque_balance", "torque_balance_observer"])
 @pytest.mark.parametrize(
     ("rate", "delays", "cuts"),

@@ -13,7 +13,7 @@ from met import run as engine
 from met.analysis.linear.creeping import CreepingRate, creeping
 from met.analysis.linear.flow import Flow
 from met.analysis.linear.jacobian import PeriodMap, at_instant, period_map
-from met.analysis.linear.margins import STABLE, LoopMargins, ScalarLoop, comes_back, gain_limits, margins
+from met.analysis.linear.margins import FARTHEST, STABLE, LoopMargins, ScalarLoop, comes_back, gain_limits, margins
 from met.analysis.linear.period import PeriodProgram
 from met.analysis.linear.plant import PlantModel, plant
 from met.analysis.linear.standing import moves, refusal, settled, standing, weak
@@ -94,6 +94,12 @@ class OpenLoop:
     gains: tuple[float | None, float | None]
     stable: bool
     returns: bool
+
+    @property
+    def searched(self) -> float | None:
+        """Times the gain up to which a limit of it was looked for, and by which down; None where no limit was left out:
+        those of a loop of one rate are eigenvalues."""
+        return FARTHEST if self.margins is None and self.stable and self.returns else None
 
     @property
     def unstable(self) -> bool:
@@ -265,6 +271,26 @@ def of_deck(experiment: Experiment, name: str | None = None) -> LinearQuestion:
     use = known[name]
     asked = experiment if use.pose is None else standing(experiment, use.pose)
     return LinearQuestion(asked, use.at, use.inputs, use.outputs, use.opened, use.pose is not None)
+
+
+def question_of(
+    experiment: Experiment,
+    of: str | None = None,
+    *,
+    at: float | None = None,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    opened: Sequence[str] = (),
+) -> LinearQuestion:
+    """The question of a run's `linear` block where one is named, or where nothing is asked and there is only one; else
+    that of what is asked, at 0 s where no instant is. Raises Problem D376, and ValueError where both are asked."""
+    asks = [key for key, value in (("inputs", inputs), ("outputs", outputs), ("opened", opened)) if value]
+    asks = ["at", *asks] if at is not None else asks
+    if of is not None and asks:
+        raise ValueError(f"`{asks[0]}` asks, and so does `of`, {of!r}: leave one of them out")
+    if of is not None or (experiment.linear and not asks):
+        return of_deck(experiment, of)
+    return LinearQuestion(experiment, at or 0.0, tuple(inputs), tuple(outputs), tuple(opened))
 
 
 @frozen

@@ -1,7 +1,8 @@
 """Metrics of linear answers: of each case, after it has run, its loops and poles at the instant that the run names.
 
 A case's numbers follow from the case alone: it is run up to the instant by the same machine code, and linearised by
-itself. What a loop has no limit of is infinite; one that is unstable as it is has no margin at all.
+itself. What a loop has no limit of is infinite, and a gain whose limit was looked for as far as it was; one that is
+unstable as it is has no margin at all.
 """
 
 from __future__ import annotations
@@ -148,7 +149,8 @@ def _figure(figure: LinearFigure, lifted: LiftedPeriod, loops: Sequence[OpenLoop
         return math.nan, OPEN
     if figure.name == "gain_margin":
         room = [1.0 / down for down, _ in (loop.gains for loop in loops) if down]
-        return min([*room, *(up for _, up in (loop.gains for loop in loops) if up is not None)], default=math.inf), 0
+        above = [loop.searched if loop.gains[1] is None else loop.gains[1] for loop in loops]
+        return min([*room, *(each for each in above if each is not None)], default=math.inf), ANSWERED
     single = [loop for loop in loops if len(loop.paths) == 1]
     if any(loop.margins is None for loop in single):
         return math.nan, SEVERAL_TICKS

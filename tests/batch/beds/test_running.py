@@ -167,7 +167,7 @@ error[E419]: case #0, shoulder: r = 1.37, stable to 1.2 with measured_accelerati
         (
             ("light", "--port", "emulated"),
             """\
-error[E419]: case #3, shoulder: r = 0.149, stable from 0.181 to 4.01 with measured_acceleration at 1000 Hz: \
+error[E419]: case #3, shoulder: r = 0.149, stable from 0.182 to 4.01 with measured_acceleration at 1000 Hz: \
 it would not be stable
  = help: `met margin` says what would be; a lower gain of the servo's rate loop, a faster servo or a heavier arm
  = help: `--force` arms it all the same

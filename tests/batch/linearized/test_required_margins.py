@@ -156,5 +156,10 @@ def test_the_command_asks_what_the_deck_asks(folder: Path) -> None:
     assert "t = 0 s" in met(folder, "linear", "deck.ic", "hold", "--at", "0 s", status=0)
     with pytest.raises(Problem, match="there is no `linear lop` in `hold`"):
         batch.linear(plan_of(folder, "hold"), of="lop")
+    by_name, by_itself = (batch.linear(plan_of(folder, "hold"), of=of).found for of in ("loop", None))
+    assert by_name.time == by_itself.time == 0.9 and by_itself.loops[0].margins == by_name.loops[0].margins
+    assert batch.linear(plan_of(folder, "hold"), at=0.0).found.time == 0.0
+    with pytest.raises(ValueError, match="`at` asks, and so does `of`, 'loop': leave one of them out"):
+        batch.linear(plan_of(folder, "hold"), of="loop", at=0.0)
     both = CliRunner().invoke(linear, [str(folder / "deck.ic"), "hold", "--of", "loop", "--at", "0"])
     assert both.exit_code == 2 and "--at asks, and so does --of loop: leave one of them out" in both.output

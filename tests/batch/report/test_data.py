@@ -411,7 +411,7 @@ class TestStability:
         [bed] = found.beds
         assert bed.unstable.tolist() == [False, False, False, True] and not bed.ok
         assert np.isnan(bed.lower[:2]).all() and bed.lower[2:] == pytest.approx([0.181, 0.181], rel=0.01)
-        assert bed.stable_at == "0.181 to 4.01" and bed.margin == "none: unstable, too light"
+        assert bed.stable_at == "0.182 to 4.01" and bed.margin == "none: unstable, too light"
 
     @pytest.mark.slow
     def test_of_many_cases_is_of_some_and_that_is_said(self, bench: Path, monkeypatch: pytest.MonkeyPatch) -> None:

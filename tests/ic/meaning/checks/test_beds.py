@@ -50,13 +50,13 @@ def said(folder: Path, deck: str) -> tuple[list[str], list[str]]:
 def test_an_arm_beyond_the_limit_is_told_and_one_within_is_not(
     r: float, kp: float, law: str, weight: str, tmp_path: Path
 ) -> None:
-    """A hundredth to each side of the limits of docs/substitution.md: 5.35, and 0.547 with a delay of a tick."""
+    """A hundredth to each side of the limits of docs/linear.md: 5.35, and 0.548 with a delay of a tick."""
     deck = BENCH.replace("[1, 1, 1]", str([r * ROTOR] * 3)).replace("measured_acceleration", law)
     deck = changed(deck, ("{ command", f"{{ kp = {kp} V*s/rad;  command"))
     if law == "velocity_tracking":
         deck = changed(deck, ("bed = emulated;", "bed = emulated(delay = 1);"))
     messages, _ = said(tmp_path, deck)
-    ends = {"": "", "heavy": "r = 5.4, and it is stable up to 5.35", "light": "r = 0.53, and it is stable above 0.547"}
+    ends = {"": "", "heavy": "r = 5.4, and it is stable up to 5.35", "light": "r = 0.53, and it is stable above 0.548"}
     assert [each.endswith(ends[weight]) for each in messages] == [True] * bool(weight)
     (experiment,) = ic.compile(tmp_path / "deck.ic").experiments
     assert margins(experiment)[0][0].stable == (not weight)

@@ -51,7 +51,7 @@ def test_the_limit_of_a_law_is_where_a_pole_leaves_the_unit_circle(
     if found.limit is None:
         sides = [("stable", found.searched * 0.5)]
     else:
-        sides = [("stable", 0.985 * found.limit), ("grows", 1.015 * found.limit)]
+        sides = [("stable", 0.999 * found.limit), ("grows", 1.001 * found.limit)]
     question = LinearQuestion(with_loads(made, [r * rotor for _, r in sides]))
     for case, (wanted, r) in enumerate(sides):
         largest = max(abs(pole.z) for pole in question.of(case).poles)

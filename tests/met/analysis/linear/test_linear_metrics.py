@@ -9,8 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from batch.terminal.linear import linear_lines
+from batch.terminal.linear_cases import case_lines
 from met import run as engine
 from met.analysis.linear import metrics
+from met.analysis.linear.answers import of_deck
 from met.plan import keys
 from met.plan.linear_uses import FIGURES
 from tests.ic.small_decks import ARM, RUN, SERVO, experiment
@@ -133,6 +136,22 @@ def test_a_law_that_ticks_several_times_in_a_period_has_a_gain_alone(tmp_path: P
     assert found.metrics["gain_margin"][0] > 1.0 and np.isnan(found.metrics["phase_margin"][0])
     (why,) = found.warning
     assert why.endswith("its law ticks several times in a period, and has no phase, delay or disk of one rate")
+
+
+def test_a_gain_is_told_as_far_as_its_limit_was_looked_for(tmp_path: Path) -> None:
+    """A law that ticks several times in a period, with a millionth of the gain of the test before: its limit is a
+    million times farther."""
+    slow = (
+        with_entries(RUN, ASKED).replace("dynamics = 1 kHz", "dynamics = 500 Hz").replace("record = 100", "record = 50")
+    )
+    soft = STIFF.replace("kp = 0.05", "kp = 5e-8")
+    assert answers(tmp_path, ARM, soft, slow, select="hold").metrics["gain_margin"].tolist() == [1e4]
+    question = of_deck(experiment(tmp_path, ARM, soft, slow, select=["hold"]))
+    found = question.of(0)
+    (loop,) = found.loops
+    assert loop.gains == (None, None) and loop.searched == 1e4
+    assert "  gain   more than 10,000 times" in linear_lines(found)
+    assert "  #0    more than 10,000 times" in case_lines(question, [found])
 
 
 def test_they_move_no_bit_and_no_key_of_a_run(tmp_path: Path) -> None:

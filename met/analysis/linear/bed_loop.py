@@ -1,0 +1,143 @@
+"""The loop of one joint on a bed, by itself: its servo, bed and law with an arm of one link, for arms of any inertia.
+
+The loop is an experiment of its own, linearised as any other (`period`), one tick of the servo a period. It is opened
+at the bed, where the arm is felt: the arm's inertia there is an input of the program, so that many arms are linearised
+side by side. Its operating point is a shaft that turns at a steady rate, at which no limit is reached and no friction
+changes its sign: at rest friction holds the shaft, and there is no loop. There are no faults, whose noise and
+converters would be taken for slopes, and the load's current has no limit, at which nothing would come back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from met.analysis.linear.abreast import FlowAbreast
+from met.analysis.linear.jacobian import seeds
+from met.analysis.linear.period import PeriodProgram
+from met.frozen import frozen
+from met.plan import Command, Coordinate, Experiment, Formula, Joint, Link, Origin, Quantity, Schedule
+from met.servos.motor import Motor
+from met.trace.graph import Formulas
+
+LINK = "load"
+"""The only link of the arm."""
+
+ARM, RATE = "bench:arm", "bench:rate"
+"""Inputs of the program besides those of the experiment: inertia of the arm, kg m^2 (prismatic: mass, kg), and the rate
+of the joint, rad/s (m/s). No path of a deck's has a colon."""
+
+LONG = 1000.0
+"""Periods for which a position command goes on at that rate; one of them is looked at."""
+
+
+class BedLoop:
+    """The loop of a joint of an experiment, for any of its cases."""
+
+    def __init__(self, experiment: Experiment, joint: str) -> None:
+        self.program = PeriodProgram(by_itself(experiment, joint))
+
+    def of_case(self, given: Mapping[str, float], motor: Motor) -> CaseLoop:
+        """The loop of a case. given: its inputs of the experiment's program;  motor: the joint's"""
+        # back-EMF alone then takes half of the torque there is
+        rate = 0.5 * motor.tau_max * motor.resistance / (motor.kt * motor.kt * motor.ratio)
+        inputs = {**given, ARM: 1.0, RATE: float(rate)}
+        begun = FlowAbreast(self.program, inputs, {}, 0, 1)
+        begun.begin()
+        return CaseLoop(self.program, inputs, begun.cells, float(motor.ratio * motor.ratio * motor.inertia))
+
+
+@frozen
+class CaseLoop:
+    """The loop of a case, before its first tick. inputs, cells: of its program; rotor: N^2 J_m, kg m^2 (kg)"""
+
+    program: PeriodProgram
+    inputs: Mapping[str, float]
+    cells: Mapping[str, float]
+    rotor: float
+
+    def maps(self, ratios: Sequence[float]) -> tuple[np.ndarray, tuple[str, ...]]:
+        """The map from tick to tick with an arm of each of these r, [arm, state, state], no numbers where an event is
+        in the tick; and its states: those that act on more than themselves, such as no angle that only adds up."""
+        program, arms = self.program, self.rotor * np.array(ratios)[:, None]
+        flow = FlowAbreast(program, {**self.inputs, ARM: arms}, {}, 0, len(arms))
+        flow.begin_as(self.cells)
+        flow.ticks()
+        flow.finish()  # no bed is under way before
+        names, n = program.states, len(program.states)
+        flow.tangents = seeds(program, flow, names, n)
+        flow.ticks()
+        flow.finish()
+        found = np.stack([np.broadcast_to(flow.tangent(name), (len(arms), n)) for name in names], axis=1)
+        act = np.flatnonzero(np.any(found != np.eye(n), axis=(0, 1)))
+        found = found[:, act][:, :, act]
+        found[flow.unusual] = np.nan
+        return found, tuple(names[place] for place in act)
+
+    def radii(self, ratios: Sequence[float]) -> np.ndarray:
+        """The largest size of a pole of a tick, with an arm of each of these r, [arm]; infinite where one is none."""
+        maps, _ = self.maps(ratios)
+        found, numbers = np.full(len(maps), np.inf), np.isfinite(maps).all((1, 2))
+        found[numbers] = np.abs(np.linalg.eigvals(maps[numbers])).max(1, initial=0.0)
+        return found
+
+
+def by_itself(experiment: Experiment, joint: str) -> Experiment:
+    """The experiment of one substituted joint without the rest of its arm, at the ticks of its servo."""
+    structure, formulas = experiment.structure, experiment.formulas
+    servo = next(use for use in structure.servos if use.joint == joint)
+    moved = next(each for each in structure.joints if each.name == joint)
+    schedule = Schedule(structure.schedule.base_hz / servo.divisor, 1, 1, 2)
+    kind = "rate" if servo.command is None else servo.command.kind
+    alone = replace(
+        structure,
+        links=(Link(LINK),),
+        joints=(Joint(joint, moved.kind, "base", LINK),),
+        servos=(replace(servo, divisor=1, command=Command(kind, "ramp" if kind == "position" else "constant")),),
+        substitutions=tuple(use for use in structure.substitutions if use.joint == joint),
+        schedule=schedule,
+        environment=(),
+        metrics=(),
+        record=(),
+        payloads=(),
+        guides=(),
+        sensors=(),
+        expressions=(),
+        base=None,
+        balanced=False,
+    )
+    n, outputs, over = 2 * len(formulas.nodes), len(formulas.outputs), LONG / schedule.base_hz
+    made = Formulas(
+        (*formulas.inputs, ARM, RATE),
+        (*formulas.nodes, ("input", ARM), ("input", RATE), ("const", over), ("mul", n + 2, n + 4)),
+        (*formulas.outputs, n, n + 2, n + 6),
+    )
+    arm, rate, far = (_number(Formula(outputs + k)) for k in range(3))
+    told = f"{joint}.servo.command."
+    parameters = {
+        path: value
+        for path, value in experiment.parameters.items()
+        if path.startswith((f"{joint}.servo.", f"{joint}.bed.", f"{joint}.law.")) and not path.startswith(told)
+    }
+    places = [f"{joint}.{part}.{axis}" for part in ("at", "rpy", "axis") for axis in "xyz"]
+    inertias = [f"inertia.{of}" for of in ("xx", "yy", "zz", "xy", "xz", "yz")]
+    body = [f"links.{LINK}.{of}" for of in ("mass", "com.x", "com.y", "com.z", *inertias)]
+    parameters |= dict.fromkeys((*places, *body, f"initial.{joint}.q", f"{told}value", f"{told}begin"), _number(0.0))
+    parameters |= {f"{joint}.axis.z": _number(1.0), f"initial.{joint}.qd": rate}
+    parameters[f"links.{LINK}.{'mass' if moved.kind == 'prismatic' else 'inertia.zz'}"] = arm
+    if kind == "position":
+        parameters |= {f"{told}start": _number(0.0), f"{told}to": far, f"{told}over": _number(over)}
+    elif kind == "rate":
+        parameters[f"{told}value"] = rate
+    inputs = (Coordinate(path, "", 1.0, np.zeros(experiment.cases.count), ()) for path in (ARM, RATE))
+    return replace(
+        experiment, structure=alone, parameters=parameters, formulas=made, requirements=(), linear=(),
+        linear_metrics=(), step_errors=(), tolerances=(), search=None,
+        cases=replace(experiment.cases, coordinates=(*experiment.cases.coordinates, *inputs)),
+    )  # fmt: skip
+
+
+def _number(value: float | Formula) -> Quantity:
+    return Quantity(value, "", Origin("derived"))
