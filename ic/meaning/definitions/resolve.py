@@ -82,6 +82,13 @@ class Definitions:
             other._by_kind[each.kind][each.name] = each
         return other
 
+    def reporting_to(self, complaints: Complaints) -> Definitions:
+        """A copy, with what is merged so far, that reports mistakes there."""
+        other = copy(self)
+        other._complaints = complaints
+        other._merged, other._failed, other._meant = dict(self._merged), set(self._failed), dict(self._meant)
+        return other
+
     def text_at(self, place: Place) -> str:
         """The characters that a place covers; "" where its text is not known."""
         lines = self._texts.get(place.file, "").splitlines()[place.line - 1 : place.line]
