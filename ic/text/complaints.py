@@ -81,6 +81,11 @@ class Complaints:
         self.needed_allowances: set[Place] = set()  # the places of each `allow` that silenced a warning
         self._lacking: dict[Diagnostic, tuple[Place, str]] = {}
 
+    @property
+    def is_clear(self) -> bool:
+        """True where nothing at all was found or noted."""
+        return not (self._found or self._remarks or self._provisional or self.known_missing or self.error_count)
+
     def copied(self) -> Complaints:
         """The same findings, to which others can be added."""
         made = copy(self)

@@ -47,6 +47,16 @@ class Names:
         self._worth: dict[str, Value | ValueList | Problem] = {}
         self._open: dict[str, Place] = {}
 
+    @property
+    def named(self) -> Collection[str]:
+        """Names whose values were asked for and found, those behind them included."""
+        return self._worth.keys()
+
+    def take_over(self, others: Names) -> None:
+        """Take over what others found, which is the same here."""
+        for name, worth in others._worth.items():
+            self._worth.setdefault(name, worth)
+
     def evaluate(self, expression: Expression) -> Value | ValueList:
         return evaluate(expression, self.find)
 
