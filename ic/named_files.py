@@ -20,6 +20,7 @@ class NamedFiles(Generic[T]):
 
     kind, ending  what messages call one, and how their names end;  most  bytes of one
     missing       the code of the message where there is none of a name
+    asked         whether a file was asked for, be it there or not
     """
 
     def __init__(
@@ -29,6 +30,7 @@ class NamedFiles(Generic[T]):
         self._most, self._missing = most, missing
         self._files = Files(deck.include_dirs, unsaved=deck.unsaved)
         self._read: dict[str, T | Problem] = {}
+        self.asked = False
 
     @property
     def sources(self) -> tuple[SourceFile, ...]:
@@ -42,6 +44,7 @@ class NamedFiles(Generic[T]):
 
     def get(self, named: String) -> T:
         """The content of the file of this name. Raises Problem, the same each time for a fault of the file."""
+        self.asked = True
         found = self._find(named)
         if found.name not in self._read:
             try:

@@ -15,6 +15,7 @@ import math
 import sys
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
+from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -278,6 +279,11 @@ def is_unit(name: str) -> bool:
 
 def measure(factors: Iterable[tuple[str, int]]) -> Measure:
     """The meaning of a product of units, (name, exponent) each; ValueError for a name that is no unit."""
+    return _measure(tuple(factors))
+
+
+@lru_cache(maxsize=1024)
+def _measure(factors: tuple[tuple[str, int], ...]) -> Measure:
     result = ONE
     for name, exponent in factors:
         if name not in ALL_UNITS:

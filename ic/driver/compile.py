@@ -33,6 +33,8 @@ from met.plan import Source as File
 
 Select = Sequence[str] | Literal["all"] | None
 
+TOO_DEEP = error("D078", "this deck's values are nested too deeply", help="build them up in steps, with `let`")
+
 
 @frozen
 class Compiled:
@@ -137,7 +139,7 @@ def compile_deck(
             with complaints.gather():
                 check_servo_definition(Scope(definitions, complaints), name)
     except RecursionError:
-        complaints.error("D078", "this deck's values are nested too deeply", help="build them up in steps, with `let`")
+        complaints.add(TOO_DEEP)
     except Problem as problem:
         complaints.add(*problem.diagnostics)
     complaints.settle()
@@ -145,7 +147,7 @@ def compile_deck(
     texts = {source.name: source.text for source in sources}
     if not complaints.errors:
         complaints.admit_remarks()
-        silence_of_all(experiments, complaints)
+        silence_of_all([each.allowances for each in experiments], complaints)
         if not settings and not defines:  # which make another deck of it
             warn_of_unneeded(definitions, asked, experiments, complaints)
     else:

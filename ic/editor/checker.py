@@ -2,13 +2,14 @@
 
     python -m ic.editor.checker FD        started by `CheckerProcess`; FD is one end of a socket pair
 
-Each check begins from the same state, so what it says is what a fresh start says, and nothing is kept that could grow.
-A check that is outdated is killed. One that crashes takes nothing with it.
+Each check begins from the same state, so what it says is what a fresh start says, and nothing is kept here that could
+grow. What a check may know from the last one is in the request. A check that is outdated is killed. One that crashes
+takes nothing with it.
 
 On the socket, from the server, a byte each: `b"c"`, with two file descriptors, of a memory file that holds a pickled
 `CheckRequest` and of the pipe for the answers; or `b"s"`, which stops the check that runs, as the next one does too.
-The answers are pickled, each behind its length: a `CheckReply`, then a `DeckIndex`
-where the deck could be compiled; or a `Crash`.
+The answers are pickled, each behind its length: `CheckReply`s, the last one with the audit, then a `DeckIndex` where
+the deck could be compiled; or a `Crash`.
 """
 
 from __future__ import annotations
@@ -20,15 +21,12 @@ import signal
 import socket
 import sys
 
-from ic.editor.checking import CheckRequest, answer, compiled_with_reply
+from ic.editor.checking import CheckRequest, answer, answers
 
 
 def _warm_up() -> None:
     """Import what a check imports, by a check; what is there from now on is shared by all children."""
-    from ic.editor.index import index_of
-
-    compiled, _ = compiled_with_reply(CheckRequest(os.getcwd(), "", "#include <two_link.ic>\n", (), (), {}))
-    index_of(compiled)
+    list(answers(CheckRequest(os.getcwd(), "", "#include <two_link.ic>\n", (), (), {}), pause=0.0))
     gc.collect()
     gc.freeze()
 

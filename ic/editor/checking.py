@@ -1,12 +1,20 @@
-"""One check of a deck for an editor: what it is asked, and what it answers, between two processes."""
+"""One check of a deck for an editor: what it is asked, and what it answers, between two processes.
+
+First the definitions are checked, without what takes programs to be built, which is the audit. What they come to is
+told, and earlier where it takes long. The audit, `met check` itself, comes behind a pause: who types on never waits
+for it.
+"""
 
 from __future__ import annotations
 
 import os
 import pickle
 import struct
+import time
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import field
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from met.diagnostic import Diagnostic
@@ -14,10 +22,18 @@ from met.frozen import frozen
 from met.messages.edits import Edit
 
 if TYPE_CHECKING:
+    from ic.driver.by_definition import Known
     from ic.driver.compile import Compiled
+    from ic.editor.index import DeckIndex
 
 LENGTH = struct.Struct("!Q")
 """The length of a pickled answer, which stands before it."""
+
+EARLY = 0.08
+"""Seconds from the start of a check after which that is told which is found by then."""
+
+AUDIT_PAUSE = 0.3
+"""Seconds without a change behind which the audit begins."""
 
 
 @frozen
@@ -28,6 +44,7 @@ class CheckRequest:
     name     of its file; "" where it is in none
     text     of a deck that is in no file
     unsaved  texts of files that an editor has open, by real paths
+    known    findings of the deck's definitions, of the last check of which all were told
     """
 
     folder: str
@@ -36,20 +53,25 @@ class CheckRequest:
     include_dirs: tuple[str, ...]
     defines: tuple[str, ...]
     unsaved: Mapping[str, str]
+    known: Known = field(default_factory=dict)
 
 
 @frozen
 class CheckReply:
     """The findings of a check.
 
-    diagnostics  as `met check` prints them
+    diagnostics  in the words and the order of `met check`
     edits        of each, with the number of its help
     sources      the text of every file that was read, by the name that places give it
+    known        findings of all definitions, before the audit; None where some of them are to come, and with the audit
+    audited      whether these are all that `met check` has to say
     """
 
     diagnostics: tuple[Diagnostic, ...]
     edits: tuple[tuple[tuple[int, Edit], ...], ...]
     sources: Mapping[str, str]
+    known: Known | None = None
+    audited: bool = True
 
 
 @frozen
@@ -63,20 +85,59 @@ def answer(request: CheckRequest, out: int) -> None:
     """Check, and write what there is to say into the file descriptor."""
     os.chdir(request.folder)
     try:
-        compiled, reply = compiled_with_reply(request)
-        _send(out, reply)
-        if compiled.plan is not None:
-            from ic.editor.index import index_of
-
-            _send(out, index_of(compiled))
+        for each in answers(request, pause=AUDIT_PAUSE):
+            _send(out, each)
     except Exception:
         _send(out, Crash(traceback.format_exc()))
+
+
+def answers(request: CheckRequest, *, pause: float) -> Iterator[CheckReply | DeckIndex]:
+    """All that there is to say of a deck, in turn; the audit comes after the pause, in s."""
+    readable = False
+    for reply in first_replies(request):
+        readable |= not reply.audited
+        yield reply
+    if not readable:
+        return
+    time.sleep(pause)
+    compiled, reply = compiled_with_reply(request)
+    yield reply
+    if compiled.plan is not None:
+        from ic.editor.index import index_of
+
+        yield index_of(compiled)
+
+
+def first_replies(request: CheckRequest) -> Iterator[CheckReply]:
+    """What is told before the audit; of a deck that cannot be read, all that there is."""
+    from ic.driver.by_definition import DefinitionChecks
+    from ic.read import read
+    from met.diagnostic import Problem
+
+    began = time.monotonic()
+    try:
+        deck = read(
+            Path(request.name),
+            [Path(each) for each in request.include_dirs],
+            request.defines,
+            despite_errors=True,
+            text=request.text,
+            unsaved=request.unsaved,
+        )
+    except Problem as problem:
+        yield _reply(problem.diagnostics, problem.sources)
+        return
+    checks, told = DefinitionChecks(deck, request.known), False
+    while checks.check_next():
+        if not told and time.monotonic() - began > EARLY:
+            told = True
+            yield _reply(*checks.diagnostics(), audited=False)
+    yield _reply(*checks.diagnostics(), known=checks.findings, audited=False)
 
 
 def compiled_with_reply(request: CheckRequest) -> tuple[Compiled, CheckReply]:
     """A deck compiled, and the reply to the request, made in this process."""
     from ic.driver.compile import check
-    from met.messages.edits import edits
 
     compiled = check(
         request.name,
@@ -86,9 +147,15 @@ def compiled_with_reply(request: CheckRequest) -> tuple[Compiled, CheckReply]:
         text=request.text,
         unsaved=request.unsaved,
     )
-    found = compiled.diagnostics
-    beside = tuple(tuple(edits(each, compiled.sources)) for each in found)
-    return compiled, CheckReply(found, beside, dict(compiled.sources))
+    return compiled, _reply(compiled.diagnostics, compiled.sources)
+
+
+def _reply(
+    found: tuple[Diagnostic, ...], sources: Mapping[str, str], *, known: Known | None = None, audited: bool = True
+) -> CheckReply:
+    from met.messages.edits import edits
+
+    return CheckReply(found, tuple(tuple(edits(each, sources)) for each in found), dict(sources), known, audited)
 
 
 def _send(out: int, answer: object) -> None:

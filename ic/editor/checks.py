@@ -1,8 +1,8 @@
 """The order of checks: of the decks that an editor has open, again after each change that concerns them.
 
 An open text is a deck of its own unless another open deck includes it. A check waits until nothing was typed for a
-moment; a change while it runs ends it. So what is told is never older than what was told before, and once nothing
-changes any more it is what a fresh start would say.
+moment; a change while it runs ends it, and while its audit runs that of another deck does too. So what is told is
+never older than what was told before, and once nothing changes any more it is what a fresh start would say.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import os
 import time
 import traceback
 from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from ic.editor.checker_process import CheckerProcess
 from ic.editor.checking import CheckReply, CheckRequest, Crash
@@ -19,10 +21,13 @@ from ic.editor.index import DeckIndex
 from ic.editor.positions import file_named, path_of
 from met.frozen import frozen
 
+if TYPE_CHECKING:
+    from ic.driver.by_definition import Known
+
 NO_DECKS = (".csv", ".urdf")
 """The endings of files that decks name and that are none."""
 
-PAUSE = 0.04
+PAUSE = 0.01
 """Seconds without a change before a check begins."""
 
 
@@ -78,10 +83,12 @@ class DeckChecks:
         self.texts: dict[str, OpenText] = {}
         self.checked: dict[str, CheckedDeck] = {}
         self._stale: dict[str, None] = {}  # addresses of decks to be checked, in the order of changes
+        self._known: dict[str, Known] = {}  # findings of each deck's definitions, by what they follow from
         self.indexes: dict[str, DeckIndex] = {}  # of each deck, when it could last be compiled
         self._failed: set[str] = set()  # decks whose last check has died; nothing is known of what they are now
         self._running: str | None = None
         self._outdated = False
+        self._auditing = False  # the check that runs has told what definitions come to
         self._due = 0.0
         self._wake = asyncio.Event()
         self._resting = asyncio.Event()
@@ -102,6 +109,7 @@ class DeckChecks:
         self.texts.pop(uri, None)
         self.checked.pop(uri, None)
         self.indexes.pop(uri, None)
+        self._known.pop(uri, None)
         self._stale.pop(uri, None)
         self.all_changed()
         self._tell(self.decks())
@@ -158,7 +166,9 @@ class DeckChecks:
         self._stale.pop(uri, None)
         self._stale[uri] = None
         self._due = time.monotonic() + PAUSE
-        if self._running == uri and not self._outdated:
+        if self._running is not None and not self._outdated and (self._running == uri or self._auditing):
+            if self._running != uri:  # its audit can wait
+                self._stale = {self._running: None, **self._stale}
             self._outdated = True
             self._process.stop_check()
         self._wake.set()
@@ -201,8 +211,9 @@ class DeckChecks:
             self.include_dirs,
             self.defines,
             self.unsaved(),
+            self._known.get(uri, {}),
         )
-        self._running, self._outdated = uri, False
+        self._running, self._outdated, self._auditing = uri, False, False
         self._stale.pop(uri, None)
         self._failed.discard(uri)
         answers = 0
@@ -229,6 +240,9 @@ class DeckChecks:
             self.indexes[deck.uri] = answer
         if not isinstance(answer, CheckReply):
             return
+        if answer.known is not None:
+            self._known[deck.uri], self._auditing = answer.known, True
+            answer = replace(answer, known=None)
         paths = (file_named(name, request.folder) for name in answer.sources)
         files = frozenset(os.path.realpath(path) for path in paths if path is not None)
         name = request.name if request.text is None else next(iter(answer.sources), "")

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import replace
 
 from ic.text.source import UnreadableStretch
 from met.diagnostic import Diagnostic, Expansion, Label, Place, Problem, error, meant
+from met.frozen import frozen
 
 MOST_DIAGNOSTICS = 200  # diagnostics of one deck; any after these seldom say more
 
@@ -32,6 +34,31 @@ UNKNOWN_WORDS = ("D044", "D045", "D082", "D108", "D136", "D157")
 """Codes of messages about unknown words of the language, which no deck defines."""
 
 
+_BEFORE = error("", "an error outside of the definition")
+
+
+@frozen
+class DefinitionFindings:
+    """All that a check of one definition by itself has found: what `Complaints.apart` collects, and `take` takes over.
+
+    diagnostics  in the order found; remarks: warnings that say something only where there are no errors
+    lacking      by those that say what a definition lacks: the definition, and the entry
+    missing      definitions, and entries that they are known to lack
+    of_no_run    those that no run is to blame for
+    silenced     warnings that are allowed, each with the place of the `allow`; needed: the places of each that was
+    turns        turns of loops that made the same mistake as the first of them
+    """
+
+    diagnostics: tuple[Diagnostic, ...]
+    remarks: tuple[Diagnostic, ...]
+    lacking: Mapping[Diagnostic, tuple[Place, str]]
+    missing: frozenset[tuple[Place, str]]
+    of_no_run: frozenset[Diagnostic]
+    silenced: Mapping[Diagnostic, Place]
+    needed: frozenset[Place]
+    turns: Mapping[object, tuple[tuple[Expansion, ...], ...]]
+
+
 class Complaints:
     """Diagnostics in the order found, each once."""
 
@@ -52,6 +79,64 @@ class Complaints:
         self._of_no_run: set[Diagnostic] = set(self._found)
         self._turns: dict[object, dict[tuple[Expansion, ...], None]] = {}  # by mistake of a loop's body: its turns
         self.needed_allowances: set[Place] = set()  # the places of each `allow` that silenced a warning
+        self._lacking: dict[Diagnostic, tuple[Place, str]] = {}
+
+    @property
+    def is_clear(self) -> bool:
+        """True where nothing at all was found or noted."""
+        return not (self._found or self._remarks or self._provisional or self.known_missing or self.error_count)
+
+    def copied(self) -> Complaints:
+        """The same findings, to which others can be added."""
+        made = copy(self)
+        for name, value in vars(self).items():
+            if isinstance(value, dict | set | list):
+                setattr(made, name, copy(value))
+        made._turns = {mistake: dict(turns) for mistake, turns in self._turns.items()}
+        return made
+
+    def apart(self) -> Complaints:
+        """A collector for one definition by itself, which knows of what is here only `known_before`."""
+        made = Complaints([_BEFORE] if self.errors else [])
+        made._torn, made._lost = set(self._torn), set(self._lost)
+        made.known_missing = set(self.known_missing)
+        return made
+
+    @property
+    def known_before(self) -> tuple[object, ...]:
+        """All on which it depends what a collector that is `apart` finds: equal where it would find the same."""
+        sets = (frozenset(each) for each in (self._torn, self._lost, self.known_missing))
+        return (bool(self.errors), *sets)
+
+    def findings(self) -> DefinitionFindings:
+        """What was found, of a collector that is `apart`."""
+        return DefinitionFindings(
+            tuple(each for each in self._found if each != _BEFORE),
+            tuple(self._remarks),
+            dict(self._lacking),
+            frozenset(self.known_missing),
+            frozenset(self._of_no_run),
+            dict(self._silenced),
+            frozenset(self.needed_allowances),
+            {mistake: tuple(turns) for mistake, turns in self._turns.items()},
+        )
+
+    def take(self, found: DefinitionFindings) -> None:
+        """Take over what was found apart, but for what is known here already."""
+        before = self._allowed
+        for each in (*found.diagnostics, *found.remarks):  # without those that the definition allows
+            self._allowed = None if each in found.of_no_run else {}
+            if each in found.remarks:
+                self._note_remark(each)
+            elif found.lacking.get(each) not in self.known_missing:
+                self.add(each)
+        self._allowed = before
+        for mistake, turns in found.turns.items():
+            self._turns.setdefault(mistake, {}).update(dict.fromkeys(turns))
+        for each, place in found.silenced.items():
+            self._silenced.setdefault(each, place)
+        self.known_missing |= found.missing
+        self.needed_allowances |= found.needed
 
     @property
     def all(self) -> tuple[Diagnostic, ...]:
@@ -202,6 +287,15 @@ class Complaints:
         """An error about what is defined at `of`, which has none of these entries, unless that is known already."""
         if not self.is_known_to_lack(of, *names):
             self.error(code, message, at or of, also=also, help=help)
+
+    def lack(
+        self, of: Place, name: str, code: str, message: str, at: Label | Place, *, also: Iterable[Label], help: str
+    ) -> None:
+        """An error about what is defined at `of`, which has no entry of this name; that is known from now on."""
+        self.known_missing.add((of, name))
+        found = error(code, message, at, also=also, help=help)
+        self._lacking[found] = (of, name)
+        self.add(found)
 
     def warn(
         self,

@@ -42,6 +42,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
+from functools import lru_cache
 
 from met import models, units
 from met.frozen import frozen
@@ -152,9 +153,14 @@ class Channel:
 
 def joint_unit(unit: str, joint: Joint, command: str | None = None) -> str:
     """A declared unit with `joint`, `effort` and `command` put in words: `joint/s` -> `rad/s`, or `m/s`."""
-    replacements = SLIDING if joint.kind == "prismatic" else TURNING
+    return _unit_of(unit, joint.kind == "prismatic", command)
+
+
+@lru_cache(maxsize=4096)
+def _unit_of(unit: str, slides: bool, command: str | None) -> str:
+    replacements = SLIDING if slides else TURNING
     if command is not None:
-        replacements = {**replacements, "command": joint_unit(COMMAND_UNIT[command], joint)}
+        replacements = {**replacements, "command": _unit_of(COMMAND_UNIT[command], slides, None)}
     out, word = "", ""
     for character in unit + " ":
         if character.isalpha() or character == "_":

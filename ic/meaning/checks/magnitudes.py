@@ -231,13 +231,14 @@ def _bodies(scope: Scope, structure: Structure) -> Iterator[WeighedBody]:
     """Links and payloads whose numbers are known."""
     named = [("link", "links", each.name) for each in structure.links]
     named += [("payload", "payloads", each.name) for each in structure.payloads]
+    shapes: dict[str, dict[str, Settled]] = {}
+    for path, settled in scope.auxiliary.items():
+        owner, shape, size = path.partition(".shape.")
+        if shape and settled.unit == "m":
+            shapes.setdefault(owner, {})[size] = settled
     for word, group, name in named:
         head = f"{group}.{name}"
-        sizes = {
-            path.removeprefix(f"{head}.shape."): settled
-            for path, settled in scope.auxiliary.items()
-            if path.startswith(f"{head}.shape.") and settled.unit == "m"
-        }
+        sizes = shapes.get(head, {})
         mass = scope.parameters.get(f"{head}.mass")
         moments = [scope.parameters.get(f"{head}.inertia.{axis}{axis}") for axis in XYZ]
         written = [*sizes.values(), *moments]

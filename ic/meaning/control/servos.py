@@ -104,10 +104,11 @@ def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[l
             if use is not None:
                 uses[use.joint] = use
     moving = [joint.name for joint in arm.moving]
+    failed = [item.name for item in body.items.values() if item.name not in uses]
     lost = frozenset(
         name
-        for item in body.items.values()
-        for name in (item.name, meant(item.name, moving))
+        for item in failed
+        for name in (item, item if item in moving else meant(item, moving))
         if name is not None and name not in uses
     )
     return [uses[joint.name] for joint in arm.joints if joint.name in uses], lost

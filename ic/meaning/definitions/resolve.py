@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from typing import Any
 
 from ic.grammar.syntax import Binary, Call, Deck, Entry, Group, Let, Name, Setting, Word
 from ic.language import DEFINITIONS, EXPERIMENTS, HEADS, OF_A_RUN
@@ -62,6 +63,7 @@ class Definitions:
         self._failed: set[tuple[str, str]] = set()
         self._meant: dict[tuple[str, str], str] = {}  # by kind and name that there is not, the name that was meant
         self._complaints = complaints
+        self.memo: dict[object, Any] = {}  # what later rooms make of arms, servos and lets alone
         self._file = deck.file
         self._texts = {source.name: source.text for source in deck.sources}
         for entry in deck.entries:
@@ -80,8 +82,20 @@ class Definitions:
         other.lets = {**self.lets, **{let.name.text: let for let in lets}}
         other._by_kind = {kind: dict(known) for kind, known in self._by_kind.items()}
         other._merged, other._failed, other._meant = {}, set(), dict(self._meant)
+        if not lets and all(each.kind in EXPERIMENTS for each in changed):  # arms and servos stay as they are
+            other._merged = {key: block for key, block in self._merged.items() if key[0] not in EXPERIMENTS}
+            other._failed = {key for key in self._failed if key[0] not in EXPERIMENTS}
+        else:
+            other.memo = {}
         for each in changed:
             other._by_kind[each.kind][each.name] = each
+        return other
+
+    def reporting_to(self, complaints: Complaints) -> Definitions:
+        """A copy, with what is merged so far, that reports mistakes there."""
+        other = copy(self)
+        other._complaints = complaints
+        other._merged, other._failed, other._meant = dict(self._merged), set(self._failed), dict(self._meant)
         return other
 
     def text_at(self, place: Place) -> str:

@@ -114,6 +114,11 @@ class Checks:
         """The values of all checks that wait, one after the other."""
         return self._tested or Formulas.of(self.graph, [x for check in self._waiting for x in check.values])
 
+    @property
+    def is_clear(self) -> bool:
+        """True where nothing has failed, and no check waits for cases."""
+        return not (self._failed or self._waiting)
+
     def fail(self, path: str) -> None:
         self._failed.add(path)
 

@@ -52,6 +52,16 @@ class Names:
         self.cells: dict[str, tuple[CsvCell, ...]] = {}  # of tables by row name, by the path that asked for them
         self._read: dict[int, tuple[float, Label]] = {}  # the numbers of such cells, by identity
 
+    @property
+    def named(self) -> Collection[str]:
+        """Names whose values were asked for and found, those behind them included."""
+        return self._worth.keys()
+
+    def take_over(self, others: Names) -> None:
+        """Take over what others found, which is the same here."""
+        for name, worth in others._worth.items():
+            self._worth.setdefault(name, worth)
+
     def evaluate(self, expression: Expression) -> Value | ValueList:
         return evaluate(expression, self.find)
 

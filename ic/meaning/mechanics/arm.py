@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import replace
 
 from ic.grammar.syntax import Call, Expression, Name, Unary
@@ -21,7 +22,7 @@ from ic.meaning.parameters.models import check_keys, value_place, word_of
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_relations, no_direction
 from ic.meaning.parameters.scope import Scope
-from ic.text.complaints import known_words, where_it_belongs
+from ic.text.complaints import Complaints, known_words, where_it_belongs
 from met.diagnostic import Label, Place, did_you_mean, leave_out, meant, write
 from met.frozen import frozen
 from met.plan import BASE, Joint, Link
@@ -54,8 +55,62 @@ class ResolvedArm:
         return tuple(joint for joint in self.joints if joint.kind != "fixed")
 
 
+@frozen
+class SharedArm:
+    """An arm in which nothing is wrong, resolved without a sweep: what runs that vary nothing of it have in common.
+
+    entered  the scope with its numbers alone
+    """
+
+    arm: ResolvedArm
+    entered: Scope
+
+
 def resolve_arm(scope: Scope, definition: Definition) -> ResolvedArm | None:
-    """The arm, with its numbers entered as parameters; None where its definition could not be merged."""
+    """The arm, with its numbers entered as parameters; None where its definition could not be merged.
+
+    It is resolved once for all runs of the deck, but for those that set or vary something of it.
+    """
+    shared = _shared(scope, definition)
+    if shared is None or not _is_as_written(scope, shared.entered):
+        return _resolved(scope, definition)
+    entered = shared.entered
+    scope.parameters |= {path: copy(settled) for path, settled in entered.parameters.items()}
+    scope.auxiliary |= {path: copy(settled) for path, settled in entered.auxiliary.items()}
+    for path, parameters in entered.known.items():
+        scope.known.setdefault(path, []).extend(parameters)
+    for path, why in entered.not_sweepable.items():
+        scope.not_sweepable.setdefault(path, why)
+    scope.names.take_over(entered.names)
+    return replace(shared.arm, free_of_errors=not scope.complaints.errors)
+
+
+def _shared(scope: Scope, definition: Definition) -> SharedArm | None:
+    """The arm as all runs have it; None where something of it is wrong, or worth a remark."""
+    if scope.complaints.is_known_to_lack(definition.place):
+        return None
+    memo, key = scope.definitions.memo, ("arm", definition.name)
+    if key not in memo:
+        complaints = Complaints()
+        alone = Scope(scope.definitions.reporting_to(complaints), complaints)
+        arm = _resolved(alone, definition)
+        plain = not (alone.notes or alone.targets or alone.removed or alone.joint_kinds)
+        memo[key] = SharedArm(arm, alone) if arm and plain and complaints.is_clear and alone.checks.is_clear else None
+    found: SharedArm | None = memo[key]
+    return found
+
+
+def _is_as_written(scope: Scope, entered: Scope) -> bool:
+    """True where no sweep and nothing set from outside changes a number of the arm, or what one is made of."""
+    given = {*scope.varied, *scope.settings}
+    named = entered.names.named
+    if not given.isdisjoint(entered.known) or not given.isdisjoint(named):
+        return False
+    return not any("." in name for name in named) and not any(path.partition(".")[0] in named for path in given)
+
+
+def _resolved(scope: Scope, definition: Definition) -> ResolvedArm | None:
+    """The arm resolved in this scope."""
     block = scope.definitions.block(definition)
     if block is None:
         return None

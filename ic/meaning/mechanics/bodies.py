@@ -7,6 +7,7 @@ has it; else every principal moment is above zero.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -30,6 +31,8 @@ def check_body(
         f"inertia is about the centre of mass, in {kind} axes: [xx, yy, zz] or [xx, yy, zz, xy, xz, yz] kg*m^2",
         "products have the sign of -sum(m x y)",
     ]
+    if _is_plainly_a_body(inertia, mass):
+        return
     weightless = isinstance(mass, float) and mass == 0.0
     if weightless:
         helps = [f"leave `inertia` out, or write the {kind}'s mass"]
@@ -48,6 +51,14 @@ def check_body(
         place=place,
         help=tuple(helps),
     )
+
+
+def _is_plainly_a_body(inertia: Sequence[Real], mass: Real | None) -> bool:
+    """True for numbers that no case varies, without products of inertia: their moments are what is written."""
+    if not all(isinstance(each, float) and math.isfinite(each) for each in (*inertia, 1.0 if mass is None else mass)):
+        return False
+    least, middle, most = sorted(float(each) for each in inertia[:3])
+    return mass != 0.0 and not any(inertia[3:]) and least >= 0.0 and most <= least + middle
 
 
 def written_elsewhere(scope: Scope, place: Place) -> bool:

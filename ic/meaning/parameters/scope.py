@@ -405,14 +405,15 @@ class Scope:
         lacks = removed or owner.place
         if any(self.complaints.is_known_to_lack(place, wanted.name) for place in (lacks, *bases)):
             return  # already reported: of another use, or of a base, or another word was taken for it
-        self.complaints.known_missing.add((lacks, wanted.name))
         unit = owner.unit(wanted)[0]
         shown = {"number": "...", "vector": "[...]", "list": "[...]", "word": "WORD"}[wanted.shape]
         shown = shown if unit == "1" or wanted.shape == "word" else f"{shown} {unit}"
         doc = f" ({wanted.doc})" if wanted.doc != wanted.name else ""
         also = [Label(owner.place, f"{owner.label} stands here")] if removed is not None else []
         at = Label(removed, "removed here") if removed is not None else owner.place
-        self.complaints.error(
+        self.complaints.lack(
+            lacks,
+            wanted.name,
             "D075",
             f"{owner.label} has no `{wanted.name}`",
             at,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -148,6 +149,9 @@ class ValueChecks:
             )
             if bound is not None
         ]
+        sound = isinstance(value, float) and math.isfinite(value) and (not wanted.whole or value.is_integer())
+        if sound and all(holds(value, bound) for bound, _, holds in bounds):
+            return
         text = owner.unit(wanted)[0]
         unit = "" if text == "1" else f" {text}"
 

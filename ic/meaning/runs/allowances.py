@@ -64,13 +64,17 @@ def places_of(allowances: Iterable[Allowance]) -> Mapping[str, Place]:
     return {each.code: each.place for each in allowances if each.place is not None}
 
 
-def silence_of_all(experiments: Sequence[Experiment], complaints: Complaints) -> None:
-    """Leave out the warnings that are of no single run, such as of a macro, and that all experiments allow."""
-    if not all(each.allowances for each in experiments):
+def silence_of_all(allowances: Sequence[tuple[Allowance, ...]], complaints: Complaints) -> None:
+    """Leave out the warnings that are of no single run, such as of a macro, and that all experiments allow.
+
+    allowances  of each experiment
+    """
+    if not all(allowances):
         return
+    codes = [{each.code for each in of_one} for of_one in allowances]
     places: dict[str, list[Place]] = {}
-    for allowance in (each for experiment in experiments for each in experiment.allowances):
-        if allowance.place is not None and all(experiment.allows(allowance.code) for experiment in experiments):
+    for allowance in (each for of_one in allowances for each in of_one):
+        if allowance.place is not None and all(allowance.code in of_one for of_one in codes):
             places.setdefault(allowance.code, []).append(allowance.place)
     complaints.silence(places)
 

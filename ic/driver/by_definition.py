@@ -1,0 +1,223 @@
+"""A deck checked definition by definition, for an editor: what each one means, without the audit of programs.
+
+Each arm, each servo, and each run or sweep is checked by itself, so its findings follow from what it can see: its own
+entries, those that it is like or of, arms, servos and `let`s, each with its places. Their digest is the findings' key.
+Who keeps findings under their keys, and brings them along next time, need not have them found again; nothing says
+when they are out of date, since another text has another key.
+
+What takes a program to be built (`DeckSource.audited`) is left to `ic.driver.compile.check`, which decides in the end.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
+
+from ic.grammar.syntax import Deck, Entry, Group
+from ic.language import EXPERIMENTS
+from ic.meaning.checks.degrees import remark_degrees
+from ic.meaning.control.servos import check_servo_definition
+from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.mechanics.arm import check_arm, resolve_arm
+from ic.meaning.parameters.scope import Scope
+from ic.meaning.runs.allowances import silence_of_all
+from ic.read import in_order, read_again
+from ic.sweeps.groups import DeckSource, experiments_of
+from ic.sweeps.settings import check_params
+from ic.text.complaints import Complaints, DefinitionFindings
+from met.diagnostic import Diagnostic
+from met.frozen import frozen
+from met.plan import Allowance
+
+
+@frozen
+class KnownFindings:
+    """What was found of one definition, and the allowances of its experiments."""
+
+    found: DefinitionFindings
+    allowances: tuple[tuple[Allowance, ...], ...] = ()
+
+
+Known = Mapping[bytes, KnownFindings]
+"""Findings by the digest of all that they follow from."""
+
+Check = Callable[[Definitions, Complaints], tuple[tuple[Allowance, ...], ...]]
+
+
+class DefinitionChecks:
+    """The checks of a deck's definitions: those that are known already at once, the others one by one."""
+
+    def __init__(self, deck: Deck, known: Known) -> None:
+        self._deck = deck
+        self._complaints = Complaints(deck.warnings)
+        self._complaints.note_unreadable(deck.unreadable)
+        self._definitions = Definitions(deck, self._complaints)
+        self._check_names()
+        self._units = list(self._all())
+        keys = _Keys(deck, self._definitions, self._complaints)
+        self._keys = [keys.of(definition) for definition, _ in self._units]
+        self._found = {n: known[key] for n, key in enumerate(self._keys) if key is not None and key in known}
+        order = sorted(range(len(self._units)), key=lambda n: self._units[n][0].kind in EXPERIMENTS)
+        self._waiting = [
+            n for n in order if n not in self._found
+        ]  # arms and servos first: runs have their mistakes too
+
+    def check_next(self) -> bool:
+        """Check a definition of which nothing is known; False where there is none left."""
+        if not self._waiting:
+            return False
+        n = self._waiting.pop(0)
+        complaints = self._complaints.apart()
+        allowances: tuple[tuple[Allowance, ...], ...] = ()
+        try:
+            with complaints.gather():
+                allowances = self._units[n][1](self._definitions.reporting_to(complaints), complaints)
+        except RecursionError:
+            complaints.error(
+                "D078", "this deck's values are nested too deeply", help="build them up in steps, with `let`"
+            )
+        self._found[n] = KnownFindings(complaints.findings(), allowances)
+        return True
+
+    @property
+    def findings(self) -> Known:
+        """What is to be brought along next time. Nothing where files are looked for whose texts no key has."""
+        if self._definitions.csv_files.asked or self._definitions.robot_files.asked:
+            return {}
+        return {key: self._found[n] for n, key in enumerate(self._keys) if key is not None and n in self._found}
+
+    def diagnostics(self) -> tuple[tuple[Diagnostic, ...], Mapping[str, str]]:
+        """All that is found so far, in the order of the text, and every file's text by name."""
+        complaints = self._complaints.copied()
+        found = [self._found[n] for n in range(len(self._units)) if n in self._found]
+        for each in found:
+            complaints.take(each.found)
+        if not complaints.errors and not self._waiting:
+            complaints.admit_remarks()
+            silence_of_all([one for each in found for one in each.allowances], complaints)
+        files = self._definitions
+        sources = (*self._deck.sources, *files.csv_files.sources, *files.robot_files.sources)
+        return in_order(complaints.all, sources), {source.name: source.text for source in sources}
+
+    def _check_names(self) -> None:
+        """Check what is no definition's own: `let`s, `param`s, and how definitions are merged."""
+        complaints, definitions = self._complaints, self._definitions
+        try:
+            with complaints.gather():
+                check_params(definitions, complaints)
+                lets = Scope(definitions, complaints).names.check_lets()
+                complaints.add(*(each for problem in lets for each in problem.diagnostics))
+                remark_degrees(self._deck, definitions, complaints)
+                for kind in ("arm", "servo", "run"):
+                    for definition in definitions.of_kind(kind).values():
+                        definitions.block(definition)
+        except RecursionError:
+            complaints.error(
+                "D078", "this deck's values are nested too deeply", help="build them up in steps, with `let`"
+            )
+
+    def _all(self) -> Iterator[tuple[Definition, Check]]:
+        """Every definition that is checked, with its check, in the order in which `met check` has them."""
+        definitions = self._definitions
+        for kind in EXPERIMENTS:
+            for definition in definitions.of_kind(kind).values():
+                yield definition, partial(self._experiment, definition)
+        blocks = (definitions.block(run) for run in definitions.of_kind("run").values())
+        loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
+        for definition in definitions.of_kind("arm").values():
+            yield definition, partial(_arm, definition, resolve_arm if loaded else check_arm)
+        for definition in definitions.of_kind("servo").values():
+            yield definition, partial(_servo, definition)
+
+    def _experiment(
+        self, definition: Definition, definitions: Definitions, complaints: Complaints
+    ) -> tuple[tuple[Allowance, ...], ...]:
+        source = DeckSource(definitions, complaints, partial(read_again, self._deck), audited=False)
+        return tuple(made.allowances for made, _ in experiments_of(source, definition))
+
+
+def _arm(
+    definition: Definition,
+    check: Callable[[Scope, Definition], object],
+    definitions: Definitions,
+    complaints: Complaints,
+) -> tuple[()]:
+    check(Scope(definitions, complaints), definition)
+    return ()
+
+
+def _servo(definition: Definition, definitions: Definitions, complaints: Complaints) -> tuple[()]:
+    check_servo_definition(Scope(definitions, complaints), definition.name)
+    return ()
+
+
+# Keys
+
+
+class _Keys:
+    """Digests of all that a definition's findings follow from."""
+
+    def __init__(self, deck: Deck, definitions: Definitions, complaints: Complaints) -> None:
+        self._known = {name: each for kind in EXPERIMENTS for name, each in definitions.of_kind(kind).items()}
+        self._of_kind = {kind: definitions.of_kind(kind) for kind in ("run", "arm", "servo")}
+        everything = [each for kind in (*EXPERIMENTS, "arm", "servo") for each in definitions.of_kind(kind).values()]
+        self._own = {id(each): pickle.dumps((each.group, each.default, each.parts)) for each in everything}
+        names = [(each.kind, each.name, each.default, each.place) for each in everything]
+        lets = list(definitions.lets.values())
+        blocks = [definitions.block(run) for run in definitions.of_kind("run").values()]
+        loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
+        before, *sets = complaints.known_before
+        told = [before, *(sorted(map(repr, each)) for each in sets)]  # type: ignore[call-overload]
+        shared = (deck.file, deck.defines, names, lets, told, loaded)
+        arms, servos = (
+            {name: self._own[id(each)] for name, each in definitions.of_kind(kind).items()} for kind in ("arm", "servo")
+        )
+        told_of, values = pickle.dumps(shared), [pickle.dumps(lets), *arms.values()]
+        named = [body for name, body in servos.items() if any(name.encode() in each for each in values)]
+        self._shared = {
+            "arm": _digest([told_of, *arms.values(), *named]),
+            "servo": _digest([told_of, *servos.values()]),
+            "run": _digest([told_of, *arms.values(), *servos.values()]),
+        }
+
+    def of(self, definition: Definition) -> bytes | None:
+        """The digest; None where it is not known what all it follows from."""
+        seen: dict[int, bytes] = {}
+        waiting = [definition]
+        while waiting:
+            each = waiting.pop()
+            body = self._own[id(each)]
+            if id(each) in seen:
+                continue
+            if _chooses_macros(each.group.body):
+                return None
+            seen[id(each)] = body
+            like, of = each.group.like, each.group.of
+            kind = "run" if each.kind in EXPERIMENTS else each.kind
+            for name, among in (
+                *((name, self._of_kind[kind]) for name in (like, of)),
+                *((p, self._known) for p in each.parts),
+            ):
+                if name is not None and name.text not in among:
+                    return None
+                waiting += [among[name.text]] if name is not None else []
+        shared = self._shared.get(definition.kind, self._shared["run"])
+        return _digest([definition.kind.encode(), definition.name.encode(), shared, *seen.values()])
+
+
+def _chooses_macros(entries: Iterable[Entry]) -> bool:
+    """True for a sweep over macros, which reads the deck again: of the text that is left out then nothing is known."""
+    return any(
+        any(word.text == "macro" for word in getattr(each, "words", ()))
+        or (isinstance(each, Group) and _chooses_macros(each.body))
+        for each in entries
+    )
+
+
+def _digest(parts: Iterable[bytes]) -> bytes:
+    made = hashlib.sha256()
+    for part in parts:
+        made.update(len(part).to_bytes(8, "big") + part)
+    return made.digest()
