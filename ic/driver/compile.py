@@ -15,6 +15,7 @@ from ic.language import EXPERIMENTS
 from ic.meaning.checks.degrees import remark_degrees
 from ic.meaning.control.servos import check_servo_definition
 from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.definitions.row_tables import is_row_table
 from ic.meaning.mechanics.arm import check_arm, resolve_arm
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import allowed_warnings, silence_of_all, warn_of_unneeded
@@ -148,6 +149,8 @@ def compile_deck(
     if not complaints.errors:
         complaints.admit_remarks()
         silence_of_all([each.allowances for each in experiments], complaints)
+        if select == "all":
+            _remark_unused_rows(definitions, scopes, complaints)
         if not settings and not defines:  # which make another deck of it
             warn_of_unneeded(definitions, asked, experiments, complaints)
     else:
@@ -160,6 +163,15 @@ def compile_deck(
         tuple(scopes),
         allowed_warnings(experiments, complaints),
     )
+
+
+def _remark_unused_rows(definitions: Definitions, scopes: Iterable[Scope], complaints: Complaints) -> None:
+    """Warn of rows of tables that no run uses, of tables of which the deck says that all are to be used."""
+    used = {path for scope in scopes for path in scope.names.cells}
+    for name, let in definitions.lets.items():
+        found = definitions.row_table(let.value).unused(name, used) if is_row_table(let.value) else None
+        if found is not None:
+            complaints.add(found)
 
 
 def _with_settings(deck: Deck, settings: Sequence[str], complaints: Complaints) -> tuple[Deck, tuple[Setting, ...]]:

@@ -12,16 +12,17 @@ and so are `inertia.xx` to `inertia.yz`, in the order that `inertia` of a link h
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Final, TypeGuard
 
 from ic.grammar.syntax import Call, Expression, Name, String, Word
 from ic.meaning.definitions.csv_files import CsvCell, CsvColumn, CsvTable, missing_column
 from ic.text.complaints import known_words
-from met.diagnostic import Label, Problem, did_you_mean, error
+from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 
 CSV: Final = "csv"
+ALL: Final = "all"
 USAGE: Final = 'write `let NAME = csv("FILE.csv");`'
 VECTORS: Final = (("x", "y", "z"), ("xx", "yy", "zz", "xy", "xz", "yz"), ("xx", "yy", "zz"))
 """Last words of the columns that are a vector together, in its order."""
@@ -36,10 +37,28 @@ def is_row_table(value: Expression) -> TypeGuard[Call]:
 
 @frozen
 class RowTable:
-    """A file whose rows have names: the number of each row by its name."""
+    """A file whose rows have names: the number of each row by its name.
+
+    all_used  the place of `rows = all`, by which a deck asks to be told of rows that nothing uses; None without it
+    """
 
     csv: CsvTable
     rows: Mapping[str, int]
+    all_used: Place | None = None
+
+    def unused(self, let: str, used: Iterable[str]) -> Diagnostic | None:
+        """The warning of rows that none of these paths names, where the deck asks for it. let: the table's name."""
+        if self.all_used is None:
+            return None
+        named = {path.split(".")[1] for path in used if path.startswith(f"{let}.")}
+        others = [name for name in self.rows if name not in named]
+        if not others:
+            return None
+        place = self.csv.cell(self.csv.columns[0], self.rows[others[0]]).place
+        message = f"nothing uses row `{others[0]}`" + (f", and {len(others) - 1} more" if len(others) > 1 else "")
+        helps = [*([known_words("not used", others)] if len(others) > 1 else []), "leave `rows = all` out, or use them"]
+        also = (Label(self.all_used, "all are to be used"),)
+        return Diagnostic("D385", message, Label(place), also, tuple(helps), severity="warning")
 
     def cells(self, name: Name) -> tuple[CsvCell, ...]:
         """What a path means, `bodies.boom.mass`: one cell, or those of a vector. Raises Problem, placed."""
@@ -86,7 +105,9 @@ class RowTable:
 
 def row_table(call: Call, get: Callable[[String], CsvTable]) -> RowTable:
     """The table that `csv("FILE.csv")` names. get: of the files. Raises Problem, placed."""
-    if len(call.positional) != 1 or not isinstance(call.positional[0], String) or call.named or call.body is not None:
+    every = next((word.place for word, value in call.named if (word.text, _word(value)) == ("rows", ALL)), None)
+    alone = len(call.positional) == 1 and call.body is None and len(call.named) == (every is not None)
+    if not alone or not isinstance(call.positional[0], String):
         raise Problem(error("D381", "a table by row name is made of the name of a file", call.place, help=USAGE))
     named = call.positional[0]
     table = get(named)
@@ -109,4 +130,8 @@ def row_table(call: Call, get: Callable[[String], CsvTable]) -> RowTable:
     for column in table.columns[1:]:
         if column.unit is not None:
             table.check_numbers(column)
-    return RowTable(table, rows)
+    return RowTable(table, rows, every)
+
+
+def _word(value: Expression) -> str:
+    return value.text if isinstance(value, Name) else ""

@@ -32,11 +32,20 @@ STRANGE = (
     '#include "deck.ic"\n', "#include <two_link.ic>\n", "#include <servos/rigid_gearbox.ic>\n", "\n#undef X\n",
     "param size = 1 m;\n", "with links.bar.mass = 2 kg;", "with size = [1, 2];",
     "for i in 0 .. 2 {", "for side in [left, right] {", "by -1", "_{i}", "{i}", "{side}_x", "[i]", "[a, b] = ", "* = ",
+    'let rows = csv("rows.csv");\n', "rows.bar.mass", "rows.{side}.com", "rows.bar.inertia", 'csv("rows.csv")', "csv(",
+    "initial { q = command; qd = command; }", "= command;", "rate(pulse(to = 1 rad/s, slope = 2 rad/s^2, over = 3 s))",
+    "_{ i }", "{ i - 1 }_", 'with rows = csv("x.csv");',
     "#define X ", "floor(", "round(1.5)", "sign(", ".x", "* [1, 2, 3] m", "-[1, 2, 3]", "/ 2",
     "#define FN(a, ...) a __VA_ARGS__\n", "FN(", "#pragma once\n", "__LINE__", "__FILE__", "__DATE__", '"x.csv"',
     '"../deck.ic"', "\u00b5", "\u00a0", "\u202e", "\x00", "\x1b", "\ufeff", "\U0001f600",
 )  # fmt: skip
 
+
+ROWS = (
+    b"link,mass [kg],com.x [m],com.y [m],com.z [m],inertia.xx [kg*m^2],inertia.yy [kg*m^2],inertia.zz [kg*m^2],by\n"
+    b"bar,2,0.5,0,0,0.1,0.2,0.2,scale\nleft,,1,0,0,0.1,0.2,0.2,-\nseg_1,1e308,1,0,0,0.1,0.2,0.2,7\n"
+)
+"""A table by row name, with an empty cell, remarks, and a mass that is very large."""
 
 _HEAD = re.compile(r"(?<![\w.])([a-z]+)\b[^;{}()=\"#\n]*\{")
 _ENTRY = re.compile(r"(?<![\w.])([a-z]+)\b[^;{}#\"]*;")
@@ -141,7 +150,7 @@ def words() -> tuple[str, ...]:
 @cache
 def companions() -> tuple[tuple[str, bytes], ...]:
     """Small files that decks name: those of the tests and the documentation, and a table."""
-    found = [("x.csv", b"time [s],value [rad/s]\n0,0\n1,0.5\n2,0.25\n"), ("y.csv", b"a,b\n1,2\n")]
+    found = [("x.csv", b"time [s],value [rad/s]\n0,0\n1,0.5\n2,0.25\n"), ("y.csv", b"a,b\n1,2\n"), ("rows.csv", ROWS)]
     for pattern in COMPANIONS:
         for path in sorted(ROOT.glob(f"[!.]*/**/{pattern}")):
             if path.stat().st_size < 100_000:

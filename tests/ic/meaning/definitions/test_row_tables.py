@@ -344,6 +344,28 @@ def test_every_mistake_in_a_file_is_told_at_its_row_and_column_once(tmp_path: Pa
     assert messages(check(tmp_path, deck)) == whole + "\n1 error\n"
 
 
+def test_rows_that_nothing_uses_are_told_where_a_deck_asks_for_that(folder: Path) -> None:
+    asking = TABLES.replace('csv("bodies.csv")', 'csv("bodies.csv", rows = all)')
+    assert messages(check(folder, TABLES, ARM, RUN, select="all")) == ""
+    assert messages(check(folder, asking, ARM, RUN, select=["fall"])) == ""
+    assert (
+        messages(check(folder, asking, ARM, RUN, select="all"))
+        == """\
+warning[D385]: nothing uses row `spare`
+ --> bodies.csv:5:1
+  |
+5 | spare, ,          0.3,       0,         0.02,      9,                  400,                400,                -
+  | ^^^^^
+ ::: deck.ic:1:32  all are to be used
+  = help: leave `rows = all` out, or use them
+
+1 warning
+"""
+    )
+    used = "run more like fall { with links.boom.mass = bodies.spare.com.x * (1 kg / (1 m)); }\n"
+    assert messages(check(folder, asking, ARM, RUN, used, select="all")) == ""
+
+
 def test_a_number_out_of_range_is_told_at_its_use_and_at_its_cell(folder: Path) -> None:
     (folder / "bodies.csv").write_text(BODIES.replace("7.1", "-7"), encoding="utf-8")
     found = messages(check(folder, TABLES, ARM, RUN))
