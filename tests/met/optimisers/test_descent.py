@@ -79,7 +79,7 @@ def test_the_least_of_a_largest_is_that_of_another_solver(dimension: int, count:
         return pieces((away**2).sum(axis=1) + 0.1, 2.0 * scales * away)
 
     of, asked = descended(farthest, draws.random(dimension))
-    other = minimize(
+    other = minimize(  # type: ignore[call-overload]  # its stubs know no plain dicts
         lambda z: z[-1], np.append(of.point, of.worth + 0.1), method="SLSQP",
         constraints={"type": "ineq", "fun": lambda z: z[-1] - farthest(z[:-1]).pieces},
         bounds=[(0, 1)] * dimension + [(None, None)], options={"ftol": 1e-13, "maxiter": 500},
