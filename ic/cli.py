@@ -180,6 +180,9 @@ def plan(
     from met.plan import file as plan_file
 
     check_options(deck, names, everything, defines, include_dirs, settings)
+    if output is not None and not output.endswith(".json"):
+        helps = "`met run` knows a plan by its ending, and takes any other file for a deck"
+        raise Problem(error("E300", f"cannot write {output}: a plan's name ends in .json", help=helps))
     made = _plan(deck, include_dirs, defines, settings, names, everything, quiet)
     if not made.experiments:
         raise Problem(error("D161", "this deck has no run", help="write `run NAME { ... }`"))

@@ -6,6 +6,8 @@
     search_against     the sweep that a tuning is held against;  search_plants: how many cases that has;
                        search_drawn_with: the seed of what it draws
     search_margin      share of its limit by which a tuning would stay inside each requirement
+    search_along_slopes    of a tuning that goes by slopes: how many of its cases were tried along them
+    search_without_slopes  of such a one: why its metrics had none where they had none last; empty where they had
 
 A coordinate that is chosen has its ends in SI, `low` and `high`, and `steps`, `equal` or `ratios`. The variable
 `generation` says which generation, from 0, asked for each case.
@@ -25,7 +27,7 @@ from met.plan.searches import MOST_PLANTS, MOST_SEARCHED, SHORTEST, Search, Sear
 GENERATION = "generation"
 """The variable that says which generation asked for each case."""
 
-WORDS = ("search", "search_of", "search_goal", "search_against")
+WORDS = ("search", "search_of", "search_goal", "search_against", "search_without_slopes")
 GOALS = {"maximise": True, "minimise": False}
 STEPS = {"equal": False, "ratios": True}
 
@@ -41,6 +43,8 @@ def attributes(search: Search, metric: str) -> dict[str, Any]:
     }
     if search.kind == "tune":
         told["search_margin"] = search.margin
+        if search.gradients:
+            told |= {"search_along_slopes": search.along_slopes, "search_without_slopes": search.without_slopes}
     if search.against:
         told |= {
             "search_against": search.against,
@@ -74,10 +78,13 @@ def why_unsound(group: StoredGroup) -> str:
         ("search_plants", 1, MOST_PLANTS),
         ("search_seed", 0, 1 << 53),
         ("search_drawn_with", 0, 1 << 53),
+        ("search_along_slopes", 0, MOST_SEARCHED),
     ):
         value = told.get(name, 1 if name != "search_at_most" else None)
         if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
             return f"attribute `{name}` is no number of it"
+    if ("search_along_slopes" in told) != ("search_without_slopes" in told):
+        return "attribute `search_along_slopes` is missing, or its other half"
     margin = told.get("search_margin", 0.0)
     if not isinstance(margin, float) or not 0.0 <= margin < 1.0:
         return "attribute `search_margin` is no share"
@@ -101,7 +108,7 @@ def _why_not_against(told: Mapping[str, Any], *, more: int) -> str:
     against, plants, tunes = told.get("search_against", ""), told.get("search_plants", 0), told["search"] == "tune"
     if not bool(against) == bool(plants) == (more > 0):
         return "attribute `search_plants` is not of its coordinates"
-    if not tunes and (plants or told.get("search_margin", 0.0)):
+    if not tunes and (plants or told.get("search_margin", 0.0) or "search_along_slopes" in told):
         return "a tuning alone is held against something"
     least = max(plants + SHORTEST if tunes else 1, told["cases_in_table"])
     return "" if told["search_at_most"] >= least else "attribute `search_at_most` is less than its cases"
@@ -170,4 +177,7 @@ def search_of(group: StoredGroup) -> Search | None:
         plants=((),) * int(told.get("search_plants", 0)),
         drawn_with=told.get("search_drawn_with", 0),
         margin=told.get("search_margin", 0.0),
+        gradients="search_along_slopes" in told,
+        along_slopes=told.get("search_along_slopes", 0),
+        without_slopes=told.get("search_without_slopes", ""),
     )

@@ -279,7 +279,7 @@ def _searches(before: Search, now: Search) -> Iterator[str]:
         yield f"against: {before.against or 'nothing'} -> {now.against or 'nothing'}"
     elif before.plants != now.plants:
         yield f"against: other cases of {now.against}"
-    for name in ("at_most", "seed", "margin"):
+    for name in ("at_most", "seed", "margin", "gradients"):
         if getattr(before, name) != getattr(now, name):
             yield f"{name}: {getattr(before, name)} -> {getattr(now, name)}"
 

@@ -15,6 +15,7 @@ from batch.campaigns import shard
 from batch.campaigns.drive import Count, Driver, Stopped
 from batch.campaigns.folder import uncovered
 from batch.campaigns.points import grown, write_points
+from batch.campaigns.slopes import TuningSlopes
 from batch.campaigns.tasks import CampaignSection, Task
 from batch.queries.search_answers import progress
 from met import run as engine
@@ -22,7 +23,7 @@ from met.diagnostic import Problem, error
 from met.plan import Experiment
 from met.plan.searches import Search
 from met.run import DONE, Run
-from met.searches import search_method
+from met.searches import search_method, steps_of
 from met.searches.answer import Answer, answer
 from met.searches.values import hurt, served
 
@@ -57,7 +58,7 @@ class CampaignSearch:
         self._requirements = experiment.requirements
         self._metrics: dict[str, list[np.ndarray]] = {}
         self._done: list[np.ndarray] = []
-        self._method = search_method(self.search)
+        self._method = search_method(self.search, TuningSlopes(experiment) if self.search.gradients else None)
         self._table = np.empty((0, len(experiment.cases.coordinates)))
         self._generations: list[int] = []
 
@@ -106,7 +107,7 @@ class CampaignSearch:
 
     def _complete(self) -> None:
         prepared = self.section.prepared
-        search = replace(self.search, generations=tuple(self._generations))
+        search = replace(self.search, generations=tuple(self._generations), **steps_of(self._method))
         experiment = replace(prepared.experiment, search=search)
         self.section = replace(self.section, prepared=prepared.of_cases(experiment))
 

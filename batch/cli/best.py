@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     "--by",
     multiple=True,
     metavar="METRIC",
-    help="The least METRIC, or expression of metrics, in the worst case; METRIC:largest. Repeated: then by the next. "
+    help="The least METRIC, or expression of metrics, in the worst case; METRIC:largest, as is meant of a margin; "
+    "METRIC:smallest. Repeated: then by the next. "
     "Without it: farthest from the border of what meets all requirements.",
 )
 @click.option("--front", multiple=True, metavar="METRIC", help="Also the trade-off of two such: name each.")

@@ -193,12 +193,14 @@ class Designs:
         return out
 
     def goal(self, text: str) -> Goal:
-        """The goal that `METRIC`, `EXPRESSION` or `METRIC:largest` asks for. Raises Problem."""
+        """The goal that `METRIC`, `EXPRESSION` or `METRIC:largest` asks for: of a margin the largest, of what else the
+        least, where the text does not say. Raises Problem."""
         name, colon, way = text.rpartition(":")
-        largest = bool(colon) and way.strip() == "largest"
-        if not colon or way.strip() not in ("largest", "smallest"):
+        expressions, said = CaseExpressions(self.pool), bool(colon) and way.strip() in ("largest", "smallest")
+        if not said:
             name = text
-        values, dimension = CaseExpressions(self.pool).values(name)
+        largest = way.strip() == "largest" if said else expressions.is_margin(name)
+        values, dimension = expressions.values(name)
         return Goal(name.strip(), largest, values, dimension)
 
     # The border

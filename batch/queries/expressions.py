@@ -20,7 +20,9 @@ from ic.meaning.expressions.quantity import Value
 from ic.meaning.expressions.truths import Truths
 from ic.text.complaints import known_words
 from ic.text.lexer import COMMAND_LINE
+from met import models
 from met.diagnostic import Problem, did_you_mean, error
+from met.plan.linear_uses import FIGURES
 from met.trace import Formulas, Graph
 from met.unit_parser import parse_unit
 from met.units import Dimension
@@ -60,6 +62,13 @@ class CaseExpressions:
             found = evaluate_number(read_expression(expression), self._find)
         [numbers] = Formulas.of(self._graph, [found.number]).replay(self._columns)
         return np.array(np.broadcast_to(np.asarray(numbers, float), self.pool.count)), found.dimension
+
+    def is_margin(self, expression: str) -> bool:
+        """True for the name of a metric that is a margin, of which more is better, as its model declares it."""
+        named = [each for each in self.pool.variables("metric") if each.path == expression.strip()]
+        model = str(named[0].attributes.get("model", "")) if named else ""
+        figure, metric = FIGURES.get(model), models.available("metric").get(model)
+        return figure.margin if figure is not None else metric is not None and metric.margin
 
     def _find(self, name: Name) -> Value:
         variable = self._variables.get(name.text)

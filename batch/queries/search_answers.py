@@ -134,7 +134,7 @@ class SearchAnswer:
     def lines(self) -> list[str]:
         """The answer in lines, without the commands that follow from it."""
         found, search = self.found, self.search
-        out = self._tuned() if search.kind == "tune" else self._worst()
+        out = [*self._tuned(), *self._by_slopes()] if search.kind == "tune" else self._worst()
         if found.missed:
             out.append(f"  misses {', '.join(found.missed)}")
         elif found.rooms and not found.failed:
@@ -142,6 +142,16 @@ class SearchAnswer:
         beyond = "worse" if search.kind == "search" else "better"
         out += [f"  {path} is at the {end} end of its range: beyond it may be {beyond}" for path, end in found.ends]
         return out + (self._border() if found.serves and search.kind == "tune" else [])
+
+    def _by_slopes(self) -> list[str]:
+        """How far a tuning went along exact slopes, and why no further, in lines."""
+        search = self.search
+        count, why_not = search.along_slopes, search.without_slopes
+        out = [f"  {count:,} of them along exact slopes of the metrics"] if count else []
+        if why_not and search.gradients:
+            out += textwrap.wrap(f"no slopes {'at some candidates' if count else 'to go by'}: {why_not}", WIDTH,
+                                 initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)  # fmt: skip
+        return out
 
     def _border(self) -> list[str]:
         """The nearest candidate that was tried and does not serve, in lines."""
@@ -221,6 +231,8 @@ class SearchAnswer:
             "missed": list(found.missed),
             "nearest": [{"requirement": room.text, "inside": room.share} for room in found.rooms],
             "at_ends": [{"path": path, "end": end} for path, end in found.ends],
+            "along_slopes": self.search.along_slopes if self.search.gradients else None,
+            "without_slopes": self.search.without_slopes or None,
             "nearest_miss": None
             if (miss := found.miss) is None
             else {

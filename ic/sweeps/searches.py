@@ -21,6 +21,7 @@ from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, measure_of
+from ic.meaning.parameters.models import word_of
 from ic.meaning.runs.allowances import ALLOW
 from ic.sweeps.axes import Sweep, SweepAxis, read_sweep, varied_path, whole_number
 from ic.sweeps.choices import check_constant, decides_structure, path_place
@@ -38,7 +39,8 @@ from met.trace import Graph, Scalar
 RANGES = {"between": False, "logbetween": True}
 """How ends are written, and whether equal ratios between them are equal steps."""
 
-CHOOSE, AGAINST = "choose", "against"
+CHOOSE, AGAINST, GRADIENTS = "choose", "against", "gradients"
+SWITCHED = {"on": True, "off": False}
 GOALS = {"maximise": True, "minimise": False}
 MOST_CORNERS = 8
 """Parameters of which all ends are looked at together, each with each; of more, one after the other."""
@@ -100,6 +102,7 @@ def read_search(
         plants=plants,
         drawn_with=0 if against is None else noise_seed if against.seed is None else against.seed,
         margin=reader.margin,
+        gradients=reader.gradients,
         place=reader.goal_place,
     )
     least = len(plants) + SHORTEST
@@ -139,6 +142,7 @@ class _SearchReader:
         self.at_most = self.seed = 0
         self.margin = float(MARGIN.default) if self.tunes and isinstance(MARGIN.default, float) else 0.0
         self.against: Name | None = None
+        self.gradients = self.tunes
         self.goal_place = self.at_most_place = definition.place
         self._written: dict[str, Place] = {}
         entries = [entry for entry in definition.group.body if isinstance(entry, Setting)]
@@ -155,6 +159,13 @@ class _SearchReader:
         match entry:
             case Setting() if not words and _path(entry) in ("at_most", "seed", *(["margin"] * self.tunes)):
                 self._number(entry, _path(entry))
+            case Setting() if not words and _path(entry) == GRADIENTS and self.tunes:
+                self._once(GRADIENTS, path_place(entry))
+                word = word_of(entry.value)
+                if word not in SWITCHED:
+                    message = "a tuning's `gradients` are `on` or `off`"
+                    raise Problem(error("D363", message, place_of(entry.value), help=f"write `{GRADIENTS} = off;`"))
+                self.gradients = SWITCHED[word]
             case Setting() if words == [CHOOSE] * self.tunes:
                 self._choose(entry)
             case Statement() if words in ([each] for each in GOALS):

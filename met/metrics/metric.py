@@ -66,3 +66,8 @@ class Metric:
     memory: tuple[Memory, ...]
     update: Callable[[Any, Any, Real, Real, Real], Mapping[str, Real]]
     result: Callable[[Any, Any, Real], Real]
+
+    @property
+    def margin(self) -> bool:
+        """True if it is the margin of a condition, of which more is better."""
+        return self.condition and not self.share

@@ -23,6 +23,11 @@ def check_search(experiment: Experiment, search: Search, where: str) -> None:
     check_whole(search.drawn_with, 0, MOST_SEED, f"{where}.drawn_with")
     if not 0.0 <= search.margin < 1.0:
         raise Damaged(f"{where}.margin", "it should be at least 0 and below 1")
+    check_whole(search.along_slopes, 0, search.at_most, f"{where}.along_slopes")
+    if search.gradients and search.kind != "tune":
+        raise Damaged(f"{where}.gradients", "a tuning alone goes by slopes")
+    if (search.along_slopes or search.without_slopes) and not (search.gradients and search.complete):
+        raise Damaged(f"{where}.along_slopes", "a tuning alone that has run by slopes says so")
     _check_parameters(experiment, search, f"{where}.parameters")
     _check_plants(experiment, search, f"{where}.plants")
     if search.complete:

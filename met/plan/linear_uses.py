@@ -50,6 +50,7 @@ class LinearFigure:
     of_loops  whether it is of opened loops: the least of all of them
     one_rate  whether a loop has it whose law ticks once in a period alone
     unstable  its value where the loop is unstable as it is
+    margin    whether more of it is better
     """
 
     name: str
@@ -59,6 +60,7 @@ class LinearFigure:
     of_loops: bool = True
     one_rate: bool = True
     unstable: float = 0.0
+    margin: bool = True
 
 
 FIGURES: Mapping[str, LinearFigure] = {
@@ -75,7 +77,7 @@ FIGURES: Mapping[str, LinearFigure] = {
         LinearFigure("damping", "1", "the least damping of all poles that do not stay; below 0 of one that grows",
                      least=-1.0, of_loops=False, one_rate=False),
         LinearFigure("decay_time", "s", "time in which the slowest mode decays by e; infinite where one grows",
-                     least=0.0, of_loops=False, one_rate=False),
+                     least=0.0, of_loops=False, one_rate=False, margin=False),
     )
 }  # fmt: skip
 """Figures of linear answers, by name."""

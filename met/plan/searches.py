@@ -58,7 +58,10 @@ class Search:
                  it draws
     margin       share of its limit by which a tuning would stay inside each requirement, and of its goal what it would
                  pay for that
+    gradients    whether a tuning takes steps along slopes of its metrics, where they have any
     generations  numbers of cases that each generation added to the case table; none before it has run
+    along_slopes  how many of its cases were tried along slopes, and `without_slopes`: why there were none where there
+                 were none last, in words, empty where there were; as found when it has run
     """
 
     kind: Literal["search", "tune"]
@@ -73,6 +76,9 @@ class Search:
     drawn_with: int = 0
     margin: float = 0.0
     generations: tuple[int, ...] = ()
+    gradients: bool = False
+    along_slopes: int = 0
+    without_slopes: str = ""
     place: Place | None = None
 
     @property

@@ -3,17 +3,19 @@
 values   what a case is worth to a search
 hardest  a search for the case that hurts most
 robust   a tuning against plants, by turns
+slopes   metrics' slopes, and what is to be small by them;  slope_steps: a tuning's steps along them
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from met.plan.searches import Search
 from met.searches.hardest import HardestCase
 from met.searches.robust import RobustTuning
+from met.searches.slopes import SlopeSource
 
 
 class SearchMethod(Protocol):
@@ -27,9 +29,18 @@ class SearchMethod(Protocol):
         """Take what these cases are worth (met/searches/values.py), [case]."""
 
 
-def search_method(search: Search) -> SearchMethod:
-    """The method of a search, at its beginning."""
-    return RobustTuning(search) if search.kind == "tune" else HardestCase(search)
+def search_method(search: Search, source: SlopeSource | None = None) -> SearchMethod:
+    """The method of a search, at its beginning. source: of slopes for a tuning that goes by them; None: for its first
+    generation alone, or of a search."""
+    if search.kind != "tune":
+        return HardestCase(search)
+    return RobustTuning(search, source if search.gradients else None)
 
 
-__all__ = ["SearchMethod", "search_method"]
+def steps_of(method: SearchMethod) -> dict[str, Any]:
+    """The fields of a `Search` that say which of its cases were tried along slopes; none of one that goes by none."""
+    steps = method.steps if isinstance(method, RobustTuning) else None
+    return {} if steps is None else {"along_slopes": steps.cases, "without_slopes": steps.why_not}
+
+
+__all__ = ["SearchMethod", "search_method", "steps_of"]

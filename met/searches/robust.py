@@ -1,5 +1,6 @@
 """A tuning against plants, by turns: tune against those that are active, try the best against all, add the worst.
 
+Where metrics have slopes, a turn goes on from its best along these: CMA-ES finds the valley, and a few steps its floor.
 So an inner loop of a few plants decides for many (P. Apkarian, M. N. Dao, D. Noll, Parametric robust structured control
 design, IEEE Trans. Automatic Control 60 (2015) 1857). A candidate is worth what it is in the worst of its plants.
 """
@@ -10,10 +11,16 @@ import numpy as np
 
 from met import optimisers
 from met.plan.searches import SHORTEST, Search
+from met.searches.slope_steps import SlopeSteps
+from met.searches.slopes import SlopeSource
 from met.searches.values import MET
 
 SHARE = 4
 """A turn takes one in so many of the cases that are left, while plants may become active."""
+
+EARLIER = 8
+"""With slopes a turn of CMA-ES takes one in so many: it need not come to the floor of a valley. After steps that ended
+elsewhere than on a floor it takes one in `SHARE`: they may be in the wrong valley."""
 
 GAIN = 1e-3
 """A turn that improves the goal by less than this share of it brings next to nothing."""
@@ -31,12 +38,16 @@ Candidate = bytes
 class RobustTuning:
     """See `SearchMethod`. Without plants the candidates themselves are the cases.
 
-    A turn ends when the optimiser does, or when its share of the cases that are left is spent. The tuning ends when no
+    source  of slopes; None: there are none
+
+    A turn ends when the optimiser does, or when its share of the cases that are left is spent, and then the steps along
+    slopes have ended. A plant that becomes active where these have settled takes steps alone. The tuning ends when no
     plant is worse than the worst active one and two turns brought next to nothing, or when no further turn has room.
     """
 
-    def __init__(self, search: Search) -> None:
+    def __init__(self, search: Search, source: SlopeSource | None = None) -> None:
         self._search, self._plants = search, search.plants or ((),)
+        self.steps = None if source is None else SlopeSteps(search, source)
         self._left = search.at_most
         self._points: dict[Candidate, np.ndarray] = {}
         self._known: dict[Candidate, dict[int, float]] = {}
@@ -47,7 +58,7 @@ class RobustTuning:
         self._may_ask = 0
         self._borne: float | None = None
         self._idle = 0
-        self._begin(None)
+        self._begin_turn(None)
 
     def ask(self) -> np.ndarray:
         """See `SearchMethod`."""
@@ -66,14 +77,19 @@ class RobustTuning:
             self._known[candidate][plant] = value
         self._go_on()
 
-    def _begin(self, start: np.ndarray | None) -> None:
+    def _begin_turn(self, start: np.ndarray | None) -> None:
         """Begin a turn, around a good candidate where there is one, if it has room; else the tuning is over."""
         room = self._left - self._reserve
         if room < SHORTEST * len(self._active):
             self._confirmed = True
             return
         least = SHORTEST * len(self._active)
-        cases = room if self._reserve == 0 or room < 2 * least else max(room // (SHARE >> self._idle), least)
+        first, stepping = self._turn == 0, self.steps is not None and self.steps.cases > 0
+        goes_by_slopes = self._search.gradients and (first or stepping)
+        settled = first or (self.steps is not None and self.steps.settled)
+        share = (EARLIER if goes_by_slopes and settled else SHARE) >> self._idle
+        whole = room < 2 * least or (self._reserve == 0 and not goes_by_slopes)
+        cases = room if whole else max(room // share, least)
         dimension, seed = len(self._search.parameters), self._search.seed + self._turn
         self._may_ask = cases // len(self._active)
         self._tuner, self._middle = optimisers.tuner(dimension, seed, self._may_ask), start
@@ -87,21 +103,45 @@ class RobustTuning:
 
     def _next(self) -> list[tuple[Candidate, int]]:
         """The next candidates with their plants, but those that were tried before."""
-        if not self._confirming:
-            points = around(self._middle, self._tuner.ask())
-            before, self._batch = len(self._batch), [each.tobytes() for each in self._search.values(points)]
+        if not self._confirming and (self.steps is None or not self.steps.going):
+            before = len(self._batch)
+            wanted = self._of_points(around(self._middle, self._tuner.ask()))
             self._converged = not self._batch and self._may_ask >= before
             self._may_ask -= len(self._batch)
-            for candidate, point in zip(self._batch, points, strict=True):
-                self._points.setdefault(candidate, point)
-                self._known.setdefault(candidate, {})
-            wanted = self._unknown(self._batch, self._active)
-            self._confirming = not self._batch or len(wanted) > self._left - self._reserve
-            if not self._confirming:
+            if self._has_room(wanted):
                 return wanted
+            self._step_from(self._best())
+        if not self._confirming and self.steps is not None and self.steps.going:
+            wanted = self._of_points(self.steps.ask())
+            if self._has_room(wanted):
+                self.steps.cases += len(wanted)
+                return wanted
+            self.steps.end()
+        self._confirming = True
         wanted = self._unknown([self._best()], range(len(self._plants)))
         self._confirmed = len(wanted) > self._left
         return [] if self._confirmed else wanted
+
+    def _of_points(self, points: np.ndarray) -> list[tuple[Candidate, int]]:
+        """Points of the cube as candidates of the next generation: those that are new, with the active plants."""
+        self._batch = [each.tobytes() for each in self._search.values(points)]
+        for candidate, point in zip(self._batch, points, strict=True):
+            self._points.setdefault(candidate, point)
+            self._known.setdefault(candidate, {})
+        return self._unknown(self._batch, self._active)
+
+    def _has_room(self, wanted: list[tuple[Candidate, int]]) -> bool:
+        """True if there are candidates, and what is new of them leaves enough to try the best against all plants."""
+        return bool(self._batch) and len(wanted) <= self._left - self._reserve
+
+    def _step_from(self, candidate: Candidate) -> None:
+        """Begin steps along slopes, where there are any."""
+        if self.steps is not None:
+            self.steps.begin(self._points[candidate], np.frombuffer(candidate), self._active_plants)
+
+    @property
+    def _active_plants(self) -> list[tuple[float, ...]]:
+        return [self._plants[each] for each in self._active]
 
     def _unknown(self, candidates: list[Candidate], plants: list[int] | range) -> list[tuple[Candidate, int]]:
         once = dict.fromkeys(candidates)
@@ -110,12 +150,20 @@ class RobustTuning:
     def _go_on(self) -> None:
         """Pass on what is known of a generation; or judge the best of a turn, which was tried against all plants."""
         if not self._confirming:
-            self._tuner.tell(np.array([self._worst(each) for each in self._batch]))
+            if self.steps is not None and self.steps.going:
+                self.steps.tell(np.frombuffer(self._batch[0]), self._active_plants)
+            else:
+                self._tuner.tell(np.array([self._worst(each) for each in self._batch]))
             return
         best = self._best()
         plant = max(range(len(self._plants)), key=lambda each: self._known[best][each])
         if self._known[best][plant] > self._worst(best):
             self._active.append(plant)
+            if self.steps is not None and self.steps.settled:
+                self._step_from(best)
+                self._confirming = not self.steps.going
+                if self.steps.going:
+                    return
         else:
             worth, before = self._worst(best), self._borne
             self._idle = self._idle + 1 if before is not None and hardly_better(worth, before) else 0
@@ -123,7 +171,7 @@ class RobustTuning:
                 self._confirmed = True
                 return
             self._borne = worth
-        self._begin(self._points[best])
+        self._begin_turn(self._points[best])
 
     def _best(self) -> Candidate:
         """The candidate that is worth most against the active plants, of those that were tried against all of these."""

@@ -42,6 +42,9 @@ _POINTS = (0.0, *(sign * near for near in NEAR for sign in (-1.0, 1.0)))
 MOST_LANES = 100_000
 """Runs of the kernel that are held in memory at once."""
 
+FAILED = "the case fails"
+"""Why a case that fails has no slopes."""
+
 Place = tuple[int, int, int]
 """(case, metric, number), as positions in `MetricGradients`."""
 
@@ -66,9 +69,13 @@ class MetricGradients:
 
 @frozen
 class GradientProgram:
-    """An experiment's program with tangents by its coordinates, compiled once for any of its cases."""
+    """An experiment's program with tangents by its coordinates, compiled once for any of its cases.
+
+    first  by so many of its coordinates alone, the first ones; None: by all
+    """
 
     experiment: Experiment
+    first: int | None = None
 
     @cached_property
     def recording(self) -> Recording:
@@ -85,7 +92,7 @@ class GradientProgram:
     @property
     def paths(self) -> tuple[str, ...]:
         """The numbers by which there are gradients."""
-        return tuple(each.path for each in self.experiment.cases.coordinates)
+        return tuple(each.path for each in self.experiment.cases.coordinates)[: self.first]
 
     @cached_property
     def dependences(self) -> dict[str, Dependence]:
@@ -99,11 +106,14 @@ class GradientProgram:
         *,
         experiment: Experiment | None = None,
         threads: int | None = None,
+        edges: bool = True,
     ) -> MetricGradients:
         """The gradients of these rows of the case table.
 
         metrics     names; all where there are none
         experiment  the same one with other cases;  threads: None: as many as there are cores
+        edges       whether each is held against the program a little to each side, which takes five times as long; for
+                    who tries what they promise
 
         Raises Problem D379 for a name that is no metric's, and where no number varies.
         """
@@ -113,9 +123,10 @@ class GradientProgram:
         rows = np.asarray(rows, dtype=np.int64)
         values, slopes = [np.empty((0, len(metrics)))], [np.empty((0, len(metrics), len(self.paths)))]
         why_not: dict[Place, str] = {}
-        many = max(1, MOST_LANES // (len(self.paths) * len(_POINTS)))
+        points = _POINTS if edges else _POINTS[:1]
+        many = max(1, MOST_LANES // (len(self.paths) * len(points)))
         for first in range(0, len(rows), many):
-            found = _Found.of(self, engine.inputs(experiment, rows[first : first + many]), threads)
+            found = _Found.of(self, engine.inputs(experiment, rows[first : first + many]), points, threads)
             reasons, slope = dict(self._why_not(found, metrics)), found.slopes(metrics)
             for place in reasons:
                 slope[place] = math.nan
@@ -127,12 +138,12 @@ class GradientProgram:
 
     def _why_not(self, found: _Found, metrics: Sequence[str]) -> Iterator[tuple[Place, str]]:
         failed, value, slope = found.failed(), found.values(metrics), found.slopes(metrics)
-        edges = found.edges(metrics)
+        edges = found.edges(metrics) if found.outputs.shape[2] == len(_POINTS) else np.zeros(slope.shape, dtype=bool)
         for case, metric, number in np.ndindex(*slope.shape):
             place, output = (case, metric, number), METRIC + metrics[metric]
             depends = self.dependences[self.paths[number]]
             if failed[case]:
-                yield place, "the case fails"
+                yield place, FAILED
             elif math.isnan(value[case, metric]):
                 yield place, "the metric is no number"
             elif math.isinf(value[case, metric]):
@@ -147,7 +158,7 @@ class GradientProgram:
 
 @frozen
 class _Found:
-    """The answers of the kernel: [case, number, point, output], the points as `_POINTS`.
+    """The answers of the kernel: [case, number, point, output], the points as `_POINTS`, or the first of them alone.
 
     steps  [case, number]: of each number, by which points are multiplied
     """
@@ -157,22 +168,22 @@ class _Found:
     steps: np.ndarray
 
     @classmethod
-    def of(cls, program: GradientProgram, given: np.ndarray, threads: int | None) -> _Found:
+    def of(cls, program: GradientProgram, given: np.ndarray, points: tuple[float, ...], threads: int | None) -> _Found:
         """Each case at each point of each number, with the tangent of that number: lanes of one run."""
         kernel, n = program.kernel, len(program.paths)
         cases, own = given.shape
         steps = np.abs(given[:, :n])
         steps = np.where(steps > 0.0, steps, 1.0)
-        inputs = np.zeros((cases, n, len(_POINTS), own + n))
+        inputs = np.zeros((cases, n, len(points), own + n))
         inputs[..., :own] = given[:, None, None, :]
         for number in range(n):
-            inputs[:, number, :, number] += steps[:, number, None] * _POINTS
+            inputs[:, number, :, number] += steps[:, number, None] * points
             inputs[:, number, :, own + number] = 1.0
         ticks = program.experiment.structure.schedule.ticks
         _, outputs = kernel.run(inputs.reshape(-1, own + n), ticks, record=False, threads=threads)
         names = program.recording.program.outputs
         judge(names, outputs[:, : len(names)])
-        return cls(names, outputs.reshape(cases, n, len(_POINTS), -1), steps)
+        return cls(names, outputs.reshape(cases, n, len(points), -1), steps)
 
     def _columns(self, metrics: Iterable[str], first: int) -> np.ndarray:
         return self.outputs[..., [first + self.names.index(METRIC + name) for name in metrics]]

@@ -157,6 +157,31 @@ def test_a_tuning_is_held_against_the_worst_of_its_plants(place: Path) -> None:
     assert answer.rooms[0].text == "far > -0.05 m"
 
 
+def test_a_tuning_says_how_far_it_went_along_slopes_and_comes_nearer_than_without(
+    place: Path, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "d.ic").write_text(DECK.replace("against loads;", "against loads;  gradients = off;"))
+    assert main(["run", "d.ic", "still", "--no-picture", "-o", "off.h5"]) == 0
+    assert "slopes" not in capsys.readouterr().out
+    with ArchiveFile(place / "undisturbed.h5") as file:
+        answer = SearchAnswer.of(next(group for group in file.groups if group.name == "still"))
+        assert answer is not None and "  20 of them along exact slopes of the metrics" in answer.lines()
+        assert answer.as_data()["along_slopes"] == 20 and answer.as_data()["without_slopes"] is None
+    phase = math.pi / (1.0 + 1.0 / math.sqrt(3.0))
+    least = FAR * abs(math.cos(phase))
+    near, far = (answers(path)["still"].found for path in (place / "undisturbed.h5", here / "off.h5"))
+    assert near.value == pytest.approx(least, rel=1e-5) and far.value > 1.001 * least
+
+
+def test_a_tuning_of_what_has_no_slopes_says_why(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A share of samples moves in steps alone."""
+    metric = "metric off = share_of_time { of = slide.q < 0 m; }"
+    (here / "d.ic").write_text(DECK.replace("metric off = final { of = abs(slide.q); }", metric))
+    main(["run", "d.ic", "still", "--no-picture", "-o", "s.h5"])
+    said = capsys.readouterr().out
+    assert "\n  no slopes to go by: `off`: it moves in steps alone, of a sample or of a count\n" in said
+
+
 def test_a_case_that_fails_hurts_most(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "d.ic").write_text(DECK)
     assert main(["run", "d.ic", "wild", "--no-picture", "-o", "w.h5"]) == 1
@@ -286,7 +311,9 @@ def test_generations_stand_beside_the_cases(place: Path) -> None:
     assert {name: value for name, value in data["still"].attrs.items() if name.startswith("search")} == {
         "search": "tune", "search_of": "swing", "search_goal": "minimise off", "search_at_most": TUNED,
         "search_seed": 0, "search_margin": 0.05, "search_against": "loads", "search_plants": 5, "search_drawn_with": 0,
+        "search_along_slopes": 20, "search_without_slopes": "",
     }  # fmt: skip
+    assert "search_along_slopes" not in data["back"].attrs
     chosen = data["back"]["environment.held.stiffness"].attrs
     assert (chosen["low"], chosen["high"], chosen["steps"]) == (5.0, 79.0, "equal")
 

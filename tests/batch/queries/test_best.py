@@ -135,6 +135,31 @@ def test_the_worst_case_decides_between_designs() -> None:
     assert designs.order([designs.goal("2 * late - kp")])[0] == 1
 
 
+def test_of_a_margin_the_largest_is_meant_whatever_its_name(tmp_path: Path) -> None:
+    """Of metrics that differ in their models alone, which say what they are."""
+    deck = DECK.replace("REQUIRED", """
+        remove settle;
+        metric slow_by = always { of = shoulder.qd < 0.02 rad/s;  after = 3 s; }
+        metric reach = max { of = shoulder.qd; }
+        metric share = share_of_time { of = shoulder.qd < 0.02 rad/s; }
+        linear loop { at = 5 s;  open = shoulder.servo.voltage; }
+        metric disk = disk_margin { of = loop; }
+        metric decay = decay_time { of = loop; }
+    """)  # fmt: skip
+    (tmp_path / "arm.ic").write_text(deck, encoding="utf-8")
+    main(["run", str(tmp_path / "arm.ic"), "grid", "-o", str(tmp_path / "g.h5"), "-q", "--histories", "none"])
+    with ArchiveFile(tmp_path / "g.h5") as file:
+        designs = Designs(pools(file.groups)[0])
+        meant = {name: designs.goal(name).largest for name in ("slow_by", "reach", "share", "disk", "decay", "past")}
+        assert meant == {"slow_by": True, "reach": False, "share": False, "disk": True, "decay": False, "past": False}
+        assert not designs.goal("disk:smallest").largest and designs.goal("reach:largest").largest
+        assert not designs.goal("2 * disk").largest, "an expression is what it says"
+        first = designs.order([designs.goal("disk")])[0]
+        assert designs.worst(designs.goal("disk").values, largest=True)[first] == pytest.approx(
+            max(designs.worst(designs.goal("disk").values, largest=True))
+        )
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_the_front_has_those_that_none_is_better_than(seed: int) -> None:
     rng = np.random.default_rng(seed)

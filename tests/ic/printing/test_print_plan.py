@@ -229,6 +229,18 @@ def test_a_plan_that_was_written_shows_as_its_deck_does(capsys: pytest.CaptureFi
     assert printed(capsys, "plan", "p.json") == PLAN
 
 
+@pytest.mark.parametrize("name", ["p.plan", "p", "p.JSON"])
+def test_a_plan_that_met_run_would_take_for_a_deck_is_not_written(
+    capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    assert cli.main(["plan", "swing.ic", "-o", name]) == 2
+    assert capsys.readouterr().err == (
+        f"error[E300]: cannot write {name}: a plan's name ends in .json\n"
+        " = help: `met run` knows a plan by its ending, and takes any other file for a deck\n\n1 error\n"
+    )
+    assert not Path(name).exists()
+
+
 def test_plan_as_json_is_the_plan_file(capsys: pytest.CaptureFixture[str]) -> None:
     out = printed(capsys, "plan", "swing.ic", "--format", "json")
     printed(capsys, "plan", "swing.ic", "-o", "p.json")

@@ -260,6 +260,9 @@ def test_a_search_that_is_none_is_refused(tmp_path: Path, old: str, new: str, me
             "error[D363]: 12 cases are too few to tune anything",
             "= help: 13 at least: 3 to try the best with each case of `loads`, and 10 to choose among; "
             "a thousand are no luxury"]),
+        ("margin = 10 %", "gradients = maybe", [
+            "error[D363]: a tuning's `gradients` are `on` or `off`",
+            "= help: write `gradients = off;`"]),
         ("margin = 10 %", "margin = 100 %", [
             "error[D363]: a margin is a share of a limit, from 0 % to less than 100 %",
             "= help: write `margin = 5 %;`"]),
@@ -317,6 +320,13 @@ def test_mistakes_of_a_block_are_told_together(tmp_path: Path) -> None:
     assert [line.split(":")[0] for line in lines(said(tmp_path, text)) if line.startswith("error")] == [
         "error[D361]", "error[D363]",
     ]  # fmt: skip
+
+
+def test_a_tuning_goes_by_gradients_unless_it_says_otherwise(tmp_path: Path) -> None:
+    for more, wanted in (("", True), ("gradients = on;", True), ("gradients = off;", False)):
+        (tmp_path / "d.ic").write_text(DECK + TUNE.replace("margin = 10 %;", more), encoding="utf-8")
+        search = ic.compile(tmp_path / "d.ic", select=["gains"]).experiments[0].search
+        assert search is not None and search.gradients is wanted
 
 
 def test_python_compiles_them(tmp_path: Path) -> None:

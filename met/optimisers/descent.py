@@ -1,0 +1,175 @@
+"""Descent by exact slopes to the least of a worst value: sequential quadratic programming in a trust region.
+
+What is to be small is the largest of pieces, each a smooth function with hinges on it, w max(0, h): so are the worst of
+several plants, and the price of what lies near to a limit or beyond. Each step solves the same with all functions
+straight, and one curvature for all, that of the Lagrangian by Powell's damped BFGS (Nocedal and Wright, *Numerical
+Optimization*, 2006, procedures 18.2 and 18.5). At a corner where as many pieces and hinges meet as there are dimensions
+it needs no curvature, and in a smooth valley few pieces.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from met.frozen import frozen
+from met.optimisers.arithmetic import added, total
+from met.optimisers.quadratic import least_within
+
+RADIUS = 0.1
+"""The first step of a coordinate is no longer than this, in edges of the cube; and none longer than LONGEST."""
+
+LONGEST = 0.3
+
+FINEST = 1e-5
+"""It ends where no step of this length does better: on an edge of an event, beside which the slopes hold no more."""
+
+CONVERGED = 1e-5
+"""It has converged where the straight functions promise no more than this share."""
+
+STEPS = 60
+"""Points that are asked for, at most."""
+
+ON = 1e-9
+"""A move that ends nearer to an end than this ends on it."""
+
+GOOD, POOR = 0.75, 0.25
+"""Shares of what was promised beyond which the next step may be twice as long, and below which it is half as long."""
+
+
+@frozen
+class LocalModel:
+    """A function of the unit cube at a point: the largest of the pieces, each with the hinges on it.
+
+    pieces  [piece];  piece_slopes: [piece, dimension]
+    hinges  [hinge];  hinge_slopes: [hinge, dimension];  of: [hinge], the number of its piece;  weights: [hinge]
+    """
+
+    pieces: np.ndarray
+    piece_slopes: np.ndarray
+    hinges: np.ndarray
+    hinge_slopes: np.ndarray
+    of: np.ndarray
+    weights: np.ndarray
+
+    @property
+    def value(self) -> float:
+        """The function there."""
+        return self.after(np.zeros(self.piece_slopes.shape[1]))
+
+    def after(self, move: np.ndarray) -> float:
+        """What the straight functions give after a move, [dimension]."""
+        values = self.pieces + added((self.piece_slopes * move).T)
+        if len(self.hinges):
+            np.add.at(
+                values, self.of, self.weights * np.maximum(0.0, self.hinges + added((self.hinge_slopes * move).T))
+            )
+        return float(values.max())
+
+    def lagrangian_slope(self, multipliers: np.ndarray) -> np.ndarray:
+        """The slope of pieces and hinges times these multipliers, [piece, then hinge]; [dimension]."""
+        return added(np.concatenate([self.piece_slopes, self.hinge_slopes]) * multipliers[:, None])
+
+
+class SlopeDescent:
+    """Points of the unit cube to try, one at a time, from a first one on.
+
+    point      [dimension], the best so far;  worth: of it: smaller is better
+    converged  whether the slopes there promise nothing more
+    """
+
+    def __init__(self, point: np.ndarray, worth: float, model: LocalModel) -> None:
+        self.point, self.worth, self.converged = np.array(point, float), worth, False
+        self._model, self._radius, self._left = model, RADIUS, STEPS
+        self._curvature = np.zeros((len(point), len(point)))
+        self._move, self._promise = np.zeros(len(point)), 0.0
+        self._multipliers = np.zeros(len(model.pieces) + len(model.hinges))
+
+    def ask(self) -> np.ndarray:
+        """The next point, [1, dimension]; [0, dimension]: it has ended."""
+        none = np.empty((0, len(self.point)))
+        while self._left > 0 and self._radius >= FINEST:
+            self._left -= 1
+            found = step(self._model, self._curvature, np.maximum(-self.point, -self._radius),
+                         np.minimum(1.0 - self.point, self._radius))  # fmt: skip
+            if found is None:
+                self._radius *= POOR
+                continue
+            self._move, self._multipliers = found
+            bent = 0.5 * total(self._move * added((self._curvature * self._move[None, :]).T))
+            self._promise = self._model.value - self._model.after(self._move) - bent
+            if not self._promise > CONVERGED * abs(self._model.value):
+                self.converged = True
+                return none
+            return np.clip(self.point + self._move, 0.0, 1.0)[None]
+        return none
+
+    def tell(self, worth: float, model: LocalModel | None) -> None:
+        """Take what the point that was asked last is worth, and the function there; None where it has no slopes."""
+        length = float(np.abs(self._move).max())
+        if model is not None and len(model.pieces) + len(model.hinges) == len(self._multipliers):
+            change = model.lagrangian_slope(self._multipliers) - self._model.lagrangian_slope(self._multipliers)
+            self._curvature = updated(self._curvature, self._move, change)
+        if model is None or not worth < self.worth:
+            self._radius = POOR * length
+            return
+        kept = (self._model.value - model.value) / self._promise
+        if kept < POOR:
+            self._radius = 0.5 * length
+        elif kept > GOOD and length > 0.9 * self._radius:
+            self._radius = min(2.0 * self._radius, LONGEST)
+        self.point, self.worth, self._model = np.clip(self.point + self._move, 0.0, 1.0), worth, model
+
+
+def step(
+    model: LocalModel, curvature: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """The best move between two ends, [dimension], by the straight functions and the curvature, with the multipliers of
+    pieces and hinges; None where it is not found."""
+    n, pieces = len(low), len(model.pieces)
+    size = abs(model.value) or 1.0
+    reach = added((np.abs(model.hinge_slopes) * np.maximum(-low, high)).T) if len(model.hinges) else np.zeros(0)
+    near = np.flatnonzero(model.hinges + reach > 0.0)
+    unknowns = n + 1 + len(near)
+    piece_rows = np.zeros((pieces, unknowns))
+    piece_rows[:, :n], piece_rows[:, n] = model.piece_slopes / size, -1.0
+    piece_rows[model.of[near], n + 1 + np.arange(len(near))] = model.weights[near] / size
+    hinge_rows = np.zeros((len(near), unknowns))
+    hinge_rows[:, :n] = model.hinge_slopes[near]
+    hinge_rows[:, n + 1 :] = -np.eye(len(near))
+    ends = np.zeros((2 * n + len(near), unknowns))
+    ends[:n, :n], ends[n : 2 * n, :n] = np.eye(n), -np.eye(n)
+    ends[2 * n :, n + 1 :] = -np.eye(len(near))
+    limits = np.concatenate([-model.pieces / size, -model.hinges[near], high, -low, np.zeros(len(near))])
+    whole = np.zeros((unknowns, unknowns))
+    whole[:n, :n] = curvature / size
+    slope = np.zeros(unknowns)
+    slope[n] = 1.0
+    found = least_within(whole, slope, np.concatenate([piece_rows, hinge_rows, ends]), limits)
+    if found is None:
+        return None
+    multipliers = np.zeros(pieces + len(model.hinges))
+    multipliers[:pieces] = found[1][:pieces]
+    multipliers[pieces + near] = found[1][pieces : pieces + len(near)] * size
+    move = np.where(found[0][:n] - low < ON, low, np.where(high - found[0][:n] < ON, high, found[0][:n]))
+    return move, multipliers
+
+
+def updated(curvature: np.ndarray, move: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """The curvature after a move along which the slope changed so much, by damped BFGS; positive semidefinite."""
+    square, along = total(move * move), total(move * change)
+    if not (square > 0.0 and math.isfinite(along)):
+        return curvature
+    if not curvature.any():
+        if along <= 0.0:
+            return curvature
+        curvature = along / square * np.eye(len(move))
+    bent = added((curvature * move[None, :]).T)
+    before = total(move * bent)
+    if not before > 0.0:
+        return curvature
+    share = 1.0 if along >= 0.2 * before else 0.8 * before / (before - along)
+    mixed = share * change + (1.0 - share) * bent
+    out = curvature - bent[:, None] * bent[None, :] / before + mixed[:, None] * mixed[None, :] / total(move * mixed)
+    return np.asarray(out) if np.isfinite(out).all() else curvature

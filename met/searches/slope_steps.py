@@ -1,0 +1,66 @@
+"""Steps of a tuning along slopes: from the best candidate, against the plants that are active."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from met.optimisers.descent import LocalModel, SlopeDescent
+from met.plan.searches import Search
+from met.searches.slopes import CaseSlopes, SlopeSource, local_model, worth_of
+
+
+class SlopeSteps:
+    """Candidates along slopes, one at a time, while there are slopes.
+
+    cases    cases that were asked for so far;  why_not: why there was no slope where there was none last, in words
+    settled  whether the last descent ended where its slopes promised nothing more
+    """
+
+    def __init__(self, search: Search, source: SlopeSource) -> None:
+        self._search, self._source = search, source
+        self._descent: SlopeDescent | None = None
+        self.cases, self.why_not, self.settled = 0, "", False
+
+    @property
+    def going(self) -> bool:
+        """True while a descent goes on."""
+        return self._descent is not None
+
+    def begin(self, point: np.ndarray, candidate: np.ndarray, plants: Sequence[tuple[float, ...]]) -> None:
+        """Begin at a point of the unit cube, with the values there, SI, if there are slopes."""
+        worth, model = self._local(candidate, plants)
+        self.settled = False
+        self._descent = None if model is None else SlopeDescent(point, worth, model)
+
+    def ask(self) -> np.ndarray:
+        """The next point of the unit cube, [1, parameter]; none, [0, parameter], where the descent has ended."""
+        assert self._descent is not None
+        points = self._descent.ask()
+        if not len(points):
+            self.settled = self._descent.converged
+            self.end()
+        return points
+
+    def end(self) -> None:
+        """End the descent."""
+        self._descent = None
+
+    def tell(self, candidate: np.ndarray, plants: Sequence[tuple[float, ...]]) -> None:
+        """The candidate that was asked for last has been run with these plants."""
+        assert self._descent is not None
+        self._descent.tell(*self._local(candidate, plants))
+
+    def _local(self, candidate: np.ndarray, plants: Sequence[tuple[float, ...]]) -> tuple[float, LocalModel | None]:
+        """The worth of a candidate, by its metrics as they are between samples, and what is to be small around it."""
+        found = self._source.slopes(np.array([[*candidate, *plant] for plant in plants]))
+        if isinstance(found, CaseSlopes):
+            model = local_model(self._search, self._source.requirements, found, candidate)
+            if isinstance(model, LocalModel):
+                return worth_of(self._search, self._source.requirements, found), model
+            self.why_not = model
+        else:
+            self.why_not = found
+        return math.inf, None

@@ -1,0 +1,110 @@
+"""Slopes of the metrics of a tuning's cases, and what is to be small of them as a function that a descent may go by.
+
+The worth of a case (met/searches/values.py) falls and rises in tiers. Within a tier it goes with smooth functions of
+the parameters, and with hinges on them: a share of a margin that is missing, a distance beyond a limit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from met.frozen import frozen
+from met.optimisers.arithmetic import logarithm
+from met.optimisers.descent import LocalModel
+from met.plan.searches import Search
+from met.searches.values import MetricLimit, served
+
+PENALTY = 100.0
+"""The share of the goal that a limit weighs which is missed by all of itself: so a step does not go beyond one."""
+
+WITHIN = 1e-6
+"""The share of a limit that a step keeps from it, at least, so that what is rounded does not lie beyond."""
+
+
+@frozen
+class CaseSlopes:
+    """Metrics of cases, and how they move with what is chosen, SI.
+
+    done     [case]: whether it reached its end;  values: by name, [case], as they are between samples
+    slopes   by name, [case, parameter]; not-a-number where there is none
+    why_not  by name, why there is none in any of the cases
+    """
+
+    done: np.ndarray
+    values: Mapping[str, np.ndarray]
+    slopes: Mapping[str, np.ndarray]
+    why_not: Mapping[str, str]
+
+
+class SlopeSource(Protocol):
+    """Gives slopes of a tuning's cases, and knows what is required of them."""
+
+    @property
+    def requirements(self) -> Sequence[MetricLimit]: ...
+
+    def slopes(self, cases: np.ndarray) -> CaseSlopes | str:
+        """The slopes of these cases, [case, coordinate], SI; or why there are none of any."""
+
+
+def worth_of(search: Search, requirements: Sequence[MetricLimit], found: CaseSlopes) -> float:
+    """The worth of the worst of these cases, by what its metrics are between samples."""
+    goal = found.values[search.metric]
+    return float(
+        served(goal, search.largest, found.done, requirements, found.values, search.margin).max(initial=-math.inf)
+    )
+
+
+def local_model(
+    search: Search, requirements: Sequence[MetricLimit], found: CaseSlopes, candidate: np.ndarray
+) -> LocalModel | str:
+    """What is to be small at a candidate, over the unit cube; or why there is no such function.
+
+    candidate  values of its parameters, SI;  found: of its cases
+    """
+    if not found.done.all():
+        return "a case fails"
+    per_share = np.array([_per_share(each.low, each.high, each.logarithmic, value)
+                          for each, value in zip(search.parameters, candidate, strict=True)])  # fmt: skip
+    sign = -1.0 if search.largest else 1.0
+    goal = sign * found.values[search.metric]
+    goal_slopes = sign * found.slopes[search.metric] * per_share
+    count, dimension = goal_slopes.shape
+    misses = worth_of(search, requirements, found) >= 1.0
+    if not np.isfinite(goal).all():
+        return f"`{search.metric}` has no value"
+    if misses:
+        goal, goal_slopes = np.zeros(count), np.zeros((count, dimension))
+    elif not np.isfinite(goal_slopes).all():
+        return found.why_not.get(search.metric, f"`{search.metric}` has no slope")
+    hinges, slopes, weights = [np.zeros(0)], [np.zeros((0, dimension))], [np.zeros(0)]
+    for each in requirements:
+        values = found.values[each.metric]
+        if not np.isfinite(values).all():
+            return f"`{each.metric}` has no value"
+        falls = -1.0 if each.comparison.startswith("<") else 1.0
+        size = abs(each.limit) or 1.0
+        out = -falls * found.slopes[each.metric] * per_share / size
+        beyond = -falls * (values - each.limit) / size
+        far = beyond < -max(2.0 * search.margin, 10.0 * WITHIN)
+        if not np.isfinite(out).all(axis=1)[~far].all():
+            return found.why_not.get(each.metric, f"`{each.metric}` has no slope")
+        out = np.where(np.isfinite(out), out, 0.0)
+        keep = WITHIN + (0.5 * search.margin if misses else 0.0)
+        hinges.append(beyond + keep)
+        slopes.append(out)
+        weights.append(np.full(count, 1.0) if misses else PENALTY * np.maximum(np.abs(goal), 1e-12))
+        if search.margin > 0.0 and each.limit != 0.0 and not misses:
+            hinges.append(1.0 + beyond / search.margin)
+            slopes.append(out / search.margin)
+            weights.append(np.abs(goal) * search.margin)
+    of = np.tile(np.arange(count), len(hinges) - 1)
+    return LocalModel(goal, goal_slopes, np.concatenate(hinges), np.concatenate(slopes), of, np.concatenate(weights))
+
+
+def _per_share(low: float, high: float, logarithmic: bool, value: float) -> float:
+    """How a parameter moves with its place in its range, there."""
+    return value * logarithm(high / low) if logarithmic else high - low
