@@ -10,7 +10,7 @@ from pygls.workspace import PositionCodec
 
 from ic.editor import completion
 from ic.editor.checks import CheckedDeck, DeckChecks
-from ic.editor.hover import about, entry_of, markdown
+from ic.editor.hover import about, markdown
 from ic.editor.index import DeckIndex
 from ic.editor.names import NameInText, NamesInTexts, deck_text
 from ic.editor.positions import Texts, lines_of, uri_of
@@ -80,7 +80,7 @@ class Asked:
         token = self.token
         if token is None:
             return None
-        found = about(self.text, token, entry_of(self.text, token), self.names, self.index, self.file)
+        found = about(self.text, token, self.names, self.index, self.file)
         if not found:
             return None
         shown = types.MarkupContent(types.MarkupKind.Markdown, markdown(found))
@@ -95,14 +95,14 @@ class Asked:
         token = self.token
         if token is None or token.kind != NAME:
             return []
-        return [self.location(each.token) for each in self.names.meant(token, entry_of(self.text, token))]
+        return [self.location(each.token) for each in self.names.meant_in(self.text, token)]
 
     def references(self, also_definitions: bool) -> list[types.Location]:
         """Where what the word here means is used: words that may mean the same definition."""
         token = self.token
         if token is None or token.kind != NAME or token.text not in self.names.by_name:
             return []
-        meant = self.names.meant(token, entry_of(self.text, token))
+        meant = self.names.meant_in(self.text, token)
         defined = {id(each.token) for each in self.names.by_name[token.text]}
         return [
             self.location(each) for each in self._uses(token.text, meant) if also_definitions or id(each) not in defined
@@ -111,7 +111,7 @@ class Asked:
     def _uses(self, name: str, meant: list[NameInText]) -> Iterator[Token]:
         texts = {text.source.name: text for text in self.names.texts}
         for use in self.names.uses(name):
-            found = self.names.meant(use, entry_of(texts[use.source.name], use))
+            found = self.names.meant_in(texts[use.source.name], use)
             if any(each in meant for each in found):
                 yield use
 
