@@ -63,6 +63,12 @@ class Asked:
     def token(self) -> Token | None:
         return self.text.token_at(self.offset)
 
+    @property
+    def name_here(self) -> Token | None:
+        """The word here, where it may be a name."""
+        token = self.token
+        return token if token is not None and token.kind == NAME else None
+
     def location(self, token: Token) -> types.Location:
         texts = Texts({token.source.name: token.source.text}, self._codec)
         return types.Location(self._addresses[token.source.name], texts.range(token.place))
@@ -92,15 +98,15 @@ class Asked:
         if included is not None:
             beginning = types.Position(0, 0)
             return [types.Location(included, types.Range(beginning, beginning))]
-        token = self.token
-        if token is None or token.kind != NAME:
+        token = self.name_here
+        if token is None:
             return []
         return [self.location(each.token) for each in self.names.meant_in(self.text, token)]
 
     def references(self, also_definitions: bool) -> list[types.Location]:
         """Where what the word here means is used: words that may mean the same definition."""
-        token = self.token
-        if token is None or token.kind != NAME or token.text not in self.names.by_name:
+        token = self.name_here
+        if token is None or token.text not in self.names.by_name:
             return []
         meant = self.names.meant_in(self.text, token)
         defined = {id(each.token) for each in self.names.by_name[token.text]}

@@ -16,7 +16,8 @@ from ic.editor.checker_process import CheckerProcess
 from ic.editor.checks import CheckedDeck, DeckChecks, OpenText
 from ic.editor.fixes import QuickFix, actions, quick_fixes
 from ic.editor.outline import folds, symbols
-from ic.editor.positions import Texts, file_named, lines_of, uri_of
+from ic.editor.positions import Texts, file_named, lines_of, path_of, uri_of
+from ic.editor.rename_process import nameable, rename
 from ic.editor.structure import DeckText
 from ic.editor.told import in_editor
 from met.diagnostic import Problem
@@ -134,6 +135,11 @@ class DeckServer(LanguageServer):
 
         return position
 
+    def folders(self) -> list[str]:
+        """The paths of the folders that the editor has open."""
+        addresses = list(self.workspace.folders) or [self.workspace.root_uri or ""]
+        return [path for path in map(path_of, addresses) if path is not None]
+
     def asked(self, parameters: types.TextDocumentPositionParams | Any) -> Asked:
         """The position that a request is about."""
         codec = self.workspace.position_codec
@@ -237,6 +243,16 @@ def make(include_dirs: Sequence[str] = (), defines: Sequence[str] = ()) -> DeckS
     @server.feature(types.TEXT_DOCUMENT_REFERENCES)
     def references(parameters: types.ReferenceParams) -> list[types.Location]:
         return server.asked(parameters).references(parameters.context.include_declaration)
+
+    @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
+    def prepare_rename(parameters: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:
+        return nameable(server.asked(parameters))
+
+    @server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))
+    async def renamed(parameters: types.RenameParams) -> types.WorkspaceEdit:
+        await server.checks.rest()
+        deck, codec = server.checks.deck_of(parameters.text_document.uri), server.workspace.position_codec
+        return await rename(server.asked(parameters), parameters.new_name, server.checks, deck, server.folders(), codec)
 
     @server.feature("met/settled")
     async def settled(parameters: None) -> bool:
