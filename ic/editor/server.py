@@ -18,6 +18,7 @@ from ic.editor.fixes import QuickFix, actions, quick_fixes
 from ic.editor.outline import folds, symbols
 from ic.editor.positions import Texts, file_named, lines_of, path_of, uri_of
 from ic.editor.rename_process import nameable, rename
+from ic.editor.semantic import LEGEND, semantic_tokens
 from ic.editor.structure import DeckText
 from ic.editor.told import in_editor
 from met.diagnostic import Problem
@@ -142,8 +143,11 @@ class DeckServer(LanguageServer):
 
     def asked(self, parameters: types.TextDocumentPositionParams | Any) -> Asked:
         """The position that a request is about."""
-        codec = self.workspace.position_codec
-        return Asked(self.checks, codec, self.address, parameters.text_document.uri, parameters.position)
+        return self.asked_about(parameters.text_document.uri, parameters.position)
+
+    def asked_about(self, uri: str, position: types.Position) -> Asked:
+        """A position of a text."""
+        return Asked(self.checks, self.workspace.position_codec, self.address, uri, position)
 
     def publish(self, decks: Iterable[CheckedDeck]) -> None:
         """Tell the editor what is wrong in which file, where that is another than it knows."""
@@ -253,6 +257,12 @@ def make(include_dirs: Sequence[str] = (), defines: Sequence[str] = ()) -> DeckS
         await server.checks.rest()
         deck, codec = server.checks.deck_of(parameters.text_document.uri), server.workspace.position_codec
         return await rename(server.asked(parameters), parameters.new_name, server.checks, deck, server.folders(), codec)
+
+    @server.feature(types.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL, LEGEND)
+    def words(parameters: types.SemanticTokensParams) -> types.SemanticTokens:
+        asked = server.asked_about(parameters.text_document.uri, types.Position(0, 0))
+        units = server.workspace.position_codec.client_num_units
+        return semantic_tokens(asked.text, asked.names, server.position_in(asked.text), units)
 
     @server.feature("met/settled")
     async def settled(parameters: None) -> bool:
