@@ -76,6 +76,7 @@ class NamesInTexts:
         for text in self.texts:
             for each in self._defined(text):
                 self.by_name.setdefault(each.token.text, []).append(each)
+        self._with_braces = {name: found for name, found in self.by_name.items() if "{" in name}
 
     def of_kind(self, *kinds: str) -> list[str]:
         """The names of these kinds, each once."""
@@ -154,11 +155,13 @@ class NamesInTexts:
 
     def _made_by_loops(self, name: str) -> list[NameInText]:
         """The definitions whose names with braces may be this one: `seg_{i}` of `seg_7` and of `seg_{i-1}`."""
+        if not self._with_braces:
+            return []
         plain = _BRACES.sub("0", name)
         return [
             each
-            for written, found in self.by_name.items()
-            if "{" in written and re.fullmatch(_BRACES.sub(r"\\w+", written), plain)
+            for written, found in self._with_braces.items()
+            if re.fullmatch(_BRACES.sub(r"\\w+", written), plain)
             for each in found
         ]
 
