@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from ic.editor.lenses import LastRun
 
 from met.diagnostic import Problem, error
 
@@ -47,7 +52,7 @@ def lsp(include_dirs: tuple[str, ...], defines: tuple[str, ...], stdio: bool, vs
         raise Problem(error("E345", message, help=(install, "MET's extra `editor` names it")))
     from ic.editor.server import serve
 
-    serve(include_dirs, defines)
+    serve(include_dirs, defines, _last_runs)
 
 
 def write_extension(path: Path) -> None:
@@ -59,3 +64,9 @@ def write_extension(path: Path) -> None:
     except OSError as reason:
         raise Problem(error("E338", f"cannot write `{path}`: {reason.strerror}")) from None
     click.echo(f"{path} is the extension for VS Code; `code --install-extension {path}` installs it")
+
+
+def _last_runs(deck: str) -> Mapping[str, LastRun]:
+    from batch.queries.last_run import last_runs  # an archive's reader is loaded where a lens is asked for
+
+    return last_runs(deck)

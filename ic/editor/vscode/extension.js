@@ -266,6 +266,12 @@ class Met {
       provideReferences: async (document, place, { includeDeclaration }, token) =>
         locations(await this.wish('references', document, { ...at(place), context: { includeDeclaration } }, token)),
     });
+    add('CodeLens', {
+      provideCodeLenses: async (document, token) =>
+        ((await this.wish('codeLens', document, {}, token)) || []).map(
+          (each) => new vscode.CodeLens(toRange(each.range), each.command),
+        ),
+    });
     add('Rename', {
       prepareRename: async (document, place, token) => {
         const found = await this.ask('prepareRename', document, at(place), token);
@@ -317,13 +323,16 @@ class Met {
     );
   }
 
-  /** Run the deck that is open, in a terminal, where its output and Ctrl-C belong. */
+  /** Run words of `met` in a terminal, where their output and Ctrl-C belong. */
+  terminal(shellArgs) {
+    const shellPath = vscode.workspace.getConfiguration('met').get('command') || 'met';
+    vscode.window.createTerminal({ name: `met ${shellArgs[0]}`, shellPath, shellArgs }).show();
+  }
+
   run() {
     const editor = vscode.window.activeTextEditor;
     if (!editor || editor.document.languageId !== 'met' || editor.document.isUntitled) return;
-    const shellPath = vscode.workspace.getConfiguration('met').get('command') || 'met';
-    const shellArgs = ['run', editor.document.uri.fsPath];
-    vscode.window.createTerminal({ name: 'met run', shellPath, shellArgs }).show();
+    this.terminal(['run', editor.document.uri.fsPath]);
   }
 }
 
@@ -334,6 +343,7 @@ exports.activate = (context) => {
   context.subscriptions.push(
     met.log, met.diagnostics,
     vscode.commands.registerCommand('met.run', () => met.run()),
+    vscode.commands.registerCommand('met.terminal', (words) => met.terminal(words)),
     vscode.commands.registerCommand('met.restart', () => met.restart()),
   );
   met.start();

@@ -91,4 +91,5 @@ def test_the_client_shows_what_the_server_says(tmp_path: Path) -> None:
     assert shown["symbols"] == ["motor", "more"] and [2, 4] in shown["folds"] and shown["laid"] == 0
     assert shown["coloured"] > 50 and shown["coloured"] % 5 == 0
     assert shown["named"] == "motor" and shown["renamed"] == 2 and shown["wrong"] == "`kg` is a unit"
-    assert shown["terminals"] == [[str(met), "run", str(deck)]]
+    assert shown["lenses"] == ["1 case", "run"]
+    assert shown["terminals"] == [[str(met), "run", str(deck), "more"], [str(met), "run", str(deck)]]

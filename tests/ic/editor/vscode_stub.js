@@ -21,14 +21,14 @@ const document = {
   uri: uri(deck), languageId: 'met', version: 1, isUntitled: false, getText: () => text,
 };
 const kinds = ['CompletionItem', 'Hover', 'Definition', 'Reference', 'Rename', 'DocumentSymbol', 'FoldingRange',
-  'DocumentFormattingEdit', 'CodeActions', 'DocumentSemanticTokens'];
+  'DocumentFormattingEdit', 'CodeActions', 'CodeLens', 'DocumentSemanticTokens'];
 const watcher = { ...subscription, onDidCreate: listen, onDidChange: listen, onDidDelete: listen };
 const changes = {};
 
 const vscode = {
   Uri: { parse: (address) => uri(address.replace('file://', '')) },
   MarkdownString: Kept, SemanticTokens: Kept, SemanticTokensLegend: Kept, FoldingRange: Kept, Hover: Kept,
-  CompletionItem: Kept, DocumentSymbol: Kept, CodeAction: Kept, DiagnosticRelatedInformation: Kept, Diagnostic: Kept,
+  CompletionItem: Kept, DocumentSymbol: Kept, CodeAction: Kept, CodeLens: Kept, DiagnosticRelatedInformation: Kept, Diagnostic: Kept,
   CodeActionKind: { QuickFix: 'quickfix' },
   Range: class { constructor(...at) { Object.assign(this, { start: { line: at[0], character: at[1] }, end: at.slice(2) }); } },
   Location: class { constructor(where, range) { Object.assign(this, { uri: where, range }); } },
@@ -84,8 +84,11 @@ const wait = (seconds) => new Promise((done) => setTimeout(done, 1000 * seconds)
   const named = await provider('Rename').prepareRename(document, place, never);
   const renamed = await provider('Rename').provideRenameEdits(document, place, 'drive', never).catch((e) => e.message);
   const wrong = await provider('Rename').provideRenameEdits(document, place, 'kg', never).catch((e) => e.message);
+  const lenses = await provider('CodeLens').provideCodeLenses(document, never);
+  for (const each of lenses) if (each.given[1].command) made[each.given[1].command](...each.given[1].arguments);
   made['met.run']();
   Object.assign(shown, {
+    lenses: lenses.map((each) => each.given[1].title),
     completed: completed.map((each) => each.given[0]),
     hovered: hovered.given[0].given[0],
     defined: defined.map((each) => each.range.start),
