@@ -81,13 +81,13 @@ class MacrosInTexts:
 
     def made(self, text: DeckText) -> Iterator[TextEntry]:
         """The entries that uses of macros make in a text: of those that are entries, or begin one."""
-        room = Room(MOST_TOKENS)
+        room = TokensLeft(MOST_TOKENS)
         for entry in text.all_entries():
             if entry.words and entry.words[0].text in self.by_name:
                 tokens = self.expanded(entry.words, room)
                 yield from flattened(entries_of(with_whole_names(tokens), entry.closed, entry.within))
 
-    def expanded(self, tokens: Sequence[Token], room: Room, within: frozenset[str] = frozenset()) -> list[Token]:
+    def expanded(self, tokens: Sequence[Token], room: TokensLeft, within: frozenset[str] = frozenset()) -> list[Token]:
         """The tokens that others become, each where it was written: in a body, or in an argument.
 
         within  the macros whose bodies these are of: they are not used again
@@ -113,7 +113,7 @@ class MacrosInTexts:
 
 
 @dataclass
-class Room:
+class TokensLeft:
     """The tokens that may still be made."""
 
     left: int

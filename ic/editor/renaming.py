@@ -61,7 +61,7 @@ class Renamed:
     refused: str = ""
 
 
-class Refused(Exception):
+class NotRenamed(Exception):
     """Raised with the reason why a name is not changed."""
 
 
@@ -132,7 +132,7 @@ def renamed(asked: RenameRequest) -> Renamed:
     """The edits that change the name, proved; or why there are none."""
     try:
         return _renamed(asked)
-    except Refused as reason:
+    except NotRenamed as reason:
         return Renamed({}, {}, str(reason))
 
 
@@ -141,11 +141,11 @@ def _renamed(asked: RenameRequest) -> Renamed:
     text = next((each for each in first.names.texts if each.source.name == asked.file), None)
     token = text.token_at(asked.offset) if text is not None else None
     if text is None or token is None or token.kind != NAME:
-        raise Refused("there is no name here")
+        raise NotRenamed("there is no name here")
     meant = first.names.meant_in(text, token)
     reason = refusal_of_word(asked.new) or refusal_of_name(token, meant)
     if reason:
-        raise Refused(reason)
+        raise NotRenamed(reason)
     home = {first.path(each.file) for each in meant}
     decks = [first]
     for request in asked.decks[1:]:
@@ -165,20 +165,20 @@ def _renamed(asked: RenameRequest) -> Renamed:
     edits = {path: tuple(sorted(offsets)) for path, offsets in found.items()}
     proved = [_is_proved(deck, edits, token.text, asked.new) for deck in decks]
     if not any(proved):
-        raise Refused("no deck has a run by which the change could be proved: open one that includes this text")
+        raise NotRenamed("no deck has a run by which the change could be proved: open one that includes this text")
     return Renamed(edits, texts)
 
 
 def _refuse_taken(deck: _Deck, new: str) -> None:
     for each in deck.names.by_name.get(new, ()):
-        raise Refused(f"`{new}` exists: {each.kind} at {each.token.place}")
+        raise NotRenamed(f"`{new}` exists: {each.kind} at {each.token.place}")
 
 
 def _refuse_outside(use: Token, path: str, roots: Iterable[str]) -> None:
     if use.source.name.startswith("<"):
-        raise Refused(f"`{use.text}` is used in {use.source.name}, which comes with MET")
+        raise NotRenamed(f"`{use.text}` is used in {use.source.name}, which comes with MET")
     if path and not any(os.path.commonpath([path, root]) == root for root in roots):
-        raise Refused(f"`{use.text}` stands in {path}, which is outside of the folders that are open")
+        raise NotRenamed(f"`{use.text}` stands in {path}, which is outside of the folders that are open")
 
 
 def _uses(deck: _Deck, name: str, places: set[tuple[str, int]]) -> list[Token]:
@@ -201,11 +201,11 @@ def edited(text: str, edits: Iterable[tuple[int, int]], new: str) -> str:
 
 def _is_proved(deck: _Deck, edits: Mapping[str, tuple[tuple[int, int], ...]], old: str, new: str) -> bool:
     """True where a deck's plan is the same but for the name; False where it has none, for it has no runs. Raises
-    Refused."""
+    NotRenamed."""
     codes = deck.codes
     if codes and codes != [NO_RUN]:
         at = deck.compiled.diagnostics[0].at
-        raise Refused(f"{at.place if at is not None else deck.request.name}: mend {codes[0]} first")
+        raise NotRenamed(f"{at.place if at is not None else deck.request.name}: mend {codes[0]} first")
     changed = {
         deck.path(name): edited(text, edits[deck.path(name)], new)
         for name, text in deck.compiled.sources.items()
@@ -218,13 +218,13 @@ def _is_proved(deck: _Deck, edits: Mapping[str, tuple[tuple[int, int], ...]], ol
     before = deck.compiled
     if before.plan is None or after.plan is None:
         if [each.code for each in after.diagnostics] != [each.code for each in before.diagnostics]:
-            raise Refused(f"`{old}` would not be found everywhere: {after.diagnostics[0].message}")
+            raise NotRenamed(f"`{old}` would not be found everywhere: {after.diagnostics[0].message}")
         return False
     one, other = (encode(type(each), each) for each in (before.plan, after.plan))
     if not same_but_for(old, new, one, other) or [d.code for d in before.diagnostics] != [
         d.code for d in after.diagnostics
     ]:
-        raise Refused(f"{deck.request.name or 'the deck'} would mean something else: `{old}` has other uses")
+        raise NotRenamed(f"{deck.request.name or 'the deck'} would mean something else: `{old}` has other uses")
     return True
 
 
