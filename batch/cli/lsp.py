@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from ic.editor.lenses import LastRun
 
 from met.diagnostic import Problem, error
 
@@ -23,12 +29,21 @@ from met.diagnostic import Problem, error
     "-D", "defines", multiple=True, metavar="NAME[=VALUE]", help="Define a macro as #define does; may be repeated."
 )
 @click.option("--stdio", is_flag=True, help="As editors ask for it: it is the only way there is.")
-def lsp(include_dirs: tuple[str, ...], defines: tuple[str, ...], stdio: bool) -> None:
+@click.option(
+    "--vscode",
+    metavar="FILE.vsix",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Write the extension for VS Code into this file, and serve nobody.",
+)
+def lsp(include_dirs: tuple[str, ...], defines: tuple[str, ...], stdio: bool, vscode: Path | None) -> None:
     """Serve an editor by the Language Server Protocol, on standard input and output.
 
     An editor starts it and asks; docs/editors.md has settings for Neovim, Helix, Emacs and VS Code. It needs the
     package pygls, which MET's extra `editor` names.
     """
+    if vscode is not None:
+        write_extension(vscode)
+        return
     from importlib.util import find_spec
 
     if find_spec("pygls") is None:
@@ -37,4 +52,21 @@ def lsp(include_dirs: tuple[str, ...], defines: tuple[str, ...], stdio: bool) ->
         raise Problem(error("E345", message, help=(install, "MET's extra `editor` names it")))
     from ic.editor.server import serve
 
-    serve(include_dirs, defines)
+    serve(include_dirs, defines, _last_runs)
+
+
+def write_extension(path: Path) -> None:
+    """Write the extension for VS Code, and say how it is installed."""
+    from ic.editor.extension import vsix
+
+    try:
+        path.write_bytes(vsix())
+    except OSError as reason:
+        raise Problem(error("E338", f"cannot write `{path}`: {reason.strerror}")) from None
+    click.echo(f"{path} is the extension for VS Code; `code --install-extension {path}` installs it")
+
+
+def _last_runs(deck: str) -> Mapping[str, LastRun]:
+    from batch.queries.last_run import last_runs  # an archive's reader is loaded where a lens is asked for
+
+    return last_runs(deck)

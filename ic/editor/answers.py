@@ -10,7 +10,7 @@ from pygls.workspace import PositionCodec
 
 from ic.editor import completion
 from ic.editor.checks import CheckedDeck, DeckChecks
-from ic.editor.hover import about, entry_of, markdown
+from ic.editor.hover import about, markdown
 from ic.editor.index import DeckIndex
 from ic.editor.names import NameInText, NamesInTexts, deck_text
 from ic.editor.positions import Texts, lines_of, uri_of
@@ -63,6 +63,12 @@ class Asked:
     def token(self) -> Token | None:
         return self.text.token_at(self.offset)
 
+    @property
+    def name_here(self) -> Token | None:
+        """The word here, where it may be a name."""
+        token = self.token
+        return token if token is not None and token.kind == NAME else None
+
     def location(self, token: Token) -> types.Location:
         texts = Texts({token.source.name: token.source.text}, self._codec)
         return types.Location(self._addresses[token.source.name], texts.range(token.place))
@@ -80,7 +86,7 @@ class Asked:
         token = self.token
         if token is None:
             return None
-        found = about(self.text, token, entry_of(self.text, token), self.names, self.index, self.file)
+        found = about(self.text, token, self.names, self.index, self.file)
         if not found:
             return None
         shown = types.MarkupContent(types.MarkupKind.Markdown, markdown(found))
@@ -92,17 +98,17 @@ class Asked:
         if included is not None:
             beginning = types.Position(0, 0)
             return [types.Location(included, types.Range(beginning, beginning))]
-        token = self.token
-        if token is None or token.kind != NAME:
+        token = self.name_here
+        if token is None:
             return []
-        return [self.location(each.token) for each in self.names.meant(token, entry_of(self.text, token))]
+        return [self.location(each.token) for each in self.names.meant_in(self.text, token)]
 
     def references(self, also_definitions: bool) -> list[types.Location]:
         """Where what the word here means is used: words that may mean the same definition."""
-        token = self.token
-        if token is None or token.kind != NAME or token.text not in self.names.by_name:
+        token = self.name_here
+        if token is None or token.text not in self.names.by_name:
             return []
-        meant = self.names.meant(token, entry_of(self.text, token))
+        meant = self.names.meant_in(self.text, token)
         defined = {id(each.token) for each in self.names.by_name[token.text]}
         return [
             self.location(each) for each in self._uses(token.text, meant) if also_definitions or id(each) not in defined
@@ -111,7 +117,7 @@ class Asked:
     def _uses(self, name: str, meant: list[NameInText]) -> Iterator[Token]:
         texts = {text.source.name: text for text in self.names.texts}
         for use in self.names.uses(name):
-            found = self.names.meant(use, entry_of(texts[use.source.name], use))
+            found = self.names.meant_in(texts[use.source.name], use)
             if any(each in meant for each in found):
                 yield use
 

@@ -7,20 +7,23 @@ from collections.abc import Iterable, Iterator
 from lsprotocol import types
 
 from ic.editor.index import DeckIndex
-from ic.editor.names import NamesInTexts
-from ic.editor.structure import DeckText, TextEntry
+from ic.editor.names import REMOVED, NamesInTexts
+from ic.editor.structure import NAMING, DeckText, TextEntry
 from ic.find import library_files
-from ic.language import BLOCKS, DEFINITIONS, BlockDeclaration
+from ic.language import BLOCKS, DEFINITIONS, EXPERIMENTS, OF_A_RUN
+from ic.language.bodies import JOINT_KINDS
 from ic.language.unit_words import units_of
+from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, USAGE
+from ic.meaning.mechanics.shapes import SHAPES
 from ic.text.lexer import NAME, NUMBERS, STRING, Token
 from ic.text.preprocess import DIRECTIVES
 from met import models
 from met.frozen import frozen
 from met.parameter import Parameter
+from met.plan.channel import COMMAND_UNIT
 from met.unit_parser import parse_unit
 from met.units import UNITS
 
-FUNCTIONS = ("sqrt", "sin", "cos", "min", "max", "linspace", "logspace", "csv", "pi")
 _PATHS = ("vary", "require", "record", "exclude", "of", "against", "choose", "maximise", "minimise", "signal")
 
 
@@ -39,11 +42,11 @@ def offers(text: DeckText, offset: int, names: NamesInTexts, index: DeckIndex, f
     files  the names of decks that an include in quotes finds
     """
     line = text.source.text[text.source.text.rfind("\n", 0, offset) + 1 : offset]
-    if line.lstrip().startswith("#"):
+    if line.lstrip().startswith("#") and names.macros.at(text, offset) is None:
         return list(_of_directive(line, files))
     if _is_in_comment_or_string(text, offset):
         return []
-    words, around = _before(text, offset)
+    words, around = _before(text, offset, names)
     found = {offer.word: offer for offer in reversed(list(_of_entry(words, around, names, index, offset)))}
     return list(reversed(found.values()))
 
@@ -68,10 +71,9 @@ def _is_in_comment_or_string(text: DeckText, offset: int) -> bool:
     return any(each.kind == STRING and each.offset < offset < each.end for each in text.tokens)
 
 
-def _before(text: DeckText, offset: int) -> tuple[list[Token], TextEntry | None]:
+def _before(text: DeckText, offset: int, names: NamesInTexts) -> tuple[list[Token], TextEntry | None]:
     """The words of the entry before the one that is written, and the entry whose block that is in."""
-    around = text.around(offset)
-    entries = text.entries if around is None else around.entries
+    around, entries = names.around(text, offset)
     for entry in entries:
         last = entry.words[-1].end if entry.words else 0
         opened = entry.opened.offset if entry.opened is not None else None
@@ -93,26 +95,37 @@ def _of_entry(
         return
     last = words[-1]
     texts = [word.text for word in words]
+    if texts[0] == "default" and around is None:
+        texts, words = texts[1:], words[1:]
+        if not words:
+            yield from (Offer(each, types.CompletionItemKind.Keyword, BLOCKS[each].doc) for each in EXPERIMENTS)
+            return
     if last.text == ".":
         yield from _rest_of_path(words, names, index)
         return
-    if last.kind in NUMBERS or (last.text == "]" and "=" in texts):
+    if last.kind in NUMBERS or (last.text in ("]", ")") and "=" in texts):
         yield from _units(_parameter(texts, around, names))
         return
+    if last.text in ("*", "/") and len(words) > 1 and (words[-2].text in UNITS or words[-2].kind in NUMBERS):
+        yield from _units(None)
+        if words[-2].kind not in NUMBERS:
+            return
     if last.text == "like":
-        kind = texts[1] if texts[0] == "default" else texts[0]
-        yield from (offer for offer in _named(names, kind) if offer.word not in texts)
+        yield from (offer for offer in _named(names, texts[0]) if offer.word not in texts)
         return
-    if last.text == "of" and texts[0] in ("sweep", "search", "tune"):
+    if last.text == "of" and texts[0] in OF_A_RUN:
         yield from _named(names, "run")
         return
-    if last.text in ("*", "/") and len(words) > 1 and words[-2].text in UNITS:
-        yield from _units(None)
-        return
-    if texts[-1:] == ["revolute"] or (len(texts) == 1 and texts[0] in BLOCKS):
+    if len(texts) == 1 and texts[0] in NAMING and texts[0] != "require":
         return
     if len(texts) == 2 and texts[0] == "joint":
-        yield from (Offer(each, types.CompletionItemKind.Keyword) for each in ("revolute", "prismatic", "fixed"))
+        yield from (Offer(each, types.CompletionItemKind.Keyword) for each in JOINT_KINDS)
+        return
+    if texts[0] == "remove":
+        yield from _named(names, *REMOVED, around=around)
+        return
+    if texts[0] == "substitute":
+        yield from _named(names, "joint", around=around)
         return
     yield from _values(texts, around, names, index)
 
@@ -126,13 +139,15 @@ def _beginnings(around: TextEntry | None, names: NamesInTexts) -> Iterator[Offer
         yield Offer("default", types.CompletionItemKind.Keyword, "marks the run that `met run` takes")
         yield from _named(names, "macro")
         return
-    block = _block(around)
-    if around.kind == "servos" or around.kind == "initial":
-        yield from _named(names, "joint")
+    block = BLOCKS.get(around.block)
+    if around.kind in ("servos", "initial") and around.within is not None and around.within.block == "run":
+        yield from _named(names, "joint", around=around)
     if block is not None:
         for entry in block.entries:
             about = f"{entry.doc}; {entry.default}" if entry.default else entry.doc
             yield Offer(entry.name, types.CompletionItemKind.Property, about)
+        if around.block in DEFINITIONS and around.word_behind("like"):
+            yield Offer("remove", types.CompletionItemKind.Keyword, "takes away what this one has of what it is `like`")
     yield from (_of_parameter(each) for each in parameters_of(around, names))
     if around.kind == "environment":
         for name in models.available("environment"):
@@ -140,16 +155,13 @@ def _beginnings(around: TextEntry | None, names: NamesInTexts) -> Iterator[Offer
     yield from _named(names, "macro")
 
 
-def _block(around: TextEntry) -> BlockDeclaration | None:
-    return BLOCKS.get(around.kind)
-
-
 def parameters_of(entry: TextEntry, names: NamesInTexts) -> tuple[Parameter, ...]:
     """The parameters of the model that an entry is of."""
     name = names.model_of(entry)
     for kind in models.GROUPS:
         found = models.available(kind).get(name)
-        wanted = kind == entry.kind or (entry.kind not in models.GROUPS and kind not in ("servo", "metric"))
+        of = entry.block or entry.kind
+        wanted = kind == of or (of not in models.GROUPS and kind not in ("servo", "metric"))
         if found is not None and wanted:
             return models.written(found)
     return ()
@@ -170,7 +182,7 @@ def _parameter(texts: list[str], around: TextEntry | None, names: NamesInTexts) 
     for each in parameters_of(around, names):
         if each.name == texts[0]:
             return each
-    block = _block(around)
+    block = BLOCKS.get(around.block)
     entries = [entry for entry in block.entries if entry.name == texts[0]] if block is not None else []
     return entries[0].parameter if entries else None
 
@@ -190,7 +202,8 @@ def _units(wanted: Parameter | None) -> Iterator[Offer]:
             yield Offer(shown, types.CompletionItemKind.Unit, f"the unit of `{wanted.name}`")
         if fit:
             yield from (Offer(each, types.CompletionItemKind.Unit, UNITS[each].word) for each in fit)
-            return
+            if shown in UNITS:
+                return  # of others a unit that does not fit may be a factor: `deg/s`
     yield from (Offer(each, types.CompletionItemKind.Unit, UNITS[each].word) for each in UNITS)
 
 
@@ -232,23 +245,31 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
     if key in kinds and where in ("joint", "run"):
         if kinds[key] == "link":
             yield Offer("base", types.CompletionItemKind.Constant, "what the arm stands on")
-        yield from _named(names, kinds[key])
+        yield from _named(names, kinds[key], around=around)
         return
     model_kinds: dict[str, models.Kind] = {
         "model": "servo", "command": "command", "integrator": "integrator", "metric": "metric", "bed": "bed",
         "law": "law", "guide": "guide", "sensor": "sensor",
     }  # fmt: skip
-    kind = model_kinds.get(key)
-    if kind is not None and "=" in texts:
+    kind = model_kinds.get(key, "environment" if where == "environment" else None)
+    if texts[-2:] == ["shape", "="] and where == "link":
+        yield from (Offer(each, types.CompletionItemKind.Class) for each in SHAPES)
+        return
+    if kind is not None and "=" in texts and "(" not in texts:
         for name, model in models.available(kind).items():
             yield Offer(name, types.CompletionItemKind.Class, first_line(model))
         if key != "command":
             return
+        yield from (Offer(each, types.CompletionItemKind.Function, "of what is commanded") for each in COMMAND_UNIT)
+    if texts[-1] == "(" and texts[-2] in COMMAND_UNIT:
+        for name, model in models.available("command").items():
+            yield Offer(name, types.CompletionItemKind.Class, first_line(model))
+        yield from _named(names, "guide")
     if key in _PATHS or "vary" in texts:
         heads = dict.fromkeys(each.path.partition(".")[0] for each in index.values)
         heads |= dict.fromkeys(path.partition(".")[0] for path in index.signals)
         yield from (Offer(each, types.CompletionItemKind.Field, "of a path") for each in heads)
-        yield from _named(names, "servo", "joint", "metric")
+        yield from _named(names, "joint", "metric", "servo", around=around)
     if "(" in texts:
         opened = len(texts) - 1 - texts[::-1].index("(")
         for each in models.GROUPS:
@@ -256,17 +277,22 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
             if model is not None and texts[-1] in ("(", ",", ";"):
                 yield from (_of_parameter(parameter) for parameter in models.written(model))
     yield from _named(names, "let", "macro")
-    yield from (Offer(each, types.CompletionItemKind.Function) for each in FUNCTIONS)
+    yield from (Offer(each, types.CompletionItemKind.Function, ", ".join(USAGE[each])) for each in FUNCTIONS)
+    yield from (Offer(each, types.CompletionItemKind.Constant) for each in CONSTANTS)
 
 
-def _named(names: NamesInTexts, *kinds: str) -> Iterator[Offer]:
+def _named(names: NamesInTexts, *kinds: str, around: TextEntry | None = None) -> Iterator[Offer]:
+    """The names of some kinds; around: those of the arms and runs that what stands in it may mean, where any are."""
     shown = {
         "let": types.CompletionItemKind.Variable,
         "macro": types.CompletionItemKind.Constant,
         "run": types.CompletionItemKind.Function,
     }
+    owners = names.owners(around) if around is not None else []
     for kind in kinds:
-        for name in names.of_kind(kind):
+        known = names.of_kind(kind)
+        own = [name for name in known if any(names.is_of(name, kind, owner) for owner in owners)]
+        for name in own or known:
             yield Offer(name, shown.get(kind, types.CompletionItemKind.Reference), kind)
 
 

@@ -8,7 +8,7 @@ from ic.editor.completion import first_line, parameters_of
 from ic.editor.index import DeckIndex, ValueInDeck
 from ic.editor.names import NamesInTexts
 from ic.editor.structure import DeckText, TextEntry
-from ic.language import BLOCKS
+from ic.language import BLOCKS, DEFINITIONS
 from ic.text.lexer import NAME, Token
 from met import models
 from met.diagnostic import Place
@@ -18,33 +18,21 @@ from met.units import UNITS
 MOST_VALUES = 4  # values that are shown of one place; of more, how many there are
 
 
-def about(
-    text: DeckText, token: Token, entry: TextEntry | None, names: NamesInTexts, index: DeckIndex, file: str
-) -> list[str]:
+def about(text: DeckText, token: Token, names: NamesInTexts, index: DeckIndex, file: str) -> list[str]:
     """Paragraphs, in Markdown, about a word of a text; none where nothing is known of it.
 
     file  the name that places of the deck give the text's file
     """
-    found = [*_of_key(token, entry, names), *_of_model(token), *_of_unit(text, token), *_of_name(token, entry, names)]
-    return [*found, *_of_values(index, token, entry, file)]
-
-
-def entry_of(text: DeckText, token: Token) -> TextEntry | None:
-    """The entry that a word of a text stands in, before its block."""
-    for entry in text.all_entries():
-        if entry.words and entry.words[0].offset <= token.offset <= entry.words[-1].offset:
-            return entry
-    return None
+    entry = names.entry_at(text, token)
+    found = [*_of_key(token, entry, names), *_of_model(token), *_of_unit(text, token)]
+    return [*found, *_of_name(text, token, names), *_of_values(index, token, entry, file)]
 
 
 def _of_key(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Iterator[str]:
-    if entry is None or not entry.words:
-        return
-    first = entry.words[0] if entry.texts and entry.words[0].text == entry.texts[0] else entry.words[-1]
-    if token.offset != first.offset and token.text not in BLOCKS:
+    if entry is None or entry.head is None or token.offset != entry.head.offset:
         return
     around = entry.within
-    block = BLOCKS.get(around.kind) if around is not None else None
+    block = BLOCKS.get(around.block) if around is not None else None
     for each in block.entries if block is not None else ():
         if each.name.split()[0] == token.text:
             unit = f" in {each.unit}" if each.unit not in ("", "1") else ""
@@ -56,7 +44,7 @@ def _of_key(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Itera
             default = "needed" if parameter.default is None else f"default: {parameter.default}"
             yield f"`{parameter.name}`{unit}: {parameter.doc}; {default}"
             return
-    if token.text in BLOCKS and token.offset == entry.words[0].offset:
+    if around is None and token.text in DEFINITIONS:
         yield f"`{BLOCKS[token.text].written}`\n\n{BLOCKS[token.text].doc}"
 
 
@@ -74,8 +62,8 @@ def _of_unit(text: DeckText, token: Token) -> Iterator[str]:
         yield f"unit `{token.text}`: {unit.word}, {unit.measure.scale:g} in SI"
 
 
-def _of_name(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Iterator[str]:
-    for found in names.meant(token, entry)[:2] if token.kind == NAME else ():
+def _of_name(text: DeckText, token: Token, names: NamesInTexts) -> Iterator[str]:
+    for found in names.meant_in(text, token)[:2] if token.kind == NAME else ():
         source = found.token.source
         line = source.text.split("\n")[source.line(found.token.offset) - 1].strip()
         yield f"{found.kind} `{found.token.text}`\n\n```met\n{line}\n```"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import field
 from itertools import islice
 
 from ic.driver.compile import Compiled
@@ -39,17 +40,25 @@ class ValueInDeck:
 
 @frozen
 class DeckIndex:
-    """The values of a deck, and the signals that its runs can record, with their units."""
+    """The values of a deck, and the signals that its runs can record, with their units.
+
+    cases  how many each run, sweep and search has, by name
+    """
 
     values: tuple[ValueInDeck, ...]
     signals: tuple[str, ...]
+    cases: Mapping[str, int] = field(default_factory=dict)
 
 
 def index_of(compiled: Compiled) -> DeckIndex:
     """The index of a deck that has a plan."""
     assert compiled.plan is not None
     signals = {path: None for experiment in compiled.plan.experiments for path in recordable(experiment.structure)}
-    return DeckIndex(tuple(islice(_values(compiled), MOST_VALUES)), tuple(signals))
+    cases: dict[str, int] = {}
+    for experiment in compiled.plan.experiments:
+        name = experiment.name.partition(" ")[0]  # one of several structures is called `NAME CHOICES`
+        cases[name] = cases.get(name, 0) + experiment.cases.count
+    return DeckIndex(tuple(islice(_values(compiled), MOST_VALUES)), tuple(signals), cases)
 
 
 def _values(compiled: Compiled) -> Iterator[ValueInDeck]:

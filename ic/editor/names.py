@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
+from types import MappingProxyType
 
-from ic.editor.structure import LETS, DeckText, TextEntry
+from ic.editor.expansions import MacrosInTexts
+from ic.editor.structure import LETS, DeckText, TextEntry, flattened, innermost_around
+from ic.language import OF_A_RUN
 from ic.text.lexer import NAME, Token
 from met.frozen import frozen
 
@@ -15,7 +18,23 @@ BASE_WORDS = {"like": None, "of": "run"}
 
 _BRACES = re.compile(r"\{[^{}]*\}")
 
-_KIND_OF_KEY = {"arm": "arm", "parent": "link", "child": "link"}
+_OF_RUNS: Mapping[str, str] = MappingProxyType({
+    "metrics": "metric", "guides": "guide", "sensors": "sensor", "payloads": "payload", "signals": "signal",
+})  # fmt: skip
+
+UNDER: Mapping[str, str] = MappingProxyType({"links": "link", "initial": "joint", **_OF_RUNS})
+"""The kinds of the names that follow these first words of paths."""
+
+_OF_KEY: Mapping[str, tuple[str, ...]] = MappingProxyType({
+    "arm": ("arm",), "parent": ("link",), "child": ("link",), "link": ("link",), "of": ("joint", "linear"),
+})  # fmt: skip
+"""The kinds of the names that are values of these keys."""
+
+_VALUES = ("let", "macro", "guide", "joint", "metric", "signal", "require", "sweep", "run", "servo", "link", "linear")
+"""The kinds of names in any other value, the likeliest first."""
+
+REMOVED = ("metric", "require", "guide", "sensor", "payload", "signal", "linear")
+"""The kinds of names that `remove` takes away."""
 
 
 @lru_cache(maxsize=32)
@@ -26,15 +45,25 @@ def deck_text(name: str, text: str) -> DeckText:
 
 @frozen
 class NameInText:
-    """A name that is defined: its kind (`servo`, `let`, `link`, `macro`), its token, and its entry if it has one."""
+    """A name that is defined: its kind (`servo`, `let`, `link`, `macro`), its token, and its entry if it has one.
+
+    made  whether a macro makes it, of an argument
+    """
 
     kind: str
     token: Token
     entry: TextEntry | None
+    made: bool = False
 
     @property
     def file(self) -> str:
         return self.token.source.name
+
+    @property
+    def owner(self) -> str:
+        """The arm or run that it is of; "" of a deck's own."""
+        around = self.entry.within if self.entry is not None else None
+        return around.named.text if around is not None and around.named is not None else ""
 
 
 class NamesInTexts:
@@ -42,31 +71,97 @@ class NamesInTexts:
 
     def __init__(self, texts: Iterable[DeckText]) -> None:
         self.texts = tuple(texts)
+        self.macros = MacrosInTexts(self.texts)
         self.by_name: dict[str, list[NameInText]] = {}
         for text in self.texts:
-            for each in _defined(text):
+            for each in self._defined(text):
                 self.by_name.setdefault(each.token.text, []).append(each)
+        self._with_braces = {name: found for name, found in self.by_name.items() if "{" in name}
 
     def of_kind(self, *kinds: str) -> list[str]:
         """The names of these kinds, each once."""
         return [name for name, found in self.by_name.items() if any(each.kind in kinds for each in found)]
 
+    def is_of(self, name: str, kind: str, owner: str) -> bool:
+        """True where an arm or a run of that name defines the name."""
+        return any(each.kind == kind and each.owner == owner for each in self.by_name.get(name, ()))
+
+    def entry_at(self, text: DeckText, token: Token) -> TextEntry | None:
+        """The entry that a word of a text stands in, before its block; also one of a macro's body."""
+        macro = self.macros.at(text, token.offset)
+        for entry in text.all_entries() if macro is None else flattened(self.macros.body(macro)):
+            if entry.words and entry.words[0].offset <= token.offset <= entry.words[-1].offset:
+                return entry
+        return None
+
+    def around(self, text: DeckText, offset: int) -> tuple[TextEntry | None, list[TextEntry]]:
+        """The innermost entry in whose block an offset is, also in a macro's body, and the entries beside it."""
+        macro = self.macros.at(text, offset)
+        if macro is None:
+            found = text.around(offset)
+            return found, text.entries if found is None else found.entries
+        body = self.macros.body(macro)
+        found = innermost_around(body, offset)
+        return (body[0].within if body else None, body) if found is None else (found, found.entries)
+
+    def meant_in(self, text: DeckText, token: Token) -> list[NameInText]:
+        """The definitions that a word of a text means: of a macro's parameter, where the macro has it."""
+        macro = next((each for each in text.macros if each.name.offset <= token.offset <= each.end), None)
+        for parameter in macro.parameters or () if macro is not None else ():
+            if parameter.text == token.text:
+                return [NameInText("parameter", parameter, None)]
+        return self.meant(token, self.entry_at(text, token))
+
     def meant(self, token: Token, entry: TextEntry | None) -> list[NameInText]:
-        """The definitions that a word in an entry means: those of the kind that is wanted there, or else all."""
+        """The definitions that a word in an entry means: those of the kind that is wanted there."""
         found = self.by_name.get(token.text) or self._made_by_loops(token.text)
-        if any(each.token is token for each in found):
-            return [each for each in found if each.token is token]
-        wanted = _wanted(token, entry)
-        of_kind = [each for each in found if each.kind in wanted]
-        return of_kind or found
+        if any(_same(each.token, token) for each in found):
+            return [each for each in found if _same(each.token, token)]
+        for kind in _wanted(token, entry):
+            of_kind = [each for each in found if each.kind == kind]
+            if of_kind:
+                macro = self.macros.meant(token) if kind == "macro" else None
+                return [each for each in of_kind if macro is not None and each.token is macro.name] or (
+                    self._of_owner(of_kind, entry)
+                )
+        return found if entry is None else []
+
+    def _of_owner(self, found: list[NameInText], entry: TextEntry | None) -> list[NameInText]:
+        """Those of the arm or the run that an entry is about, where some are."""
+        if len(found) < 2 or entry is None:
+            return found
+        for owner in self.owners(entry):
+            own = [each for each in found if each.owner == owner]
+            if own:
+                return own
+        return found
+
+    def owners(self, entry: TextEntry) -> list[str]:
+        """The arms and runs whose names an entry may mean, its own first, then those that it is `like`."""
+        while entry.within is not None:
+            entry = entry.within
+        owners: list[str] = []
+        waiting = [entry]
+        while waiting and len(owners) < 16:
+            entry = waiting.pop(0)
+            if entry.named is not None:
+                owners.append(entry.named.text)
+            of = entry.word_behind("of") if entry.kind in OF_A_RUN else ""
+            arms = [inner.texts[2] for inner in entry.entries if inner.texts[:2] == ["arm", "="] and inner.texts[2:]]
+            for kind, name in ((entry.kind, entry.word_behind("like")), ("run", of), *(("arm", arm) for arm in arms)):
+                bases = [each for each in self.by_name.get(name, ()) if each.kind == kind]
+                waiting += [each.entry for each in bases if each.entry is not None]
+        return owners
 
     def _made_by_loops(self, name: str) -> list[NameInText]:
         """The definitions whose names with braces may be this one: `seg_{i}` of `seg_7` and of `seg_{i-1}`."""
+        if not self._with_braces:
+            return []
         plain = _BRACES.sub("0", name)
         return [
             each
-            for written, found in self.by_name.items()
-            if "{" in written and re.fullmatch(_BRACES.sub(r"\\w+", written), plain)
+            for written, found in self._with_braces.items()
+            if re.fullmatch(_BRACES.sub(r"\\w+", written), plain)
             for each in found
         ]
 
@@ -84,44 +179,69 @@ class NamesInTexts:
             for inner in entry.entries:
                 if inner.kind == "model" and len(inner.words) > 2:
                     return inner.words[2].text
-            if "=" in entry.texts:
-                return entry.word_behind("=")
             base = entry.word_behind("like")
-            found = [each for each in self.by_name.get(base, ()) if each.kind == entry.kind and each.entry]
+            if "=" in entry.texts:
+                base = entry.word_behind("=")
+                if entry.block != "servo":
+                    return base
+            kind = entry.block
+            found = [each for each in self.by_name.get(base, ()) if each.kind == kind and each.entry]
             if not found or found[0].entry is entry:
                 return ""
             assert found[0].entry is not None
             entry = found[0].entry
         return ""
 
+    def _defined(self, text: DeckText) -> Iterator[NameInText]:
+        yield from _named(text.all_entries(), made=False)
+        parameters = {each.text for macro in text.macros for each in macro.parameters or ()}
+        for macro in text.macros:
+            yield NameInText("macro", macro.name, None)
+        known: set[tuple[str, int]] = set()
+        for each in _named(self.macros.made(text), made=True):
+            if each.token.text not in parameters and (each.token.text, each.token.offset) not in known:
+                known.add((each.token.text, each.token.offset))
+                yield each
 
-def _defined(text: DeckText) -> Iterator[NameInText]:
-    for entry in text.all_entries():
+
+def _named(entries: Iterable[TextEntry], made: bool) -> Iterator[NameInText]:
+    for entry in entries:
         name = entry.named
         if name is not None:
-            yield NameInText("let" if entry.kind in LETS else entry.kind, name, entry)
-    for line in text.directives:
-        if line.name == "define" and len(line.tokens) > 2:
-            yield NameInText("macro", line.tokens[2], None)
+            yield NameInText("let" if entry.kind in LETS else entry.kind, name, entry, made)
 
 
-def _wanted(token: Token, entry: TextEntry | None) -> tuple[str, ...]:
-    """The kinds of definitions that a word may mean where it stands."""
-    if entry is None:
-        return ()
-    words = entry.words
+def _same(one: Token, other: Token) -> bool:
+    """True for a token, and for one that stands for the same text."""
+    return one is other or (one.source is other.source and one.offset == other.offset and one.text == other.text)
+
+
+def _wanted(token: Token, entry: TextEntry | None) -> Sequence[str]:
+    """The kinds of definitions that a word may mean where it stands, the likeliest first."""
+    words = entry.words if entry is not None else []
     at = next((i for i, word in enumerate(words) if word is token or word.offset == token.offset), None)
-    if at is None:
+    if entry is None or at is None:
         return ()
     before = words[at - 1].text if at else ""
-    if before in BASE_WORDS:
+    behind = words[at + 1].text if at + 1 < len(words) else ""
+    around = entry.within.kind if entry.within is not None else ""
+    if words[at] is entry.head or (before in ("[", ",") and words[0].text == "[" and "=" not in entry.texts[:at]):
+        return ("joint", "macro") if around in ("servos", "initial") else ("macro",)
+    if before in BASE_WORDS and at > 1:
         return (BASE_WORDS[before] or entry.kind,)
+    if before == "substitute":
+        return ("joint",)
+    if entry.kind == "remove":
+        return REMOVED
+    if before == ".":
+        return (UNDER[words[at - 2].text],) if at >= 2 and words[at - 2].text in UNDER else ()
+    if behind == ".":
+        return ("joint", "servo", "arm", "run", "let")
+    if around == "servos" and before == "=":
+        return ("servo", "macro")
     if before == "=" and at >= 2:
         key = words[at - 2].text
-        around = entry.within.kind if entry.within is not None else ""
-        return ("servo",) if around == "servos" else (_KIND_OF_KEY.get(key, "let"),)
-    if before == ".":
-        return ("link", "payload") if at >= 2 and words[at - 2].text == "links" else ("joint", "metric")
-    if at + 1 < len(words) and words[at + 1].text == ".":
-        return ("joint", "servo", "arm")
-    return ("macro", "let", "metric", "joint")
+        return (*_OF_KEY[key], "let", "macro", "metric", "signal") if key in _OF_KEY else _VALUES
+    if entry.kind in ("require", "exclude", "maximise", "minimise"):
+        return ("metric", *_VALUES)
+    return _VALUES if "=" in entry.texts or "(" in entry.texts or before in ("against", "macro") else ("macro",)

@@ -15,8 +15,11 @@ from ic.editor.answers import Asked
 from ic.editor.checker_process import CheckerProcess
 from ic.editor.checks import CheckedDeck, DeckChecks, OpenText
 from ic.editor.fixes import QuickFix, actions, quick_fixes
+from ic.editor.lenses import FindLastRuns, lenses
 from ic.editor.outline import folds, symbols
-from ic.editor.positions import Texts, file_named, lines_of, uri_of
+from ic.editor.positions import Texts, file_named, lines_of, path_of, uri_of
+from ic.editor.rename_process import nameable, rename
+from ic.editor.semantic import LEGEND, semantic_tokens
 from ic.editor.structure import DeckText
 from ic.editor.told import in_editor
 from met.diagnostic import Problem
@@ -29,7 +32,7 @@ OPTIONS = ("includeDirs", "defines", "helpInMessage")
 class DeckServer(LanguageServer):
     """A language server with what it knows of decks."""
 
-    def __init__(self, include_dirs: Iterable[str], defines: Iterable[str]) -> None:
+    def __init__(self, include_dirs: Iterable[str], defines: Iterable[str], last_runs: FindLastRuns | None) -> None:
         super().__init__("met", VERSION, text_document_sync_kind=types.TextDocumentSyncKind.Full)
         self.process = CheckerProcess()
         self.checks = DeckChecks(
@@ -39,6 +42,7 @@ class DeckServer(LanguageServer):
             include_dirs=[os.path.abspath(each) for each in include_dirs],
             defines=defines,
         )
+        self._last_runs = last_runs
         self.related = True
         self.fixes: dict[str, list[QuickFix]] = {}
         self._published: dict[str, types.PublishDiagnosticsParams] = {}
@@ -134,10 +138,29 @@ class DeckServer(LanguageServer):
 
         return position
 
+    def folders(self) -> list[str]:
+        """The paths of the folders that the editor has open."""
+        addresses = list(self.workspace.folders) or [self.workspace.root_uri or ""]
+        return [path for path in map(path_of, addresses) if path is not None]
+
+    def lenses(self, uri: str) -> list[types.CodeLens]:
+        """The lines above the runs of a text, with what archives beside its file say of them."""
+        asked, path = self.asked_about(uri, types.Position(0, 0)), path_of(uri)
+        known = self._last_runs(path) if self._last_runs is not None and path is not None else {}
+        position = self.position_in(asked.text)
+        return list(
+            lenses(
+                asked.text, asked.index, path, known, lambda *ends: types.Range(position(ends[0]), position(ends[1]))
+            )
+        )
+
     def asked(self, parameters: types.TextDocumentPositionParams | Any) -> Asked:
         """The position that a request is about."""
-        codec = self.workspace.position_codec
-        return Asked(self.checks, codec, self.address, parameters.text_document.uri, parameters.position)
+        return self.asked_about(parameters.text_document.uri, parameters.position)
+
+    def asked_about(self, uri: str, position: types.Position) -> Asked:
+        """A position of a text."""
+        return Asked(self.checks, self.workspace.position_codec, self.address, uri, position)
 
     def publish(self, decks: Iterable[CheckedDeck]) -> None:
         """Tell the editor what is wrong in which file, where that is another than it knows."""
@@ -166,9 +189,11 @@ class DeckServer(LanguageServer):
                 del self._published[uri]
 
 
-def make(include_dirs: Sequence[str] = (), defines: Sequence[str] = ()) -> DeckServer:
+def make(
+    include_dirs: Sequence[str] = (), defines: Sequence[str] = (), last_runs: FindLastRuns | None = None
+) -> DeckServer:
     """A server with all that it answers."""
-    server = DeckServer(include_dirs, defines)
+    server = DeckServer(include_dirs, defines, last_runs)
 
     @server.feature(types.INITIALIZE)
     def initialize(parameters: types.InitializeParams) -> None:
@@ -238,6 +263,26 @@ def make(include_dirs: Sequence[str] = (), defines: Sequence[str] = ()) -> DeckS
     def references(parameters: types.ReferenceParams) -> list[types.Location]:
         return server.asked(parameters).references(parameters.context.include_declaration)
 
+    @server.feature(types.TEXT_DOCUMENT_CODE_LENS)
+    def code_lens(parameters: types.CodeLensParams) -> list[types.CodeLens]:
+        return server.lenses(parameters.text_document.uri)
+
+    @server.feature(types.TEXT_DOCUMENT_PREPARE_RENAME)
+    def prepare_rename(parameters: types.PrepareRenameParams) -> types.PrepareRenamePlaceholder | None:
+        return nameable(server.asked(parameters))
+
+    @server.feature(types.TEXT_DOCUMENT_RENAME, types.RenameOptions(prepare_provider=True))
+    async def renamed(parameters: types.RenameParams) -> types.WorkspaceEdit:
+        await server.checks.rest()
+        deck, codec = server.checks.deck_of(parameters.text_document.uri), server.workspace.position_codec
+        return await rename(server.asked(parameters), parameters.new_name, server.checks, deck, server.folders(), codec)
+
+    @server.feature(types.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL, LEGEND)
+    def words(parameters: types.SemanticTokensParams) -> types.SemanticTokens:
+        asked = server.asked_about(parameters.text_document.uri, types.Position(0, 0))
+        units = server.workspace.position_codec.client_num_units
+        return semantic_tokens(asked.text, asked.names, server.position_in(asked.text), units)
+
     @server.feature("met/settled")
     async def settled(parameters: None) -> bool:
         """An answer once all that the editor has said is checked, and told."""
@@ -251,9 +296,9 @@ def make(include_dirs: Sequence[str] = (), defines: Sequence[str] = ()) -> DeckS
     return server
 
 
-def serve(include_dirs: Sequence[str] = (), defines: Sequence[str] = ()) -> None:
-    """Serve an editor until it says that it ends, or has gone."""
-    server = make(include_dirs, defines)
+def serve(include_dirs: Sequence[str] = (), defines: Sequence[str] = (), last_runs: FindLastRuns | None = None) -> None:
+    """Serve an editor until it says that it ends, or has gone. last_runs: finds what archives say, for lenses."""
+    server = make(include_dirs, defines, last_runs)
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever prints does not print into the protocol
     try:

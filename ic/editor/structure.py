@@ -7,17 +7,27 @@ a single text, and takes whatever there is.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from ic.grammar.braced_names import name_length
+from ic.language import BLOCKS, DEFINITIONS
 from ic.text.lexer import NAME, SPACE, Text, Token, logical_lines
+from met.frozen import frozen
 
 LETS = ("let", "param")
 """Words that give a value a name."""
 
 LOOP = "for"
+
+INSIDE_SERVO = "sensor"
+"""A word that names something in a run, and is followed by a quantity in a servo."""
+
+NAMING = frozenset({
+    *DEFINITIONS, *LETS, "require", *(word for block in BLOCKS.values() for word in block.named),
+}) - {"substitute", "with"}  # fmt: skip
+"""Words that a new name follows."""
 
 
 @dataclass
@@ -49,15 +59,30 @@ class TextEntry:
         return self.texts[0] if self.texts else ""
 
     @property
+    def head(self) -> Token | None:
+        """The first of its words, or the one behind `default`."""
+        return self.words[len(self.words) - len(self.texts)] if self.words else None
+
+    @property
+    def block(self) -> str:
+        """The block of the language that it is: `servo` also of `elbow = motor { ... }` among a run's servos."""
+        if "=" in self.texts[1:]:
+            if self.within is not None and self.within.kind == "servos":
+                return "servo"
+            return self.kind if self.texts[2:3] == ["="] and self.kind in BLOCKS else ""
+        return self.kind if self.kind in BLOCKS else ""
+
+    @property
     def named(self) -> Token | None:
         """The token of the name that it defines: `reach` of `let reach = 2 m;`, `motor` of `servo motor { ... }`."""
         words = self.words[len(self.words) - len(self.texts) :]
-        if len(words) < 2 or words[0].kind != NAME or words[1].kind != NAME or words[0].text == LOOP:
+        if len(words) < 2 or words[0].text not in NAMING or words[1].kind != NAME:
+            return None
+        if words[0].text == INSIDE_SERVO and self.within is not None and self.within.block == "servo":
             return None
         if words[0].text in LETS or self.opened is not None or "like" in self.texts[2:3]:
             return words[1]
-        behind = words[2].text if len(words) > 2 else ""
-        return words[1] if behind in ("=", ":") and words[0].text in ("metric", "require", "sweep") else None
+        return words[1] if len(words) > 2 and words[2].text in ("=", ":") else None
 
     def word_behind(self, word: str) -> str:
         """The word behind another one, such as the servo that one is `like`; "" where there is none."""
@@ -86,6 +111,124 @@ def _is_call(words: list[Token]) -> bool:
     return len(words) > 2 and words[1].text == "(" and words[-1].text == ")" and words[0].kind == NAME
 
 
+def entries_of(tokens: Iterable[Token], last: int, within: TextEntry | None = None) -> list[TextEntry]:
+    """The entries that tokens make, in whose names braces are joined; last: the offset at which the text ends."""
+    outermost: list[TextEntry] = []
+    around: TextEntry | None = None
+    entry: TextEntry | None = None
+    blocks: list[TextEntry] = []  # that are open, loops among them
+    rounds = 0
+    for token in tokens:
+        text = token.text
+        rounds = max(rounds + (text in ("(", "[")) - (text in (")", "]")), 0)
+        if text == "}":
+            rounds = 0
+            _end(entry, token.offset, False)
+            entry = None
+            if blocks:
+                _end(blocks.pop(), token.end, True)
+                around = blocks[-1] if blocks else None
+            continue
+        if entry is not None and not rounds and token.kind == NAME and _is_call(entry.words):
+            _end(entry, entry.words[-1].end, True)  # a macro's, that stands alone
+            entry = None
+        if entry is None:
+            if text == ";":
+                continue
+            entry = TextEntry([], _no_loop(around) or within)
+            (outermost if around is None else around.entries).append(entry)
+        if text == ";" and not rounds:
+            _end(entry, token.end, True)
+            entry = None
+        elif text == "{":
+            rounds = 0
+            entry.opened = token
+            blocks.append(entry)
+            around, entry = entry, None
+        else:
+            entry.words.append(token)
+    _end(entry, last, False)
+    for block in blocks:
+        _end(block, last, False)
+    return outermost
+
+
+def _end(entry: TextEntry | None, at: int, complete: bool) -> None:
+    if entry is not None:
+        entry.closed, entry.complete = at, complete
+
+
+def with_whole_names(seen: Sequence[Token]) -> Iterator[Token]:
+    """The tokens, of a name with braces in a loop all in one: `seg_{i-1}`."""
+    indices: list[str] = [""]  # of each block that is open; "" where it is no loop's
+    index, at = "", 0
+    while at < len(seen):
+        token, length = seen[at], 1
+        if token.kind == NAME or token.text == "{":
+            length = max(1, name_length(seen, at))
+            inside = seen[at : at + length]
+            if not any(each.text in indices for each in inside[1:] if each.kind == NAME):
+                length = 1
+        if length > 1:
+            text = "".join(each.text for each in seen[at : at + length])
+            token = Token(NAME, text, token.source, token.offset, seen[at + length - 1].end - token.offset)
+        elif token.text == LOOP and at + 2 < len(seen) and seen[at + 2].text == "in":
+            index = seen[at + 1].text
+        elif token.text == "{":
+            indices.append(index)
+            index = ""
+        elif token.text == "}" and len(indices) > 1:
+            indices.pop()
+        at += length
+        yield token
+
+
+def flattened(entries: Iterable[TextEntry]) -> Iterator[TextEntry]:
+    """Entries with all those inside of them, outer ones first."""
+    waiting = list(reversed(list(entries)))
+    while waiting:
+        entry = waiting.pop()
+        yield entry
+        waiting += reversed(entry.entries)
+
+
+def innermost_around(entries: Iterable[TextEntry], offset: int) -> TextEntry | None:
+    """The innermost of the entries in whose block an offset is, through loops; None outside all blocks."""
+    found: TextEntry | None = None
+    while True:
+        inside = [e for e in entries if e.opened is not None and e.opened.end <= offset < max(e.closed, 1)]
+        inside += [e for e in entries if e.opened is not None and not e.complete and offset == e.closed]
+        if not inside:
+            return _no_loop(found)
+        found, entries = inside[-1], inside[-1].entries
+
+
+@frozen
+class TextMacro:
+    """A macro as a text defines it; parameters: None where it has no parentheses."""
+
+    name: Token
+    parameters: tuple[Token, ...] | None
+    body: tuple[Token, ...]
+
+    @property
+    def end(self) -> int:
+        return self.body[-1].end if self.body else self.name.end
+
+
+def _macro(line: TextDirective) -> TextMacro | None:
+    tokens = line.tokens
+    if line.name != "define" or len(tokens) < 3 or tokens[2].kind != NAME:
+        return None
+    parameters, begin = None, 3
+    if len(tokens) > 3 and tokens[3].text == "(" and tokens[3].offset == tokens[2].end:
+        close = next((n for n, token in enumerate(tokens) if token.text == ")"), len(tokens) - 1)
+        parameters = tuple(token for token in tokens[4:close] if token.text != ",")
+        begin = close + 1
+    body = [token for token in tokens[begin:] if token.text.strip()]
+    return TextMacro(tokens[2], parameters, tuple(with_whole_names(body)))
+
+
 class DeckText:
     """A text with its tokens, entries and preprocessor lines."""
 
@@ -103,97 +246,17 @@ class DeckText:
                 self.directives.append(TextDirective(seen))
             else:
                 self.tokens += (token for token in seen if token.text.strip())
-        self.entries: list[TextEntry] = []
-        self._structure()
-
-    def _structure(self) -> None:
-        around: TextEntry | None = None
-        entry: TextEntry | None = None
-        blocks: list[TextEntry] = []  # that are open, loops among them
-        rounds = 0
-        for token in self._in_loops_as_names():
-            text = token.text
-            rounds = max(rounds + (text in ("(", "[")) - (text in (")", "]")), 0)
-            if text == "}":
-                rounds = 0
-                self._end(entry, token.offset, False)
-                entry = None
-                if blocks:
-                    self._end(blocks.pop(), token.end, True)
-                    around = blocks[-1] if blocks else None
-                continue
-            if entry is not None and not rounds and token.kind == NAME and _is_call(entry.words):
-                self._end(entry, entry.words[-1].end, True)  # a macro's, that stands alone
-                entry = None
-            if entry is None:
-                if text == ";":
-                    continue
-                entry = TextEntry([], _no_loop(around))
-                (self.entries if around is None else around.entries).append(entry)
-            if text == ";" and not rounds:
-                self._end(entry, token.end, True)
-                entry = None
-            elif text == "{":
-                rounds = 0
-                entry.opened = token
-                blocks.append(entry)
-                around, entry = entry, None
-            else:
-                entry.words.append(token)
-        last = len(self.source.text)
-        self._end(entry, last, False)
-        for block in blocks:
-            self._end(block, last, False)
-
-    def _in_loops_as_names(self) -> Iterator[Token]:
-        """The tokens, of a name with braces in a loop all in one, which it also keeps in `tokens`."""
-        seen, self.tokens = self.tokens, []
-        indices: list[str] = [""]  # of each block that is open; "" where it is no loop's
-        index, at = "", 0
-        while at < len(seen):
-            token, length = seen[at], 1
-            if token.kind == NAME or token.text == "{":
-                length = max(1, name_length(seen, at))
-                inside = seen[at : at + length]
-                if not any(each.text in indices for each in inside[1:] if each.kind == NAME):
-                    length = 1
-            if length > 1:
-                text = "".join(each.text for each in seen[at : at + length])
-                token = Token(NAME, text, token.source, token.offset, seen[at + length - 1].end - token.offset)
-            elif token.text == LOOP and at + 2 < len(seen) and seen[at + 2].text == "in":
-                index = seen[at + 1].text
-            elif token.text == "{":
-                indices.append(index)
-                index = ""
-            elif token.text == "}" and len(indices) > 1:
-                indices.pop()
-            at += length
-            self.tokens.append(token)
-            yield token
-
-    @staticmethod
-    def _end(entry: TextEntry | None, at: int, complete: bool) -> None:
-        if entry is not None:
-            entry.closed, entry.complete = at, complete
+        self.tokens = list(with_whole_names(self.tokens))
+        self.entries = entries_of(self.tokens, len(text))
+        self.macros = [macro for macro in map(_macro, self.directives) if macro is not None]
 
     def all_entries(self) -> Iterator[TextEntry]:
         """All entries, outer ones first."""
-        waiting = list(reversed(self.entries))
-        while waiting:
-            entry = waiting.pop()
-            yield entry
-            waiting += reversed(entry.entries)
+        return flattened(self.entries)
 
     def around(self, offset: int) -> TextEntry | None:
         """The innermost entry in whose block an offset is, through loops; None outside all blocks."""
-        found: TextEntry | None = None
-        entries = self.entries
-        while True:
-            inside = [e for e in entries if e.opened is not None and e.opened.end <= offset < max(e.closed, 1)]
-            inside += [e for e in entries if e.opened is not None and not e.complete and offset == e.closed]
-            if not inside:
-                return _no_loop(found)
-            found, entries = inside[-1], inside[-1].entries
+        return innermost_around(self.entries, offset)
 
     def token_at(self, offset: int) -> Token | None:
         """The word at an offset or just before it, in the deck or in a preprocessor line."""

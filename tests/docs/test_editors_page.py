@@ -78,7 +78,7 @@ def test_the_page_names_commands_and_files_that_there_are() -> None:
     for path in re.findall(r"docs/editors[\w./]*", text):
         assert (ROOT / path.rstrip(".")).exists(), path
     used = {line.split()[1] for line in text.splitlines() if line.startswith("    met ")}
-    assert used == {"check", "fmt", "new"} and used <= set(cli.met.list_commands(None))  # type: ignore[arg-type]
+    assert used == {"check", "fmt", "lsp", "new"} and used <= set(cli.met.list_commands(None))  # type: ignore[arg-type]
 
 
 def test_the_hooks_before_a_commit_are_commands_of_met_and_those_that_the_page_names(

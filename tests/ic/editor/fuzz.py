@@ -85,7 +85,8 @@ def ask_anything(editor: Editor, deck: Path, text: str, chance: random.Random) -
     editor.about("textDocument/references", deck, line, 3, context={"includeDeclaration": True})
     document = {"textDocument": {"uri": uri(deck)}}
     editor.ask("textDocument/documentSymbol", document)
-    editor.ask("textDocument/foldingRange", document)
+    for question in ("foldingRange", "semanticTokens/full", "codeLens"):
+        editor.ask(f"textDocument/{question}", document)
     editor.ask("textDocument/formatting", {**document, "options": {"tabSize": 4, "insertSpaces": True}})
     everything = {"start": {"line": 0, "character": 0}, "end": {"line": len(lines), "character": 0}}
     editor.ask("textDocument/codeAction", {**document, "range": everything, "context": {"diagnostics": []}})

@@ -1,0 +1,71 @@
+"""The last run of each run and sweep of a deck, from the archives beside it: for the lenses of an editor."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.queries.requirements import outcomes, requirement_texts
+from ic.editor.lenses import LastRun
+from met.diagnostic import Problem
+
+MOST_ARCHIVES = 20
+"""Archives beside a deck that are looked into, the newest first."""
+
+
+def last_runs(deck: str) -> dict[str, LastRun]:
+    """The last run of each run and sweep, by name, from the archives that `met run` calls after the deck.
+
+    What cannot be read is left out: an editor has no use for what is wrong with an archive.
+    """
+    path = Path(deck)
+    found: dict[str, LastRun] = {}
+    for archive in _newest(path):
+        try:
+            with ArchiveFile(archive) as opened:
+                if Path(opened.deck).name != path.name:
+                    continue
+                seconds = _seconds(archive)
+                for group in opened.groups:
+                    found.setdefault(group.name, _last_run(archive, group, seconds.get(group.name)))
+        except (Problem, OSError):
+            continue
+    return found
+
+
+def _newest(deck: Path) -> list[Path]:
+    try:
+        archives = [each for each in deck.parent.iterdir() if each.suffix == ".h5" and each.name.startswith(deck.stem)]
+        return sorted(archives, key=lambda each: -each.stat().st_mtime)[:MOST_ARCHIVES]
+    except OSError:
+        return []
+
+
+def _last_run(archive: Path, group: ArchiveGroup, seconds: float | None) -> LastRun:
+    counts = {}
+    if group.summary is None:
+        met = outcomes(group)
+        for number, text in enumerate(requirement_texts(group)[: met.shape[1]]):
+            one = met[:, number]
+            counts[text] = (int((one == 1).sum()), int((one == 0).sum()), int((one == -1).sum()))
+    return LastRun(str(archive), group.count, seconds, counts)
+
+
+def _seconds(archive: Path) -> dict[str, float]:
+    """Seconds of computing by experiment, as the file beside the archive says; none where it does not."""
+    try:
+        return dict(_numbers(json.loads(archive.with_name(archive.name + ".run.json").read_text())))
+    except (OSError, ValueError):
+        return {}
+
+
+def _numbers(told: Any) -> Iterator[tuple[str, float]]:
+    every = told.get("experiments") if isinstance(told, dict) else None
+    for each in every if isinstance(every, list) else ():
+        if isinstance(each, dict) and isinstance(each.get("experiment"), str):
+            seconds = each.get("seconds")
+            if isinstance(seconds, int | float) and seconds >= 0:
+                yield each["experiment"], float(seconds)

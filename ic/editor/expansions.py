@@ -1,0 +1,160 @@
+"""Macros as a deck's texts use them: what an entry that is a macro's use becomes, where a body stands in the deck.
+
+This is the preprocessor for names alone. It takes texts that are not whole, knows no conditions, and gives up early: an
+editor is better off without a name than without an answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from ic.editor.structure import (
+    DeckText,
+    TextEntry,
+    TextMacro,
+    entries_of,
+    flattened,
+    innermost_around,
+    with_whole_names,
+)
+from ic.text.lexer import NAME, PASTE, Token
+
+MOST_TOKENS = 20_000
+"""Tokens that the uses of macros in a text become, at most."""
+
+
+class MacrosInTexts:
+    """The macros of some texts, the uses of them, and the entries that these make."""
+
+    def __init__(self, texts: Sequence[DeckText]) -> None:
+        self._texts = texts
+        self.by_name: dict[str, list[TextMacro]] = {}
+        for text in texts:
+            for macro in text.macros:
+                self.by_name.setdefault(macro.name.text, []).append(macro)
+        self._uses = dict(self._first_uses()) if self.by_name else {}
+        self._bodies: dict[int, list[TextEntry]] = {}
+
+    def meant(self, use: Token) -> TextMacro | None:
+        """The macro that a token is a use of: the last that its text defines before it, or else any."""
+        found = self.by_name.get(use.text, ())
+        before = [each for each in found if each.name.source is use.source and each.name.offset <= use.offset]
+        return before[-1] if before else found[-1] if found else None
+
+    @staticmethod
+    def at(text: DeckText, offset: int) -> TextMacro | None:
+        """The macro in whose body an offset of a text is, or behind which it stands on its line."""
+        for macro in text.macros:
+            begin = macro.body[0].offset if macro.body else macro.end + 1
+            behind = text.source.text[macro.end : offset]
+            if begin <= offset and (offset <= macro.end or not behind.strip(" \t")):
+                return macro
+        return None
+
+    def body(self, macro: TextMacro) -> list[TextEntry]:
+        """The entries of a macro's body, inside of what stands around its first use."""
+        key = id(macro)
+        if key not in self._bodies:
+            self._bodies[key] = []  # of a macro that is used in itself
+            self._bodies[key] = entries_of(macro.body, macro.end, self._around_use(macro))
+        return self._bodies[key]
+
+    def _around_use(self, macro: TextMacro) -> TextEntry | None:
+        text, use = self._uses.get(macro.name.text, (None, None))
+        if text is None or use is None:
+            return None
+        inside = self.at(text, use.offset)
+        if inside is None:
+            return text.around(use.offset)
+        body = self.body(inside)
+        return innermost_around(body, use.offset) or (body[0].within if body else self._around_use(inside))
+
+    def _first_uses(self) -> Iterator[tuple[str, tuple[DeckText, Token]]]:
+        """The first use of each macro, one in a body only where there is no other."""
+        for in_bodies in (True, False):
+            for text in reversed(self._texts):
+                lines = (token for macro in text.macros for token in macro.body)
+                for token in reversed(list(lines) if in_bodies else text.tokens):
+                    if token.text in self.by_name:
+                        yield token.text, (text, token)
+
+    def made(self, text: DeckText) -> Iterator[TextEntry]:
+        """The entries that uses of macros make in a text: of those that are entries, or begin one."""
+        room = TokensLeft(MOST_TOKENS)
+        for entry in text.all_entries():
+            if entry.words and entry.words[0].text in self.by_name:
+                tokens = self.expanded(entry.words, room)
+                yield from flattened(entries_of(with_whole_names(tokens), entry.closed, entry.within))
+
+    def expanded(self, tokens: Sequence[Token], room: TokensLeft, within: frozenset[str] = frozenset()) -> list[Token]:
+        """The tokens that others become, each where it was written: in a body, or in an argument.
+
+        within  the macros whose bodies these are of: they are not used again
+        """
+        made: list[Token] = []
+        at = 0
+        while at < len(tokens) and room.left > 0:
+            token = tokens[at]
+            at += 1
+            room.left -= 1
+            macro = self.meant(token) if token.kind == NAME and token.text not in within else None
+            if macro is None:
+                made.append(token)
+            elif macro.parameters is None:
+                made += self.expanded(pasted(macro.body), room, within | {token.text})
+            elif at < len(tokens) and tokens[at].text == "(":
+                arguments, at = arguments_at(tokens, at)
+                given = dict(zip((each.text for each in macro.parameters), arguments, strict=False))
+                made += self.expanded(pasted(_filled(macro.body, given)), room, within | {token.text})
+            else:
+                made.append(token)
+        return made
+
+
+@dataclass
+class TokensLeft:
+    """The tokens that may still be made."""
+
+    left: int
+
+
+def arguments_at(tokens: Sequence[Token], at: int) -> tuple[list[list[Token]], int]:
+    """The arguments in the parentheses that begin at an index, and the index behind them."""
+    arguments: list[list[Token]] = [[]]
+    depth = 0
+    while at < len(tokens):
+        token = tokens[at]
+        at += 1
+        depth += (token.text == "(") - (token.text == ")")
+        if depth == 0:
+            break
+        if depth == 1 and token.text == ",":
+            arguments.append([])
+        elif depth > 1 or token.text != "(":
+            arguments[-1].append(token)
+    return arguments, at
+
+
+def _filled(body: Iterable[Token], given: Mapping[str, list[Token]]) -> Iterator[Token]:
+    for token in body:
+        if token.kind == NAME and token.text in given:
+            yield from given[token.text]
+        else:
+            yield token
+
+
+def pasted(tokens: Iterable[Token]) -> list[Token]:
+    """The tokens with `##` carried out; what is joined stands where its first part does."""
+    made: list[Token] = []
+    joins = False
+    for token in tokens:
+        if token.kind == PASTE:
+            joins = bool(made)
+        elif joins:
+            first = made.pop()
+            made.append(Token(NAME, first.text + token.text, first.source, first.offset, first.length))
+            joins = False
+        else:
+            made.append(token)
+    return made

@@ -1,0 +1,86 @@
+"""The extension for VS Code as one file, `met lsp --vscode FILE.vsix`: made without a network, of what MET has.
+
+A .vsix is a ZIP file: the extension in the folder `extension`, its manifest, and the types of the files in it
+(github.com/microsoft/vscode-vsce). Equal versions of MET make equal bytes.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from io import BytesIO
+from pathlib import Path
+from xml.sax.saxutils import escape, quoteattr
+
+from ic.printing.textmate import grammar
+
+FOLDER = Path(__file__).parent / "vscode"
+DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a ZIP file can hold: a build's clock is no part of it
+
+_TYPES = {"json": "application/json", "js": "application/javascript", "vsixmanifest": "text/xml"}
+
+
+def package() -> dict[str, object]:
+    """The extension's own description, package.json."""
+    described: dict[str, object] = json.loads((FOLDER / "package.json").read_text())
+    return described
+
+
+def files() -> dict[str, bytes]:
+    """The files of a .vsix, by their names in it."""
+    found = {f"extension/{path.name}": path.read_bytes() for path in sorted(FOLDER.iterdir()) if path.is_file()}
+    found["extension/met.tmLanguage.json"] = (json.dumps(grammar(), indent=2) + "\n").encode()
+    return {
+        "extension.vsixmanifest": _manifest(package()).encode(),
+        "[Content_Types].xml": _content_types().encode(),
+        **found,
+    }
+
+
+def vsix() -> bytes:
+    """The whole extension."""
+    made = BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in files().items():
+            entry = zipfile.ZipInfo(name, DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, data)
+    return made.getvalue()
+
+
+def _manifest(described: Mapping[str, object]) -> str:
+    name, version, publisher = (quoteattr(str(described[key])) for key in ("name", "version", "publisher"))
+    engines = described["engines"]
+    assert isinstance(engines, dict)
+    return f"""<?xml version="1.0" encoding="utf-8"?>
+<PackageManifest Version="2.0.0" xmlns="http://schemas.microsoft.com/developer/vsx-schema/2011">
+  <Metadata>
+    <Identity Language="en-US" Id={name} Version={version} Publisher={publisher}/>
+    <DisplayName>{escape(str(described["displayName"]))}</DisplayName>
+    <Description xml:space="preserve">{escape(str(described["description"]))}</Description>
+    <Tags>met,ic</Tags>
+    <Categories>Programming Languages</Categories>
+    <GalleryFlags>Public</GalleryFlags>
+    <Properties>
+      <Property Id="Microsoft.VisualStudio.Code.Engine" Value={quoteattr(str(engines["vscode"]))}/>
+    </Properties>
+  </Metadata>
+  <Installation>
+    <InstallationTarget Id="Microsoft.VisualStudio.Code"/>
+  </Installation>
+  <Dependencies/>
+  <Assets>
+    <Asset Type="Microsoft.VisualStudio.Code.Manifest" Path="extension/package.json" Addressable="true"/>
+  </Assets>
+</PackageManifest>
+"""
+
+
+def _content_types() -> str:
+    types = "".join(f'<Default Extension=".{end}" ContentType="{kind}"/>' for end, kind in _TYPES.items())
+    return (
+        '<?xml version="1.0" encoding="utf-8"?>\n'
+        f'<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">{types}</Types>\n'
+    )

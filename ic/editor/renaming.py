@@ -1,0 +1,262 @@
+"""A name changed wherever it stands, in all decks that have it: edits that are proved, or why there are none.
+
+The edits are found by name and place in the texts, which is not as sharp as the compiler. So they are proved: every
+deck that has the name is compiled as it is and as it will be, and the two plans must be equal up to the name.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from ic.driver.compile import Compiled
+from ic.editor.checking import CheckRequest
+from ic.editor.names import NameInText, NamesInTexts
+from ic.editor.structure import DeckText
+from ic.language import BLOCKS
+from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
+from ic.text.lexer import NAME, Token
+from met.frozen import frozen
+from met.plan.codec import encode
+from met.units import is_unit
+
+WORDS = ("for", "in", "let", "param", "like", "of", "from", "and", "or", "not", "when", "default", "base")
+"""Words of the grammar, which name nothing."""
+
+NO_RUN = "D161"
+"""The error of a text that is a part of decks and none itself."""
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_WORDS = re.compile(r"\w+|\W+")
+
+
+@frozen
+class RenameRequest:
+    """A name to be changed.
+
+    decks  the deck in which it was asked first, then others that may have the name
+    file   the text with the name, as the first deck's places call it;  offset: where it stands
+    roots  the real paths of the folders in which texts may be changed
+    """
+
+    decks: tuple[CheckRequest, ...]
+    file: str
+    offset: int
+    new: str
+    roots: tuple[str, ...]
+
+
+@frozen
+class Renamed:
+    """Offsets and lengths of what is replaced, by the files' real paths (a text in no file: ""); or why nothing is.
+
+    texts  the files' texts, by their paths
+    """
+
+    edits: Mapping[str, tuple[tuple[int, int], ...]]
+    texts: Mapping[str, str]
+    refused: str = ""
+
+
+class NotRenamed(Exception):
+    """Raised with the reason why a name is not changed."""
+
+
+def refusal_of_word(new: str) -> str:
+    """Why a word can be no name; "" where it can."""
+    if _NAME.fullmatch(new) is None:
+        return f"`{new}` is no name: letters, digits and `_`, not a digit first"
+    if is_unit(new):
+        return f"`{new}` is a unit"
+    if new in (*FUNCTIONS, *CONSTANTS):
+        return f"`{new}` is a function or a number of the language"
+    return f"`{new}` is a word of the language" if new in WORDS or new in BLOCKS else ""
+
+
+def refusal_of_name(token: Token, meant: Sequence[NameInText]) -> str:
+    """Why what a word means cannot be renamed, as far as texts alone tell; "" where it may be."""
+    if any("{" in each.token.text for each in meant):
+        return f"`{token.text}` is made by a loop: change `{meant[0].token.text}` by hand"
+    if any(each.made for each in meant):
+        return f"`{token.text}` is made by a macro: change what the macro is given by hand"
+    library = [each for each in meant if each.file.startswith("<")]
+    if library:
+        return f"`{token.text}` is defined in {library[0].file}, which comes with MET"
+    if not meant:
+        return f"`{token.text}` is no name that a deck defines here"
+    return ""
+
+
+class _Deck:
+    """A deck as it is: compiled, with the names in its texts."""
+
+    def __init__(self, request: CheckRequest) -> None:
+        self.request = request
+        self.compiled = _compiled(request)
+        texts = self.compiled.sources
+        self.names = NamesInTexts(DeckText(name, text) for name, text in texts.items() if _is_deck(name))
+
+    def path(self, name: str) -> str:
+        """The real path of a file that its places name; "" of a text in no file."""
+        if self.request.text is not None and name == next(iter(self.compiled.sources)):
+            return ""
+        return os.path.realpath(os.path.join(self.request.folder, name))
+
+    @property
+    def codes(self) -> list[str]:
+        return [each.code for each in self.compiled.diagnostics if each.severity == "error"]
+
+
+def _is_deck(name: str) -> bool:
+    return not name.endswith((".csv", ".urdf", ".xacro")) and name != "<command line>"
+
+
+def _compiled(request: CheckRequest) -> Compiled:
+    from ic.driver.compile import check
+
+    os.chdir(request.folder)
+    return check(
+        request.name,
+        include_dirs=request.include_dirs,
+        defines=request.defines,
+        select="all",
+        text=request.text,
+        unsaved=request.unsaved,
+    )
+
+
+def renamed(asked: RenameRequest) -> Renamed:
+    """The edits that change the name, proved; or why there are none."""
+    try:
+        return _renamed(asked)
+    except NotRenamed as reason:
+        return Renamed({}, {}, str(reason))
+
+
+def _renamed(asked: RenameRequest) -> Renamed:
+    first = _Deck(asked.decks[0])
+    text = next((each for each in first.names.texts if each.source.name == asked.file), None)
+    token = text.token_at(asked.offset) if text is not None else None
+    if text is None or token is None or token.kind != NAME:
+        raise NotRenamed("there is no name here")
+    meant = first.names.meant_in(text, token)
+    reason = refusal_of_word(asked.new) or refusal_of_name(token, meant)
+    if reason:
+        raise NotRenamed(reason)
+    home = {first.path(each.file) for each in meant}
+    decks = [first]
+    for request in asked.decks[1:]:
+        other = _Deck(request)
+        if home & {other.path(name) for name in other.compiled.sources}:
+            decks.append(other)
+    found: dict[str, set[tuple[int, int]]] = {}
+    texts: dict[str, str] = {}
+    places = {(first.path(each.file), each.token.offset) for each in meant}
+    for deck in decks:
+        _refuse_taken(deck, asked.new)
+        for use in _uses(deck, token.text, places):
+            path = deck.path(use.source.name)
+            _refuse_outside(use, path, asked.roots)
+            found.setdefault(path, set()).add((use.offset, use.length))
+            texts[path] = use.source.text
+    edits = {path: tuple(sorted(offsets)) for path, offsets in found.items()}
+    proved = [_is_proved(deck, edits, token.text, asked.new) for deck in decks]
+    if not any(proved):
+        raise NotRenamed("no deck has a run by which the change could be proved: open one that includes this text")
+    return Renamed(edits, texts)
+
+
+def _refuse_taken(deck: _Deck, new: str) -> None:
+    for each in deck.names.by_name.get(new, ()):
+        raise NotRenamed(f"`{new}` exists: {each.kind} at {each.token.place}")
+
+
+def _refuse_outside(use: Token, path: str, roots: Iterable[str]) -> None:
+    if use.source.name.startswith("<"):
+        raise NotRenamed(f"`{use.text}` is used in {use.source.name}, which comes with MET")
+    if path and not any(os.path.commonpath([path, root]) == root for root in roots):
+        raise NotRenamed(f"`{use.text}` stands in {path}, which is outside of the folders that are open")
+
+
+def _uses(deck: _Deck, name: str, places: set[tuple[str, int]]) -> list[Token]:
+    """The tokens of a deck's texts that mean one of the definitions."""
+    texts = {text.source.name: text for text in deck.names.texts}
+    found = []
+    for use in deck.names.uses(name):
+        meant = deck.names.meant_in(texts[use.source.name], use)
+        if any((deck.path(each.file), each.token.offset) in places for each in meant):
+            found.append(use)
+    return found
+
+
+def edited(text: str, edits: Iterable[tuple[int, int]], new: str) -> str:
+    """A text with stretches of it replaced."""
+    for offset, length in sorted(edits, reverse=True):
+        text = text[:offset] + new + text[offset + length :]
+    return text
+
+
+def _is_proved(deck: _Deck, edits: Mapping[str, tuple[tuple[int, int], ...]], old: str, new: str) -> bool:
+    """True where a deck's plan is the same but for the name; False where it has none, for it has no runs. Raises
+    NotRenamed."""
+    codes = deck.codes
+    if codes and codes != [NO_RUN]:
+        at = deck.compiled.diagnostics[0].at
+        raise NotRenamed(f"{at.place if at is not None else deck.request.name}: mend {codes[0]} first")
+    changed = {
+        deck.path(name): edited(text, edits[deck.path(name)], new)
+        for name, text in deck.compiled.sources.items()
+        if deck.path(name) in edits
+    }
+    request = deck.request
+    if "" in changed:
+        request = replace(request, text=changed.pop(""))
+    after = _compiled(replace(request, unsaved={**request.unsaved, **changed}))
+    before = deck.compiled
+    if before.plan is None or after.plan is None:
+        if [each.code for each in after.diagnostics] != [each.code for each in before.diagnostics]:
+            raise NotRenamed(f"`{old}` would not be found everywhere: {after.diagnostics[0].message}")
+        return False
+    one, other = (encode(type(each), each) for each in (before.plan, after.plan))
+    if not same_but_for(old, new, one, other) or [d.code for d in before.diagnostics] != [
+        d.code for d in after.diagnostics
+    ]:
+        raise NotRenamed(f"{deck.request.name or 'the deck'} would mean something else: `{old}` has other uses")
+    return True
+
+
+_COLUMNS = ("column", "length")
+
+
+def same_but_for(old: str, new: str, before: Any, after: Any) -> bool:
+    """True for two values of plans that are equal where one word stands for another, and columns of places aside."""
+    if isinstance(before, str) and isinstance(after, str):
+        return before == after or _renamed_words(old, new, before, after)
+    if isinstance(before, dict) and isinstance(after, dict):
+        if "sources" in before and "experiments" in before:
+            before, after = ({k: v for k, v in each.items() if k != "sources"} for each in (before, after))
+        if "file" in before and "line" in before:
+            before, after = ({k: v for k, v in each.items() if k not in _COLUMNS} for each in (before, after))
+        keys = [(key, key if key in after else _in_words(old, new, key)) for key in before]
+        return len(before) == len(after) and all(
+            other in after and same_but_for(old, new, before[key], after[other]) for key, other in keys
+        )
+    if isinstance(before, list | tuple) and isinstance(after, list | tuple):
+        return len(before) == len(after) and all(
+            same_but_for(old, new, one, other) for one, other in zip(before, after, strict=True)
+        )
+    return type(before) is type(after) and bool(before == after)
+
+
+def _renamed_words(old: str, new: str, before: str, after: str) -> bool:
+    ones, others = _WORDS.findall(before), _WORDS.findall(after)
+    return len(ones) == len(others) and all(
+        one == other or (one == old and other == new) for one, other in zip(ones, others, strict=True)
+    )
+
+
+def _in_words(old: str, new: str, text: str) -> str:
+    return "".join(new if each == old else each for each in _WORDS.findall(text))

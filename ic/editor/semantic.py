@@ -1,0 +1,156 @@
+"""The meaning of each word of a text, for an editor's colours: keys, models, units, names by what they name, macros.
+
+A grammar of colours goes by how a word is written; this goes by what the language declares and the deck defines.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
+
+from lsprotocol import types
+
+from ic.editor.completion import parameters_of
+from ic.editor.names import NamesInTexts
+from ic.editor.structure import LOOP, DeckText, TextEntry, flattened
+from ic.language import BLOCKS
+from ic.language.bodies import JOINT_KINDS
+from ic.meaning.expressions.evaluate import FUNCTIONS
+from ic.text.lexer import NAME, Token
+from met import models
+from met.units import UNITS
+
+TYPES = ("keyword", "property", "class", "function", "type", "enumMember", "macro", "parameter", "variable", "struct",
+         "method")  # fmt: skip
+"""The kinds of words, in the names of the protocol: a unit is a `type`, a model a `class`, a run a `method`."""
+
+MODIFIERS = ("definition", "defaultLibrary")
+LEGEND = types.SemanticTokensLegend(token_types=list(TYPES), token_modifiers=list(MODIFIERS))
+DEFINES, OF_LIBRARY = 1, 2
+
+_OF_NAME: Mapping[str, str] = MappingProxyType({
+    "macro": "macro", "parameter": "parameter", "link": "struct", "joint": "struct", "arm": "struct",
+    "payload": "struct", "servo": "class", "run": "method", "sweep": "method", "search": "method", "tune": "method",
+})  # fmt: skip
+
+
+def semantic_tokens(
+    text: DeckText, names: NamesInTexts, position: Callable[[int], types.Position], units: Callable[[str], int]
+) -> types.SemanticTokens:
+    """The words of a text that mean something, as the protocol packs them.
+
+    position  of an offset, for the editor;  units: the length of a text, for the editor
+    """
+    data: list[int] = []
+    line = column = 0
+    for token, kind, modifiers in meanings(text, names):
+        at = position(token.offset)
+        written = text.source.text[token.offset : token.end]
+        if "\n" in written:
+            continue
+        if at.line != line:
+            column = 0
+        data += [at.line - line, at.character - column, units(written), TYPES.index(kind), modifiers]
+        line, column = at.line, at.character
+    return types.SemanticTokens(data)
+
+
+def meanings(text: DeckText, names: NamesInTexts) -> Iterator[tuple[Token, str, int]]:
+    """The words of a text in order, each with its kind of `TYPES` and bits of `MODIFIERS`; those that mean nothing are
+    left out."""
+    entries = [entry for entry in text.all_entries() if entry.words]
+    for macro in text.macros:
+        entries += [entry for entry in flattened(names.macros.body(macro)) if entry.words]
+    entries.sort(key=lambda entry: entry.words[0].offset)
+    begins = [entry.words[0].offset for entry in entries]
+    loops = [entry for entry in entries if entry.kind == LOOP and entry.opened is not None and len(entry.words) > 1]
+    in_lines = (token for directive in text.directives for token in directive.tokens[2:])
+    every = sorted((*text.tokens, *in_lines), key=lambda token: token.offset)
+    before: Token | None = None
+    for n, token in enumerate(every):
+        if token.kind == NAME:
+            behind = every[n + 1].text if n + 1 < len(every) else ""
+            at = bisect_right(begins, token.offset) - 1
+            entry = entries[at] if at >= 0 and token.offset <= entries[at].words[-1].offset else None
+            found = _parameter_or_index(text, token, loops) or _meaning(text, token, entry, names, before, behind)
+            if found is not None:
+                yield token, *found
+        before = token
+
+
+def _parameter_or_index(text: DeckText, token: Token, loops: list[TextEntry]) -> tuple[str, int] | None:
+    """Whether a word is the parameter of a macro, or the index of a loop around it."""
+    for macro in text.macros:
+        if macro.name.offset < token.offset <= macro.end:
+            for each in macro.parameters or ():
+                if each.text == token.text:
+                    return "parameter", DEFINES if each.offset == token.offset else 0
+    for loop in loops:
+        index = loop.words[1]
+        if index.text == token.text and index.offset <= token.offset < loop.closed:
+            return "parameter", DEFINES if index.offset == token.offset else 0
+    return None
+
+
+def _meaning(
+    text: DeckText, token: Token, entry: TextEntry | None, names: NamesInTexts, before: Token | None, behind: str
+) -> tuple[str, int] | None:
+    for found in names.meant(token, entry)[:1]:
+        defines = found.token.offset == token.offset and found.file == text.source.name
+        library = OF_LIBRARY if found.file.startswith("<") else 0
+        return _OF_NAME.get(found.kind, "variable"), (DEFINES if defines else 0) | library
+    if token.text in UNITS and before is not None and _may_precede_unit(text, token):
+        return "type", 0
+    if entry is None or entry.head is None:
+        return None
+    if token.text == "default" and token is entry.words[0] and token is not entry.head:
+        return "keyword", 0
+    if token.offset == entry.head.offset:
+        return _key(token, entry, names)
+    if token.text in ("like", "of", "from", "when", "in", "by", "and", "or", "not", "because") and behind != "=":
+        return "keyword", 0
+    if behind == "(" and token.text in FUNCTIONS:
+        return "function", OF_LIBRARY
+    if token.text in JOINT_KINDS and entry.kind == "joint":
+        return "enumMember", 0
+    if behind == "=" and "(" in entry.texts:
+        return "property", 0
+    if before is not None and before.text == ".":
+        return "property", 0
+    if any(token.text in models.available(kind) for kind in models.GROUPS) and "=" in entry.texts:
+        return "class", OF_LIBRARY
+    return ("enumMember", 0) if token.text in _words_of(entry, names) else None
+
+
+def _may_precede_unit(text: DeckText, token: Token) -> bool:
+    last = text.source.text[: token.offset].rstrip()[-1:]
+    return last.isdigit() or last in "*/.])^"
+
+
+def _key(token: Token, entry: TextEntry, names: NamesInTexts) -> tuple[str, int] | None:
+    around = entry.within
+    if around is None:
+        return ("keyword", 0) if token.text in (*BLOCKS, "let", "param", LOOP) else None
+    block = BLOCKS.get(around.block)
+    declared = {each.name.split()[0]: each for each in block.entries} if block is not None else {}
+    if token.text in declared:
+        return ("property" if declared[token.text].form == "key" and entry.opened is None else "keyword"), 0
+    if token.text in ("remove", LOOP):
+        return "keyword", 0
+    return ("property", 0) if any(each.name == token.text for each in parameters_of(around, names)) else None
+
+
+def _words_of(entry: TextEntry, names: NamesInTexts) -> tuple[str, ...]:
+    """The words that the value of an entry may be."""
+    around = entry.within
+    if around is None:
+        return ()
+    declared = [each for each in parameters_of(around, names) if each.name == entry.kind]
+    block = BLOCKS.get(around.block)
+    declared += [
+        each.parameter
+        for each in (block.entries if block is not None else ())
+        if each.name == entry.kind and each.parameter is not None
+    ]
+    return tuple(word for each in declared for word in each.words)
