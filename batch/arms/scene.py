@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from batch.arms.placing import OF_FREE_BASE, POSITION, parameters, world_poses
-from batch.arms.shapes import ArmNumbers, drawn, shape_of, shapes
-from met.dynamics.spatial import HERE, Pose, rotation_quaternion, settled
+from batch.arms.shapes import ArmNumbers, drawn, numbers, shape_of, shapes
+from met.dynamics.spatial import HERE, IDENTITY, Pose, Vector, compose, rotation_quaternion, settled
 from met.frozen import frozen
 from met.plan import BASE, Experiment, Joint, Link, Payload
 from met.program.courses import TIME
@@ -51,14 +51,14 @@ class ArmScene:
     """An arm that can be drawn.
 
     formulas  of each body the rows of its rotation and its origin in the world; then of each shape middle, axis and
-              size (`ArmShape`), in the body's frame. Inputs are channels by path, `time`, varied parameters by path,
-              and of a joint that slides the stretch that a case uses, `low:JOINT` and `high:JOINT`
+              size (`ArmShape`), in the body's frame; last the tip in the world, whose path is drawn. Inputs are
+              channels by path, `time`, varied parameters by path, and of a joint that slides the stretch that a case
+              uses, `low:JOINT` and `high:JOINT`
     channels  inputs that a run must record
     joints    names of those that move
     reach     from the base to the farthest tip, m, stretched out
     limb      radius with which lines and rods are drawn, m
     up        against gravity, world axes; z where there is none
-    tip       a body, and a point of it, whose path is drawn
     moves     whether the base moves: then there is no floor under it
     """
 
@@ -70,7 +70,6 @@ class ArmScene:
     reach: float
     limb: float
     up: tuple[float, float, float]
-    tip: tuple[int, tuple[float, float, float]]
     moves: bool
 
 
@@ -115,7 +114,8 @@ def arm_scene(experiment: Experiment, recorded: Sequence[str]) -> ArmScene:
     lengths = _lengths(experiment, first)
     reach = max([*lengths.values(), 0.0])
     reach = reach if 0.0 < reach < math.inf else NO_REACH
-    found = shapes(ArmNumbers(experiment, values, varied, first, travel, reach), bodies)
+    arm = ArmNumbers(experiment, values, varied, first, travel, reach)
+    found = shapes(arm, bodies)
     names = list(dict.fromkeys([BASE, *(body.name for body in bodies)]))
     number = {name: place for place, name in enumerate(names)}
     moving = {joint.name: place for place, joint in enumerate(joints)}
@@ -124,6 +124,7 @@ def arm_scene(experiment: Experiment, recorded: Sequence[str]) -> ArmScene:
     outputs: list[Any] = [x for name in names for x in (*(e for row in world[name].R for e in row), *world[name].p)]
     outputs += [x for _, shape in listed for vector in (shape.middle, shape.axis, shape.size) for x in vector]
     tip = max((body.name for body in structure.links), key=lambda name: lengths.get(name, 0.0), default=BASE)
+    outputs += compose(world[tip], Pose(IDENTITY, _end(arm, tip))).p
     return ArmScene(
         tuple(ArmBody(name, number.get(carriers.get(name, ""), -1)) for name in names),
         tuple(SceneShape(b, shape.kind, shape.role, own.get(shape.joint, -1)) for b, shape in listed),
@@ -133,7 +134,6 @@ def arm_scene(experiment: Experiment, recorded: Sequence[str]) -> ArmScene:
         reach,
         _limb(experiment, first, reach),
         _up(experiment, first),
-        (number[tip], _end(experiment, first, tip)),
         structure.base is not None,
     )
 
@@ -158,7 +158,6 @@ def scene_json(scene: ArmScene) -> dict[str, Any]:
         "reach": scene.reach,
         "limb": scene.limb,
         "up": list(scene.up),
-        "tip": [scene.tip[0], *scene.tip[1]],
         "moves": scene.moves,
     }
 
@@ -191,7 +190,7 @@ def _lengths(experiment: Experiment, first: Mapping[str, float]) -> dict[str, fl
     carrier = {joint.child: joint for joint in experiment.structure.joints}
     out: dict[str, float] = {}
     for link in experiment.structure.links:
-        far, name = math.hypot(*_end(experiment, first, link.name)), link.name
+        far, name = _size(experiment, first, link.name), link.name
         while name in carrier:
             joint = carrier[name]
             far += math.hypot(*(first.get(f"{joint.name}.at.{part}", 0.0) for part in "xyz"))
@@ -203,24 +202,27 @@ def _lengths(experiment: Experiment, first: Mapping[str, float]) -> dict[str, fl
     return out
 
 
-def _end(experiment: Experiment, first: Mapping[str, float], name: str) -> tuple[float, float, float]:
+def _size(experiment: Experiment, first: Mapping[str, float], name: str) -> float:
+    """The way from a link's origin to its far end, m."""
+    end = _end(ArmNumbers(experiment, first, {}, first, {}, NO_REACH), name)
+    return math.hypot(*(float(x) for x in end))  # type: ignore[arg-type]
+
+
+def _end(arm: ArmNumbers, name: str) -> Vector:
     """A link's far end in its frame, m: of its shape; else of the last joint that it carries, or its centre of mass."""
-    structure = experiment.structure
+    structure = arm.experiment.structure
     link = next((each for each in structure.links if each.name == name), None)
     carried = [joint for joint in structure.joints if joint.parent == name]
     if link is not None and drawn(link) and link.shape is not None:
-        kind, sizes = shape_of(ArmNumbers(experiment, first, {}, first, {}, NO_REACH), link)
+        kind, sizes = shape_of(arm, link)
         along = int(dict(link.shape[1]).get("along", 0.0))
         far = {"sphere": 0.0, "box": sizes.get(f"size_{'xyz'[along]}", 0.0)}.get(kind, sizes.get("length", 0.0))
-        x, y, z = (float(far) if axis == along else 0.0 for axis in range(3))
-        return (x, y, z)
-    path = f"{carried[-1].name}.at" if carried else f"links.{name}.com"
-    x, y, z = (first.get(f"{path}.{part}", 0.0) for part in "xyz")
-    return (x, y, z)
+        return (far * float(along == 0), far * float(along == 1), far * float(along == 2))
+    return numbers(arm, f"{carried[-1].name}.at" if carried else f"links.{name}.com")
 
 
 def _limb(experiment: Experiment, first: Mapping[str, float], reach: float) -> float:
-    ways = [math.hypot(*_end(experiment, first, link.name)) for link in experiment.structure.links]
+    ways = [_size(experiment, first, link.name) for link in experiment.structure.links]
     lengths = sorted(way for way in ways if way > 1e-6 * reach)
     middle = lengths[len(lengths) // 2] if lengths else reach
     return min(LIMB * reach, LIMB_OF_LINK * middle)

@@ -52,7 +52,7 @@ MET.arm = (() => {
         columns.forEach((rows, n) => { inputs[n + 1] = share < 1e-9 ? rows[row] : rows[row] + share * (rows[row + 1] - rows[row]); });
         return formulas.at(state, inputs, out);
       }
-      const tip = (t) => point(at(t), scene.tip[0], scene.tip.slice(1));
+      const tip = (t) => up(vector(at(t), out.length - 3));
       return { at, tip, end: time[last] };
     }
 
@@ -60,7 +60,6 @@ MET.arm = (() => {
     const rows = (numbers, body) => [0, 3, 6].map((at) => vector(numbers, POSE * body + at));
     const origin = (numbers, body) => vector(numbers, POSE * body + 9);
     const turn = (R, v) => [dot(R[0], v), dot(R[1], v), dot(R[2], v)];
-    const point = (numbers, body, v) => up(plus(origin(numbers, body), turn(rows(numbers, body), v)));
 
     // The solids: {mesh, role, joint, at, axes (of the mesh, in the world), size}.
     function solids(numbers) {

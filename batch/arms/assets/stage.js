@@ -6,6 +6,7 @@ MET.stage = (() => {
   const { node, number, palette } = MET;
   const [FITTED, FITTED_OF_GHOSTS] = [48, 5];  // instants of a run that are fitted into the view
   const FAR = 1e4;  // reaches, farther than which nothing is fitted
+  const [REST, SLOW] = [120, 45];  // ms after which a picture that stands is drawn fine; of a picture, more than which is slow
   const TRACED = 240;  // points of the tip's path
   const FILM = 6;  // pictures on paper
   const rgb = (hex, alpha = 1) => [...[1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255), alpha];
@@ -27,7 +28,7 @@ MET.stage = (() => {
     const step = stepOf(arm.reach);
     let [chosen, others, floor, time, playing, rate, end] = [null, [], null, 0, false, 1, 0];
     let [frames, ghostly, fresh, asked, touched, moved, before] = [false, true, true, false, false, false, 0];
-    let path = [];
+    let [path, still, rest, pace, coarse] = [[], true, 0, 0, 1];
 
     const canvas = node("canvas");
     const paper = node("div", { class: "paper" });
@@ -67,7 +68,7 @@ MET.stage = (() => {
       const by = { link: rgb(link), base: rgb(base), rail: rgb(base), payload: rgb(payload), joint: rgb(base) };
       Object.entries(AXES).forEach(([axis, colour]) => { by[axis] = rgb(colour); });
       const joints = mine.lines.map((each) => rgb(each));
-      const faint = Math.min(0.3, Math.max(0.035, 1.4 / Math.max(1, others.length)));
+      const faint = Math.min(0.28, Math.max(0.06, 2 / Math.max(1, others.length)));
       const [plain, bad] = [mine.muted, mine.attend].map((each) => rgb(each, faint));
       return {
         solid: (each) => (each.role === "joint" && each.joint >= 0 ? joints[each.joint % joints.length] : by[each.role]),
@@ -98,6 +99,13 @@ MET.stage = (() => {
       camera.fit([...all, ...(ghostly ? others.flatMap((each) => pills(each, FITTED_OF_GHOSTS)) : [])]);
     }
 
+    // Dots of the canvas; fine: as many as make edges smooth.
+    function sized(fine) {
+      const dots = Math.min((devicePixelRatio || 1) * (fine ? (renderer.software ? 2 : 1) : coarse), 2);
+      const [w, h] = [view.clientWidth, view.clientHeight].map((side) => Math.round(side * dots));
+      if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
+    }
+
     function paint() {
       asked = false;
       if (!chosen) return;
@@ -106,18 +114,22 @@ MET.stage = (() => {
       camera.aspect = wide / high;
       if (fresh && !(fresh = false)) home();
       if (renderer) {
-        const dots = Math.min(devicePixelRatio || 1, 2);
-        const [w, h] = [Math.round(wide * dots), Math.round(high * dots)];
-        if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
+        sized(still);
         renderer.draw(picture(time));
       } else paper.replaceChildren(MET.painter.draw(picture(time), wide, high));
       scrub.value = end ? time / end : 0;
       clock.textContent = `${time.toFixed(end < 10 ? 2 : 1)} s`;
     }
 
+    // While pictures follow one another, those that software draws are coarser.
     function redraw() {
       if (!asked) requestAnimationFrame(paint);
-      asked = true;
+      [asked, still] = [true, false];
+      clearTimeout(rest);
+      rest = setTimeout(() => requestAnimationFrame(() => {
+        still = true;
+        paint();
+      }), REST);
     }
 
     function seek(to, quietly = false) {
@@ -138,7 +150,11 @@ MET.stage = (() => {
 
     function tick(now) {
       if (!playing) return;
-      if (before) seek(time + Math.min(0.1, (now - before) / 1000) * rate);
+      if (before) {
+        seek(time + Math.min(0.1, (now - before) / 1000) * rate);
+        pace += 0.1 * (now - before - pace);
+        if (pace > SLOW) [coarse, pace] = [Math.max(0.5, 0.8 * coarse), 0];  // fewer dots, until it stands
+      }
       before = now;
       if (time >= end) run(false);
       else requestAnimationFrame(tick);
@@ -228,16 +244,19 @@ MET.stage = (() => {
 
     addEventListener("beforeprint", () => {
       if (!chosen) return;
-      film.replaceChildren(...Array.from({ length: FILM }, (_, n) => (end * n) / (FILM - 1)).map((at) => {
-        camera.aspect = 4 / 3;
-        return node("figure", null, MET.painter.draw(picture(at, false), 400, 300), node("figcaption", null, `${number(at)} s`));
-      }));
+      const { distance, target, aspect } = camera;
+      camera.aspect = 4 / 3;
+      camera.fit(pills(chosen, FITTED));
+      film.replaceChildren(...Array.from({ length: FILM }, (_, n) => (end * n) / (FILM - 1)).map((at) =>
+        node("figure", null, MET.painter.draw(picture(at, false), 400, 300), node("figcaption", null, `${number(at)} s`))));
+      Object.assign(camera, { distance, target, aspect });
     });
     new ResizeObserver(redraw).observe(view);
     MET.drawn.push(redraw);
 
-    // How long a picture takes, ms, everything drawn.
+    // How long a picture of many takes, ms, everything drawn.
     function measure(count = 20) {
+      if (renderer) sized(false);
       const begun = performance.now();
       for (let n = 0; n < count; n++) {
         const made = picture((end * n) / count);
@@ -245,7 +264,7 @@ MET.stage = (() => {
       }
       return (performance.now() - begun) / count;
     }
-    return { take: arm.take, show, haunt, settle, seek, play: run, measure, camera, redraw, time: () => time, isPlaying: () => playing, ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
+    return { take: arm.take, show, haunt, settle, seek, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
   }
 
   return { make };

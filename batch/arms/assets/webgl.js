@@ -6,6 +6,7 @@
 MET.webgl = (() => {
   const { plus, unit, along, length } = MET.arm;
   const NUMBERS = 20;  // of an instance
+  const [FEW, THIN] = [16, 0.4];  // ghosts; of more only what is long is drawn, thinner by this and with few faces
   const SUN = unit([-0.28, -0.18, 1]);  // where shadows come from
 
   const SOLID = [`#version 300 es
@@ -24,10 +25,11 @@ MET.webgl = (() => {
     }`, `#version 300 es
     precision highp float;
     in vec3 normal; in vec3 place; in vec4 colour;
-    uniform vec3 eye; uniform vec3 key; uniform vec4 shadow; uniform vec4 shade;
+    uniform vec3 eye; uniform vec3 key; uniform vec4 shadow; uniform vec4 shade; uniform float plain;
     out vec4 done;
     void main() {
       if (shadow.w > 0.0) { done = shade; return; }
+      if (plain > 0.0) { done = vec4(colour.rgb * (0.9 + 0.2 * normal.z) * colour.a, colour.a); return; }
       vec3 n = normalize(normal), v = normalize(eye - place);
       float lit = 0.5 + 0.5 * dot(n, key), sky = 0.5 + 0.5 * n.z;
       vec3 c = colour.rgb * (0.42 + 0.66 * lit * lit) * mix(0.84, 1.04, sky);
@@ -105,8 +107,18 @@ MET.webgl = (() => {
     return { vertices, faces };
   }
 
+  // Whether a processor draws, with whose help no picture has four samples a dot in time.
+  function drawnBySoftware() {
+    const gl = document.createElement("canvas").getContext("webgl2", { antialias: false });
+    const told = gl && gl.getExtension("WEBGL_debug_renderer_info");
+    const by = gl ? String(gl.getParameter(told ? told.UNMASKED_RENDERER_WEBGL : gl.RENDERER)) : "";
+    if (gl) gl.getExtension("WEBGL_lose_context")?.loseContext();
+    return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(by);
+  }
+
   function make(canvas) {
-    const gl = canvas.getContext("webgl2", { antialias: true, alpha: true, stencil: true, premultipliedAlpha: true });
+    const software = drawnBySoftware();
+    const gl = canvas.getContext("webgl2", { antialias: !software, alpha: true, stencil: true, premultipliedAlpha: true });
     if (!gl) return null;
 
     function program([vertex, fragment]) {
@@ -145,6 +157,7 @@ MET.webgl = (() => {
     }
     const fine = { pill: mesh(pill(28, 8)), can: mesh(can(36)), block: mesh(block()) };
     const coarse = { pill: mesh(pill(10, 2)), can: mesh(can(10)), block: fine.block };
+    const sparse = { ...coarse, pill: mesh(pill(6, 1)) };
 
     // Instances by mesh, their numbers one after another.
     function packed(groups) {
@@ -212,15 +225,21 @@ MET.webgl = (() => {
         gl.depthMask(false);
         gl.enable(gl.POLYGON_OFFSET_FILL);  // behind what is solid, where they coincide
         gl.polygonOffset(2, 400);
-        put(coarse, packed(ghosts.map((each, n) => ({ solids: each, colour: () => colours.ghost(n) }))));
+        const many = ghosts.length > FEW;
+        gl.uniform1f(solid.uniforms.plain, 1);
+        put(many ? sparse : coarse, packed(ghosts.map((each, n) => ({ solids: many ? thin(each) : each, colour: () => colours.ghost(n) }))));
+        gl.uniform1f(solid.uniforms.plain, 0);
         gl.disable(gl.POLYGON_OFFSET_FILL);
         gl.depthMask(true);
       }
       gl.disable(gl.CULL_FACE);
     }
 
-    return { draw, finish: () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)) };
+    return { software, draw, finish: () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)) };
   }
+
+  // What is long of an arm, thinner.
+  const thin = (solids) => solids.filter(({ mesh }) => mesh === "pill").map((each) => ({ ...each, size: each.size.map((x, n) => (n < 3 ? THIN * x : x)) }));
 
   // A path as thin pills.
   const threads = (points, radius) => points.slice(1).map((p, n) => {

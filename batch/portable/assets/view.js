@@ -86,8 +86,8 @@
   }
 
   function haunt() {
-    const every = Math.max(1, Math.ceil(cases.length / MOST_GHOSTS));
-    const chosen = cases.map((_, n) => n).filter((n) => n % every === 0);
+    const count = Math.min(cases.length, MOST_GHOSTS + 1);
+    const chosen = Array.from({ length: count }, (_, n) => Math.floor((n * cases.length) / count));
     let done = 0;
     (function next() {
       const begun = performance.now();

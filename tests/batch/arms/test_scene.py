@@ -132,9 +132,12 @@ def test_shapes_are_those_of_the_deck_and_of_the_case(tmp_path: Path) -> None:
     ]  # fmt: skip
     assert scene.reach == 1.5 and scene.up == (0.0, -1.0, 0.0) and scene.joints == ("a", "b")
     given = {"a.q": 0.3, "b.q": 0.2, "low:b": 0.0, "high:b": 0.2, "links.two.shape.radius": 0.01}
-    numbers = np.array(scene.formulas.replay(given))[12 * 3 :].reshape(-1, 9)
+    numbers = np.array(scene.formulas.replay(given))[12 * 3 : -3].reshape(-1, 9)
     assert numbers[0].tolist() == [0, 0, 0.5, 0, 0, 1, 0.2, 0.1, 1]
     assert numbers[2][:6].tolist() == [0, 0, 1, 0.2, 0, 0]
+    tip = scene.formulas.replay(given)[-3:]  # of one, turned about y, then along its x by q and 0.5 m
+    c, s = np.cos(0.3), np.sin(0.3)
+    assert tip == pytest.approx([0.7 * c + s, 0.0, c - 0.7 * s], abs=1e-15)
     assert numbers[3].tolist() == [0.25, 0, 0, 1, 0, 0, 0.01, 0.01, 0.5]
 
 

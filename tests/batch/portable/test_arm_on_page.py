@@ -63,6 +63,7 @@ def opened(chromium: Chromium, path: Path, **words: object) -> Page:
 
 def pixels(page: Page, folder: Path) -> np.ndarray:
     """The view as the browser shows it, (row, column, rgb) from 0 to 1."""
+    page.run("new Promise(d => { const f = () => MET.shown.isStill() ? d() : setTimeout(f, 20); f(); })")
     page.settle()
     return image.imread(page.picture(folder / "view.png", ".stage .view", margin=0))[..., :3]
 
@@ -130,8 +131,8 @@ def test_arm_and_signals_have_one_clock(webgl: Chromium, pages: Path, tmp_path: 
     places = "Array.from(document.querySelectorAll('.panel .u-cursor-x'), e => e.getBoundingClientRect().left)"
     assert page.run(places) == pytest.approx([left + 0.25 * width] * 4, abs=3)
     page.run("document.querySelector('.stage .play').click()")
-    page.run("new Promise(done => setTimeout(done, 600))")
-    assert 0.5 < page.run("MET.shown.time()") <= 2.0
+    page.run("new Promise(d => { const f = () => MET.shown.time() > 0.55 ? d() : setTimeout(f, 20); f(); })")
+    assert page.run("MET.shown.isPlaying()") == (page.run("MET.shown.time()") < 2.0)
     quiet(page)
     page.close()
 
