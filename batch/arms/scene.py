@@ -205,7 +205,7 @@ def _lengths(experiment: Experiment, first: Mapping[str, float]) -> dict[str, fl
 def _size(experiment: Experiment, first: Mapping[str, float], name: str) -> float:
     """The way from a link's origin to its far end, m."""
     end = _end(ArmNumbers(experiment, first, {}, first, {}, NO_REACH), name)
-    return math.hypot(*(float(x) for x in end))  # type: ignore[arg-type]
+    return math.hypot(*(float(x) for x in end))
 
 
 def _end(arm: ArmNumbers, name: str) -> Vector:

@@ -75,8 +75,8 @@ def plot(
     elif at:
         raise click.UsageError("--at is of --arm, which draws the arm at instants")
     parameters = [name.strip() for name in over.split(",") if name.strip()]
-    options = {"against": against, "size": size, "dpi": dpi, "arm": arm, "at": at}
-    target = plot(archive, output, names, run=run, cases=cases, over=parameters, **options)
+    drawn = {"run": run, "against": against}
+    target = plot(archive, output, names, **drawn, cases=cases, over=parameters, size=size, dpi=dpi, arm=arm, at=at)
     if not quiet:
         say(f"{target}")
     return YES

@@ -79,7 +79,7 @@ def _recorded(group: ArchiveGroup, position: int) -> tuple[np.ndarray, dict[str,
     """Times of a case's rows, s, and its channels by path, until it failed, if it did."""
     with reading(group.path):
         valid = int(group.values("n_valid")[position])
-        channels = {}
+        channels: dict[str, np.ndarray] = {}
         for variable in group.role("signal"):
             values = group.signal(variable.name, position)[:valid].astype(np.float64)
             columns = values.reshape(valid, math.prod(values.shape[1:])).T
@@ -113,8 +113,7 @@ def _instants(asked: Sequence[float], time: np.ndarray, case: str) -> list[int]:
             message = f"{case} has no instant {number_text(instant)} s: {rows}"
             raise Problem(error("E399", message, help='`--at` takes an instant of these, `--at "1 s"`'))
     wanted = np.asarray(asked) if asked else np.linspace(first, last, SHOWN)
-    rows = {int(np.argmin(np.abs(time - instant))) for instant in wanted}
-    return sorted(rows)
+    return sorted({int(np.argmin(np.abs(time - instant))) for instant in wanted})
 
 
 def _outputs(

@@ -68,7 +68,7 @@ MET.stage = (() => {
       const by = { link: rgb(link), base: rgb(base), rail: rgb(base), payload: rgb(payload), joint: rgb(base) };
       Object.entries(AXES).forEach(([axis, colour]) => { by[axis] = rgb(colour); });
       const joints = mine.lines.map((each) => rgb(each));
-      const faint = Math.min(0.28, Math.max(0.06, 2 / Math.max(1, others.length)));
+      const faint = Math.min(0.2, Math.max(0.06, 2 / Math.max(1, others.length)));
       const [plain, bad] = [mine.muted, mine.attend].map((each) => rgb(each, faint));
       return {
         solid: (each) => (each.role === "joint" && each.joint >= 0 ? joints[each.joint % joints.length] : by[each.role]),

@@ -6,7 +6,7 @@
 MET.webgl = (() => {
   const { plus, unit, along, length } = MET.arm;
   const NUMBERS = 20;  // of an instance
-  const [FEW, THIN] = [16, 0.4];  // ghosts; of more only what is long is drawn, thinner by this and with few faces
+  const [FEW, THIN] = [16, 0.4];  // ghosts; of more, limbs are thinner by this and have few faces
   const SUN = unit([-0.28, -0.18, 1]);  // where shadows come from
 
   const SOLID = [`#version 300 es
@@ -227,7 +227,7 @@ MET.webgl = (() => {
         gl.polygonOffset(2, 400);
         const many = ghosts.length > FEW;
         gl.uniform1f(solid.uniforms.plain, 1);
-        put(many ? sparse : coarse, packed(ghosts.map((each, n) => ({ solids: many ? thin(each) : each, colour: () => colours.ghost(n) }))));
+        put(many ? sparse : coarse, packed(ghosts.map((each, n) => ({ solids: (many ? thin : plain)(each), colour: () => colours.ghost(n) }))));
         gl.uniform1f(solid.uniforms.plain, 0);
         gl.disable(gl.POLYGON_OFFSET_FILL);
         gl.depthMask(true);
@@ -238,8 +238,9 @@ MET.webgl = (() => {
     return { software, draw, finish: () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)) };
   }
 
-  // What is long of an arm, thinner.
-  const thin = (solids) => solids.filter(({ mesh }) => mesh === "pill").map((each) => ({ ...each, size: each.size.map((x, n) => (n < 3 ? THIN * x : x)) }));
+  // What is shown of a ghost: no joints; of many, what is long is thinner.
+  const plain = (solids) => solids.filter(({ role, mesh }) => role !== "base" && (role !== "joint" || mesh === "pill"));
+  const thin = (solids) => plain(solids).map((each) => (each.mesh === "pill" ? { ...each, size: each.size.map((x, n) => (n < 3 ? THIN * x : x)) } : each));
 
   // A path as thin pills.
   const threads = (points, radius) => points.slice(1).map((p, n) => {

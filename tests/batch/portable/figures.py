@@ -1,11 +1,10 @@
-"""Pictures of docs/webassembly.md and README.md: the page of a real sweep, as a browser shows it, and `met plot --arm`.
+"""Pictures of docs/webassembly.md and README.md: the page of a real sweep, as a browser shows it.
 
-python -m tests.batch.portable.figures          writes docs/figures/view_*.png and plot_arm.png
+python -m tests.batch.portable.figures          writes docs/figures/view_*.png
 
 view_arm.png      the Panda with an upper arm of seven lengths, one of them solid
 view_narrow.png   the same page on a telephone, dark
 view_film.png     six instants, as the page prints them
-plot_arm.png      `met plot panda.h5 --arm`
 
 It says how large the page is, and how long its pictures take.
 """
@@ -18,7 +17,6 @@ from pathlib import Path
 
 import batch
 import ic
-from batch.plotting import plot
 from met import cli
 from tests.batch.report.browser import Page, browser
 
@@ -52,8 +50,7 @@ def draw(folder: Path) -> list[Path]:
         picture = narrow.ask("Page.captureScreenshot", format="png")["data"]
         written.append(folder / "view_narrow.png")
         written[-1].write_bytes(base64.b64decode(picture))
-        archive = batch.run(ic.compile("panda.ic"), output=home / "reach.h5")
-        written.append(plot(archive.path, folder / "plot_arm.png", arm=True, dpi=110))
+
         (home / "hundred.ic").write_text(HUNDRED, encoding="utf-8")
         batch.run(ic.compile(home / "hundred.ic", select=["hundred"]), output=home / "hundred.h5", histories="none")
         for width in (1280, 400):
