@@ -7,22 +7,9 @@ from typing import Any
 
 import click
 
-from batch.cli.run import measured
+from batch.cli.instant import Instant
 from met.cli import NO, YES, check_options, deck_options, format_option
 from met.messages.visible import say
-
-
-class Instant(click.ParamType):
-    """An instant of a run, with its unit: `2 s`, `250 ms`; a bare number is seconds."""
-
-    name = "time"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Read an instant as seconds."""
-        try:
-            return measured(value, "s")
-        except ValueError:
-            self.fail(f"`{value}` is no instant: write `2 s` or `250 ms`", param, ctx)
 
 
 @click.command(short_help="Linearise the program that runs: poles, modes, margins of loops, A B C D.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from batch.cli.instant import Instant
 from met.cli import YES, loudness_options
 from met.messages.visible import say
 
@@ -38,6 +39,10 @@ from met.messages.visible import say
     help="For a paper: 8.5cm, or 8.5x6cm, with letters of 8 pt and no title.",
 )
 @click.option("--dpi", type=int, metavar="N", help="Dots of a PNG to the inch [144; with --size 300].")
+@click.option("--arm", is_flag=True, help="The arm itself, at some instants, and the path of its tip.")
+@click.option(
+    "--at", multiple=True, type=Instant(), metavar="TIME", help="With --arm: an instant, `2 s`; may be repeated."
+)
 @loudness_options
 def plot(
     archive: str,
@@ -49,6 +54,8 @@ def plot(
     against: str | None,
     size: str,
     dpi: int | None,
+    arm: bool,
+    at: tuple[float, ...],
     quiet: bool,
     verbose: bool,
 ) -> int:
@@ -59,8 +66,17 @@ def plot(
     """
     from batch.plotting import plot
 
+    if arm:
+        for option, given in (("names", names), ("--over", over), ("--against", against)):
+            if given:
+                raise click.UsageError(f"--arm draws an arm alone: leave out {option}")
+        if len(cases) > 1:
+            raise click.UsageError("--arm is of one case: leave all but one --case out")
+    elif at:
+        raise click.UsageError("--at is of --arm, which draws the arm at instants")
     parameters = [name.strip() for name in over.split(",") if name.strip()]
-    target = plot(archive, output, names, run=run, cases=cases, over=parameters, against=against, size=size, dpi=dpi)
+    drawn = {"run": run, "against": against}
+    target = plot(archive, output, names, **drawn, cases=cases, over=parameters, size=size, dpi=dpi, arm=arm, at=at)
     if not quiet:
         say(f"{target}")
     return YES

@@ -12,23 +12,14 @@ import numpy as np
 
 from batch.archive.read import reading
 from batch.archive.stored import Stored
+from batch.arms.placing import OF_FREE_BASE, POSITION, free_pose, parameters, prescribed_pose, world_poses
 from batch.export.picking import ExportedCase
 from met.diagnostic import Problem, error
-from met.dynamics.spatial import HERE, IDENTITY, Pose, compose, inverse, rotation_quaternion, sub
+from met.dynamics.spatial import HERE, IDENTITY, Pose, compose, inverse, sub
 from met.frozen import frozen
 from met.outputs import quoted
-from met.plan import BASE, Experiment, Formula, Plan
-from met.program.motion.base import BaseMotion, motions, prescribed
-from met.program.system import PARAMETER, System
+from met.plan import BASE, Experiment, Plan
 from met.vectors import quaternion
-
-POSITION = "q"
-
-OF_FREE_BASE = (f"links.{BASE}.position", f"links.{BASE}.orientation")
-"""Signals that give the pose of a free base."""
-
-INSTANT = 1e-6
-"""Share of a step by which a row's time may be rounded below its instant."""
 
 
 @frozen
@@ -108,22 +99,6 @@ def arm_of(plan: Plan, case: ExportedCase, prefix: str) -> PosedArm:
     return PosedArm(case, experiment, prefix, values, first, parents, poses, start, travel)
 
 
-def parameters(experiment: Experiment, varied: Mapping[str, Any]) -> dict[str, Any]:
-    """The numbers among a case's parameters, of which some follow from what is varied. varied: numbers, or arrays of
-    one shape, with which those that follow are arrays too."""
-    outputs = experiment.formulas.replay({path: _plain(value) for path, value in varied.items()})
-    out = {}
-    for path, quantity in experiment.parameters.items():
-        value = outputs[quantity.value.output] if isinstance(quantity.value, Formula) else quantity.value
-        if isinstance(value, int | float | np.floating | np.ndarray):
-            out[path] = _plain(value)
-    return out
-
-
-def _plain(value: Any) -> Any:
-    return float(value) if np.ndim(value) == 0 else value
-
-
 def positions(case: ExportedCase, joints: Sequence[str], *, free: bool = False) -> list[np.ndarray]:
     """q of each of these joints by row, as one signal of all or a signal of each. Raises Problem E370: free, where what
     tells of a free base is missing too."""
@@ -156,31 +131,6 @@ def lacking_help(*, free: bool) -> str:
     """Help that names the signals to record. free: also those of the base."""
     more = ", ".join(("q", *OF_FREE_BASE)) if free else "q, ..."
     return f"`record = [{more}]` in the run keeps where its joints{' and its base' * free} are; then run it again"
-
-
-def free_pose(position: np.ndarray, orientation: np.ndarray) -> Pose:
-    """A free base's pose from its recorded numbers: (..., 3) and (..., 4)."""
-    p, q = np.moveaxis(position, -1, 0), np.moveaxis(orientation, -1, 0)
-    return Pose(rotation_quaternion(q[0], q[1], q[2], q[3]), (p[0], p[1], p[2]))
-
-
-def prescribed_pose(experiment: Experiment, values: Mapping[str, Any], time: np.ndarray) -> Pose:
-    """A prescribed base's pose at rows of these times, s: that of the step's instant, as all that is recorded."""
-    memory = {PARAMETER + path: value for path, value in values.items()}
-    step = experiment.structure.schedule.step
-    instant: Any = np.floor(time / step + INSTANT) * step
-    return prescribed(System(experiment), memory.__getitem__, instant).pose
-
-
-def world_poses(
-    experiment: Experiment, values: Mapping[str, Any], q: Sequence[Any], base: Pose = HERE
-) -> dict[str, Pose]:
-    """Every link's frame in the world, whose numbers are those of all rows at once where they change."""
-    system = System(experiment)
-    memory = {PARAMETER + path: value for path, value in values.items()}
-    system.keep_tree(memory.__getitem__, memory.__setitem__)
-    found = motions(system.tree(memory.__getitem__), q, [0.0] * len(q), BaseMotion(base))
-    return {name: motion.pose for name, motion in found.items()}
 
 
 def pose_variables(pose: Pose, rows: int | tuple[int, ...], time: int | None = 0) -> PoseVariables:

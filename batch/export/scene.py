@@ -1,25 +1,19 @@
-"""What the links look like: the deck's shapes as foxglove's primitives, each fixed to its link's frame.
-
-A rod, a box and a cylinder begin at the link frame's origin and extend along one of its axes; a sphere is centred there
-(ic/meaning/mechanics/shapes.py). Where the deck writes a centre of mass and leaves the inertia to the shape, the solid
-that is simulated is centred on it, and so it is drawn. A link without a shape is a line to each joint that it carries,
-or to its centre of mass. Joints are drawn besides: a short cylinder about the axis of a revolute joint, and for a
-prismatic one a cube on a rail, which is as long as the case uses it.
-"""
+"""What the links look like (`batch.arms.shapes`) as foxglove's primitives, each fixed to its link's frame."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from batch.arms.shapes import ArmNumbers, ArmShape, drawn, head, shape_of, shapes
 from batch.export.poses import PosedArm
 from batch.export.wire import plain
 from batch.plotting.sheet import COLOURS
-from met.dynamics.spatial import IDENTITY, Pose, compose, rotation_rpy
-from met.plan import BASE, Joint, Link, Payload
+from met.dynamics.spatial import Real
+from met.plan import BASE, Link, Payload
 
 Vector = tuple[float, float, float]
 
@@ -30,17 +24,8 @@ JOINTS = "#8a939c"
 GHOST = 0.22
 """Opacity of every case but the first."""
 
-ROD, JOINT_RADIUS, JOINT_LENGTH, MASS = 0.02, 0.02, 0.05, 0.015
-"""Radii and lengths of what has none: of a rod, in its own lengths; of others, in the arm's size."""
-
-SIZES = {
-    "rod": ("length",),
-    "cylinder": ("radius", "length"),
-    "sphere": ("radius",),
-    "box": ("size_x", "size_y", "size_z"),
-}
-"""Parameters of the shapes that are drawn; a link of another shape, which a later MET may know, is drawn as one
-without."""
+ROD = 0.02
+"""Radius of a rod, which has none, in its own lengths."""
 
 LINE_PIXELS = 4.0
 ORIGIN: Vector = (0.0, 0.0, 0.0)
@@ -51,8 +36,8 @@ def size(arms: Sequence[PosedArm]) -> float:
     far = 0.0
     for arm in arms:
         for link in arm.experiment.structure.links:
-            sizes = shape_of(arm, link)[1] if drawn(link) else {}
-            own = max((value for name, value in sizes.items() if name != "along"), default=0.0)
+            sizes = shape_of(_numbers(arm, 1.0), link)[1] if drawn(link) else {}
+            own = max((float(value) for name, value in sizes.items() if name != "along"), default=0.0)
             far = max(far, float(np.linalg.norm(arm.place[link.name])) + own)
     return far if 0.0 < far < math.inf else 1.0
 
@@ -63,68 +48,29 @@ def scene(arm: PosedArm, root: str, ghost: bool, size: float) -> Any:
 
     structure = arm.experiment.structure
     opacity = GHOST if ghost else 1.0
-    carried: dict[str, list[Joint]] = {}
-    for joint in structure.joints:
-        carried.setdefault(joint.parent, []).append(joint)
-    carrier = {joint.child: joint for joint in structure.joints}
     out = SceneUpdate()
     grey = _colour(JOINTS, opacity)
-    if all(link.name != BASE for link in structure.links):
-        ground = _entity(out, root, f"{arm.prefix}{BASE}")
-        _draw(ground, [(ORIGIN, _at(arm, joint)) for joint in carried.get(BASE, ())], grey)
-        _draw(ground, _rails(arm, carried.get(BASE, ())), grey)
     payloads = [payload for payload in structure.payloads if payload.name in arm.poses]
     bodies: list[Link | Payload] = [*structure.links, *payloads]
+    found = shapes(_numbers(arm, size), bodies)
+    if all(link.name != BASE for link in structure.links):
+        _draw(_entity(out, root, f"{arm.prefix}{BASE}"), found[BASE], grey, grey)
     for number, link in enumerate(bodies):
         entity = _entity(out, arm.prefix + link.name, arm.prefix + link.name)
-        colour = _colour(LINKS[number % len(LINKS)], opacity)
         what = "payload" if isinstance(link, Payload) else "link"
         told = {what: link.name, "mass": f"{arm.values.get(f'{head(link)}.mass', math.nan):g} kg"}
-        if drawn(link):
-            kind, numbers = shape_of(arm, link)
-            _solid(entity, kind, numbers, _middle(arm, link, kind, numbers), colour)
-            told["shape"] = kind
-        else:
-            _bare(entity, arm, link, carried.get(link.name, ()), colour, size)
-        if link.name in carrier:
-            _joint(entity, arm, carrier[link.name], grey, size)
-        _draw(entity, _rails(arm, carried.get(link.name, ())), grey)
+        if drawn(link) and link.shape is not None:
+            told["shape"] = link.shape[0]
+        _draw(entity, found[link.name], _colour(LINKS[number % len(LINKS)], opacity), grey)
         for key, value in told.items():
             entity.metadata.add(key=key, value=plain(value))
     return out
 
 
-def head(link: Link | Payload) -> str:
-    """The beginning of the paths of a link's or payload's parameters."""
-    return f"payloads.{link.name}" if isinstance(link, Payload) else f"links.{link.name}"
-
-
-def drawn(link: Link | Payload) -> bool:
-    """True if a link has a shape that is drawn."""
-    return link.shape is not None and set(SIZES.get(link.shape[0], ("none",))) <= set(dict(link.shape[1]))
-
-
-def shape_of(arm: PosedArm, link: Link | Payload) -> tuple[str, dict[str, float]]:
-    """A link's shape in this case: kind and sizes, in m; `along` as 0, 1 or 2.
-
-    The plan has the sizes of its first case. Where a sweep varies a size by its path, this case has its own; and where
-    a length follows from something else that varies, it is twice as far as the shape's centre, which the case has.
-    """
-    assert link.shape is not None
-    kind, numbers = link.shape
-    sizes = dict(numbers)
-    along = "xyz"[int(sizes.get("along", 0.0))]
-    length = f"size_{along}" if kind == "box" else "length"
-    centre = f"{head(link)}.com.{along}"
-    before, now = arm.first.get(centre, math.nan), arm.values.get(centre, math.nan)
-    if length in sizes and now > 0.0 and math.isclose(2.0 * before, sizes[length], rel_tol=1e-9):
-        sizes[length] = 2.0 * now
+def _numbers(arm: PosedArm, size: float) -> ArmNumbers:
     group = arm.case.group
     varied = {v.path: float(group.at(v.name, [arm.case.position])[0]) for v in group.role("coordinate")}
-    for name in sizes:
-        path = f"{head(link)}.shape.{name}".replace("size_", "size.")
-        sizes[name] = varied.get(path, sizes[name])
-    return kind, sizes
+    return ArmNumbers(arm.experiment, arm.values, varied, arm.first, arm.travel, size)
 
 
 # Primitives
@@ -138,80 +84,36 @@ def _entity(scene: Any, frame: str, name: str) -> Any:
     return entity
 
 
-def _middle(arm: PosedArm, link: Link | Payload, kind: str, numbers: Mapping[str, float]) -> Vector:
-    """The middle of a link's shape in the link's frame, m."""
-    inertia = arm.experiment.parameters.get(f"{head(link)}.inertia.xx")
-    if inertia is not None and inertia.origin.kind != "deck":
-        return _numbers(arm, f"{head(link)}.com", "xyz")
-    axis = _axis(numbers)
-    lengths = {"sphere": 0.0, "box": numbers.get(f"size_{'xyz'[axis.index(1.0)]}", 0.0)}
-    return _scaled(axis, lengths.get(kind, numbers.get("length", 0.0)) / 2.0)
+def _draw(entity: Any, found: Sequence[ArmShape], own: Any, grey: Any) -> None:
+    """The shapes of a body, the joints' and rails' in grey; lines of one role are one primitive."""
+    for shape in found:
+        colour = own if shape.role in ("link", "payload") else grey
+        middle, (x, y, z) = _point(shape.middle), _point(shape.size)
+        if shape.kind == "sphere":
+            entity.spheres.add(pose=_pose(middle), size=_vector((2 * x, 2 * y, 2 * z)), color=colour)
+        elif shape.kind == "box":
+            entity.cubes.add(pose=_pose(middle), size=_vector((x, y, z)), color=colour)
+        elif shape.kind in ("cylinder", "rod"):
+            radius = x if shape.kind == "cylinder" else ROD * z
+            pose, extent = _pose(middle, turned_to(_point(shape.axis))), _vector((2 * radius, 2 * radius, z))
+            entity.cylinders.add(pose=pose, size=extent, bottom_scale=1.0, top_scale=1.0, color=colour)
+    for role in dict.fromkeys(shape.role for shape in found if shape.kind == "line"):
+        lines = [shape for shape in found if shape.kind == "line" and shape.role == role]
+        _lines(entity, lines, own if role in ("link", "payload") else grey)
 
 
-def _axis(numbers: Mapping[str, float]) -> Vector:
-    """Along which a shape extends."""
-    x, y, z = (float(each == int(numbers.get("along", 0.0))) for each in range(3))
-    return (x, y, z)
-
-
-def _solid(entity: Any, kind: str, numbers: Mapping[str, float], middle: Vector, colour: Any) -> None:
-    if kind == "sphere":
-        entity.spheres.add(pose=_pose(middle), size=_vector((2 * numbers["radius"],) * 3), color=colour)
-    elif kind == "box":
-        edges = (numbers["size_x"], numbers["size_y"], numbers["size_z"])
-        entity.cubes.add(pose=_pose(middle), size=_vector(edges), color=colour)
-    else:
-        length = numbers["length"]
-        _cylinder(entity, middle, _axis(numbers), numbers.get("radius", ROD * length), length, colour)
-
-
-def _bare(entity: Any, arm: PosedArm, link: Link | Payload, carried: Sequence[Joint], colour: Any, size: float) -> None:
-    """A link that has no shape: lines to its joints, or to its centre of mass."""
-    com = _numbers(arm, f"{head(link)}.com", "xyz")
-    ends = [_at(arm, joint) for joint in carried] or [com]
-    _draw(entity, [(ORIGIN, end) for end in ends], colour)
-    if not carried:
-        entity.spheres.add(pose=_pose(com), size=_vector((2 * MASS * size,) * 3), color=colour)
-
-
-def _joint(entity: Any, arm: PosedArm, joint: Joint, colour: Any, size: float) -> None:
-    """The joint that carries a link, in the link's frame."""
-    radius, length = JOINT_RADIUS * size, JOINT_LENGTH * size
-    if joint.kind == "revolute":
-        axis, pivot = _numbers(arm, f"{joint.name}.axis", "xyz"), _numbers(arm, f"{joint.name}.pivot", "xyz")
-        _cylinder(entity, pivot, axis, radius, length, colour)
-    elif joint.kind == "prismatic":
-        entity.cubes.add(pose=_pose(ORIGIN), size=_vector((2 * radius,) * 3), color=colour)
-
-
-def _cylinder(entity: Any, middle: Vector, axis: Vector, radius: float, length: float, colour: Any) -> None:
-    pose, extent = _pose(middle, turned_to(axis)), _vector((2 * radius, 2 * radius, length))
-    entity.cylinders.add(pose=pose, size=extent, bottom_scale=1.0, top_scale=1.0, color=colour)
-
-
-def _rails(arm: PosedArm, carried: Sequence[Joint]) -> list[tuple[Vector, Vector]]:
-    """The ends of the rails of joints that slide on a link, in the link's frame, m."""
-    out = []
-    for joint in carried:
-        if joint.name in arm.travel:
-            axis, turn = (_numbers(arm, f"{joint.name}.{name}", "xyz") for name in ("axis", "rpy"))
-            frame = Pose(rotation_rpy(*turn), _at(arm, joint))
-            low, high = (_point(compose(frame, Pose(IDENTITY, _scaled(axis, q))).p) for q in arm.travel[joint.name])
-            out.append((low, high))
-    return out
-
-
-def _point(numbers: Sequence[Any]) -> Vector:
-    x, y, z = map(float, numbers)
-    return (x, y, z)
-
-
-def _draw(entity: Any, lines: Sequence[tuple[Vector, Vector]], colour: Any) -> None:
+def _lines(entity: Any, lines: Sequence[ArmShape], colour: Any) -> None:
     """Lines from a point to another, those that have a length."""
     from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
     from foxglove_schemas_protobuf.Point3_pb2 import Point3
 
-    points = [Point3(x=x, y=y, z=z) for ends in lines if math.dist(*ends) > 0.0 for x, y, z in ends]
+    points = []
+    for shape in lines:
+        begin, way = _point(shape.middle), _point(shape.axis)
+        if any(way):
+            points += [
+                Point3(x=x, y=y, z=z) for x, y, z in (begin, _point([a + b for a, b in zip(begin, way, strict=True)]))
+            ]
     if points:
         entity.lines.add(
             type=LinePrimitive.LINE_LIST,
@@ -221,6 +123,11 @@ def _draw(entity: Any, lines: Sequence[tuple[Vector, Vector]], colour: Any) -> N
             points=points,
             color=colour,
         )
+
+
+def _point(numbers: Sequence[Real]) -> Vector:
+    x, y, z = (float(number) for number in numbers)
+    return (x, y, z)
 
 
 def turned_to(axis: Vector) -> tuple[float, float, float, float]:
@@ -253,21 +160,3 @@ def _colour(hexadecimal: str, opacity: float) -> Any:
 
     r, g, b = (int(hexadecimal[at : at + 2], 16) / 255.0 for at in (1, 3, 5))
     return Color(r=r, g=g, b=b, a=opacity)
-
-
-# Numbers of the case
-
-
-def _at(arm: PosedArm, joint: Joint) -> Vector:
-    """The position of a joint's frame in its parent link's, m."""
-    return _numbers(arm, f"{joint.name}.at", "xyz")
-
-
-def _numbers(arm: PosedArm, path: str, parts: str) -> Vector:
-    x, y, z = (arm.values.get(f"{path}.{part}", 0.0) for part in parts)
-    return (x, y, z)
-
-
-def _scaled(vector: Vector, factor: float) -> Vector:
-    x, y, z = vector
-    return (factor * x, factor * y, factor * z)

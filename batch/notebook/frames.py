@@ -10,16 +10,8 @@ import numpy as np
 import xarray
 
 from batch.archive.read import ArchiveGroup
-from batch.export.poses import (
-    OF_FREE_BASE,
-    POSITION,
-    free_pose,
-    lacking_help,
-    parameters,
-    pose_variables,
-    prescribed_pose,
-    world_poses,
-)
+from batch.arms.placing import OF_FREE_BASE, POSITION, free_pose, parameters, prescribed_pose, world_poses
+from batch.export.poses import lacking_help, pose_variables
 from batch.notebook.quantities import number
 from batch.notebook.source import experiment, places
 from batch.notebook.table import CASE, NO_HISTORIES, RECORDED, path_of, run_name, unknown_name

@@ -31,6 +31,8 @@ def plot(
     against: str | os.PathLike[str] | None = None,
     size: str = "",
     dpi: int | None = None,
+    arm: bool = False,
+    at: Sequence[float] = (),
 ) -> Path:
     """Draw one run or sweep of an archive; the picture. The same archive gives the same bytes.
 
@@ -44,6 +46,8 @@ def plot(
     against  another archive: its cases of the same values under the own ones; in maps the difference, own less theirs
     size     for a paper: `8.5cm` wide, or `8.5x6cm`; letters are then of 8 pt, and a caption says what is drawn
     dpi      dots of a PNG; None: 144, on paper 300
+    arm      draws the arm of the first of `cases`, or of the first that has a history
+    at       instants of which it is drawn, s; none: some over all of the run
 
     Raises met.diagnostic.Problem for what a user can mend.
     """
@@ -56,6 +60,8 @@ def plot(
         archive = files.enter_context(ArchiveFile(Path(path)))
         other = None if against is None else files.enter_context(ArchiveFile(Path(against)))
         target = Path(output) if output is not None else archive.path.with_suffix(".png")
+        if arm:
+            return draw_arm(archive, target, run=run, case=cases[0] if cases else "", at=at, sheet=on)
         return draw(archive, target, names, run=run, cases=cases, over=over, against=other, sheet=on)
 
 
@@ -100,6 +106,34 @@ def draw(
             others = {number: each for number, each in enumerate(theirs) if each is not None}
             figure = metrics.draw(archive, pool, wanted.metrics, over, sheet, others, against)
         place.save(figure, target)
+    return target
+
+
+def draw_arm(
+    archive: ArchiveFile,
+    output: str | os.PathLike[str],
+    *,
+    run: str | None = None,
+    case: str = "",
+    at: Sequence[float] = (),
+    sheet: PictureSheet | None = None,
+) -> Path:
+    """Draw the arm of a case of an archive that is open, as `plot` does."""
+    from batch.plotting import output as place
+    from batch.plotting.arm import arm_picture
+    from batch.plotting.sheet import PictureSheet
+    from batch.queries.groups import groups_named
+
+    target, sheet = Path(output), sheet or PictureSheet()
+    archive.need_every_row("a picture of an arm")
+    groups = groups_named(archive, (run,) if run else ())
+    group = _with_case(groups, case) if case else groups[0]
+    place.check(target)
+    matplotlib = _matplotlib()
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()  # as in `draw`
+        matplotlib.rcParams.update(sheet.style)
+        place.save(arm_picture(archive, group, case, at, sheet), target)
     return target
 
 

@@ -14,6 +14,8 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup, reading
 from batch.archive.stored import Unlike
+from batch.arms.scene import arm_scene, lacking, scene_json
+from batch.arms.scripts import arm_scripts, arm_style
 from batch.portable.description import MOST_CASES, described
 from batch.queries.groups import groups_named
 from batch.queries.signals import pretty_unit
@@ -83,7 +85,16 @@ def data_of(experiment: Experiment, group: ArchiveGroup) -> dict[str, Any]:
         "units": [_unit(each["unit"]) for each in told["inputs"]],
         "metricUnits": [_unit(each["unit"]) for each in metrics],
         "columnUnits": [_unit(each["unit"]) for each in told["columns"]],
+        "arm": _arm(experiment),
     }  # fmt: skip
+
+
+def _arm(experiment: Experiment) -> dict[str, Any]:
+    """The arm as the page draws it, or what the run does not record for that."""
+    recorded = [channel for each in experiment.structure.record for channel in each.channels]
+    scene = arm_scene(experiment, recorded)
+    missing = lacking(scene, recorded)
+    return {"lacking": [visible(name) for name in missing]} if missing else {"scene": scene_json(scene)}
 
 
 def _unit(unit: str) -> str:
@@ -110,19 +121,20 @@ def page_of(experiment: Experiment, data: dict[str, Any]) -> str:
     script = "\n".join(
         [
             inlined.licensed("uPlot.iife.min.js", "core.js"),
+            arm_scripts(),
             KERNEL_JS.read_text(encoding="utf-8"),
             f"const MET_PAGE = {script_json(data)};",
             (_ASSETS / "view.js").read_text(encoding="utf-8"),
         ]
     )
-    style = f"{inlined.style()}\n{(_ASSETS / 'view.css').read_text(encoding='utf-8')}"
+    style = f"{inlined.style()}\n{arm_style()}\n{(_ASSETS / 'view.css').read_text(encoding='utf-8')}"
     head = page_head(experiment.name, generator=GENERATOR, style=style, script=script, allowed=_CODE)
     by = "by the code that the archive was made with" if data["same_code"] else f"{OTHER_CODE} (MET {VERSION})"
     header = el(
         "header",
         el("p", "A page that simulates", cls="kicker"),
         el("h1", experiment.name),
-        el("p", f"Move a slider: the run is computed again, here, {by}.", cls="lede"),
+        el("p", f"Move a slider, and the run is computed again, here, {by}.", cls="lede"),
     )
     none = el("p", "This page needs scripts and WebAssembly, which this reader does not run.")
     body = lines([header, el("main", none), Html(f"<script>{script}</script>")])

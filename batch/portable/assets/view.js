@@ -17,6 +17,10 @@
   const came = node("p", { class: "came", role: "status" });
   const answers = node("tbody");
   const panels = node("div");
+  const room = node("div");
+  const MOST_GHOSTS = 100;
+  const SLICE = 24;  // ms of work between which the page answers
+  const others = [];
   let values = cases[0].slice();
   let plots = [];
   let lines = [];
@@ -51,9 +55,7 @@
     const begun = performance.now();
     const found = kernel.run([values], told.ticks);
     const took = performance.now() - begun;
-    const tick = METKernel.failed(found.outputs, told.failure);
-    const failed = tick !== null;
-    const rows = failed ? Math.ceil(tick / told.kernel.record_divisor) : told.rows;
+    const { tick, failed, rows } = ended(found.outputs);
     const width = told.columns.length;
     lines = told.columns.map((_, c) => Array.from(time, (_t, row) => (row < rows ? found.rows[row * width + c] : null)));
     draw();
@@ -62,7 +64,65 @@
     knobs.forEach(({ shown, input, n }) => { shown.textContent = `${number(values[n] / input.scale)} ${data.units[n]}`; });
     const measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
     tell(which, measured, failed, tick, took);
+    if (stage && rows) stage.show(taken(values, found.rows, rows), which < 0 ? "not in the archive" : `case #${data.positions[which]}`);
+    if (stage) stage.haunt(others.filter((each) => each.n !== which));
   }
+
+  // How a case ended, and how many rows it has.
+  function ended(outputs) {
+    const tick = METKernel.failed(outputs, told.failure);
+    return { tick, failed: tick !== null, rows: tick === null ? told.rows : Math.ceil(tick / told.kernel.record_divisor) };
+  }
+
+  // The arm: the case that is shown, and the archive's others, which are computed here one after another.
+  const channels = data.arm.scene ? data.arm.scene.channels.map((name) => told.columns.findIndex((column) => column.channel === name)) : [];
+  const stage = data.arm.scene ? MET.stage.make(room, data.arm.scene, { seen: point }) : null;
+  if (!stage) room.append(node("p", { class: "note" }, `The arm is not shown, for the run does not record ${data.arm.lacking.join(", ")}: `, node("code", null, `record += [${data.arm.lacking.join(", ")}];`)));
+
+  function taken(inputs, numbers, rows) {
+    const width = told.columns.length;
+    const columns = channels.map((c) => Float64Array.from({ length: rows }, (_, row) => numbers[row * width + c]));
+    return stage.take(Object.fromEntries(told.inputs.map((input, n) => [input.name, inputs[n]])), time.subarray(0, rows), columns);
+  }
+
+  function haunt() {
+    const count = Math.min(cases.length, MOST_GHOSTS + 1);
+    const chosen = Array.from({ length: count }, (_, n) => Math.floor((n * cases.length) / count));
+    let done = 0;
+    (function next() {
+      const begun = performance.now();
+      while (done < chosen.length && performance.now() - begun < SLICE) {
+        const n = chosen[done++];
+        const found = kernel.run([cases[n]], told.ticks);
+        const { failed, rows } = ended(found.outputs);
+        const bad = failed || told.requirements.some((each) => !judged(each, numberOf(each.metric, n, found.outputs)));
+        if (rows) others.push({ n, bad, taken: taken(cases[n], found.rows, rows) });
+      }
+      stage.haunt(others.filter((each) => !same(cases[each.n], values)));
+      if (done < chosen.length) setTimeout(next);
+      else {
+        stage.settle();
+        document.documentElement.dataset.haunted = "yes";
+      }
+    })();
+  }
+
+  // A metric of an archive's case: computed here, or as the archive has it.
+  function numberOf(name, n, outputs) {
+    const own = told.metrics.find((metric) => metric.name === name);
+    return own ? outputs[own.output] : archived[told.metrics.length + told.not_computed.findIndex((metric) => metric.name === name)][n];
+  }
+
+  function judged({ comparison, limit }, value) {
+    return { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b }[comparison](value, limit);
+  }
+
+  // One clock: the plots' cursors stand at the arm's time, and the arm at that of a plot that is pointed at.
+  function point(at) {
+    plots.forEach((plot) => plot.setCursor({ left: plot.valToPos(at, "x"), top: plot.over.clientHeight / 2 }, false));
+  }
+
+  const pointed = (plot) => { if (stage && plot.cursor.event && plot.cursor.idx !== null && plot.cursor.left >= 0) stage.seek(time[plot.cursor.idx], true); };
 
   // Whose numbers these are: the archive's, where every metric has the bits that stand there.
   function tell(which, measured, failed, tick, took) {
@@ -82,7 +142,7 @@
       const unknown = given[m] === null || Number.isNaN(given[m]);
       const verdicts = told.requirements.filter((each) => each.metric === metric.name).map((each) => {
         if (unknown) return node("div", null, `${each.text}: not known`);
-        const met = { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b }[each.comparison](given[m], each.limit);
+        const met = judged(each, given[m]);
         return node("div", { class: met ? "met" : "missed" }, `${each.text}: ${met ? "met" : "missed"}`);
       });
       const value = given[m] === null ? "not computed here" : `${number(given[m])} ${data.metricUnits[m]}`.trim();
@@ -119,18 +179,22 @@
       panels.append(node("div", { class: "panel" }, node("div", { class: "head" }, node("b", null, node("code", null, signal), data.columnUnits[columns[0]] ? ` (${data.columnUnits[columns[0]]})` : ""),
         node("div", { class: "reading" }, names)), frame));
       return new uPlot({ width: MET.width(frame), height: 190, padding: [8, 14, 0, 0], legend: { show: false },
-        scales: { x: { time: false } }, cursor: { y: false, sync: { key: "time" } },
+        scales: { x: { time: false } }, cursor: { y: false, sync: { key: "time" } }, hooks: { setCursor: [pointed] },
         series: [{}, ...columns.map((_, nth) => ({ stroke: colours.lines[nth % colours.lines.length], width: 1.6, points: { show: false }, spanGaps: false }))],
         axes: [{ ...axis, size: 26, values: (self, v) => ticks(v) }, { ...axis, size: 62, space: 32, values: (self, v) => ticks(v) }],
       }, drawn(signal), frame);
     });
+    if (stage) requestAnimationFrame(() => point(stage.time()));
   }
 
-  main.replaceChildren(
+  main.replaceChildren(room,
     node("div", { class: "knobs" }, node("label", { class: "knob" }, "Case", chosen, node("output", null, `of ${data.count}`)), knobs.map((knob) => knob.box)),
     came, node("table", { class: "answers" }, answers), panels);
   knobs.forEach((knob) => knob.put());
   update();
+  if (stage && cases.length > 1) requestAnimationFrame(() => setTimeout(haunt));
+  else document.documentElement.dataset.haunted = "yes";
+  MET.shown = stage;
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", make);
   addEventListener("resize", make);
 })();

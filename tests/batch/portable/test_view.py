@@ -89,7 +89,7 @@ def chromium() -> Iterator[Chromium]:
 
 
 SAID = "document.querySelector('.came').textContent"
-CHOOSE = """(n => { const e = document.querySelector('select'); e.value = n; e.dispatchEvent(new Event('change'));
+CHOOSE = """(n => { const e = document.querySelector('.knob select'); e.value = n; e.dispatchEvent(new Event('change'));
     return document.querySelector('.came').textContent; })"""
 MOVE = """((n, at) => { const e = document.querySelectorAll('.knob input')[n]; e.value = at;
     e.dispatchEvent(new Event('input')); return document.querySelector('.came').textContent; })"""
@@ -103,7 +103,7 @@ def test_each_case_has_the_archives_bits_and_says_so(chromium: Chromium, sent: P
         assert page.run(f"{CHOOSE}({n})").startswith(
             f"Case #{n}, with the archive's bits in its metric: computed here in "
         )
-    assert all(share > 0.005 for share in page.run(f"{INK}('main canvas')"))
+    assert all(share > 0.005 for share in page.run(f"{INK}('.panel canvas')"))
     quiet(page)
     page.close()
 
@@ -143,7 +143,7 @@ def test_a_slider_runs_the_case_again_and_turns_the_verdict(chromium: Chromium, 
     before = page.picture(sent / "before.png").read_bytes()
     assert page.run("document.querySelector('.answers .met, .answers .missed').className") == "missed"
     assert page.run(f"{MOVE}(0, 0.93)").startswith("Not in the archive: computed here in ")
-    assert page.run("document.querySelector('select').value") == ""
+    assert page.run("document.querySelector('.knob select').value") == ""
     assert page.run("document.querySelector('.answers .met, .answers .missed').className") == "met"
     page.settle()
     assert page.picture(sent / "after.png").read_bytes() != before
@@ -261,6 +261,7 @@ def test_texts_of_an_archive_are_texts_whatever_they_hold(chromium: Chromium, se
         data = portable_page.data_of(experiment, file.groups[0])
     assert data["same_code"] and "by the code that the archive was made with" in portable_page.page_of(experiment, data)
     data["same_code"] = False
+    data["arm"]["scene"]["bodies"] = [[HOSTILE, carrier] for _, carrier in data["arm"]["scene"]["bodies"]]
     data["labels"] = data["units"] = data["metricUnits"] = data["columnUnits"] = [HOSTILE] * 9
     for key in ("inputs", "columns", "metrics", "requirements"):
         for each in data["description"][key]:

@@ -33,7 +33,8 @@ WORDS = (
     "--headless",
     "--no-sandbox",
     "--remote-debugging-pipe",
-    "--disable-gpu",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
     "--disable-dev-shm-usage",
     "--disable-background-networking",
     "--disable-component-update",
@@ -68,14 +69,14 @@ def program() -> str | None:
 
 
 @contextmanager
-def browser() -> Iterator[Chromium]:
-    """A browser with nothing in it."""
+def browser(*, webgl: bool = True) -> Iterator[Chromium]:
+    """A browser with nothing in it. webgl: whether it has WebGL, which is drawn by software."""
     found = program()
     if found is None:
         raise BrowserFailed(f"no {PROGRAMS[0]} here; on Debian: apt-get install {PACKAGE}")
     with TemporaryDirectory(prefix="met-browser-", ignore_cleanup_errors=True) as home:
         down, up = os.pipe(), os.pipe()
-        command = [found, *WORDS, f"--user-data-dir={home}", "about:blank"]
+        command = [found, *WORDS, *(() if webgl else ("--disable-3d-apis",)), f"--user-data-dir={home}", "about:blank"]
         shell = ["/bin/bash", "-c", f'exec "$@" 3<&{down[0]} 4>&{up[1]}', "chromium", *command]
         with subprocess.Popen(
             shell,

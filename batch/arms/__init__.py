@@ -1,0 +1,6 @@
+"""An arm as it is drawn: where its links are, and what they look like, of a case or for all cases at once.
+
+placing   the links' frames in the world, from the numbers of a case
+shapes    simple solids and lines, fixed to the links' frames
+scene     both as formulas of what a case records and a sweep varies, which a page replays
+"""

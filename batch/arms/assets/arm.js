@@ -1,0 +1,102 @@
+// An arm to be drawn: where its bodies are at an instant of a case, and its shapes as solids in the world, each a mesh that
+// is stretched: a block (edges), a can (radius, length) or a pill (radius, length; a ball where it has no length).
+"use strict";
+
+MET.arm = (() => {
+  const POSE = 12;  // numbers of a body: the rows of its rotation, its origin
+  const SHAPE = 9;  // of a shape: middle, axis, size
+  const JOINT = [1.32, 2.9];  // radius and length of a joint, in limbs
+  const FOOT = [2.6, 0.5];  // of the disc under a base that stays
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const plus = (a, b, k = 1) => [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]];
+  const size = (a) => Math.hypot(a[0], a[1], a[2]);
+  const unit = (a) => a.map((each) => each / (size(a) || 1));
+
+  // Three axes of which the last is along a direction.
+  function along(axis) {
+    const z = unit(axis);
+    const x = unit(cross(Math.abs(z[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], z));
+    return [x, cross(z, x), z];
+  }
+
+  // scene: as `batch.arms.scene.scene_json` has it.
+  function make(scene) {
+    const moving = new Set(["time", ...scene.channels]);
+    const formulas = MET.formulas.make(scene.nodes, scene.outputs, moving);
+    const turned = along(scene.up);
+    const up = scene.up[2] === 1 ? (v) => v : (v) => turned.map((axis) => dot(axis, v));  // the world, seen with z up
+    const count = scene.bodies.length;
+    const { limb } = scene;
+
+    // A case. values: of what the sweep varies, by path; time: of its rows; columns: of each channel, by row.
+    function take(values, time, columns) {
+      const ends = {};
+      scene.joints.forEach((joint) => {
+        const rows = columns[scene.channels.indexOf(`${joint}.q`)];
+        ends[`low:${joint}`] = rows.reduce((a, b) => Math.min(a, b), 0);
+        ends[`high:${joint}`] = rows.reduce((a, b) => Math.max(a, b), 0);
+      });
+      const state = formulas.begin({ ...values, ...ends });
+      const out = new Float64Array(scene.outputs.length);
+      const inputs = new Float64Array(scene.channels.length + 1);
+      const last = time.length - 1;
+
+      // Its numbers at a time; between rows along a straight line.
+      function at(t) {
+        const [first, step] = [time[0], last > 0 ? (time[last] - time[0]) / last : 1];
+        const place = Math.min(Math.max((t - first) / step, 0), last);
+        const row = Math.min(Math.floor(place + 1e-9), Math.max(last - 1, 0));
+        const share = last > 0 ? Math.min(Math.max(place - row, 0), 1) : 0;
+        inputs[0] = Math.min(t, time[last]);
+        columns.forEach((rows, n) => { inputs[n + 1] = share < 1e-9 ? rows[row] : rows[row] + share * (rows[row + 1] - rows[row]); });
+        return formulas.at(state, inputs, out);
+      }
+      const tip = (t) => up(vector(at(t), out.length - 3));
+      return { at, tip, end: time[last] };
+    }
+
+    const vector = (numbers, at) => [numbers[at], numbers[at + 1], numbers[at + 2]];
+    const rows = (numbers, body) => [0, 3, 6].map((at) => vector(numbers, POSE * body + at));
+    const origin = (numbers, body) => vector(numbers, POSE * body + 9);
+    const turn = (R, v) => [dot(R[0], v), dot(R[1], v), dot(R[2], v)];
+
+    // The solids: {mesh, role, joint, at, axes (of the mesh, in the world), size}.
+    function solids(numbers) {
+      const out = scene.shapes.map(([body, kind, role, joint], n) => {
+        const first = POSE * count + SHAPE * n;
+        const R = rows(numbers, body);
+        const [axis, sizes] = [vector(numbers, first + 3), vector(numbers, first + 6)];
+        let middle = vector(numbers, first);
+        let [mesh, stretch] = ["pill", [limb, limb, limb, 0]];
+        let own = along(axis);
+        if (kind === "line") [middle, stretch[3]] = [plus(middle, axis, 0.5), size(axis)];
+        else if (kind === "rod") stretch[3] = sizes[2];
+        else if (kind === "sphere") stretch = [...sizes, 0];
+        else if (kind === "box") [mesh, own, stretch] = ["block", [[1, 0, 0], [0, 1, 0], [0, 0, 1]], role === "joint" ? [2.4 * limb, 2.4 * limb, 2.4 * limb, 0] : [...sizes, 0]];
+        else [mesh, stretch] = ["can", role === "joint" ? [JOINT[0] * limb, JOINT[0] * limb, JOINT[0] * limb, JOINT[1] * limb] : [sizes[0], sizes[0], sizes[0], sizes[2]]];
+        if (role === "rail") stretch = [0.4 * limb, 0.4 * limb, 0.4 * limb, stretch[3]];
+        return { mesh, role, joint, at: up(plus(origin(numbers, body), turn(R, middle))), axes: own.map((each) => up(turn(R, each))), size: stretch };
+      });
+      if (!scene.moves) out.push({ mesh: "can", role: "base", joint: -1, at: [0, 0, FOOT[1] * limb / 2], axes: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], size: [FOOT[0] * limb, FOOT[0] * limb, 0.4 * limb, FOOT[1] * limb] });
+      return out;
+    }
+
+    // The axes of all frames, as solids of role "x", "y", "z".
+    const frames = (numbers) => scene.bodies.flatMap((_, body) => [0, 1, 2].map((which) => {
+      const far = 3.6 * limb;
+      const axis = up(rows(numbers, body).map((row) => row[which]));
+      return { mesh: "can", role: "xyz"[which], joint: -1, at: plus(up(origin(numbers, body)), axis, far / 2), axes: along(axis), size: [0.2 * limb, 0.2 * limb, 0.2 * limb, far] };
+    }));
+
+    return { take, solids, frames, scene, limb, reach: scene.reach };
+  }
+
+  // Ends and radius of a solid as if it were a pill, by which it is fitted into a picture.
+  function ends({ mesh, at, axes, size: [x, y, z, length] }) {
+    const half = mesh === "block" ? z / 2 : length / 2;
+    return { ends: [plus(at, axes[2], -half), plus(at, axes[2], half)], radius: mesh === "block" ? Math.hypot(x, y) / 2 : x };
+  }
+
+  return { make, ends, dot, cross, plus, unit, along, length: size };
+})();

@@ -1,0 +1,271 @@
+// The arm on a page: a view that is turned, moved and zoomed by mouse, touch and keys, and the clock that it has in common
+// with the signals. The chosen case is solid, others are ghosts. Texts come into the page as text nodes alone.
+"use strict";
+
+MET.stage = (() => {
+  const { node, number, palette } = MET;
+  const [FITTED, FITTED_OF_GHOSTS] = [48, 5];  // instants of a run that are fitted into the view
+  const FAR = 1e4;  // reaches, farther than which nothing is fitted
+  const [REST, SLOW] = [120, 45];  // ms after which a picture that stands is drawn fine; of a picture, more than which is slow
+  const TRACED = 240;  // points of the tip's path
+  const FILM = 6;  // pictures on paper
+  const rgb = (hex, alpha = 1) => [...[1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255), alpha];
+  const BODY = { light: ["#c3ccd6", "#6f7a86", "#e0a02a"], dark: ["#aab6c3", "#66717d", "#e0b44a"] };
+  const AXES = { x: "#d8434e", y: "#3a9d4f", z: "#3d6fe0" };
+  const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 50];
+  const LONG = 20;  // s, longer than which nobody looks at a run
+
+  // A step of the grid: 1, 2 or 5 of a power of ten, about a share of the reach.
+  function stepOf(reach) {
+    const [wanted, power] = [reach / 4, 10 ** Math.floor(Math.log10(reach / 4))];
+    return power * [1, 2, 5, 10].reduce((a, b) => (Math.abs(b * power - wanted) < Math.abs(a * power - wanted) ? b : a));
+  }
+
+  // scene: as `batch.arms.scene.scene_json` has it. seen: is told of each instant that is shown.
+  function make(root, scene, { seen = () => {} } = {}) {
+    const arm = MET.arm.make(scene);
+    const camera = MET.camera.make();
+    const step = stepOf(arm.reach);
+    let [chosen, others, floor, time, playing, rate, end] = [null, [], null, 0, false, 1, 0];
+    let [frames, ghostly, fresh, asked, touched, moved, before] = [false, true, true, false, false, false, 0];
+    let [path, still, rest, pace, coarse] = [[], true, 0, 0, 1];
+
+    const canvas = node("canvas");
+    const paper = node("div", { class: "paper" });
+    const told = node("div", { class: "told" });
+    const scaled = node("div", { class: "scaled" }, `grid ${number(step)} m`);
+    const toggle = (words, title, pressed, act) => {
+      const made = node("button", { type: "button", class: "chip", "aria-pressed": String(pressed), title, click: () => {
+        made.setAttribute("aria-pressed", String(act()));
+        redraw();
+      } }, words);
+      return made;
+    };
+    const withFrames = toggle("frames", "Axes of the links' frames: x red, y green, z blue", frames, () => (frames = !frames));
+    const withOthers = toggle("", "The other cases, as ghosts", ghostly, () => (ghostly = !ghostly));
+    const whole = node("button", { type: "button", class: "chip", title: "Everything in view (0)", click: () => { home(); redraw(); } }, "fit");
+    const view = node("div", { class: "view", tabindex: 0, role: "application", "aria-label": "The arm in 3D. Space plays, comma and full stop step, arrows turn, with shift they move, plus and minus zoom, 0 shows all." },
+      canvas, paper, told, scaled, node("div", { class: "tools" }, withOthers, withFrames, whole));
+    const sign = node("path", { d: "M3 1.5 L14 8 L3 14.5 Z" });
+    const play = node("button", { type: "button", class: "play", "aria-label": "Play", click: () => run(!playing) }, node("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, sign));
+    const scrub = node("input", { type: "range", min: 0, max: 1, step: "any", "aria-label": "Time", input: () => { run(false); seek(Number(scrub.value) * end); } });
+    const clock = node("output", { class: "clock" });
+    const speed = node("select", { "aria-label": "Speed", change: () => { rate = Number(speed.value); } }, SPEEDS.map((each) => node("option", { value: each }, `${number(each)} ×`)));
+    const film = node("div", { class: "film printed" });
+    root.append(node("div", { class: "stage" }, view, node("div", { class: "transport" }, play, scrub, clock, speed), film));
+    let renderer = null;
+    try {
+      renderer = MET.webgl.make(canvas);
+    } catch {
+      renderer = null;  // a driver that cannot; SVG can
+    }
+    canvas.hidden = !renderer;
+    canvas.addEventListener("webglcontextlost", () => { renderer = null; canvas.hidden = true; redraw(); });
+
+    function colours() {
+      const mine = palette();
+      const [link, base, payload] = BODY[MET.dark() ? "dark" : "light"];
+      const by = { link: rgb(link), base: rgb(base), rail: rgb(base), payload: rgb(payload), joint: rgb(base) };
+      Object.entries(AXES).forEach(([axis, colour]) => { by[axis] = rgb(colour); });
+      const joints = mine.lines.map((each) => rgb(each));
+      const faint = Math.min(0.2, Math.max(0.06, 2 / Math.max(1, others.length)));
+      const [plain, bad] = [mine.muted, mine.attend].map((each) => rgb(each, faint));
+      return {
+        solid: (each) => (each.role === "joint" && each.joint >= 0 ? joints[each.joint % joints.length] : by[each.role]),
+        ghost: (n) => (others[n] && others[n].bad ? bad : plain),
+        trace: rgb(mine.accent), grid: rgb(MET.dark() ? "#5d6873" : "#aab3bc", 0.9), ground: rgb(mine.paper, MET.dark() ? 0.16 : 0.55),
+        shade: MET.dark() ? [0, 0, 0, 0.42] : [0.02, 0.028, 0.036, 0.17],
+      };
+    }
+
+    function picture(at, all = true) {
+      const numbers = chosen.at(at);
+      const solids = [...arm.solids(numbers), ...(frames ? arm.frames(numbers) : [])];
+      const shown = all && ghostly ? others : [];
+      return { camera, solids, ghosts: shown.map((each) => arm.solids(each.at(at))), trace: path, floor, step, reach: arm.reach, limb: arm.limb, colours: colours() };
+    }
+
+    // Everything that a case comes to, as pills; what has run away is left out.
+    const near = ({ ends }) => ends.flat().every((x) => Math.abs(x) < FAR * arm.reach);
+    const pills = (each, count) => Array.from({ length: count }, (_, n) => arm.solids(each.at((end * n) / (count - 1))).map(MET.arm.ends)).flat().filter(near);
+
+    // Everything in view, seen from where most is seen of the chosen case.
+    function home() {
+      const all = pills(chosen, FITTED);
+      if (!all.length) return;
+      const lowest = all.reduce((low, { ends, radius }) => Math.min(low, ends[0][2] - radius, ends[1][2] - radius), Infinity);
+      floor = scene.moves ? lowest - 0.25 * arm.reach : Math.min(0, lowest);
+      camera.choose(all.flatMap(({ ends }) => ends));
+      camera.fit([...all, ...(ghostly ? others.flatMap((each) => pills(each, FITTED_OF_GHOSTS)) : [])]);
+    }
+
+    // Dots of the canvas; fine: as many as make edges smooth.
+    function sized(fine) {
+      const dots = Math.min((devicePixelRatio || 1) * (fine ? (renderer.software ? 2 : 1) : coarse), 2);
+      const [w, h] = [view.clientWidth, view.clientHeight].map((side) => Math.round(side * dots));
+      if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
+    }
+
+    function paint() {
+      asked = false;
+      if (!chosen) return;
+      const { clientWidth: wide, clientHeight: high } = view;
+      if (!wide) return;
+      camera.aspect = wide / high;
+      if (fresh && !(fresh = false)) home();
+      if (renderer) {
+        sized(still);
+        renderer.draw(picture(time));
+      } else paper.replaceChildren(MET.painter.draw(picture(time), wide, high));
+      scrub.value = end ? time / end : 0;
+      clock.textContent = `${time.toFixed(end < 10 ? 2 : 1)} s`;
+    }
+
+    // While pictures follow one another, those that software draws are coarser.
+    function redraw() {
+      if (!asked) requestAnimationFrame(paint);
+      [asked, still] = [true, false];
+      clearTimeout(rest);
+      rest = setTimeout(() => requestAnimationFrame(() => {
+        still = true;
+        paint();
+      }), REST);
+    }
+
+    function seek(to, quietly = false) {
+      time = Math.min(Math.max(to, 0), end);
+      if (!quietly) seen(time);
+      redraw();
+    }
+
+    function run(on) {
+      playing = on;
+      sign.setAttribute("d", on ? "M3 2 H6.5 V14 H3 Z M9.5 2 H13 V14 H9.5 Z" : "M3 1.5 L14 8 L3 14.5 Z");
+      play.setAttribute("aria-label", on ? "Pause" : "Play");
+      if (!on) return;
+      if (time >= end) time = 0;
+      before = 0;
+      requestAnimationFrame(tick);
+    }
+
+    function tick(now) {
+      if (!playing) return;
+      if (before) {
+        seek(time + Math.min(0.1, (now - before) / 1000) * rate);
+        pace += 0.1 * (now - before - pace);
+        if (pace > SLOW) [coarse, pace] = [Math.max(0.5, 0.8 * coarse), 0];  // fewer dots, until it stands
+      }
+      before = now;
+      if (time >= end) run(false);
+      else requestAnimationFrame(tick);
+    }
+
+    // Mouse, touch and keys.
+    const fingers = new Map();
+    const spread = () => { const [a, b] = [...fingers.values()]; return b ? Math.hypot(a.x - b.x, a.y - b.y) : 0; };
+    const least = 0.2 * arm.reach;
+    const zoom = (factor) => { camera.zoom(factor, least, 60 * arm.reach); redraw(); };
+    view.addEventListener("pointerdown", (event) => {
+      if (event.target.closest("button")) return;
+      view.setPointerCapture(event.pointerId);
+      fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    });
+    view.addEventListener("pointermove", (event) => {
+      const held = fingers.get(event.pointerId);
+      if (!held) return;
+      const [dx, dy, wide] = [event.clientX - held.x, event.clientY - held.y, spread()];
+      [held.x, held.y] = [event.clientX, event.clientY];
+      const high = view.clientHeight;
+      if (fingers.size > 1) {
+        if (wide) zoom(wide / spread());
+        camera.pan(dx / high, dy / high);
+      } else if (event.shiftKey || event.buttons & 6) camera.pan((2 * dx) / high, (2 * dy) / high);
+      else camera.orbit((dx / high) * 3, (dy / high) * 3);
+      touched = moved = true;
+      redraw();
+    });
+    ["pointerup", "pointercancel"].forEach((kind) => view.addEventListener(kind, (event) => fingers.delete(event.pointerId)));
+    view.addEventListener("contextmenu", (event) => event.preventDefault());
+    view.addEventListener("wheel", (event) => {
+      if (!touched && document.activeElement !== view && !event.ctrlKey) return;  // a page that is scrolled goes on
+      event.preventDefault();
+      zoom(Math.exp(0.0012 * event.deltaY));
+    }, { passive: false });
+    view.addEventListener("pointerleave", () => { touched = false; });
+    view.addEventListener("dblclick", () => { home(); redraw(); });
+    view.addEventListener("keydown", (event) => {
+      const moves = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+      if (event.target !== view || event.ctrlKey || event.metaKey || event.altKey) return;
+      moved ||= Boolean(moves);
+      if (moves && event.shiftKey) camera.pan(-0.08 * moves[0], -0.08 * moves[1]);
+      else if (moves) camera.orbit(0.1 * moves[0], 0.1 * moves[1]);
+      else if (event.key === " ") run(!playing);
+      else if (event.key === "," || event.key === ".") seek(time + (event.key === "," ? -1 : 1) * (end / 100));
+      else if (event.key === "+" || event.key === "=") zoom(0.85);
+      else if (event.key === "-") zoom(1 / 0.85);
+      else if (event.key === "0" || event.key === "Home") home();
+      else if (event.key === "f") withFrames.click();
+      else if (event.key === "g" && !withOthers.hidden) withOthers.click();
+      else return;
+      event.preventDefault();
+      redraw();
+    });
+
+    // The case that is solid, taken by `take`; label: what it is called.
+    function show(taken, label) {
+      const first = !chosen;
+      chosen = taken;
+      end = taken.end;
+      time = Math.min(time, end);
+      told.textContent = label;
+      path = Array.from({ length: TRACED }, (_, n) => taken.tip((end * n) / (TRACED - 1)));
+      if (first) {
+        rate = SPEEDS.find((each) => end / each <= LONG) ?? SPEEDS[SPEEDS.length - 1];
+        if (rate < 1) rate = end < 0.5 ? rate : 1;
+        speed.value = rate;
+      }
+      redraw();
+    }
+
+    // Cases that are ghosts: {taken, bad}.
+    function haunt(list) {
+      others = list.map(({ taken, bad }) => ({ at: taken.at, bad }));
+      withOthers.hidden = !list.length;
+      withOthers.textContent = list.length === 1 ? "1 other case" : `${list.length} other cases`;
+      redraw();
+    }
+    haunt([]);
+
+    // All ghosts are there: they too come into view, unless somebody has looked round.
+    function settle() {
+      if (!moved) fresh = true;
+      redraw();
+    }
+
+    addEventListener("beforeprint", () => {
+      if (!chosen) return;
+      const { distance, target, aspect } = camera;
+      camera.aspect = 4 / 3;
+      camera.fit(pills(chosen, FITTED));
+      film.replaceChildren(...Array.from({ length: FILM }, (_, n) => (end * n) / (FILM - 1)).map((at) =>
+        node("figure", null, MET.painter.draw(picture(at, false), 400, 300), node("figcaption", null, `${number(at)} s`))));
+      Object.assign(camera, { distance, target, aspect });
+    });
+    new ResizeObserver(redraw).observe(view);
+    MET.drawn.push(redraw);
+
+    // How long a picture of many takes, ms, everything drawn.
+    function measure(count = 20) {
+      if (renderer) sized(false);
+      const begun = performance.now();
+      for (let n = 0; n < count; n++) {
+        const made = picture((end * n) / count);
+        if (renderer) { renderer.draw(made); renderer.finish(); } else MET.painter.draw(made, view.clientWidth, view.clientHeight);
+      }
+      return (performance.now() - begun) / count;
+    }
+    return { take: arm.take, show, haunt, settle, seek, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
+  }
+
+  return { make };
+})();

@@ -1,0 +1,21 @@
+"""The scripts and the style with which a page draws an arm; they build on `core.js` of the report."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+FOLDER = Path(__file__).with_name("assets")
+
+SCRIPTS = ("formulas.js", "arm.js", "camera.js", "webgl.js", "painter.js", "stage.js")
+"""In the order in which they stand in a page; each builds on those before."""
+
+
+@cache
+def arm_scripts() -> str:
+    return "\n".join((FOLDER / name).read_text(encoding="utf-8").strip() for name in SCRIPTS)
+
+
+@cache
+def arm_style() -> str:
+    return (FOLDER / "stage.css").read_text(encoding="utf-8").strip()

@@ -1,0 +1,80 @@
+"""Pictures of docs/webassembly.md and README.md: the page of a real sweep, as a browser shows it.
+
+python -m tests.batch.portable.figures          writes docs/figures/view_*.png
+
+view_arm.png      the Panda with an upper arm of seven lengths, one of them solid
+view_narrow.png   the same page on a telephone, dark
+view_film.png     six instants, as the page prints them
+
+It says how large the page is, and how long its pictures take.
+"""
+
+from __future__ import annotations
+
+import base64
+import tempfile
+from pathlib import Path
+
+import batch
+import ic
+from met import cli
+from tests.batch.report.browser import Page, browser
+
+FOLDER = Path(__file__).parents[3] / "docs" / "figures"
+
+UPPER = "#include <panda.ic>\nsweep upper of reach { vary d3 = linspace(0.2, 0.45, 7) m; }\n"
+HUNDRED = "#include <panda.ic>\nsweep hundred of reach { vary links.load.mass = linspace(0.1, 3, 101) kg; }\n"
+
+READY = """new Promise(done => { const look = () =>
+    document.documentElement.dataset.haunted && MET.shown.isStill() ? done() : setTimeout(look, 30); look(); })"""
+
+
+CHOOSE = """(() => { const chosen = document.querySelector(".knob select"); chosen.value = 3;
+    chosen.dispatchEvent(new Event("change")); })()"""
+
+
+def draw(folder: Path) -> list[Path]:
+    """All pictures, in `folder`; gives back their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as name, browser() as chromium:
+        home = Path(name)
+        (home / "upper.ic").write_text(UPPER, encoding="utf-8")
+        batch.run(ic.compile(home / "upper.ic", select=["upper"]), output=home / "panda.h5")
+        page = _page(home / "panda.h5")
+        shown = chromium.open(page, width=1180, height=900, scale=1.5)
+        shown.run(CHOOSE)
+        written = [_at(shown, 2.0).picture(folder / "view_arm.png", ".stage")]
+        shown.run("dispatchEvent(new Event('beforeprint')); document.querySelector('.film').style.display = 'grid'; 0")
+        written.append(shown.picture(folder / "view_film.png", ".film", margin=0))
+        narrow = _at(chromium.open(page, width=390, height=844, dark=True, scale=2), 2.0)
+        picture = narrow.ask("Page.captureScreenshot", format="png")["data"]
+        written.append(folder / "view_narrow.png")
+        written[-1].write_bytes(base64.b64decode(picture))
+
+        (home / "hundred.ic").write_text(HUNDRED, encoding="utf-8")
+        batch.run(ic.compile(home / "hundred.ic", select=["hundred"]), output=home / "hundred.h5", histories="none")
+        for width in (1280, 400):
+            crowd = _at(chromium.open(_page(home / "hundred.h5"), width=width), 2.0)
+            times = [crowd.run("MET.shown.measure(10)") for _ in range(3)]
+            print(f"{crowd.run('MET.shown.ghosts()')} ghosts, {width} px: {min(times):.0f} ms a picture")
+    return written
+
+
+def _page(archive: Path) -> Path:
+    assert cli.main(["view", str(archive), "-q"]) == 0
+    page = archive.with_suffix(".view.html")
+    print(f"{page.name}: {page.stat().st_size / 1024:.0f} KiB")
+    return page
+
+
+def _at(page: Page, time: float) -> Page:
+    page.run(READY)
+    page.run(f"MET.shown.seek({time})")
+    page.run(READY)
+    page.settle()
+    return page
+
+
+if __name__ == "__main__":
+    for path in draw(FOLDER):
+        print(path)
