@@ -37,12 +37,11 @@ def loose_beds(flow: Flow) -> list[str]:
 
 
 def _rates(flow: Flow) -> Iterator[tuple[str, str]]:
-    """The cells of such rates, and what they are of, in words."""
-    for actuator, _, law in flow.program.system.mounted:
+    """The cells of such rates, and what they are of, by name. A law that goes by no reference rate keeps none."""
+    for actuator, _, _ in flow.program.system.mounted:
         joint = actuator.use.joint
-        yield f"{joint}.bed.shaft_rate", f"{joint}.bed"
-        if law.observer:
-            yield cell_names.REFERENCE_RATE(joint), f"{joint}.law"
+        cells = {f"{joint}.bed.shaft_rate": f"{joint}.bed", cell_names.REFERENCE_RATE(joint): f"{joint}.law"}
+        yield from ((cell, name) for cell, name in cells.items() if cell in flow.cells)
 
 
 def _is_held(flow: Flow, cell: str) -> bool:
