@@ -16,6 +16,7 @@ import numpy as np
 from met import run as engine
 from met.analysis.linear.flow import Edge, Flow, added, listed
 from met.analysis.linear.period import PeriodProgram
+from met.analysis.linear.shafts import held_rates
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.passing import run_past
@@ -127,10 +128,11 @@ def period_map(program: PeriodProgram, flow: Flow) -> PeriodMap:
     flow = start.copy()
     flow.ticks()
     locked = start.locked()
-    held = (*(name for name, mode in flow.modes().items() if mode == 0.0), *locked)
+    rates = held_rates(start)
+    held = (*(name for name, mode in flow.modes().items() if mode == 0.0), *rates.values(), *locked)
     if going := flow.breaking_away():
         raise flow.event(f"{listed(going)} {'breaks' if len(going) == 1 else 'break'} away")
-    stuck = {f"{name}.{part}" for name in held for part in ("q", "qd")} | set(held)
+    stuck = {f"{name}.{part}" for name in held for part in ("q", "qd")} | {*held, *rates}
     states = tuple(name for name in program.states if name not in stuck)
     ticks = tuple(
         InputTick(number, after)

@@ -7,7 +7,7 @@ next. Where a motor is too weak for that, or something moves that no servo holds
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,12 +16,18 @@ from met.analysis.linear.flow import Flow
 from met.analysis.linear.injected import ADDED
 from met.analysis.linear.jacobian import period_map
 from met.analysis.linear.period import PeriodProgram
+from met.analysis.linear.shafts import bring_to_rest, loose_beds
 from met.diagnostic import Problem, error
 from met.plan import Command, Experiment, Origin, Quantity, Structure
+from met.program import cell_names
+from met.program.control.substituted import QUEUE
 from met.program.unheld import Unheld, unheld
 
 CLOSE = 1e-11
 """Change of a number over a period, as a share of it and at most this itself, that is none."""
+
+HOLD = (".bed.drive_voltage", ".bed.load_current", ":queue.")
+"""Cells of a bed in which what a law asks for waits and acts, after the joint's name."""
 
 MOST_STEPS = 8
 """Steps of Newton's method: what it starts from is nearly there, or there is nothing."""
@@ -90,7 +96,9 @@ def settled(program: PeriodProgram, flow: Flow) -> Flow | None:
     flow = flow.copy()
     for name in program.states:
         flow.cells.setdefault(name, 0.0)  # what the run has not written yet
+    flow, fixed = _under_way(program, flow), _places(program)
     for _ in range(MOST_STEPS):
+        bring_to_rest(flow)
         try:
             found = period_map(program, flow)
         except Problem:  # a limit that is reached, or something breaks away: it does not stand
@@ -104,8 +112,8 @@ def settled(program: PeriodProgram, flow: Flow) -> Flow | None:
         if not np.isfinite(change).all():
             return None
         if np.all(np.abs(change) <= CLOSE * np.maximum(np.abs(now), 1.0)):
-            return flow
-        sought = [place for place, name in enumerate(found.states) if name not in program.positions]
+            return None if loose_beds(flow) else flow
+        sought = [place for place, name in enumerate(found.states) if name not in fixed]
         added = [[k for k, each in enumerate(found.ticks) if each.entry == number] for number in commands]
         columns = [(found.A - np.eye(len(now)))[:, sought], *(found.B[:, ticks].sum(1)[:, None] for ticks in added)]
         moves_by = np.hstack(columns)
@@ -120,15 +128,63 @@ def settled(program: PeriodProgram, flow: Flow) -> Flow | None:
     return None
 
 
+def _under_way(program: PeriodProgram, flow: Flow) -> Flow:
+    """The flow with beds under way: their amplifiers hold, and their queues have, what laws ask for where it stands.
+    All else stays as the run begins it."""
+    found, heads = (
+        flow.copy(),
+        tuple(f"{each.use.joint}{part}" for each, _, _ in program.system.mounted for part in HOLD),
+    )
+    for _ in range(QUEUE + 1 if heads else 0):
+        later = found.copy()
+        for _ in range(program.ticks):
+            later.ticks()
+            later.finish()
+        found.cells |= {name: value for name, value in later.cells.items() if name.startswith(heads)}
+        found.cells |= {
+            cell_names.REFERENCE_RATE(each.use.joint): 0.0 for each, _, law in program.system.mounted if law.observer
+        }
+    return found
+
+
+def _places(program: PeriodProgram) -> tuple[str, ...]:
+    """Cells of where joints are, and shafts of beds."""
+    return (*program.positions, *(cell_names.SHAFT_ANGLE(each.use.joint) for each, _, _ in program.system.mounted))
+
+
+def _faults(program: PeriodProgram) -> Iterator[str]:
+    """The faults that beds have, as paths."""
+    for actuator, bed, _ in program.system.mounted:
+        for name in dict.fromkeys(name for preset in bed.presets.values() for name in preset):
+            path = f"{actuator.use.joint}.bed.{name}"
+            if program.experiment.parameters[path].value != 0.0:
+                yield path
+
+
 def moves(program: PeriodProgram, flow: Flow) -> Reason:
     """The part of an arm that changes its rate most within a period that begins where a flow stands, in words."""
     if program.bodies:
         return f"`{program.bodies[0].name}` moves freely"
+    flow = _under_way(program, flow)
+    bring_to_rest(flow)
     after = flow.copy()
     for _ in range(program.ticks):
         after.ticks()
         after.finish()
     found = {name: abs(after.cells[name] - flow.cells[name]) / program.seconds for name in program.rates}
+    faults = ", ".join(f"`{path}`" for path in _faults(program))
+    if program.of_beds and faults:
+        return f"its beds have faults, with which nothing comes to rest or goes evenly: {faults}"
+    if loose := loose_beds(flow):
+        return (
+            f"no dry friction, `f_c`, holds the shaft of the bed of `{loose[0]}`, and an emulated bed stops a shaft "
+            "that would turn back for the rest of a substep, so that there is no derivative at rest"
+        )
+    if not any(found.values()):
+        try:
+            period_map(program, flow)
+        except Problem as edge:
+            return f"it stands still there, on an edge: {edge.diagnostics[0].message.partition(': ')[2]}"
     name = max(found, key=lambda each: found[each])
     first = name.removesuffix(".qd")
     sliding = {joint.name for joint in program.experiment.structure.moving if joint.kind == "prismatic"}

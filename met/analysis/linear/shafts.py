@@ -1,0 +1,59 @@
+"""Shafts of emulated beds that dry friction holds at rest, and the reference rates of laws that it holds likewise.
+
+Such a rate is exactly 0, and a small one to either side is gone within the period: it is held, and no state, as that of
+a joint that sticks. Without dry friction a small rate goes on; but an emulated bed stops a shaft that would turn back,
+for the rest of a substep, so that a push to one side and to the other differ, and there is no derivative at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from met.analysis.linear.flow import Flow
+from met.program import cell_names
+
+SMALL = 1e-9
+"""Rate of a shaft, rad/s, that friction undoes within a period where it holds the shaft at all."""
+
+SLOW = 1e-4
+"""Rate, rad/s, up to which a shaft is taken for one that stands, where it is looked for what stands."""
+
+
+def held_rates(flow: Flow) -> dict[str, str]:
+    """Rates that are held where a period begins, by cell: the names of what is held."""
+    return {cell: name for cell, name in _rates(flow) if flow.cells[cell] == 0.0 and _is_held(flow, cell)}
+
+
+def bring_to_rest(flow: Flow) -> None:
+    """Make the rates of shafts that hardly turn exactly 0."""
+    flow.cells |= {cell: 0.0 for cell, _ in _rates(flow) if abs(flow.cells[cell]) <= SLOW}
+
+
+def loose_beds(flow: Flow) -> list[str]:
+    """Joints whose bed's shaft stands where a period begins, and does for all of it, though nothing holds it there."""
+    shafts = [each.use.joint for each, _, _ in flow.program.system.mounted]
+    rates = {joint: f"{joint}.bed.shaft_rate" for joint in shafts}
+    return [joint for joint, cell in rates.items() if _goes_to_0(flow, cell, 0.0) and not _is_held(flow, cell)]
+
+
+def _rates(flow: Flow) -> Iterator[tuple[str, str]]:
+    """The cells of such rates, and what they are of, by name. A law that goes by no reference rate keeps none."""
+    for actuator, _, _ in flow.program.system.mounted:
+        joint = actuator.use.joint
+        cells = {f"{joint}.bed.shaft_rate": f"{joint}.bed", cell_names.REFERENCE_RATE(joint): f"{joint}.law"}
+        yield from ((cell, name) for cell, name in cells.items() if cell in flow.cells)
+
+
+def _is_held(flow: Flow, cell: str) -> bool:
+    """True where a small rate, and none, is 0 after the period."""
+    return all(_goes_to_0(flow, cell, rate) for rate in (0.0, SMALL, -SMALL))
+
+
+def _goes_to_0(flow: Flow, cell: str, rate: float) -> bool:
+    """True where a period that begins with this rate ends with none."""
+    moved = flow.copy()
+    moved.cells[cell] = rate
+    for _ in range(flow.program.ticks):
+        moved.ticks()
+        moved.finish()
+    return moved.cells[cell] == 0.0
