@@ -276,13 +276,14 @@ def is_unit(name: str) -> bool:
     return name in UNITS
 
 
-def measure(factors: Iterable[tuple[str, int]]) -> Measure:
-    """The meaning of a product of units, (name, exponent) each; ValueError for a name that is no unit."""
+def measure(factors: Iterable[tuple[str, int]], declared: Mapping[str, Measure] = MappingProxyType({})) -> Measure:
+    """The meaning of a product of units, (name, exponent) each; ValueError for a name that is no unit. declared: units
+    of a deck's own."""
     result = ONE
     for name, exponent in factors:
-        if name not in ALL_UNITS:
+        if name not in ALL_UNITS and name not in declared:
             raise ValueError(f"`{name}` is not a unit")
-        result = result * ALL_UNITS[name].measure ** exponent
+        result = result * (ALL_UNITS[name].measure if name in ALL_UNITS else declared[name]) ** exponent
     return result
 
 

@@ -13,20 +13,27 @@ and those only where they stand: what a run of names means is decided by what co
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import field
 from itertools import takewhile
+from types import MappingProxyType
 from typing import NoReturn
 
 from ic.grammar.cursor import OPENING, SHOWN, EndedInsideBlock, Unreadable, span, token_in_words
+from ic.grammar.declared_units import UNIT, USAGE, declarations, is_declaration, measures
 from ic.grammar.loops import Loops
 from ic.grammar.syntax import Broken, Call, Entry, Expression, Group, Let, Name, OverCases, Setting, Statement, Word
+from ic.text.edition import EDITION_WORD, EDITIONS
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import Findings, GiveUp, without_collection
 from ic.text.source import UnreadableStretch
 from met import units
-from met.diagnostic import Diagnostic, Label, write
+from met.diagnostic import Diagnostic, Label, leave_out, write
+from met.frozen import frozen
+from met.units import ONE, Measure
 
+NO_UNITS: Mapping[str, Measure] = MappingProxyType({})
 COMPARE = ("require", "exclude")
 PARAM = "param"
 LETS = ("let", PARAM)
@@ -35,31 +42,49 @@ _SEMICOLON = "an entry ends with `;`"
 _NOT_OPEN = "leave it out, or open it where it begins"
 
 
+@frozen
+class Parsed:
+    """The entries of a deck, and what else its text says.
+
+    unreadable  the stretches that could not be read
+    sound       whether the rest is where it belongs: not where a brace is missing or too many
+    units       those that the deck declares
+    """
+
+    entries: tuple[Entry, ...] = ()
+    unreadable: tuple[UnreadableStretch, ...] = ()
+    sound: bool = False
+    units: Mapping[str, Measure] = field(default_factory=dict)
+
+
 def parse(
-    tokens: Sequence[Token], findings: Findings | None = None
+    tokens: Sequence[Token], findings: Findings | None = None, declared: Mapping[str, Measure] = NO_UNITS
 ) -> tuple[tuple[Entry, ...], tuple[Diagnostic, ...]]:
-    """The entries of a deck, and what is wrong with it; where something is, the entries are not all there."""
+    """The entries of a deck, and what is wrong with it; where something is, the entries are not all there. declared:
+    units that are known besides."""
     findings = findings if findings is not None else Findings()
-    return parse_on(tokens, findings)[0], findings.all
+    return parse_on(tokens, findings, declared).entries, findings.all
 
 
-def parse_on(
-    tokens: Sequence[Token], findings: Findings
-) -> tuple[tuple[Entry, ...], tuple[UnreadableStretch, ...], bool]:
-    """The entries of a deck, the stretches of it that could not be read, and whether the rest is where it belongs: not
-    where a brace is missing or too many."""
+def parse_on(tokens: Sequence[Token], findings: Findings, declared: Mapping[str, Measure] = NO_UNITS) -> Parsed:
+    """The deck of these tokens; what is wrong with it is in the findings."""
     parser = _Parser(tokens, findings)
+    parser.declared = declared
     entries: list[Entry] = []
     sound = False
     with without_collection(), suppress(GiveUp, EndedInsideBlock):
+        parser.declare_units()
         parser.entries(entries)
         sound = not parser.unbalanced
-    return tuple(entries), tuple(parser.unreadable), sound
+    return Parsed(tuple(entries), tuple(parser.unreadable), sound, parser.declared)
 
 
-def parse_expression(tokens: Sequence[Token], findings: Findings) -> Expression | None:
+def parse_expression(
+    tokens: Sequence[Token], findings: Findings, declared: Mapping[str, Measure] = NO_UNITS
+) -> Expression | None:
     """The one expression that these tokens are; None, and what is wrong is in the findings, where they are not one."""
     parser = _Parser(tokens, findings)
+    parser.declared = declared
     with suppress(GiveUp, EndedInsideBlock, Unreadable):
         found = parser.value()
         if parser.token.kind != END:
@@ -87,6 +112,9 @@ class _Parser(Loops):
             if token.text == ";":
                 self.advance()
                 continue
+            if token.text == UNIT and is_declaration(self.tokens, self.at):
+                self.step_over_unit()
+                continue
             start = self.at
             try:
                 operators = self.operators
@@ -101,6 +129,63 @@ class _Parser(Loops):
                 self.operators = operators
                 self.recover(start, depth)
                 into += self.note_unreadable(start)
+
+    # editions
+
+    def declare_units(self) -> None:
+        """Finds the units that the deck declares, wherever it does so, before it is parsed."""
+        positions = declarations(self.tokens)
+        if not positions:
+            return
+        self.declared = {**self.declared, **dict.fromkeys(positions, ONE)}
+        sizes: dict[str, tuple[Token, Expression]] = {}
+        self.units_alone = True
+        for name, at in positions.items():
+            self.at = at + 2
+            with suppress(Unreadable):
+                sizes[name] = (self.tokens[at], self.value())
+            self.operators, self.peak = 0, 0
+            self.open.clear()
+        self.declared = {**self.declared, **measures(sizes, self.findings)}
+        self.at, self.units_alone = 0, False
+
+    def step_over_unit(self) -> None:
+        """Steps over `unit NAME = SIZE;`, which has been read, and refuses it where it has no place."""
+        start, (word, name) = self.at, self.tokens[self.at : self.at + 2]
+        depth = len(self.open)
+        try:
+            if word.source.edition == 1:
+                help = self.as_edition_2(word, "a file of edition 2 declares units")
+                self.fail("D384", "edition 1 declares no units", span(word, name), help=help)
+            if self.depth or depth:
+                self.fail("D384", "a unit is declared outside of blocks and loops", span(word, name), help=USAGE)
+            first = declarations(self.tokens)[name.text]
+            if first != start + 1:
+                also = (Label(self.tokens[first].place, "the first"),)
+                self.fail("D384", f"unit `{name.text}` is declared twice", name, also=also, help="leave one out")
+            self.at += 3
+            self.units_alone = True
+            self.semicolon(self.value())
+            self.units_alone = False
+        except Unreadable:
+            self.units_alone = False
+            self.recover(start, depth)
+
+    def not_the_edition(self, word: Token) -> NoReturn:
+        """`deck 2;` where it does not say the edition, at its number."""
+        number = self.token
+        heading = word.source.heading
+        said = f"{word.text} {number.text};"
+        if heading is not None:
+            place = word.source.place(heading.first, heading.last - heading.first)
+            label = Label(place, "it is said here")
+            help = leave_out("leave one of the two out", word.place)
+            self.fail("D381", "a file says its edition once", span(word, number), also=(label,), help=help)
+        known = " or ".join(f"`{EDITION_WORD} {each};`" for each in EDITIONS)
+        if number.text not in map(str, EDITIONS) or self.following.text != ";":
+            self.fail("D381", "this is no edition", span(word, number), help=f"write {known} in the file's first line")
+        message = "a file says its edition before all else but comments"
+        self.fail("D381", message, span(word, number), help=f"make `{said}` the first line of the file")
 
     def note_unreadable(self, start: int) -> list[Entry]:
         """Notes that an entry could not be read; what of it is known: what it sets, to a value that nobody knows."""
@@ -187,6 +272,8 @@ class _Parser(Loops):
             self.at -= 1
             tail = self.path()[1:]
         text = self.token.text
+        if len(names) == 1 and first.text == EDITION_WORD and self.token.kind in NUMBERS:
+            self.not_the_edition(first)
         if text in ("=", "+="):
             if len(names) == 2 and (names[0].text == "let" or (names[0].text == PARAM and not self.open)):
                 return self.let(names, tail)
@@ -290,7 +377,7 @@ class _Parser(Loops):
         name = names[1]
         if tail:
             self.fail("D020", f"`{names[0].text}` gives a value to one name, without points", span(name, tail[-1]))
-        if units.is_unit(name.text):
+        if self.is_reserved(name):
             message = f"`{name.text}` is the unit {units.UNITS[name.text].word}, so it cannot name a value"
             self.tell("D026", message, name, help="choose another name: after a number it would be read as the unit")
         if self.token.text == "+=":

@@ -15,6 +15,7 @@ from ic.meaning.definitions.csv_files import csv_files
 from ic.meaning.definitions.merge import MergedBlock, defined_twice, merge
 from ic.robots.files import RobotFiles
 from ic.text.complaints import Complaints, known_words, where_it_belongs, with_article
+from ic.text.edition import FIRST
 from ic.text.files import add_include, library_defines
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error, meant, write
 from met.frozen import frozen
@@ -62,6 +63,7 @@ class Definitions:
         self._complaints = complaints
         self._file = deck.file
         self._texts = {source.name: source.text for source in deck.sources}
+        self._editions = {source.name: source.edition for source in deck.sources if source.edition > FIRST}
         for entry in deck.entries:
             try:
                 self._enter(entry)
@@ -86,6 +88,10 @@ class Definitions:
         """The characters that a place covers; "" where its text is not known."""
         lines = self._texts.get(place.file, "").splitlines()[place.line - 1 : place.line]
         return lines[0][place.column - 1 : place.column - 1 + place.length] if lines else ""
+
+    def edition_at(self, place: Place) -> int:
+        """The edition of the deck language that the file of a place is written in."""
+        return self._editions.get(place.file, FIRST)
 
     def of_kind(self, kind: str) -> Mapping[str, Definition]:
         return self._by_kind[kind]
