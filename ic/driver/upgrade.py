@@ -62,11 +62,11 @@ def upgrades(paths: Sequence[str]) -> Upgrades:
         files = {os.path.realpath(name) for name in compiled.sources} & new.keys()
         if compiled.plan is None or not files:
             continue
-        problem = _difference(path, compiled, new)
-        if problem is None:
+        difference = _difference(path, compiled, new)
+        if difference is None:
             proved |= files
         else:
-            wrong.update(dict.fromkeys(files, problem))
+            wrong.update(dict.fromkeys(files, difference))
     texts: dict[str, str] = {}
     for path in found:
         real = os.path.realpath(path)

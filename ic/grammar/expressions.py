@@ -93,12 +93,12 @@ class Expressions(Quantities):
                 self.not_a_bare_fraction(left, right, first, under)
             left = Binary(operator, left, right, token.place)
             if level == _COMPARISON and _LEVEL.get(self.token.text) == _COMPARISON:
-                first = Label(token.place, "the first is here")
+                compared = Label(token.place, "the first is here")
                 helps = (
                     "in `exclude when` write `a < b and b < c`",
                     "of requirements write two: `require a < b; require b < c;`",
                 )
-                self.fail("D033", "comparisons do not chain", self.token, also=(first,), help=helps)
+                self.fail("D033", "comparisons do not chain", self.token, also=(compared,), help=helps)
 
     def prefix(self, least: int) -> Expression:
         token = self.token

@@ -200,12 +200,11 @@ class _Preprocessor(Macros):
             return
         if found.edition not in EDITIONS:
             start, end = found.number
-            known = " and ".join(map(str, EDITIONS))
-            helps = [f"the editions that this MET knows: {known}"]
+            help = f"this MET knows the editions {' and '.join(map(str, EDITIONS))}"
             if found.edition > LATEST:
-                helps.append("a newer MET may know it")
+                help += "; a newer one may know it"
             message = f"there is no edition {found.edition} of the deck language"
-            self._give_up("D380", message, source.place(start, end - start), help=helps)
+            self._give_up("D380", message, source.place(start, end - start), help=help)
         if not found.closed:
             at = source.place(found.last, 1)
             self.findings.error("D021", "expected `;`", at, help=write(";", "an entry ends with `;`", where="before"))

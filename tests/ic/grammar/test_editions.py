@@ -18,8 +18,10 @@ from ic.text.edition import EDITIONS, edition_of
 from met import units
 from met.diagnostic import Problem
 from met.plan import file as plan_file
+from met.plan.keys import inputs, structure_key
 from tests.ic.decktext import Desk
 from tests.ic.grammar.test_loops import same
+from tests.oracles.random_deck import in_edition_2, random_deck
 
 
 def value(folder: Path, text: str, name: str = "it", **others: str) -> Value:
@@ -129,6 +131,19 @@ def test_a_plan_keeps_the_editions_of_its_files_and_nothing_else_of_them(tmp_pat
     texts = [plan_file.dumps(plan) for plan in made]
     assert ['"edition"' in text for text in texts] == [False, False, True]
     assert plan_file.loads(texts[2]).sources[0].edition == 2
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_decks_have_the_same_parameters_with_names_of_units_and_units_of_their_own(seed: int) -> None:
+    old = random_deck(seed)
+    new = in_edition_2(old, seed)
+    assert "\nlet " in new and "\nunit " in new
+    before, after = (ic.compile(text=text, select="all").experiments for text in (old, new))
+    for one, other in zip(before, after, strict=True):
+        assert {path: (each.value, each.unit) for path, each in one.parameters.items()} == {
+            path: (each.value, each.unit) for path, each in other.parameters.items()
+        }
+        assert structure_key(one.structure, inputs(one)) == structure_key(other.structure, inputs(other))
 
 
 @pytest.mark.parametrize(("size", "number", "unit"), [
