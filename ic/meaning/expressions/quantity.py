@@ -58,6 +58,11 @@ def measure_of(unit: Unit) -> units.Measure:
     return measure
 
 
+def unit_of_plan(unit: Unit | None) -> Unit | None:
+    """The unit in which a plan may show a value: the deck's; None, for SI, where the deck declares a part of it."""
+    return None if unit is None or unit.declared else unit
+
+
 def in_unit(value: Value, unit: Unit) -> Value:
     """A pure number in a unit, rounded once. Raises D067 where it is too large in SI, or so small that it would be
     0."""

@@ -6,6 +6,7 @@ import random
 from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import ic
@@ -174,3 +175,25 @@ def test_a_hostile_declaration_ends_in_a_message(tmp_path: Path) -> None:
                  "unit z = 0e999999999 m;\n", "unit z = 1e-300 m / 1e300;\n", "unit z = 1 m / 0;\n"):  # fmt: skip
         with pytest.raises(Problem, match=r"unit|number"):
             value(tmp_path, f"deck 2;\n{text}let it = 1;\n")
+
+
+def test_a_plan_is_in_units_of_the_language_where_a_deck_varies_a_value_in_one_of_its_own(tmp_path: Path) -> None:
+    text = f"""deck 2;
+unit stone = 6.25 kg;
+let it = 1 kg;
+{RUN}
+sweep listed of r {{ vary links.bar.mass = [1, 2] stone; }}
+sweep ranged of r {{ vary links.bar.mass = 1 .. 3 by 0.5 stone; }}
+sweep drawn of r {{ sample random(4) {{ links.bar.mass = uniform(1, 2) stone; }} }}
+sweep spread of r {{ sample lhs(4) {{ it = uniform(1 stone, 2 stone); }} }}
+run measured like r {{ metric top = max {{ of = j.q; }} }}
+search worst of measured {{ maximise top; links.bar.mass = between(1, 2) stone; at_most = 40; }}
+"""
+    (tmp_path / "deck.ic").write_text(text, encoding="utf-8")
+    plan = plan_file.loads(plan_file.dumps(ic.compile(tmp_path / "deck.ic", select="all")))
+    found = {each.name: each for each in plan.experiments}
+    for name in ("listed", "ranged", "drawn", "spread", "worst"):
+        assert [each.unit for each in found[name].cases.coordinates] == ["kg"]
+        values = np.asarray(found[name].cases.coordinates[0].values)
+        assert (values >= 6.25).all() and (values <= 18.75).all()
+    assert np.asarray(found["listed"].cases.coordinates[0].values).tolist() == [6.25, 12.5]
