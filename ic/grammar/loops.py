@@ -113,7 +113,12 @@ class Loops(Expressions):
     def check_index(self, index: Token) -> None:
         if self.is_reserved(index):
             message = f"`{index.text}` is the unit {units.UNITS[index.text].word}, so it cannot be a loop's index"
-            self.tell("D026", message, index, help="choose another name: after a number it would be read as the unit")
+            self.tell(
+                "D026",
+                message,
+                index,
+                help="choose another name: after a number it would be the unit; in edition 2 (`deck 2;`) it may",
+            )
         if index.text in self.indices:
             message = f"`{index.text}` is the index of a loop around this one"
             self.tell("D283", message, index, help="give one of the two another name")

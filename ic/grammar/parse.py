@@ -379,7 +379,12 @@ class _Parser(Loops):
             self.fail("D020", f"`{names[0].text}` gives a value to one name, without points", span(name, tail[-1]))
         if self.is_reserved(name):
             message = f"`{name.text}` is the unit {units.UNITS[name.text].word}, so it cannot name a value"
-            self.tell("D026", message, name, help="choose another name: after a number it would be read as the unit")
+            self.tell(
+                "D026",
+                message,
+                name,
+                help="choose another name: after a number it would be the unit; in edition 2 (`deck 2;`) it may",
+            )
         if self.token.text == "+=":
             self.fail("D023", f"`{names[0].text}` gives a value once", self.token, help=write("="))
         self.advance()
