@@ -21,17 +21,17 @@ from types import MappingProxyType
 from typing import NoReturn
 
 from ic.grammar.cursor import OPENING, SHOWN, EndedInsideBlock, Unreadable, span, token_in_words
-from ic.grammar.declared_units import UNIT, USAGE, declarations, is_declaration, measures
-from ic.grammar.loops import Loops
+from ic.grammar.declared_units import UNIT, is_declaration
+from ic.grammar.edition_entries import EditionEntries
 from ic.grammar.syntax import Broken, Call, Entry, Expression, Group, Let, Name, OverCases, Setting, Statement, Word
-from ic.text.edition import EDITION_WORD, EDITIONS
+from ic.text.edition import EDITION_WORD
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import Findings, GiveUp, without_collection
 from ic.text.source import UnreadableStretch
 from met import units
-from met.diagnostic import Diagnostic, Label, leave_out, write
+from met.diagnostic import Diagnostic, Label, write
 from met.frozen import frozen
-from met.units import ONE, Measure
+from met.units import Measure
 
 NO_UNITS: Mapping[str, Measure] = MappingProxyType({})
 COMPARE = ("require", "exclude")
@@ -94,7 +94,7 @@ def parse_expression(
     return None
 
 
-class _Parser(Loops):
+class _Parser(EditionEntries):
     def entries(self, into: list[Entry]) -> None:
         """Entries up to the closing brace of the block they stand in, or to the end."""
         depth = len(self.open)
@@ -129,63 +129,6 @@ class _Parser(Loops):
                 self.operators = operators
                 self.recover(start, depth)
                 into += self.note_unreadable(start)
-
-    # editions
-
-    def declare_units(self) -> None:
-        """Finds the units that the deck declares, wherever it does so, before it is parsed."""
-        positions = declarations(self.tokens)
-        if not positions:
-            return
-        self.declared = {**self.declared, **dict.fromkeys(positions, ONE)}
-        sizes: dict[str, tuple[Token, Expression]] = {}
-        self.units_alone = True
-        for name, at in positions.items():
-            self.at = at + 2
-            with suppress(Unreadable):
-                sizes[name] = (self.tokens[at], self.value())
-            self.operators, self.peak = 0, 0
-            self.open.clear()
-        self.declared = {**self.declared, **measures(sizes, self.findings)}
-        self.at, self.units_alone = 0, False
-
-    def step_over_unit(self) -> None:
-        """Steps over `unit NAME = SIZE;`, which has been read, and refuses it where it has no place."""
-        start, (word, name) = self.at, self.tokens[self.at : self.at + 2]
-        depth = len(self.open)
-        try:
-            if word.source.edition == 1:
-                help = self.as_edition_2(word, "a file of edition 2 declares units")
-                self.fail("D384", "edition 1 declares no units", span(word, name), help=help)
-            if self.depth or depth:
-                self.fail("D384", "a unit is declared outside of blocks and loops", span(word, name), help=USAGE)
-            first = declarations(self.tokens)[name.text]
-            if first != start + 1:
-                also = (Label(self.tokens[first].place, "the first"),)
-                self.fail("D384", f"unit `{name.text}` is declared twice", name, also=also, help="leave one out")
-            self.at += 3
-            self.units_alone = True
-            self.semicolon(self.value())
-            self.units_alone = False
-        except Unreadable:
-            self.units_alone = False
-            self.recover(start, depth)
-
-    def not_the_edition(self, word: Token) -> NoReturn:
-        """`deck 2;` where it does not say the edition, at its number."""
-        number = self.token
-        heading = word.source.heading
-        said = f"{word.text} {number.text};"
-        if heading is not None:
-            place = word.source.place(heading.first, heading.last - heading.first)
-            label = Label(place, "it is said here")
-            help = leave_out("leave one of the two out", word.place)
-            self.fail("D381", "a file says its edition once", span(word, number), also=(label,), help=help)
-        known = " or ".join(f"`{EDITION_WORD} {each};`" for each in EDITIONS)
-        if number.text not in map(str, EDITIONS) or self.following.text != ";":
-            self.fail("D381", "this is no edition", span(word, number), help=f"write {known} in the file's first line")
-        message = "a file says its edition before all else but comments"
-        self.fail("D381", message, span(word, number), help=f"make `{said}` the first line of the file")
 
     def note_unreadable(self, start: int) -> list[Entry]:
         """Notes that an entry could not be read; what of it is known: what it sets, to a value that nobody knows."""
