@@ -1,6 +1,6 @@
 """`met fmt --upgrade`: decks rewritten to the latest edition of the language, and the proof that they mean the same.
 
-What edition 1 warns of (D382) gets the brackets that mean the same in both, and the file its line `deck 2;`. That is a
+What edition 1 warns of (D392) gets the brackets that mean the same in both, and the file its line `deck 2;`. That is a
 guess until it is proved: every deck has the same tree before and after, and all its runs and sweeps have the same plans
 and keys. A file that is no deck by itself is proved by those that include it. What cannot be proved stays as it is.
 """
@@ -27,7 +27,7 @@ from met.plan import Experiment, Origin
 from met.plan.columns import ComputedColumn
 from met.plan.keys import case_ids, inputs, structure_key
 
-CODE = "D382"
+CODE = "D392"
 """The warning of what the next edition reads otherwise; the first change of its help means the same in both."""
 
 MOST_ROWS = 10_000

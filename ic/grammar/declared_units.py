@@ -69,11 +69,11 @@ def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) 
             message = f"unit `{name}` needs itself: " + " needs ".join(f"`{each}`" for each in loop)
             labels = [Label(sizes[each][0].place, f"`{each}`") for each in loop[1:-1]]
             raise Problem(
-                error("D384", message, token.place, also=labels, help="write one of them in units of the language")
+                error("D394", message, token.place, also=labels, help="write one of them in units of the language")
             )
         if len(within) >= DEEPEST:
             message = f"unit `{name}` is at the end of a chain of {DEEPEST} units"
-            raise Problem(error("D384", message, token.place, help="write it in units of the language"))
+            raise Problem(error("D394", message, token.place, help="write it in units of the language"))
         _check_name(token)
         made = _measure(size, lambda each: find(each, (*within, name)))
         known[name] = made
@@ -89,20 +89,20 @@ def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) 
 
 
 def _check_name(token: Token) -> None:
-    """Raises Problem D384 where no unit may be called so."""
+    """Raises Problem D394 where no unit may be called so."""
     name = token.text
     if name in units.ALL_UNITS:
         unit = units.ALL_UNITS[name]
         si = f"{unit.measure.scale:.10g} {units.text(unit.measure.dimension)}"
         helps = f"leave this entry out; a unit of another size needs another name, such as `my_{name}`"
-        raise Problem(error("D384", f"`{name}` is a unit already: {unit.word}, {si}", token.place, help=helps))
+        raise Problem(error("D394", f"`{name}` is a unit already: {unit.word}, {si}", token.place, help=helps))
     if name in TAKEN:
         message = f"`{name}` is a word of the language, so it cannot be a unit"
-        raise Problem(error("D384", message, token.place, help="choose another name"))
+        raise Problem(error("D394", message, token.place, help="choose another name"))
 
 
 def _measure(size: Expression, find: Callable[[str], Measure]) -> Measure:
-    """The measure that an expression of numbers, units and `pi` is. Raises Problem D384 where it is something else."""
+    """The measure that an expression of numbers, units and `pi` is. Raises Problem D394 where it is something else."""
     place = size.place
     match size:
         case Number():
@@ -121,21 +121,21 @@ def _measure(size: Expression, find: Callable[[str], Measure]) -> Measure:
         case Name(text="pi"):
             return Measure(PURE, turns=1)
     what = f"`{size.text}` is no number and no unit: a" if isinstance(size, Name) else "a"
-    raise Problem(error("D384", f"{what} unit is made of numbers and units, with `*` and `/`", place, help=USAGE))
+    raise Problem(error("D394", f"{what} unit is made of numbers and units, with `*` and `/`", place, help=USAGE))
 
 
 def _product(one: Measure, other: Measure, place: Place) -> Measure:
-    """The product where numbers can hold it. Raises Problem D384."""
+    """The product where numbers can hold it. Raises Problem D394."""
     made = one * other
     if made.over == 0:
-        raise Problem(error("D384", "a unit has a size above 0", place, help=USAGE))
+        raise Problem(error("D394", "a unit has a size above 0", place, help=USAGE))
     if max(made.over.bit_length(), made.under.bit_length()) <= MOST_BITS and abs(made.turns) <= DEEPEST:
         try:
             if made.scale > 0.0:
                 return made
         except OverflowError:
             pass
-    raise Problem(error("D384", "this unit is beyond what a number can hold", place, help=USAGE))
+    raise Problem(error("D394", "this unit is beyond what a number can hold", place, help=USAGE))
 
 
 def _of_unit(unit: Unit, find: Callable[[str], Measure]) -> Measure:

@@ -81,7 +81,7 @@ class EditionDifferences(Cursor):
             first = number if number.kind in NUMBERS else taken[0]
             value = f"for the value write `({quantity}) {taken[sign].text} {token.text}`"
             self.fail(
-                "D383",
+                "D393",
                 f"`{token.text}` is a unit here, and this file gives a value that name",
                 token,
                 also=(Label(named.place, f"`{token.text}`"),),
@@ -105,7 +105,7 @@ class EditionDifferences(Cursor):
         quantity = first.source.text[first.offset : self.previous.end]
         unit = units.FURTHER_UNITS[named.text].word
         self.findings.warn(
-            "D382",
+            "D392",
             f"`{named.text}` is a value here, and in edition 2 the unit {unit}",
             named.place,
             help=write(
@@ -132,9 +132,9 @@ class EditionDifferences(Cursor):
             ]
         if under.source.edition > 1:
             message = "a number is divided by a number with a unit: which of the two has the unit?"
-            self.fail("D383", message, span(first, last), help=helps)
+            self.fail("D393", message, span(first, last), help=helps)
         message = "this divides by a quantity, since a unit binds to its number; edition 2 wants brackets around it"
-        self.findings.warn("D382", message, span(first, last), help=helps)
+        self.findings.warn("D392", message, span(first, last), help=helps)
 
 
 def _is_bare(expression: Expression) -> bool:

@@ -42,13 +42,13 @@ class EditionEntries(Loops):
         try:
             if word.source.edition == 1:
                 help = self.as_edition_2(word, "a file of edition 2 declares units")
-                self.fail("D384", "edition 1 declares no units", span(word, name), help=help)
+                self.fail("D394", "edition 1 declares no units", span(word, name), help=help)
             if self.depth or depth:
-                self.fail("D384", "a unit is declared outside of blocks and loops", span(word, name), help=USAGE)
+                self.fail("D394", "a unit is declared outside of blocks and loops", span(word, name), help=USAGE)
             first = declarations(self.tokens)[name.text]
             if first != start + 1:
                 also = (Label(self.tokens[first].place, "the first"),)
-                self.fail("D384", f"unit `{name.text}` is declared twice", name, also=also, help="leave one out")
+                self.fail("D394", f"unit `{name.text}` is declared twice", name, also=also, help="leave one out")
             self.at += 3
             self.units_alone = True
             self.semicolon(self.value())
@@ -66,9 +66,9 @@ class EditionEntries(Loops):
             place = word.source.place(heading.first, heading.last - heading.first)
             label = Label(place, "it is said here")
             help = leave_out("leave one of the two out", word.place)
-            self.fail("D381", "a file says its edition once", span(word, number), also=(label,), help=help)
+            self.fail("D391", "a file says its edition once", span(word, number), also=(label,), help=help)
         known = " or ".join(f"`{EDITION_WORD} {each};`" for each in EDITIONS)
         if number.text not in map(str, EDITIONS) or self.following.text != ";":
-            self.fail("D381", "this is no edition", span(word, number), help=f"write {known} in the file's first line")
+            self.fail("D391", "this is no edition", span(word, number), help=f"write {known} in the file's first line")
         message = "a file says its edition before all else but comments"
-        self.fail("D381", message, span(word, number), help=f"make `{said}` the first line of the file")
+        self.fail("D391", message, span(word, number), help=f"make `{said}` the first line of the file")

@@ -204,7 +204,7 @@ class _Preprocessor(Macros):
             if found.edition > LATEST:
                 help += "; a newer one may know it"
             message = f"there is no edition {found.edition} of the deck language"
-            self._give_up("D380", message, source.place(start, end - start), help=help)
+            self._give_up("D390", message, source.place(start, end - start), help=help)
         if not found.closed:
             at = source.place(found.last, 1)
             self.findings.error("D021", "expected `;`", at, help=write(";", "an entry ends with `;`", where="before"))

@@ -111,7 +111,7 @@ def test_a_part_is_proved_by_the_deck_that_includes_it(capsys: pytest.CaptureFix
 def test_what_would_not_mean_the_same_is_left_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
     counting = "let reach = __LINE__ * 1 m;\n" + RUN
     macro = "#define HALF 1/2 m^-1\nlet reach = HALF;\n" + RUN
-    for text, why in ((counting, "`r` would not have the same plan"), (macro, "D383, a number is divided by")):
+    for text, why in ((counting, "`r` would not have the same plan"), (macro, "D393, a number is divided by")):
         Path("a.ic").write_text(text)
         fmt(capsys, "a.ic")
         text = Path("a.ic").read_text()
@@ -152,4 +152,4 @@ def test_random_decks_with_values_that_are_called_as_units_are_keep_their_plans(
     kept = meaning("a.ic")
     assert fmt(capsys, "--upgrade", "a.ic") == (0, "a.ic: upgraded\n", "")
     assert meaning("a.ic") == kept
-    assert not [each for each in ic.check("a.ic").diagnostics if each.code in ("D382", "D383")]
+    assert not [each for each in ic.check("a.ic").diagnostics if each.code in ("D392", "D393")]
