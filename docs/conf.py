@@ -20,8 +20,8 @@ from met.version import VERSION  # noqa: E402  (only once the checkout is on the
 # In the order in which a user needs them; the headings stand in the sidebar.
 PAGES = {
     "A first campaign": ["tutorial"],
-    "Decks": ["deck", "loops", "robots", "servos", "environments", "models", "substitution", "reference", "diagnostics",
-              "editors"],
+    "Decks": ["deck", "loops", "editions", "robots", "servos", "environments", "models", "substitution", "reference",
+              "diagnostics", "editors"],
     "Campaigns and results": ["cluster", "best", "search", "verification", "evidence", "sensitivity", "linear", "plots",
                               "report", "diff", "export", "webassembly", "notebooks"],
     "A motor on a bed": ["bed", "bench", "protocol", "../hw/firmware/README"],

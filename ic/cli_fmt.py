@@ -13,25 +13,35 @@ from met.messages.visible import say
 @click.argument("paths", nargs=-1, required=True, metavar="PATH...")
 @click.option("--check", is_flag=True, help="Write nothing; exit with 1 where a deck would change.")
 @click.option("--diff", is_flag=True, help="Write nothing; print what would change.")
+@click.option("--upgrade", is_flag=True, help="Make them decks of edition 2, which mean what they meant; proved first.")
 @loudness_options
-def fmt(paths: tuple[str, ...], check: bool, diff: bool, quiet: bool, verbose: bool) -> int:
+def fmt(paths: tuple[str, ...], check: bool, diff: bool, upgrade: bool, quiet: bool, verbose: bool) -> int:
     """Lay out decks: indentation, blanks, alignment.
 
     PATH is a deck, a folder (all `.ic` files in it and in its folders), or `-`: from standard input to standard output.
     Where lines break and what is aligned is yours; tokens, comments and preprocessor lines stay as they are. A deck
-    that is broken is left alone. Exit status: 0 done, or nothing to do; 1 with --check: some would change; 2 a deck
-    cannot be formatted.
+    that is broken is left alone. --upgrade writes the line `deck 2;`, and brackets where the editions read a text
+    otherwise; all runs and sweeps have the same plans and keys, or the file stays as it is. Exit status: 0 done, or
+    nothing to do; 1 with --check: some would change; 2 a deck cannot be formatted, or upgraded.
     """
+    from ic.driver.upgrade import Upgrades, upgrades
     from ic.formatting.files import STDIN, decks, lay_out, write
 
     found = decks(paths)
     if STDIN in found and len(found) > 1:
         raise click.UsageError("`-` stands alone: what is formatted goes to standard output")
+    made = Upgrades({}, {})
+    if upgrade:
+        if STDIN in found:
+            raise click.UsageError("--upgrade takes files: what a deck means depends on what lies beside it")
+        made = upgrades([path for path in found if not path.endswith(".json")])
     changed = 0
     broken = False
     for path in found:
         try:
-            deck = lay_out(path)
+            if path in made.refused:
+                raise made.refused[path]
+            deck = lay_out(path, made.texts.get(path))
             if deck.changes and path != STDIN and not (check or diff):
                 write(path, deck.after)
         except Problem as problem:
@@ -44,7 +54,8 @@ def fmt(paths: tuple[str, ...], check: bool, diff: bool, quiet: bool, verbose: b
         if path == STDIN and not (check or diff):
             say(deck.after, end="", exact=True)
         if path != STDIN and not quiet and (verbose or deck.changes) and (check or not diff):
-            state = "as it should be" if not deck.changes else "would be formatted" if check else "formatted"
+            done = "upgraded" if path in made.texts else "formatted"
+            state = "as it should be" if not deck.changes else f"would be {done}" if check else done
             ends = "; its lines end with a newline alone" if deck.changes and deck.ends else ""
             say(f"{deck.name}: {state}{ends}", err=diff)
     if broken:

@@ -7,12 +7,12 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from ic.grammar.parse import parse_on
-from ic.grammar.syntax import Deck, Entry
+from ic.grammar.parse import Parsed, parse_on
+from ic.grammar.syntax import Deck
 from ic.text.files import LIBRARY, NOTHING_UNSAVED, Unsaved
 from ic.text.limits import Findings, GiveUp
 from ic.text.preprocess import preprocess
-from ic.text.source import SourceFile, UnreadableStretch
+from ic.text.source import SourceFile
 from met.diagnostic import Diagnostic, Problem
 from met.messages.message import shown_place
 
@@ -42,28 +42,27 @@ def read(
     """
     seen = preprocess(path, include_dirs, defines, library=library, text=text, unsaved=unsaved)
     findings = Findings()
-    entries: tuple[Entry, ...] = ()
-    unreadable: tuple[UnreadableStretch, ...] = ()
-    sound = False
+    parsed = Parsed()
     with suppress(GiveUp):
         findings.add(*seen.diagnostics)
         if seen.complete:
-            entries, unreadable, sound = parse_on(seen.tokens, findings)
+            parsed = parse_on(seen.tokens, findings)
     found = in_order(findings.all, seen.sources)
-    sound = sound and despite_errors and not any(each.code in UNKNOWN_TEXT for each in findings.errors)
+    sound = parsed.sound and despite_errors and not any(each.code in UNKNOWN_TEXT for each in findings.errors)
     if not seen.complete or (findings.errors and not sound):
         raise Problem(found, {source.name: source.text for source in seen.sources})
     return Deck(
         seen.sources[0].name,
-        entries,
+        parsed.entries,
         seen.sources,
         found,
         tuple(os.fspath(each) for each in include_dirs),
         os.fspath(path),
         tuple(defines),
-        unreadable,
+        parsed.unreadable,
         text,
         unsaved,
+        parsed.units,
     )
 
 

@@ -277,18 +277,24 @@ def is_unit(name: str) -> bool:
     return name in UNITS
 
 
-def measure(factors: Iterable[tuple[str, int]]) -> Measure:
-    """The meaning of a product of units, (name, exponent) each; ValueError for a name that is no unit."""
-    return _measure(tuple(factors))
+def measure(factors: Iterable[tuple[str, int]], declared: Mapping[str, Measure] = MappingProxyType({})) -> Measure:
+    """The meaning of a product of units, (name, exponent) each; ValueError for a name that is no unit. declared: units
+    of a deck's own."""
+    named = tuple(factors)
+    return _product(named, declared) if declared else _known_product(named)
 
 
 @lru_cache(maxsize=1024)
-def _measure(factors: tuple[tuple[str, int], ...]) -> Measure:
+def _known_product(factors: tuple[tuple[str, int], ...]) -> Measure:
+    return _product(factors, {})
+
+
+def _product(factors: Iterable[tuple[str, int]], declared: Mapping[str, Measure]) -> Measure:
     result = ONE
     for name, exponent in factors:
-        if name not in ALL_UNITS:
+        if name not in ALL_UNITS and name not in declared:
             raise ValueError(f"`{name}` is not a unit")
-        result = result * ALL_UNITS[name].measure ** exponent
+        result = result * (ALL_UNITS[name].measure if name in ALL_UNITS else declared[name]) ** exponent
     return result
 
 

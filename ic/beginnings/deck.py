@@ -12,6 +12,8 @@ DECK = """\
 //   met fmt $name.ic               lays it out anew
 //   met doc                       models there are; `met doc rigid_gearbox` says what one takes
 
+deck 2;                                         // the edition of the language that this file is written in
+
 let reach = 0.5 m;                              // a unit follows its number; a wrong one is an error
 
 // Links have mass and inertia, joints say what hangs on what. z is up, because gravity says so below.

@@ -412,6 +412,8 @@ TRIAL = """\
 //
 //   met run $name.ic
 
+deck 2;
+
 arm trial {
     link bar { mass = 2 kg;  shape = rod(length = 1 m, along = x); }
     joint hinge revolute { parent = base;  child = bar;  axis = z; }

@@ -25,6 +25,7 @@ from ic.sweeps.from_command_line import command_line_sweep
 from ic.sweeps.groups import DeckSource, ScopedExperiment, experiments_of
 from ic.sweeps.settings import Settings, check_params
 from ic.text.complaints import Complaints, known_words
+from ic.text.edition import FIRST
 from ic.text.files import NOTHING_UNSAVED, Unsaved
 from ic.text.lexer import COMMAND_LINE
 from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
@@ -155,7 +156,8 @@ def compile_deck(
             warn_of_unneeded(definitions, asked, experiments, complaints)
     else:
         return Compiled(None, in_order(complaints.all, sources), texts)
-    files = tuple(File(source.name, source.text, source.sha256) for source in sources)
+    decks = {source.name: source.edition for source in deck.sources if source.name != COMMAND_LINE}
+    files = tuple(File(each.name, each.text, each.sha256, decks.get(each.name, FIRST)) for each in sources)
     return Compiled(
         Plan(deck.file, tuple(experiments), files, tuple(defines), selected, tuple(settings)),
         in_order(complaints.all, sources),
@@ -182,7 +184,7 @@ def _with_settings(deck: Deck, settings: Sequence[str], complaints: Complaints) 
     files = (source for source in deck.sources if source.name != COMMAND_LINE)
     deck = replace(deck, sources=(*files, command_line(settings, before)))
     with complaints.gather():
-        return deck, read_settings(settings, before)
+        return deck, read_settings(settings, before, edition=deck.edition, units=deck.units)
     return deck, ()
 
 

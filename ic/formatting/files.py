@@ -76,8 +76,8 @@ def _inside(folder: str) -> Iterator[str]:
         yield from (os.path.normpath(os.path.join(at, name)) for name in files if name.endswith(".ic"))
 
 
-def lay_out(path: str) -> LaidOut:
-    """One deck. Raises Problem where it cannot be read, is broken, or is no deck."""
+def lay_out(path: str, text: str | None = None) -> LaidOut:
+    """One deck; laid out as if it had this text. Raises Problem where it cannot be read, is broken, or is no deck."""
     if path == STDIN:
         if sys.stdin is None:
             raise Problem(error("D001", "cannot read standard input: it is closed", help="name a deck, or pipe one in"))
@@ -88,7 +88,7 @@ def lay_out(path: str) -> LaidOut:
     file = FoundFile(path, os.path.normpath(path))
     Files().text(file)  # complains as every reader of decks does
     with open_regular(path) as stream:
-        return _laid_out(file, stream.read(MOST_BYTES + 1))
+        return _laid_out(file, stream.read(MOST_BYTES + 1), text)
 
 
 def lay_out_text(path: str, text: str) -> str:
@@ -97,13 +97,14 @@ def lay_out_text(path: str, text: str) -> str:
     return formatted(file.name, text, making_strings(text, file))
 
 
-def _laid_out(file: FoundFile, data: bytes) -> LaidOut:
+def _laid_out(file: FoundFile, data: bytes, new: str | None = None) -> LaidOut:
     if len(data) > MOST_BYTES:
         raise Problem(error("D018", f"`{file.name}` has more than the {MOST_BYTES >> 20} MiB that a deck may have"))
     text, complaint = decode(data, file.name, "deck")
     if complaint is not None:
         raise Problem(complaint, {file.name: text})
-    after = formatted(file.name, text, making_strings(text, file))
+    wanted = text if new is None else new
+    after = formatted(file.name, wanted, making_strings(wanted, file))
     return LaidOut(file.name, text, after, after.encode() != data, b"\r" in data)
 
 

@@ -6,16 +6,19 @@ A path, a unit and a number with its sign are one piece each. Where a unit ends 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
+from itertools import pairwise
 
 from ic.formatting.row import Kind, Row, RowPiece
 from ic.grammar.braced_names import name_length
 from ic.grammar.cursor import OPENING
+from ic.grammar.declared_units import TAKEN, declarations
 from ic.grammar.expressions import Expressions
 from ic.text.lexer import END, NAME, NUMBERS, SPACE, STRING, WHOLE, Text, Token, logical_lines
 from ic.text.limits import Findings
 from met import units
+from met.units import ONE
 
 WORDS = ("and", "or", "not", "when", "require", "by", "in")
 """Behind these a value begins."""
@@ -32,10 +35,20 @@ def cut(rows: Iterable[Row]) -> None:
     if not tokens:
         return
     parser = Expressions([*tokens, Token(END, "", tokens[-1].source, tokens[-1].end, 1)], Findings())
+    parser.declared = dict.fromkeys(_declared_units(tokens), ONE)
     at = 0
     for row in code:
         row.pieces = _cut(row, at, parser)
         at += len(row.tokens)
+
+
+def _declared_units(tokens: Sequence[Token]) -> Iterator[str]:
+    """The units that a file of edition 2 declares, or has from another file: nothing else stands behind a number."""
+    if tokens[0].source.edition > 1:
+        yield from declarations(tokens)
+        for before, token in pairwise(tokens):
+            if before.kind in NUMBERS and token.kind == NAME and token.text not in TAKEN:
+                yield token.text
 
 
 def _cut(row: Row, at: int, parser: Expressions) -> list[RowPiece]:
@@ -128,12 +141,16 @@ def _unit(parser: Expressions, at: int, before: RowPiece) -> int:
     over = None
     if token.kind == WHOLE and token.text == "1" and following.text == "/":
         over = parser.unit_factor(at + 2, -1, 0)
-    if over is None and not ((token.kind == NAME or token.text == "%") and token.text in units.ALL_UNITS):
+    if over is None and not ((token.kind == NAME or token.text == "%") and _is_unit(token, parser)):
         return 0
     if before.kind == "name" and following.text not in ("*", "/", "^"):  # a macro's name, perhaps: `TEETH V*s/rad`
         return 0
     product = parser.unit_product(at, 1, 0, over)
     return 0 if product is None else product[1] - at
+
+
+def _is_unit(token: Token, parser: Expressions) -> bool:
+    return token.text in units.ALL_UNITS or token.text in parser.declared
 
 
 def blanks_between(before: RowPiece, piece: RowPiece) -> int:

@@ -13,6 +13,7 @@ from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, Token
 from ic.text.limits import DEPTH, MOST_OPERATORS, Findings, GiveUp
 from met.diagnostic import Help, Label, Place, write
 from met.messages.message import macro_count
+from met.units import Measure
 
 OPENING = {"(": ")", "[": "]", "{": "}"}
 SHOWN = 40  # characters of a token in a message
@@ -57,6 +58,7 @@ class Cursor:
         self.misindented: tuple[Token, Token] | None = None
         self.unbalanced = False  # whether a brace is missing somewhere, or a bracket too many
         self.indices: Mapping[str, str] = {}  # of the loops around: what each stands for in this turn
+        self.declared: Mapping[str, Measure] = {}  # units that the deck declares
         self.depth = 0  # brackets that are open around the tokens
 
     @property

@@ -70,6 +70,7 @@ class Expressions(Quantities):
         return Range(first, last, self.expression(), dots.place)
 
     def expression(self, least: int = 1) -> Expression:
+        first = self.token
         left = self.prefix(least)
         while True:
             token = self.token
@@ -86,15 +87,18 @@ class Expressions(Quantities):
                     span(token, self.token),
                     help=write("^", "a power is written `a^b`"),
                 )
+            under = self.token
             right = self.expression(level if operator == "^" else level + 1)
+            if operator == "/":
+                self.not_a_bare_fraction(left, right, first, under)
             left = Binary(operator, left, right, token.place)
             if level == _COMPARISON and _LEVEL.get(self.token.text) == _COMPARISON:
-                first = Label(token.place, "the first is here")
+                compared = Label(token.place, "the first is here")
                 helps = (
                     "in `exclude when` write `a < b and b < c`",
                     "of requirements write two: `require a < b; require b < c;`",
                 )
-                self.fail("D033", "comparisons do not chain", self.token, also=(first,), help=helps)
+                self.fail("D033", "comparisons do not chain", self.token, also=(compared,), help=helps)
 
     def prefix(self, least: int) -> Expression:
         token = self.token
@@ -159,7 +163,10 @@ class Expressions(Quantities):
         """The expression whose bracket was just closed, with the unit that may follow it."""
         closing = self.previous
         unit = self.unit()
-        return inner if unit is None else WithUnit(inner, unit, span(opening, closing))
+        if unit is None:
+            return inner
+        self.not_a_value_behind(opening)
+        return WithUnit(inner, unit, span(opening, closing))
 
     # names, calls, lists
 
@@ -204,7 +211,7 @@ class Expressions(Quantities):
             return self.indexed(name, parts[0])
         token = self.token
         if units.is_unit(token.text) and token.kind == NAME and not self.begins_entry(self.at):
-            if units.is_unit(name.text):
+            if self.is_reserved(parts[0]) and len(parts) == 1:
                 self.fail(
                     "D025",
                     f"`{name.text}` is the unit {units.UNITS[name.text].word}, and stands here without a number",
@@ -239,6 +246,8 @@ class Expressions(Quantities):
                 help=self.write(f"{after.text} {token.text}", token, after),
             )
         before = self.previous.text
+        if not self.is_reserved(token):
+            return
         if before in ("+", "-", "*", "/", "^", "<", ">", "<=", ">=", "==", "!=") or after.text in (
             "+",
             "-",

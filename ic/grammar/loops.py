@@ -103,6 +103,7 @@ class Loops(Expressions):
         end = Token(END, "", tokens[-1].source, tokens[-1].end, 1)
         turn = type(self)([*tokens, end], self.findings)
         turn.indices, turn.looped, turn.within = known, self.looped, self.within
+        turn.declared, turn.values_of_files = self.declared, self.values_of_files
         turn.open, turn.depth, turn.operators = [opening], self.depth + len(self.open) - 1, self.operators
         turn.entries(into)
         self.unreadable += turn.unreadable
@@ -110,9 +111,14 @@ class Loops(Expressions):
         self.peak = max(self.peak, turn.peak)
 
     def check_index(self, index: Token) -> None:
-        if units.is_unit(index.text):
+        if self.is_reserved(index):
             message = f"`{index.text}` is the unit {units.UNITS[index.text].word}, so it cannot be a loop's index"
-            self.tell("D026", message, index, help="choose another name: after a number it would be read as the unit")
+            self.tell(
+                "D026",
+                message,
+                index,
+                help="choose another name: after a number it would be the unit; in edition 2 (`deck 2;`) it may",
+            )
         if index.text in self.indices:
             message = f"`{index.text}` is the index of a loop around this one"
             self.tell("D283", message, index, help="give one of the two another name")

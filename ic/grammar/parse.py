@@ -13,20 +13,27 @@ and those only where they stand: what a run of names means is decided by what co
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import field
 from itertools import takewhile
+from types import MappingProxyType
 from typing import NoReturn
 
 from ic.grammar.cursor import OPENING, SHOWN, EndedInsideBlock, Unreadable, span, token_in_words
-from ic.grammar.loops import Loops
+from ic.grammar.declared_units import UNIT, is_declaration
+from ic.grammar.edition_entries import EditionEntries
 from ic.grammar.syntax import Broken, Call, Entry, Expression, Group, Let, Name, OverCases, Setting, Statement, Word
+from ic.text.edition import EDITION_WORD
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import Findings, GiveUp, without_collection
 from ic.text.source import UnreadableStretch
 from met import units
 from met.diagnostic import Diagnostic, Label, write
+from met.frozen import frozen
+from met.units import Measure
 
+NO_UNITS: Mapping[str, Measure] = MappingProxyType({})
 COMPARE = ("require", "exclude")
 PARAM = "param"
 LETS = ("let", PARAM)
@@ -35,31 +42,49 @@ _SEMICOLON = "an entry ends with `;`"
 _NOT_OPEN = "leave it out, or open it where it begins"
 
 
+@frozen
+class Parsed:
+    """The entries of a deck, and what else its text says.
+
+    unreadable  the stretches that could not be read
+    sound       whether the rest is where it belongs: not where a brace is missing or too many
+    units       those that the deck declares
+    """
+
+    entries: tuple[Entry, ...] = ()
+    unreadable: tuple[UnreadableStretch, ...] = ()
+    sound: bool = False
+    units: Mapping[str, Measure] = field(default_factory=dict)
+
+
 def parse(
-    tokens: Sequence[Token], findings: Findings | None = None
+    tokens: Sequence[Token], findings: Findings | None = None, declared: Mapping[str, Measure] = NO_UNITS
 ) -> tuple[tuple[Entry, ...], tuple[Diagnostic, ...]]:
-    """The entries of a deck, and what is wrong with it; where something is, the entries are not all there."""
+    """The entries of a deck, and what is wrong with it; where something is, the entries are not all there. declared:
+    units that are known besides."""
     findings = findings if findings is not None else Findings()
-    return parse_on(tokens, findings)[0], findings.all
+    return parse_on(tokens, findings, declared).entries, findings.all
 
 
-def parse_on(
-    tokens: Sequence[Token], findings: Findings
-) -> tuple[tuple[Entry, ...], tuple[UnreadableStretch, ...], bool]:
-    """The entries of a deck, the stretches of it that could not be read, and whether the rest is where it belongs: not
-    where a brace is missing or too many."""
+def parse_on(tokens: Sequence[Token], findings: Findings, declared: Mapping[str, Measure] = NO_UNITS) -> Parsed:
+    """The deck of these tokens; what is wrong with it is in the findings."""
     parser = _Parser(tokens, findings)
+    parser.declared = declared
     entries: list[Entry] = []
     sound = False
     with without_collection(), suppress(GiveUp, EndedInsideBlock):
+        parser.declare_units()
         parser.entries(entries)
         sound = not parser.unbalanced
-    return tuple(entries), tuple(parser.unreadable), sound
+    return Parsed(tuple(entries), tuple(parser.unreadable), sound, parser.declared)
 
 
-def parse_expression(tokens: Sequence[Token], findings: Findings) -> Expression | None:
+def parse_expression(
+    tokens: Sequence[Token], findings: Findings, declared: Mapping[str, Measure] = NO_UNITS
+) -> Expression | None:
     """The one expression that these tokens are; None, and what is wrong is in the findings, where they are not one."""
     parser = _Parser(tokens, findings)
+    parser.declared = declared
     with suppress(GiveUp, EndedInsideBlock, Unreadable):
         found = parser.value()
         if parser.token.kind != END:
@@ -69,7 +94,7 @@ def parse_expression(tokens: Sequence[Token], findings: Findings) -> Expression 
     return None
 
 
-class _Parser(Loops):
+class _Parser(EditionEntries):
     def entries(self, into: list[Entry]) -> None:
         """Entries up to the closing brace of the block they stand in, or to the end."""
         depth = len(self.open)
@@ -86,6 +111,9 @@ class _Parser(Loops):
                 continue
             if token.text == ";":
                 self.advance()
+                continue
+            if token.text == UNIT and is_declaration(self.tokens, self.at):
+                self.step_over_unit()
                 continue
             start = self.at
             try:
@@ -187,6 +215,8 @@ class _Parser(Loops):
             self.at -= 1
             tail = self.path()[1:]
         text = self.token.text
+        if len(names) == 1 and first.text == EDITION_WORD and self.token.kind in NUMBERS:
+            self.not_the_edition(first)
         if text in ("=", "+="):
             if len(names) == 2 and (names[0].text == "let" or (names[0].text == PARAM and not self.open)):
                 return self.let(names, tail)
@@ -290,9 +320,14 @@ class _Parser(Loops):
         name = names[1]
         if tail:
             self.fail("D020", f"`{names[0].text}` gives a value to one name, without points", span(name, tail[-1]))
-        if units.is_unit(name.text):
+        if self.is_reserved(name):
             message = f"`{name.text}` is the unit {units.UNITS[name.text].word}, so it cannot name a value"
-            self.tell("D026", message, name, help="choose another name: after a number it would be read as the unit")
+            self.tell(
+                "D026",
+                message,
+                name,
+                help="choose another name: after a number it would be the unit; in edition 2 (`deck 2;`) it may",
+            )
         if self.token.text == "+=":
             self.fail("D023", f"`{names[0].text}` gives a value once", self.token, help=write("="))
         self.advance()

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 import re
-from functools import cached_property
 
-from ic.grammar.cursor import Cursor, span
+from ic.grammar.cursor import span
+from ic.grammar.edition_differences import EditionDifferences
 from ic.grammar.syntax import Expression, Number, Unit, Word
 from ic.text.lexer import NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import LONGEST_NUMBER
@@ -22,12 +22,14 @@ _UNIT_DEPTH = 8
 MOST_FACTORS = 32
 
 
-class Quantities(Cursor):
+class Quantities(EditionDifferences):
     def number(self) -> Expression:
         token = self.advance()
         value = self.number_value(token)
         unit = self.unit()
         last = self.previous
+        if unit is not None:
+            self.not_a_value_behind(token)
         self.not_a_second_number(token)
         return Number(value, unit, span(token, last), token.text)
 
@@ -67,7 +69,7 @@ class Quantities(Cursor):
                     "D028",
                     f"`{named.text}` is not a unit",
                     named,
-                    help=other_units.remedy(named.text) or _units_known(),
+                    help=other_units.remedy(named.text) or self.units_known(),
                 )
         if token.kind != NAME and token.text not in ("%", "(") and over is None:
             return None
@@ -93,7 +95,10 @@ class Quantities(Cursor):
             self.fail("D030", f"a unit has at most {MOST_FACTORS} factors", token)
         self.not_a_second_unit(start)
         taken = self.tokens[start : self.at]
-        return Unit(tuple(factors), span(taken[0], taken[-1]), "".join(t.text for t in taken))
+        self.not_a_value_too(taken)
+        declared = [(word.text, self.declared[word.text]) for word, _ in factors if word.text in self.declared]
+        text = "".join(t.text for t in taken)
+        return Unit(tuple(factors), span(taken[0], taken[-1]), text, tuple(declared))
 
     def reads_as_unit(self, at: int, *, first: bool = False) -> bool:
         """Return True if the name at token `at`, which stands behind a number or a unit, is one.
@@ -101,24 +106,13 @@ class Quantities(Cursor):
         first  it stands behind the number, where no other name may stand
         """
         name = self.tokens[at].text
+        if self.tokens[at].source.edition > 1:
+            return name in units.ALL_UNITS or name in self.declared
         if name not in units.FURTHER_UNITS:
             return units.is_unit(name)
         if first:
             return not self.on_new_line(at) and self.tokens[at + 1].text not in ("=", "+=", "{", "(")
         return name not in self.names_of_units
-
-    @cached_property
-    def names_of_units(self) -> frozenset[str]:
-        """Names of further units that the deck uses for something else: they stand where no unit can stand."""
-        pairs = zip(self.tokens, self.tokens[1:], strict=False)
-        return frozenset(
-            token.text
-            for before, token in pairs
-            if token.text in units.FURTHER_UNITS
-            and token.kind == NAME
-            and before.kind not in NUMBERS
-            and before.text not in ("*", "/", "(", ")", "]")
-        )
 
     def is_word_of_requirement(self) -> bool:
         """Return True at `in 99 %`, `of cases`, `with 90 %` or `confidence`, of which none is a unit."""
@@ -153,7 +147,10 @@ class Quantities(Cursor):
                 return None
             factors, at = inner[0], inner[1] + 1
         elif (
-            token.kind != STRING and self.tokens[at + 1].text not in ("{", ".") and self.reads_as_unit(at, first=first)
+            token.kind != STRING
+            and self.tokens[at + 1].text not in ("{", ".")
+            and not (token.text == "min" and self.tokens[at + 1].text == "(" and not first)  # the function
+            and self.reads_as_unit(at, first=first)
         ):
             factors, at = [(Word(token.text, token.place), sign)], at + 1
         else:
@@ -241,8 +238,9 @@ class Quantities(Cursor):
         elif powered and (other := other_units.suggest(powered.group(1))) and "/" not in other:
             near = f"{other}^{powered.group(2)}"
             helps = (write(near, f"did you mean `{near}`?"),)
-        self.fail("D028", f"`{token.text}` is not a unit", token, help=helps or _units_known())
+        if token.text in self.declared:
+            helps = (self.as_edition_2(token, "units that a deck declares are known in files of edition 2"),)
+        self.fail("D028", f"`{token.text}` is not a unit", token, help=helps or self.units_known())
 
-
-def _units_known() -> str:
-    return "the units: " + ", ".join(units.ALL_UNITS)
+    def units_known(self) -> str:
+        return "the units: " + ", ".join((*units.ALL_UNITS, *self.declared))

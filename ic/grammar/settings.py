@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from ic.grammar.parse import parse, parse_expression
+from ic.grammar.parse import NO_UNITS, parse, parse_expression
 from ic.grammar.syntax import Expression, Setting
+from ic.text.edition import FIRST, LATEST
 from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, SPACE, Text, Token, logical_lines
 from ic.text.limits import Findings, GiveUp
 from ic.text.source import SourceFile
@@ -13,6 +14,7 @@ from ic.text.strays import complain_of_stray
 from met.diagnostic import Problem, error
 from met.settings import VARY
 from met.settings import varies as is_varied
+from met.units import Measure
 
 EXAMPLE = "write `PATH=VALUE`, such as `gearbox.kp=0.02 V*s/rad`"
 VARY_EXAMPLE = "write `PATH=VALUES`, such as `gearbox.kp=[0.01, 0.02] V*s/rad` or `gearbox.kp=0.1..0.5 by 0.1 V*s/rad`"
@@ -25,19 +27,25 @@ def command_line(texts: Sequence[str], before: str = "") -> SourceFile:
     return SourceFile(COMMAND_LINE, before + "".join(f"{_one_line(text)}\n" for text in texts), "")
 
 
-def read_settings(texts: Sequence[str], before: str = "") -> tuple[Setting, ...]:
-    """An entry for each `PATH=VALUE` and `vary PATH=VALUES`, in their order. before: as in `command_line`.
+def read_settings(
+    texts: Sequence[str], before: str = "", *, edition: int = FIRST, units: Mapping[str, Measure] = NO_UNITS
+) -> tuple[Setting, ...]:
+    """An entry for each `PATH=VALUE` and `vary PATH=VALUES`, in their order.
+
+    before          as in `command_line`
+    edition, units  of the deck that they are for
 
     Raises Problem with all that is wrong with them: what the syntax does not have, and D231, D232.
     """
     source = Text(COMMAND_LINE, command_line(texts, before).text)
+    source.edition = edition
     findings = Findings()
     made: dict[str, Setting] = {}
     at = len(before)
     for text in map(_one_line, texts):
         try:
             with findings.gather():
-                entry = _read(source, at, text, findings)
+                entry = _read(source, at, text, findings, units)
                 path = path_of(entry)
                 if path in made:
                     twice = "is set twice" if not made[path].words and not entry.words else "is set, and varied"
@@ -57,6 +65,7 @@ def read_expression(text: str) -> Expression:
     """An expression of the command line, as behind `--where`. Raises Problem with all that is wrong with it."""
     text = _one_line(text)
     source, findings = Text(COMMAND_LINE, f"{text}\n"), Findings()
+    source.edition = LATEST
     tokens = [*_tokens(source, 0, text, findings), Token(END, "", source, len(text.rstrip()), 1)]
     found = None if findings.errors else parse_expression(tokens, findings)
     if found is None or findings.errors:
@@ -73,7 +82,7 @@ def _one_line(text: str) -> str:
     return " ".join(text.splitlines())
 
 
-def _read(source: Text, at: int, text: str, findings: Findings) -> Setting:
+def _read(source: Text, at: int, text: str, findings: Findings, units: Mapping[str, Measure]) -> Setting:
     """The one entry of a line that begins at `at`. Raises Problem."""
     place = source.place(at, max(len(text), 1))
     varies = is_varied(text)
@@ -88,7 +97,7 @@ def _read(source: Text, at: int, text: str, findings: Findings) -> Setting:
     before = len(findings.errors)
     tokens = [*_tokens(source, at, text, findings), Token(END, "", source, at + len(text.rstrip()), 1)]
     inner = Findings()
-    entries, _ = parse(tokens, inner)
+    entries, _ = parse(tokens, inner, units)
     end = tokens[-2].end if len(tokens) > 1 else at
     lacking = source.place(end, 1)  # no `;` ends it
     findings.add(*(each for each in inner.all if each.code != "D021" or each.at is None or each.at.place != lacking))

@@ -24,13 +24,15 @@ what may stand where is decided when the tree is resolved. So a joint may be cal
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 
+from ic.text.edition import FIRST
 from ic.text.files import Unsaved
 from ic.text.source import SourceFile, UnreadableStretch
 from met.diagnostic import Diagnostic, Place
 from met.frozen import frozen
+from met.units import Measure
 
 
 @frozen
@@ -43,11 +45,15 @@ class Word:
 
 @frozen
 class Unit:
-    """A unit as written: factors (name, exponent) in order. `%` is a unit of 0.01."""
+    """A unit as written: factors (name, exponent) in order. `%` is a unit of 0.01.
+
+    declared  those of its names that the deck declares, each with its measure
+    """
 
     factors: tuple[tuple[Word, int], ...]
     place: Place
     text: str
+    declared: tuple[tuple[str, Measure], ...] = ()
 
 
 @frozen
@@ -277,6 +283,7 @@ class Deck:
     path, text, defines: what it was read from and with, to read it again; text: None where it was in a file.
     unsaved: texts that count in place of what files hold.
     unreadable: what could not be read; where there are some, `warnings` holds errors too.
+    units: those that the deck declares, which files of its editions may use.
     """
 
     file: str
@@ -289,3 +296,9 @@ class Deck:
     unreadable: tuple[UnreadableStretch, ...] = ()
     text: str | None = None
     unsaved: Unsaved = field(default_factory=dict, compare=False, repr=False)
+    units: Mapping[str, Measure] = field(default_factory=dict)
+
+    @property
+    def edition(self) -> int:
+        """The edition of the deck's own file."""
+        return self.sources[0].edition if self.sources else FIRST

@@ -23,6 +23,7 @@ from ic.language.runs import (
     TUNE,
 )
 from ic.language.servos import SERVO
+from ic.language.top_level import TOP_LEVEL
 
 BLOCKS = {
     block.name: block
@@ -70,6 +71,7 @@ __all__ = [
     "EXPERIMENTS",
     "HEADS",
     "OF_A_RUN",
+    "TOP_LEVEL",
     "BlockDeclaration",
     "Entry",
     "choices",

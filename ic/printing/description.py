@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ic.find import library_files
-from ic.language import ANYWHERE, BLOCKS, DEFINITIONS
+from ic.language import ANYWHERE, BLOCKS, DEFINITIONS, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
 from ic.language.runs import BASE_KINDS
 from ic.meaning.expressions.evaluate import COMPARISONS, CONSTANTS, RESERVED, USAGE
@@ -18,6 +18,7 @@ from ic.printing.columns import columns, count
 from ic.printing.language import block_json
 from ic.printing.models import FIELDS, KINDS, UNIT_WORDS, model_json, where_written
 from ic.printing.sweeps import words_json
+from ic.text.edition import EDITIONS, FIRST
 from ic.text.preprocess import DIRECTIVES
 from met import models, units
 from met.messages.warning_codes import WARNINGS
@@ -50,6 +51,7 @@ def description() -> dict[str, Any]:
             }
             for block in BLOCKS.values()
         ],
+        "top_level": [{key: each[key] for key in ("name", "written", "doc")} for each in block_json(TOP_LEVEL)],
         "anywhere": [{key: each[key] for key in ("name", "written", "doc")} for each in block_json(ANYWHERE)],
         "models": [
             {**model_json(kind, model), "written": where_written(kind, model)}
@@ -73,13 +75,20 @@ def description() -> dict[str, Any]:
         "designs": words_json("designs"),
         "distributions": words_json("distributions"),
         "directives": list(DIRECTIVES),
-        "taken_names": [*CONSTANTS, *RESERVED, *(name for name in units.UNITS if name.isidentifier())],
+        "taken_names": _taken_names(FIRST),
+        "editions": [{"edition": each, "taken_names": _taken_names(each)} for each in EDITIONS],
         "diagnostics": [
             {"code": code, "title": title, "may_be_allowed": code in WARNINGS}
             for code, title in sorted(codes.titles().items())
         ],
         "library": library_files(),
     }
+
+
+def _taken_names(edition: int) -> list[str]:
+    """The names that no value may have in an edition."""
+    of_units = [name for name in units.UNITS if name.isidentifier()] if edition == FIRST else []
+    return [*CONSTANTS, *RESERVED, *of_units]
 
 
 def parameter_json(parameter: Any) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ic.grammar.declared_units import UNIT
 from ic.language import BLOCKS, DEFINITIONS
 from ic.language.bodies import JOINT_KINDS
 from ic.language.runs import BASE_KINDS
@@ -23,6 +24,7 @@ from ic.meaning.definitions.row_tables import CSV
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
 from ic.meaning.mechanics import dh
 from ic.meaning.mechanics.shapes import SHAPES
+from ic.text.edition import EDITION_WORD
 from ic.text.preprocess import DIRECTIVES
 from met import models, units
 from met.plan import BASE
@@ -169,6 +171,8 @@ def _entries() -> dict[str, Any]:
         _groups(rf"\b({kinds})\s+({IN_LOOPS})(?=\s+(?:like|of|from)\b|\s*[{{=;])", "storage.type", "entity.name.type"),
         _groups(rf"\b(like|of)\s+({PATH})(?=\s*(?:[{{;]|\bof\b))", "keyword.other", "entity.other.inherited-class"),
         _groups(rf"\b(let|param)\s+({IN_LOOPS})(?=\s*=)", "storage.type", "variable.other.constant"),
+        _groups(rf"\b({UNIT})\s+({NAME})(?=\s*=)", "storage.type", "entity.name.type.unit"),
+        _groups(rf"^\s*({EDITION_WORD})\s+([0-9]+)(?=\s*;)", "keyword.control.edition", "constant.numeric"),
         _groups(rf"\b(for)\s+({NAME})\s+(in)\b", "keyword.control", "variable.parameter", "keyword.control"),
         _groups(
             rf"\b(joint)\s+({IN_LOOPS})\s+({_any(JOINT_KINDS)})\b",

@@ -21,7 +21,7 @@ from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Value, in_words, measure_of
+from ic.meaning.expressions.quantity import Value, in_words, measure_of, unit_of_plan
 from ic.meaning.runs.allowances import ALLOW
 from ic.sweeps.choices import (
     MACRO,
@@ -408,7 +408,7 @@ def varied_path(
     graph: Graph, path: str, place: Place, numbers: CaseValues, like: Value, unit: Unit | None
 ) -> VariedPath:
     """A column of numbers in SI. like: a value of its dimension; unit: the one that the deck wrote."""
-    scale = 1.0
+    unit, scale = unit_of_plan(unit), 1.0
     if unit is not None and measure_of(unit).dimension == like.dimension:
         scale = measure_of(unit).scale
     value = Value(graph.input(path), like.dimension, like.place, like.bare, unit, hertz=like.hertz)

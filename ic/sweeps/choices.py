@@ -98,7 +98,7 @@ def word_in(listed: Expression, names: Names) -> Name | String | None:
     def is_word(item: Expression) -> bool:
         if not isinstance(item, Name):
             return isinstance(item, String)
-        known = names.knows(item.text) or units.is_unit(item.text) or did_you_mean(item.text, names.definitions.lets)
+        known = names.knows(item.text) or did_you_mean(item.text, names.definitions.lets)
         return len(item.path) == 1 and not known
 
     items = listed.items if isinstance(listed, List) else ()

@@ -25,7 +25,7 @@ from ic.grammar.syntax import Call, Expression, Name, Setting, Statement, Unit, 
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Value, measure_of
+from ic.meaning.expressions.quantity import Value, measure_of, unit_of_plan
 from ic.sweeps.choices import check_constant
 from ic.text.complaints import Complaints, known_words
 from met import units
@@ -312,7 +312,7 @@ def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> DrawnPara
     unit = unit or next((value.unit for value in found if value.unit is not None), None)
     if unit is not None and measure_of(unit).dimension != found[0].dimension:
         unit = None
-    return DrawnParameter(path, entry.place, name, arguments, found[0], unit)
+    return DrawnParameter(path, entry.place, name, arguments, found[0], unit_of_plan(unit))
 
 
 def in_unit(expression: Expression, unit: Unit | None) -> Expression:

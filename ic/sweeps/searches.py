@@ -20,7 +20,7 @@ from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Value, measure_of
+from ic.meaning.expressions.quantity import Value, measure_of, unit_of_plan
 from ic.meaning.parameters.models import word_of
 from ic.meaning.runs.allowances import ALLOW
 from ic.sweeps.axes import Sweep, SweepAxis, read_sweep, varied_path, whole_number
@@ -120,7 +120,7 @@ def read_search(
     rows = search_method(search).ask()
     columns = []
     for number, each in enumerate(chosen):
-        unit = each.with_unit.unit if each.with_unit is not None else each.low.unit
+        unit = unit_of_plan(each.with_unit.unit if each.with_unit is not None else each.low.unit)
         if unit is not None and measure_of(unit).dimension != each.low.dimension:
             unit = None
         columns.append(varied_path(graph, each.parameter.path, each.place, rows[:, number], each.low, unit))
@@ -290,7 +290,7 @@ class _SearchReader:
         if not np.isfinite(ends[1] - ends[0]):
             message = f"the ends of this `{name}` are too far apart: their difference is no number"
             raise Problem(error("D361", message, high.place, help="take ends that a machine could have"))
-        shown = unit or low.unit or high.unit
+        shown = unit_of_plan(unit or low.unit or high.unit)
         text = shown.text if shown is not None and measure_of(shown).dimension == low.dimension else ""
         parameter = SearchedParameter(path, *ends, RANGES[name], text)
         return _Chosen(parameter, path_place(entry), low, entry.value if isinstance(entry.value, WithUnit) else None)

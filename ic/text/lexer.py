@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
+from ic.text.edition import Heading, edition_of, heading
 from met.diagnostic import Expansion, Place
 
 NAME = "CPP_ID"
@@ -98,6 +99,21 @@ class Text:
             total += match.end() - match.start()
             taken.append(total)
         return at, taken
+
+    @cached_property
+    def edition(self) -> int:
+        """The edition of the deck language that the file is written in."""
+        return edition_of(self.joined)
+
+    @cached_property
+    def heading(self) -> Heading | None:
+        """The line that says the edition, by offsets in the text as written."""
+        found = heading(self.joined)
+        if found is None or len(self.joined) == len(self.text):
+            return found
+        first, last, (start, end) = found.first, found.last, found.number
+        at = self.written_at
+        return Heading(found.edition, at(first), at(last - 1) + 1, (at(start), at(end - 1) + 1), found.closed)
 
     def written_at(self, offset: int) -> int:
         """The offset in the text as written of the character at `offset` of the joined text."""

@@ -17,6 +17,7 @@ from pcpp import Action, OutputDirective
 
 from ic.text.complaints import Complaints
 from ic.text.conditions import Refused, evaluate, well_formed, with_defined
+from ic.text.edition import EDITIONS, LATEST
 from ic.text.files import LIBRARY, NOTHING_UNSAVED, Files, FoundFile, Unsaved
 from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, NAME, NOTHING, SPACE, STRING, Text, Token, logical_lines
 from ic.text.limits import (
@@ -108,6 +109,7 @@ class _Preprocessor(Macros):
         self.output: list[Token] = []
         self.command_line: tuple[SourceFile, ...] = ()
         self.given: dict[str, Token] = {}
+        self._given_text: Text | None = None
         self._including: list[tuple[FoundFile, Text]] = []
         self._entered: list[Place] = []
         self._ifs: list[list[_Conditional]] = []
@@ -129,12 +131,15 @@ class _Preprocessor(Macros):
             f"{name} {value if equals else 1}\n" for name, equals, value in (d.partition("=") for d in defines)
         )
         self.command_line = (SourceFile(COMMAND_LINE, written, ""),)
-        for line in logical_lines(Text(COMMAND_LINE, written)):
+        self._given_text = Text(COMMAND_LINE, written)
+        for line in logical_lines(self._given_text):
             self.define(self.tokenstrip(line))
         self.given = {name: macro.name_token for name, macro in self.macros.items()}
 
     def read_deck(self, file: FoundFile) -> None:
         source = Text(file.name, self.files.text(file))
+        if self._given_text is not None:  # which is read as the deck is
+            self._given_text.edition = source.edition
         self._read(file, source, source.place(0, 1))
         self.output.append(Token(END, "", source, len(source.text.rstrip()), 1))
 
@@ -168,6 +173,7 @@ class _Preprocessor(Macros):
         self._entered.append(at)
         self._ifs.append([])
         complain_of_unseen(source, self.findings)
+        self._check_heading(source)
         for token in self.parsegen("", source):
             kind = token.kind
             if kind == SPACE:
@@ -187,6 +193,22 @@ class _Preprocessor(Macros):
         self._including.pop()
         self._entered.pop()
 
+    def _check_heading(self, source: Text) -> None:
+        """Looks at the line that says a file's edition, which no token of the deck comes from."""
+        found = source.heading
+        if found is None:
+            return
+        if found.edition not in EDITIONS:
+            start, end = found.number
+            help = f"this MET knows the editions {' and '.join(map(str, EDITIONS))}"
+            if found.edition > LATEST:
+                help += "; a newer one may know it"
+            message = f"there is no edition {found.edition} of the deck language"
+            self._give_up("D390", message, source.place(start, end - start), help=help)
+        if not found.closed:
+            at = source.place(found.last, 1)
+            self.findings.error("D021", "expected `;`", at, help=write(";", "an entry ends with `;`", where="before"))
+
     def group_lines(self, _text: str, source: Text) -> Iterable[list[Token]]:
         """The lines that pcpp works on. Those that `#if` leaves out are lexed, since a comment may begin there."""
         ifs = self._ifs[-1]
@@ -195,7 +217,10 @@ class _Preprocessor(Macros):
             at = source.place(source.written_at(long.start()), 1)
             self._give_up("D018", f"a line has at most {LONGEST_LINE} characters", at)
         joined = len(source.joined) < len(source.text)
+        headed = source.heading.last if source.heading is not None else 0
         for line in logical_lines(source):
+            if headed and line[0].offset < headed:
+                line = [token for token in line if token.kind == SPACE or token.offset >= headed]
             self._tokens += len(line)
             if self._tokens > MOST_TOKENS:
                 self._give_up("D018", f"more than {MOST_TOKENS} tokens", line[0].place)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ic.text.edition import edition_of
 from met.diagnostic import Place
 from met.frozen import frozen
 
@@ -28,3 +29,8 @@ class SourceFile:
     name: str
     text: str
     sha256: str
+
+    @property
+    def edition(self) -> int:
+        """The edition of the deck language that its text is written in; 1 of what is no deck."""
+        return edition_of(self.text)

@@ -622,11 +622,13 @@ class Experiment:
 
 @frozen
 class Source:
-    """A deck file as it was read: name as messages print it, whole text, SHA-256 of its bytes."""
+    """A deck file as it was read: name as messages print it, whole text, SHA-256 of its bytes, and the edition of the
+    deck language that it is written in, which no result depends on."""
 
     name: str
     text: str
     sha256: str
+    edition: int = 1
 
 
 @frozen

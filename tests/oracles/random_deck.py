@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import random
+import re
+
+from met import units
 
 GEARBOX = """servo {name} {{
     model = rigid_gearbox;
@@ -168,3 +171,27 @@ def random_deck(seed: int, *, friction: bool = True) -> str:
             "",
         ]
     )
+
+
+def in_edition_2(text: str, seed: int) -> str:
+    """A deck of edition 1 in edition 2, with the same parameters: some of its values have names of units, and some are
+    in units that it declares."""
+    pick = random.Random(seed)
+    behind = {"min", *re.findall(r"[*/(]\s*([A-Za-z]+)", text)}  # units that could be values where they stand
+    names = [name for name in units.ALL_UNITS if name.isalpha() and name not in behind]
+    pick.shuffle(names)
+    head: list[str] = []
+
+    def changed(found: re.Match[str]) -> str:
+        number, unit = found["number"], found["unit"]
+        if pick.random() < 0.3 and names:
+            head.append(f"let {names.pop()} = {number} ({unit});")
+            return f"= {head[-1].split()[1]};"
+        if pick.random() < 0.4:
+            head.append(f"unit own_{len(head)} = 1 {unit};")
+            return f"= {number} own_{len(head) - 1};"
+        return found[0]
+
+    body = re.sub(r"= (?P<number>\d[\d.]*(?:e-?\d+)?) (?P<unit>[A-Za-z][A-Za-z*/^0-9]*);", changed, text)
+    pick.shuffle(head)
+    return "deck 2;\n" + "\n".join(head) + "\n" + body

@@ -84,7 +84,7 @@ def name_guides(scope: Scope, block: MergedBlock) -> None:
     scope.guides = {item.name: item for item in block.of_kind(KIND)}
     for name, item in scope.guides.items():
         let = scope.definitions.lets.get(name)
-        if meaning := _meaning(scope, name):
+        if meaning := _meaning(scope, name, item.place):
             scope.complaints.error(
                 "D271",
                 f"`{name}` is {meaning}, so no guide can be called so",
@@ -94,12 +94,14 @@ def name_guides(scope: Scope, block: MergedBlock) -> None:
             )
 
 
-def _meaning(scope: Scope, name: str) -> str:
+def _meaning(scope: Scope, name: str, place: Place) -> str:
     """The other meaning of a name where a command's value stands; "" where it may be a guide's name."""
     if name in scope.definitions.lets:
         return "a value"
+    if units.is_unit(name) and scope.definitions.edition_at(place) == 1:
+        return "a unit"
     courses = set(models.available("command")) - COURSES_BEHIND_GUIDES
-    return "a unit" if units.is_unit(name) else "a course in time" if name in courses else ""
+    return "a course in time" if name in courses else ""
 
 
 def resolve_guides(
@@ -177,7 +179,7 @@ def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration
     body = item.body or MergedBlock()
     follow = [use for use in uses if use.command is not None and use.command.guide == item.name]
     whole = not scope.failed_servos and all(use.command is not None or not use.servo.commands for use in uses)
-    if not follow and whole and not _meaning(scope, item.name):
+    if not follow and whole and not _meaning(scope, item.name, item.place):
         kind = guide.commands[0]
         scope.complaints.error(
             "D272",

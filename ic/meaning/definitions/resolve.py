@@ -17,6 +17,7 @@ from ic.meaning.definitions.merge import MergedBlock, defined_twice, merge
 from ic.meaning.definitions.row_tables import RowTable, row_table
 from ic.robots.files import RobotFiles
 from ic.text.complaints import Complaints, known_words, where_it_belongs, with_article
+from ic.text.edition import FIRST
 from ic.text.files import add_include, library_defines
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error, meant, write
 from met.frozen import frozen
@@ -66,6 +67,7 @@ class Definitions:
         self.memo: dict[object, Any] = {}  # what later rooms make of arms, servos and lets alone
         self._file = deck.file
         self._texts = {source.name: source.text for source in deck.sources}
+        self._editions = {source.name: source.edition for source in deck.sources if source.edition > FIRST}
         for entry in deck.entries:
             try:
                 self._enter(entry)
@@ -115,6 +117,10 @@ class Definitions:
         if isinstance(found, Problem):
             raise found
         return found
+
+    def edition_at(self, place: Place) -> int:
+        """The edition of the deck language that the file of a place is written in."""
+        return self._editions.get(place.file, FIRST)
 
     def of_kind(self, kind: str) -> Mapping[str, Definition]:
         return self._by_kind[kind]

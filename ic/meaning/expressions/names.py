@@ -237,15 +237,6 @@ class Names:
             if len(problems) >= MOST_DIAGNOSTICS:  # no more would be reported, and each searches all names
                 break
             try:
-                if units.is_unit(text):
-                    raise Problem(
-                        error(
-                            "D079",
-                            f"`{text}` is a unit ({units.UNITS[text].word}), so no value may bear it",
-                            let.name.place,
-                            help="give the value another name",
-                        )
-                    )
                 if text in CONSTANTS or text in RESERVED:
                     raise Problem(
                         error(

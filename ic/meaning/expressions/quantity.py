@@ -45,16 +45,22 @@ class ValueList:
 
 def measure_of(unit: Unit) -> units.Measure:
     """The measure of a unit. Raises D074 where a factor is no unit."""
+    declared = dict(unit.declared)
     for word, _ in unit.factors:
-        if word.text not in units.ALL_UNITS:
+        if word.text not in units.ALL_UNITS and word.text not in declared:
             raise Problem(error("D074", f"`{word.text}` is not a unit", word.place, help=other_units.remedy(word.text)))
     try:
-        measure = units.measure((word.text, exponent) for word, exponent in unit.factors)
+        measure = units.measure(((word.text, exponent) for word, exponent in unit.factors), declared)
         if measure.scale == 0.0:
             raise OverflowError
     except OverflowError:
         raise Problem(error("D067", "this unit is beyond what a number can hold", unit.place)) from None
     return measure
+
+
+def unit_of_plan(unit: Unit | None) -> Unit | None:
+    """The unit in which a plan may show a value: the deck's; None, for SI, where the deck declares a part of it."""
+    return None if unit is None or unit.declared else unit
 
 
 def in_unit(value: Value, unit: Unit) -> Value:

@@ -30,6 +30,7 @@ NUMBERS = (
 STRANGE = (
     "// comment\n", "/* comment */", "/*", '"', "'", "\\\n", "\n", "\t", "#if 1\n", "#if 0\n", "#endif\n", "#else\n",
     '#include "deck.ic"\n', "#include <two_link.ic>\n", "#include <servos/rigid_gearbox.ic>\n", "\n#undef X\n",
+    "deck 2;\n", "deck 1;\n", "unit ozin = 7.061552e-3 N*m;\n", " ozin", "let m = 2 kg;\n", "2 m/s", "1/2 m",
     "param size = 1 m;\n", "with links.bar.mass = 2 kg;", "with size = [1, 2];",
     "for i in 0 .. 2 {", "for side in [left, right] {", "by -1", "_{i}", "{i}", "{side}_x", "[i]", "[a, b] = ", "* = ",
     'let rows = csv("rows.csv");\n', "rows.bar.mass", "rows.{side}.com", "rows.bar.inertia", 'csv("rows.csv")', "csv(",

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 
 from ic.text.preprocess import DIRECTIVES
+from met import units
 from tests.ic.fuzz import corpus
 
 _PIECES = re.compile(r"//[^\n]*\n?|/\*.*?\*/|\"[^\"\n]*\"|[A-Za-z_]\w*|\d[\d.e]*|\s+|.", re.DOTALL)
@@ -179,6 +180,30 @@ def in_a_loop(rng: random.Random, text: str) -> str:
     return f"{text[:start]} for i in {turns} {{ {''.join(entry)} }}{text[end:]}"
 
 
+def in_an_edition(rng: random.Random, text: str) -> str:
+    """A deck that says its edition, right or wrong; values called as units are, and units that it declares."""
+    pieces = pieces_of(text)
+    names = re.findall(r"\b(?:let|param)\s+(\w+)", text)
+    known = [*units.ALL_UNITS, "ozin", "in", "pi"]
+    if names and rng.random() < 0.6:
+        old, new = rng.choice(names), rng.choice(known)
+        pieces = [new if piece == old else piece for piece in pieces]
+    at = [i for i, piece in enumerate(pieces) if piece in units.ALL_UNITS]
+    if at and rng.random() < 0.5:
+        where = rng.choice(at)
+        size = rng.choice(
+            [f"2.5 {pieces[where]}", f"(1/3) {pieces[where]}", "1 ozin^2", "0 m", "1e300 km^9", "x", "-1 m"]
+        )
+        pieces[where] = "ozin"
+        pieces.insert(rng.choice([0, len(pieces)]), f"\nunit ozin = {size};\n")
+    heading = rng.choice(
+        ["deck 2;\n", "deck 2;\n", "deck 2;\n", "// a\ndeck 1;\n", "deck 3;\n", "deck 2\n", "\ndeck 2;"]
+    )
+    if rng.random() < 0.1:
+        return "".join(pieces) + heading
+    return heading + "".join(pieces)
+
+
 def nested(rng: random.Random, text: str) -> str:
     """Something repeated very often, or very deep."""
     spots = [match.start() for match in re.finditer(r"[=;{]", text)] or [0]
@@ -215,6 +240,7 @@ def _solid(pieces: Sequence[str]) -> list[int]:
 
 GENTLE: Sequence[Callable[[random.Random, str], str]] = (
     word_of_its_kind, word_of_its_kind, changed_number, changed_entry, other_block, other_block, in_a_loop,
+    in_an_edition,
 )  # fmt: skip
 _WILD: Sequence[Callable[[random.Random, str], str]] = (
     *GENTLE, changed_word, changed_word, changed_word, through_macro, through_macro, nested, long_line, spliced,

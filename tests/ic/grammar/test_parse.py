@@ -350,7 +350,7 @@ error[D026]: `m` is the unit metre, so it cannot name a value
   |
 1 | let m = 3;
   |     ^
-  = help: choose another name: after a number it would be read as the unit
+  = help: choose another name: after a number it would be the unit; in edition 2 (`deck 2;`) it may
 
 1 error
 """

@@ -1,7 +1,7 @@
 """Every message about text and grammar, whole: the sentence, its place, other places, remedies, and how it got there.
 
-`text.txt`, `grammar.txt` and `loops.txt` hold a deck with a mistake after each line `=== ...`, files that it includes
-after lines `-- name`, and what the user is shown after a line `>>>`.
+`text.txt`, `grammar.txt`, `loops.txt` and `editions.txt` hold a deck with a mistake after each line `=== ...`, files
+that it includes after lines `-- name`, and what the user is shown after a line `>>>`.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def cases(name: str) -> dict[str, tuple[str, dict[str, str], str]]:
     return found
 
 
-TEXT, GRAMMAR, LOOPS = cases("text.txt"), cases("grammar.txt"), cases("loops.txt")
-ALL = {**TEXT, **GRAMMAR, **LOOPS}
+TEXT, GRAMMAR, LOOPS, EDITIONS = (cases(f"{name}.txt") for name in ("text", "grammar", "loops", "editions"))
+ALL = {**TEXT, **GRAMMAR, **LOOPS, **EDITIONS}
 
 
 @pytest.mark.parametrize("title", ALL)

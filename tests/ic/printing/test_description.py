@@ -25,12 +25,14 @@ PARAMETER = {field.name for field in fields(Parameter)}
 
 KEYS = {
     "": {
-        "schema", "version", "met", "definitions", "blocks", "anywhere", "models", "shapes", "dh", "joint_kinds", "base_kinds",
+        "schema", "version", "met", "definitions", "blocks", "top_level", "anywhere", "models", "shapes", "dh", "joint_kinds", "base_kinds",
         "channels", "units", "unit_words", "functions", "constants", "comparisons", "designs", "distributions",
-        "directives", "taken_names", "diagnostics", "library",
+        "directives", "taken_names", "editions", "diagnostics", "library",
     },
     "blocks": {"name", "doc", "written", "within", "head", "free", "entries"},
+    "top_level": {"name", "written", "doc"},
     "anywhere": {"name", "written", "doc"},
+    "editions": {"edition", "taken_names"},
     "models": {"kind", "name", "doc", "written", "parameters"},
     "shapes": {"name", "parameters"},
     "dh": {"name", "unit", "doc", "default"},
@@ -115,11 +117,13 @@ def test_every_deck_of_the_library_can_be_included(found: dict[str, Any], tmp_pa
 
 
 def test_a_name_that_is_taken_is_no_name_of_a_value(found: dict[str, Any], tmp_path: Path) -> None:
-    for name in (*found["taken_names"], "free_name"):
-        deck = tmp_path / "deck.ic"
-        deck.write_text(f"let {name} = 2;\n")
-        errors = [each for each in ic.check(deck).diagnostics if each.severity == "error"]
-        assert bool(errors) == (name != "free_name"), name
+    assert found["taken_names"] == found["editions"][0]["taken_names"]
+    for edition in found["editions"]:
+        for name in (*found["taken_names"], "free_name"):
+            deck = tmp_path / "deck.ic"
+            deck.write_text(f"deck {edition['edition']};\nlet {name} = 2;\n")
+            errors = [each for each in ic.check(deck).diagnostics if each.severity == "error"]
+            assert bool(errors) == (name in edition["taken_names"]), name
 
 
 def test_the_overview_counts_what_is_there(capsys: pytest.CaptureFixture[str], found: dict[str, Any]) -> None:

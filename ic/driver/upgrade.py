@@ -1,0 +1,185 @@
+"""`met fmt --upgrade`: decks rewritten to the latest edition of the language, and the proof that they mean the same.
+
+What edition 1 warns of (D392) gets the brackets that mean the same in both, and the file its line `deck 2;`. That is a
+guess until it is proved: every deck has the same tree before and after, and all its runs and sweeps have the same plans
+and keys. A file that is no deck by itself is proved by those that include it. What cannot be proved stays as it is.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ic.driver.compile import Compiled, check
+from ic.read import read
+from ic.text.edition import EDITION_WORD, LATEST, edition_of
+from ic.text.files import NOTHING_UNSAVED, Files, FoundFile, Unsaved
+from ic.text.lexer import SPACE, Text, logical_lines
+from met.diagnostic import Diagnostic, Label, Place, Problem, error
+from met.frozen import frozen
+from met.messages.edits import edits
+from met.plan import Experiment, Origin
+from met.plan.columns import ComputedColumn
+from met.plan.keys import case_ids, inputs, structure_key
+
+CODE = "D392"
+"""The warning of what the next edition reads otherwise; the first change of its help means the same in both."""
+
+MOST_ROWS = 10_000
+"""Rows of a case table that are compared at either end; all of it follows from the tree, which is compared whole."""
+
+
+@frozen
+class Upgrades:
+    """The new texts of files, by path, and of those that stay as they are why."""
+
+    texts: Mapping[str, str]
+    refused: Mapping[str, Problem]
+
+
+def upgrades(paths: Sequence[str]) -> Upgrades:
+    """What `met fmt --upgrade` makes of these files, of which those of the latest edition are not among the texts."""
+    found: dict[str, str] = {}
+    before: dict[str, Compiled] = {}
+    refused: dict[str, Problem] = {}
+    for path in paths:
+        try:
+            found[path] = Files().text(FoundFile(path, os.path.normpath(path)))
+        except Problem as problem:
+            refused[path] = problem
+            continue
+        before[path] = _compiled(path)
+    old = {os.path.realpath(path): text for path, text in found.items() if edition_of(text) < LATEST}
+    new = {path: _rewritten(path, text, before.values()) for path, text in old.items()}
+    proved: set[str] = set()
+    wrong: dict[str, Problem] = {}
+    for path, compiled in before.items():
+        files = {os.path.realpath(name) for name in compiled.sources} & new.keys()
+        if compiled.plan is None or not files:
+            continue
+        difference = _difference(path, compiled, new)
+        if difference is None:
+            proved |= files
+        else:
+            wrong.update(dict.fromkeys(files, difference))
+    texts: dict[str, str] = {}
+    for path in found:
+        real = os.path.realpath(path)
+        if real in wrong:
+            refused[path] = wrong[real]
+        elif real in proved:
+            texts[path] = new[real]
+        elif real in new:
+            refused[path] = _not_proved(path, before[path])
+    return Upgrades(texts, refused)
+
+
+def _compiled(path: str, unsaved: Unsaved = NOTHING_UNSAVED) -> Compiled:
+    return check(path, include_dirs=(), defines=(), select="all", unsaved=unsaved)
+
+
+# The text
+
+
+def _rewritten(real: str, text: str, compiled: Iterable[Compiled]) -> str:
+    """The text of a file with brackets where the editions differ, and with its line."""
+    stretches: set[tuple[int, int]] = set()
+    starts = [0, *(each.end() for each in re.finditer("\n", text))]
+    for each in compiled:
+        for warning in (*each.diagnostics, *(allowed for allowed, _ in each.allowed)):
+            first = next(edits(warning, each.sources), None) if warning.code == CODE else None
+            if first is not None and os.path.realpath(first[1].file) == real:
+                edit = first[1]
+                start, end = starts[edit.line - 1] + edit.column - 1, starts[edit.end_line - 1] + edit.end_column - 1
+                if edit.text == f"({text[start:end]})":
+                    stretches.add((start, end))
+    marks = sorted([(end, 0, ")") for _, end in stretches] + [(start, 1, "(") for start, _ in stretches], reverse=True)
+    for at, _, mark in marks:
+        text = text[:at] + mark + text[at:]
+    return _with_line(text)
+
+
+def _with_line(text: str) -> str:
+    """The text with the line of the latest edition: before its first entry, and the comment that belongs to it."""
+    source, line = Text("", text), f"{EDITION_WORD} {LATEST};"
+    if source.heading is not None:
+        start, end = source.heading.number
+        return f"{text[:start]}{LATEST}{text[end:]}"
+    tokens = (token for line in logical_lines(source) for token in line)
+    first = next((token.offset for token in tokens if token.kind != SPACE), len(text))
+    at = text.rfind("\n", 0, first) + 1
+    above = text[:at].rstrip(" \t").rpartition("\n\n")
+    if above[1] and above[0].strip() and above[2].strip():  # a comment of its own, below that of the file
+        at = len(above[0]) + len(above[1])
+    elif text[:at].strip() and not text[:at].endswith("\n\n"):
+        line = f"\n{line}"
+    behind = "" if text[at:].startswith("\n") or not text[at:] else "\n"
+    return f"{text[:at]}{line}\n{behind}{text[at:]}"
+
+
+# The proof
+
+
+def _difference(path: str, before: Compiled, new: Mapping[str, str]) -> Problem | None:
+    """Why a deck with these texts is not what it was; None where it is."""
+    after = _compiled(path, new)
+    if after.plan is None:
+        found = next(each for each in after.diagnostics if each.severity == "error")
+        return Problem(_left(path, f"{found.code}, {found.message}", found), after.sources)
+    assert before.plan is not None
+    olds, news = before.plan.experiments, after.plan.experiments
+    for old, made in zip(olds, news, strict=False):
+        if _meaning(old) != _meaning(made):
+            return Problem(_left(path, f"`{old.name}` would not have the same plan"))
+    same = len(olds) == len(news) and placeless(read(path).entries) == placeless(read(path, unsaved=new).entries)
+    return None if same else Problem(_left(path, "it would not have the same entries"))
+
+
+def _left(path: str, why: str, found: Diagnostic | None = None) -> Diagnostic:
+    message = f"`{path}` stays in its edition: {why}"
+    if found is None:
+        help = "does it count lines, by `__LINE__`? The file has one more; else please report it together with the deck"
+        return error("E346", message, help=help)
+    at = Label(found.at.place, "in the new edition") if found.at is not None else None
+    return error("E346", message, at, help=[*found.help, "write it so that both editions read it alike"])
+
+
+def _not_proved(path: str, compiled: Compiled) -> Problem:
+    first = next((each for each in compiled.diagnostics if each.severity == "error"), None)
+    at = Label(first.at.place, f"{first.code}, {first.message}") if first is not None and first.at is not None else None
+    helps = (
+        "what it means cannot be compared before and after",
+        "name a deck that includes it, too: `met fmt --upgrade DECK PART`; or write the line by hand",
+    )
+    message = f"`{path}` stays in its edition: it does not compile by itself"
+    return Problem(error("E346", message, at, help=helps), compiled.sources)
+
+
+def _meaning(experiment: Experiment) -> object:
+    """All that a run or sweep is, and its keys; not where it is written."""
+    rows = range(min(experiment.cases.count, MOST_ROWS))
+    keys = structure_key(experiment.structure, inputs(experiment)), case_ids(experiment, rows)
+    return placeless(replace(experiment, notes=())), keys  # notes are words for a reader, with lines in them
+
+
+def placeless(value: Any) -> Any:
+    """A part of a plan or of a tree, to be compared: without places and origins."""
+    if isinstance(value, Place | Origin):
+        return None
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, ComputedColumn):
+        ends = (slice(0, MOST_ROWS), slice(max(0, len(value) - MOST_ROWS), len(value)))
+        return type(value).__name__, len(value), *(np.asarray(value[end]).tobytes() for end in ends)
+    if is_dataclass(value):
+        return type(value).__name__, *(placeless(getattr(value, field.name)) for field in fields(value))
+    if isinstance(value, Mapping):
+        return {name: placeless(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [placeless(each) for each in value]
+    return value

@@ -1,0 +1,146 @@
+"""Units that a deck declares, `unit ozin = 7.061552e-3 N*m;`: names that are units behind a number, in edition 2.
+
+They are known before the deck is parsed, since what a name behind a number is decides how the deck reads; so their
+sizes are made of numbers and units alone, and found exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
+
+from ic.grammar.syntax import Binary, Expression, Name, Number, Unary, Unit, WithUnit
+from ic.text.lexer import NAME, Token
+from ic.text.limits import Findings
+from met import units
+from met.diagnostic import Label, Place, Problem, error
+from met.units import ONE, PURE, Measure
+
+UNIT = "unit"
+USAGE = "write `unit NAME = NUMBER UNIT;`, as in `unit ozin = 7.061552e-3 N*m;`"
+
+TAKEN = (
+    "in", "with", "of", "and", "or", "not", "by", "when", "like", "from", "cases", "confidence", "because", "pi", "for",
+    "let", "param", "deck", UNIT,
+)  # fmt: skip
+"""Words that stand behind numbers, or begin what stands there, and so can be no unit."""
+
+MOST_BITS = 4096  # of a size, over or under the line: decks write a few digits
+DEEPEST = 64  # units that need units
+
+
+def declarations(tokens: Sequence[Token]) -> dict[str, int]:
+    """Positions of the names that `unit NAME =` declares outside of blocks, in files whose edition has it; of a name
+    that is declared twice, the first."""
+    found: dict[str, int] = {}
+    depth = 0
+    for at, token in enumerate(tokens):
+        if token.text == "{":
+            depth += 1
+        elif token.text == "}":
+            depth -= 1
+        elif token.text == UNIT and depth == 0 and is_declaration(tokens, at) and token.source.edition > 1:
+            found.setdefault(tokens[at + 1].text, at + 1)
+    return found
+
+
+def is_declaration(tokens: Sequence[Token], at: int) -> bool:
+    """Return True if `unit NAME =` stands at this position, where an entry begins."""
+    return (
+        at + 2 < len(tokens)
+        and (tokens[at].text, tokens[at + 1].kind, tokens[at + 2].text) == (UNIT, NAME, "=")
+        and (at == 0 or tokens[at - 1].text in (";", "}", "{"))
+    )
+
+
+def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) -> dict[str, Measure]:
+    """The measure of each unit; of one that has none, which is reported, that of a pure number.
+
+    sizes  the token of each unit's name, and what it is declared to be
+    """
+    known: dict[str, Measure] = {}
+
+    def find(name: str, within: tuple[str, ...]) -> Measure:
+        if name in known:
+            return known[name]
+        token, size = sizes[name]
+        if name in within:
+            loop = [*within[within.index(name) :], name]
+            message = f"unit `{name}` needs itself: " + " needs ".join(f"`{each}`" for each in loop)
+            labels = [Label(sizes[each][0].place, f"`{each}`") for each in loop[1:-1]]
+            raise Problem(
+                error("D394", message, token.place, also=labels, help="write one of them in units of the language")
+            )
+        if len(within) >= DEEPEST:
+            message = f"unit `{name}` is at the end of a chain of {DEEPEST} units"
+            raise Problem(error("D394", message, token.place, help="write it in units of the language"))
+        _check_name(token)
+        made = _measure(size, lambda each: find(each, (*within, name)))
+        known[name] = made
+        return made
+
+    for name in sizes:
+        try:
+            find(name, ())
+        except Problem as problem:
+            findings.add(*problem.diagnostics)
+            known[name] = ONE
+    return known
+
+
+def _check_name(token: Token) -> None:
+    """Raises Problem D394 where no unit may be called so."""
+    name = token.text
+    if name in units.ALL_UNITS:
+        unit = units.ALL_UNITS[name]
+        si = f"{unit.measure.scale:.10g} {units.text(unit.measure.dimension)}"
+        helps = f"leave this entry out; a unit of another size needs another name, such as `my_{name}`"
+        raise Problem(error("D394", f"`{name}` is a unit already: {unit.word}, {si}", token.place, help=helps))
+    if name in TAKEN:
+        message = f"`{name}` is a word of the language, so it cannot be a unit"
+        raise Problem(error("D394", message, token.place, help="choose another name"))
+
+
+def _measure(size: Expression, find: Callable[[str], Measure]) -> Measure:
+    """The measure that an expression of numbers, units and `pi` is. Raises Problem D394 where it is something else."""
+    place = size.place
+    match size:
+        case Number():
+            number = Fraction(size.text) if size.value else Fraction(0)
+            own = _of_unit(size.unit, find) if size.unit is not None else ONE
+            return _product(Measure(PURE, number.numerator, number.denominator), own, place)
+        case WithUnit():
+            inner = _measure(size.inner, find)
+            if (inner.dimension, inner.hertz) == (PURE, 0):
+                return _product(inner, _of_unit(size.unit, find), place)
+        case Unary(operator="+"):
+            return _measure(size.operand, find)
+        case Binary(operator="*" | "/"):
+            left, right = _measure(size.left, find), _measure(size.right, find)
+            return _product(left, right if size.operator == "*" else right**-1, place)
+        case Name(text="pi"):
+            return Measure(PURE, turns=1)
+    what = f"`{size.text}` is no number and no unit: a" if isinstance(size, Name) else "a"
+    raise Problem(error("D394", f"{what} unit is made of numbers and units, with `*` and `/`", place, help=USAGE))
+
+
+def _product(one: Measure, other: Measure, place: Place) -> Measure:
+    """The product where numbers can hold it. Raises Problem D394."""
+    made = one * other
+    if made.over == 0:
+        raise Problem(error("D394", "a unit has a size above 0", place, help=USAGE))
+    if max(made.over.bit_length(), made.under.bit_length()) <= MOST_BITS and abs(made.turns) <= DEEPEST:
+        try:
+            if made.scale > 0.0:
+                return made
+        except OverflowError:
+            pass
+    raise Problem(error("D394", "this unit is beyond what a number can hold", place, help=USAGE))
+
+
+def _of_unit(unit: Unit, find: Callable[[str], Measure]) -> Measure:
+    made = ONE
+    for word, power in unit.factors:
+        known = units.ALL_UNITS.get(word.text)
+        made = _product(made, (known.measure if known is not None else find(word.text)) ** power, unit.place)
+    return made

@@ -1,0 +1,74 @@
+"""Entries that came with editions: `deck 2;` where it is out of place, and `unit NAME = SIZE;`."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import NoReturn
+
+from ic.grammar.cursor import Unreadable, span
+from ic.grammar.declared_units import USAGE, declarations, measures
+from ic.grammar.loops import Loops
+from ic.grammar.syntax import Expression
+from ic.text.edition import EDITION_WORD, EDITIONS
+from ic.text.lexer import Token
+from met.diagnostic import Label, leave_out
+from met.units import ONE
+
+
+class EditionEntries(Loops):
+    """The part of the parser that knows these entries."""
+
+    def declare_units(self) -> None:
+        """Finds the units that the deck declares, wherever it does so, before it is parsed."""
+        positions = declarations(self.tokens)
+        if not positions:
+            return
+        self.declared = {**self.declared, **dict.fromkeys(positions, ONE)}
+        sizes: dict[str, tuple[Token, Expression]] = {}
+        self.units_alone = True
+        for name, at in positions.items():
+            self.at = at + 2
+            with suppress(Unreadable):
+                sizes[name] = (self.tokens[at], self.value())
+            self.operators, self.peak = 0, 0
+            self.open.clear()
+        self.declared = {**self.declared, **measures(sizes, self.findings)}
+        self.at, self.units_alone = 0, False
+
+    def step_over_unit(self) -> None:
+        """Steps over `unit NAME = SIZE;`, which has been read, and refuses it where it has no place."""
+        start, (word, name) = self.at, self.tokens[self.at : self.at + 2]
+        depth = len(self.open)
+        try:
+            if word.source.edition == 1:
+                help = self.as_edition_2(word, "a file of edition 2 declares units")
+                self.fail("D394", "edition 1 declares no units", span(word, name), help=help)
+            if self.depth or depth:
+                self.fail("D394", "a unit is declared outside of blocks and loops", span(word, name), help=USAGE)
+            first = declarations(self.tokens)[name.text]
+            if first != start + 1:
+                also = (Label(self.tokens[first].place, "the first"),)
+                self.fail("D394", f"unit `{name.text}` is declared twice", name, also=also, help="leave one out")
+            self.at += 3
+            self.units_alone = True
+            self.semicolon(self.value())
+            self.units_alone = False
+        except Unreadable:
+            self.units_alone = False
+            self.recover(start, depth)
+
+    def not_the_edition(self, word: Token) -> NoReturn:
+        """`deck 2;` where it does not say the edition, at its number."""
+        number = self.token
+        heading = word.source.heading
+        said = f"{word.text} {number.text};"
+        if heading is not None:
+            place = word.source.place(heading.first, heading.last - heading.first)
+            label = Label(place, "it is said here")
+            help = leave_out("leave one of the two out", word.place)
+            self.fail("D391", "a file says its edition once", span(word, number), also=(label,), help=help)
+        known = " or ".join(f"`{EDITION_WORD} {each};`" for each in EDITIONS)
+        if number.text not in map(str, EDITIONS) or self.following.text != ";":
+            self.fail("D391", "this is no edition", span(word, number), help=f"write {known} in the file's first line")
+        message = "a file says its edition before all else but comments"
+        self.fail("D391", message, span(word, number), help=f"make `{said}` the first line of the file")

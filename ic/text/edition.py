@@ -1,0 +1,52 @@
+"""The edition of the deck language that a file is written in: its line `deck 2;`, which stands before all but comments.
+
+What a deck means never changes within an edition. A file without the line is of edition 1.
+"""
+
+from __future__ import annotations
+
+import re
+
+from met.frozen import frozen
+
+FIRST, LATEST = 1, 2
+EDITIONS = (FIRST, LATEST)
+
+EDITION_WORD = "deck"
+
+_HEADING = re.compile(
+    r"(?:\s+|//[^\n]*|/\*(?:[^*]|\*(?!/))*+\*/)*+"
+    rf"(?P<whole>{EDITION_WORD}\s+(?P<number>[0-9]{{1,9}})(?![\w.])(?:\s*(?P<end>;))?)"
+)
+
+
+@frozen
+class Heading:
+    """The line of a file that says its edition, by offsets in the text: where it begins and ends, and its number.
+
+    closed  whether its `;` is there
+    """
+
+    edition: int
+    first: int
+    last: int
+    number: tuple[int, int]
+    closed: bool
+
+
+def heading(text: str) -> Heading | None:
+    """The heading of a file's text; None where it has none."""
+    found = _HEADING.match(text)
+    if found is None:
+        return None
+    return Heading(
+        int(found["number"]), found.start("whole"), found.end("whole"), found.span("number"), found["end"] is not None
+    )
+
+
+def edition_of(text: str) -> int:
+    """The edition of a file's text; the latest where it names one that there is not, which is reported."""
+    found = heading(text)
+    if found is None:
+        return FIRST
+    return found.edition if found.edition in EDITIONS else LATEST
