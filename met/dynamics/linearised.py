@@ -25,7 +25,8 @@ ch. 8.3); D are the recursion's own. Where a joint is in acceleration mode its 1
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from met.dynamics.joints import JointTransform, X, Z
 from met.dynamics.recursion import Solved, Wrench, loads_on_bodies
@@ -50,8 +51,12 @@ from met.dynamics.spatial import (
     shift_force,
     sub,
 )
-from met.dynamics.tree import Tree
+from met.dynamics.tree import Tree, each_number
 from met.frozen import frozen
+from met.trace import Mask
+from met.trace.known import KnownDerivative, Tangent
+from met.trace.nodes import Nodes
+from met.trace.scalar import Scalar
 
 Entries = dict[tuple[int, int], Real]
 """A matrix by (row, column), joints by number; joints on different branches have no entry."""
@@ -331,3 +336,70 @@ def _less(A: Nine, B: Nine) -> Nine:
 
 def _sum(a: Wrench, b: Wrench) -> Wrench:
     return add(a[0], b[0]), add(a[1], b[1])
+
+
+MOVING = ("q", "qd", "tau", "qdd", "wrenches")
+"""What `recursion.solve` is given that its derivative is known by, by its words."""
+
+
+def tell(tree: Tree, given: Mapping[str, Any], solved: Solved) -> None:
+    """Tells the graph in which `recursion.solve` was recorded the derivative of what it found (`met.trace.known`).
+
+    given  what `solve` was given, by its words, `velocity_products` with them
+    """
+    moving = {name: given[name] for name in MOVING}
+    scalars = _scalars(moving)
+    if tree.floating is not None or not scalars:
+        return
+    held = _scalars({"tree": tree} | {name: value for name, value in given.items() if name not in MOVING})
+    taken = {x.ref >> 1 for x in (*scalars, *held)}
+    found = (
+        *solved.qdd,
+        *(x if mode is not True else 0.0 for x, mode in zip(solved.tau_load, solved.mode, strict=True)),
+    )
+    places = [place for place, x in enumerate(found) if isinstance(x, Scalar) and x.ref >> 1 not in taken]
+    if not places:
+        return
+    if not given["velocity_products"]:
+        moving["qd"] = (0.0,) * len(tree.joints)
+
+    def moves(graph: Nodes) -> Callable[[Tangent], list[int]]:
+        here = _in_graph((tree, moving, solved), graph)
+        of = linearised(here[0], here[1]["qd"], here[2])
+
+        def along(tangent: Tangent) -> list[int]:
+            move = {name: _tangents(graph, value, tangent) for name, value in here[1].items()}
+            ends = [x for part in of.along(**move) for x in part]
+            return [x.ref if isinstance(x, Scalar) else graph.constant(x) for x in (ends[place] for place in places)]
+
+        return along
+
+    refs = tuple(x.ref for x in (found[place] for place in places) if isinstance(x, Scalar))
+    scalars[0].graph.known.append(KnownDerivative(refs, tuple(x.ref for x in held), moves))
+
+
+def _scalars(value: Any) -> list[Scalar]:
+    """The recorded numbers in nested dataclasses, tuples and dictionaries."""
+    found: dict[int, Scalar] = {}
+
+    def see(_: str, x: Any) -> Any:
+        if isinstance(x, Scalar):
+            found[x.ref] = x
+        return x
+
+    each_number("", value, see)
+    return list(found.values())
+
+
+def _in_graph(value: Any, graph: Nodes) -> Any:
+    """The same with the numbers of another graph that has the nodes of the first one."""
+    return each_number("", value, lambda _, x: type(x)(graph, x.ref) if isinstance(x, (Scalar, Mask)) else x)
+
+
+def _tangents(graph: Nodes, value: Any, tangent: Tangent) -> Any:
+    """The moves of the numbers in nested tuples and dictionaries."""
+    if isinstance(value, dict):
+        return {name: _tangents(graph, each, tangent) for name, each in value.items()}
+    if isinstance(value, tuple):
+        return tuple(_tangents(graph, each, tangent) for each in value)
+    return Scalar(graph, tangent(value.ref)) if isinstance(value, Scalar) else 0.0

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
+from met.trace.known import KnownTangents
 from met.trace.nodes import OPERANDS, TRUTHS, ZERO, Node, Nodes
 from met.trace.scalar import Scalar
 
@@ -26,16 +27,32 @@ def derivative(x: Scalar, name: str) -> Scalar:
 
 
 def slopes(
-    graph: Nodes, order: Iterable[int], leaf: Callable[[Node], int], straight: Callable[[int], bool] = lambda _: False
+    graph: Nodes,
+    order: Iterable[int],
+    leaf: Callable[[Node], int],
+    straight: Callable[[int], bool] = lambda _: False,
+    known: KnownTangents | None = None,
 ) -> dict[int, int]:
     """References of the derivatives of nodes by position, made in the same graph; a truth's is 0.
 
     order     positions of the nodes, each after its operands
     leaf      gives the reference of a leaf's own derivative
     straight  tells of a `floor` or `rint` by its position whether it counts as the straight line through its steps
+    known     derivatives that are known in closed form; None: each operation goes by its own rule
     """
     found: dict[int, int] = {}
+    closed: dict[int, int] = {}
+
+    def tangent(ref: int) -> int:
+        return found.get(ref >> 1, ZERO) ^ (ref & 1)
+
     for i in order:
+        if known is not None:
+            if i not in closed:
+                closed |= known.at(i, tangent)
+            if i in closed:
+                found[i] = closed[i]
+                continue
         op, *rest = graph.nodes[i]
         operands = [ref for ref in rest[: OPERANDS[op]] if graph.nodes[ref >> 1][0] not in TRUTHS]
         moving = any(found[ref >> 1] & -2 != ZERO for ref in operands)
