@@ -2,7 +2,8 @@
 
     dynamics    all of d(qdd)/d(q, qd, tau) of an arm with a rotor behind each joint, beside the evaluation itself
     direction   a whole run of the Panda with its seven servos, carried along one direction, beside the plain run: what
-                a gradient costs for each number (`met.analysis.linear.gradient`); a Jacobian of a step is 21 of them
+                a gradient costs for each number (`met.analysis.linear.gradient`)
+    step        the same run with the Jacobian of each whole step, by 21 states (`met.analysis.linear.many`)
 
 Many cases on one core; time is the core's.
 """
@@ -21,7 +22,8 @@ from benchmarks import evaluation
 from benchmarks.arms import ARMS, GRAVITY, Arm
 from benchmarks.benchmark import Benchmark, Derived, Target, ratio
 from met import run as engine
-from met.analysis.linear.period import is_converter
+from met.analysis.linear.many import PeriodJacobians
+from met.analysis.linear.period import PeriodProgram, is_converter
 from met.backends.llvm import kernel
 from met.dynamics.linearised import LinearisedDynamics, linearised
 from met.dynamics.recursion import solve
@@ -117,10 +119,10 @@ def _panda() -> engine.Prepared:
     return engine.prepare(found)
 
 
-def _run(tangents: bool) -> Callable[[], float]:
+def _run(tangents: bool, *, jacobian: bool = False) -> Callable[[], float]:
     prepared = _panda()
     inputs = engine.inputs(prepared.experiment, np.arange(CASES))
-    made = prepared.kernel
+    made = PeriodJacobians(PeriodProgram(prepared.experiment)).kernel if jacobian else prepared.kernel
     if tangents:
         recording = differentiated(prepared.recording, prepared.program.inputs, is_converter)
         made = kernel.from_recording(recording)
@@ -146,4 +148,6 @@ BENCHMARKS: tuple[Benchmark | Derived, ...] = (
     Benchmark("run.panda", "a step of the Panda's run", "ns", partial(_run, False)),
     Benchmark("direction.panda", "a step with its tangent along one direction", "ns", partial(_run, True)),
     ratio("direction.times.panda", "times the plain step", over="direction.panda", under="run.panda"),
+    Benchmark("step.panda", "a step with its whole Jacobian", "ns", partial(_run, False, jacobian=True)),
+    ratio("step.times.panda", "times the plain step", over="step.panda", under="run.panda", target=Target(5.0)),
 )  # fmt: skip
