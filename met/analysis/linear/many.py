@@ -1,7 +1,7 @@
-"""Jacobians of a period of many cases at once, in machine code, which does not look for events on the way as `jacobian` does.
+"""Jacobians of a period of many cases at once, in machine code. Events on the way are not looked for (`jacobian` does).
 
 The first one costs the making of the program, which for seven joints with servos takes half a minute; then each costs
-some six times a plain step.
+some five times a plain step.
 """
 
 from __future__ import annotations
