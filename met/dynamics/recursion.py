@@ -199,7 +199,7 @@ def solve(
                 c[i] = (ZERO, add(slide, scale(2.0, cross(carried, along))))
 
     # Tips to base: articulated inertias and bias wrenches.
-    load, base_load = _loads(tree, wrenches)
+    load, base_load = loads_on_bodies(tree, wrenches)
     base_IA: Symmetric = NOTHING
     base_p: Wrench = (ZERO, ZERO)
     IA: list[Symmetric] = [NOTHING] * n
@@ -421,7 +421,7 @@ def _of_base_frame(tree: Tree, gravity: Vector, rate: Vector, wd: Vector, a: Vec
     return wd, sub(a, add(cross(wd, p), cross(rate, cross(rate, p))))
 
 
-def _loads(tree: Tree, wrenches: Mapping[str, Wrench] | None) -> tuple[tuple[Wrench, ...], Wrench]:
+def loads_on_bodies(tree: Tree, wrenches: Mapping[str, Wrench] | None) -> tuple[tuple[Wrench, ...], Wrench]:
     """Sum of the given wrenches on each joint's body, about its frame's origin and in its axes; and on a free base."""
     total: list[Wrench] = [(ZERO, ZERO)] * len(tree.joints)
     base: Wrench = (ZERO, ZERO)

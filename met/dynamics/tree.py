@@ -133,7 +133,7 @@ class Tree:
         A phase that runs once writes them to the case's memory; later phases, building the same tree from the same
         parameters, read them there, and what they would have computed drops out.
         """
-        return _each("tree", self, function)
+        return each_number("tree", self, function)
 
 
 class _Builder:
@@ -422,15 +422,15 @@ def _clean_turn(turn: Turn) -> Turn:
     return (snapped(float(turn[0])), snapped(float(turn[1])))
 
 
-def _each(name: str, value: Any, function: Callable[[str, Real], Real]) -> Any:
+def each_number(name: str, value: Any, function: Callable[[str, Real], Real]) -> Any:
     """Rebuilds nested dataclasses, tuples and dictionaries with function applied to numbers that are no constants."""
     if is_dataclass(value) and not isinstance(value, type):
-        changed = {f.name: _each(f"{name}.{f.name}", getattr(value, f.name), function) for f in fields(value)}
+        changed = {f.name: each_number(f"{name}.{f.name}", getattr(value, f.name), function) for f in fields(value)}
         return type(value)(**changed)
     if isinstance(value, dict):
-        return {key: _each(f"{name}.{key}", item, function) for key, item in value.items()}
+        return {key: each_number(f"{name}.{key}", item, function) for key, item in value.items()}
     if isinstance(value, tuple):
-        items = [_each(f"{name}.{number}", item, function) for number, item in enumerate(value)]
+        items = [each_number(f"{name}.{number}", item, function) for number, item in enumerate(value)]
         return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
     if value is None or isinstance(value, str) or constant(value):
         return value

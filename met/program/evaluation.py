@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from typing import Any
 
+from met.dynamics.linearised import tell
 from met.dynamics.recursion import Solved, solve
 from met.dynamics.tree import Tree
 from met.environments.environment import Environment
@@ -90,14 +92,14 @@ def derivative(
         wrenches, on_payloads = split_wrenches(system, read, loads.wrenches)
 
     prescribed_qdd = prescribed_qdd or {}
-    given: list[Real] = []
+    given_qdd: list[Real] = []
     mode: list[Truth] = []
     dry: list[Real] = []
     for i, drive in enumerate(drives):
         s = friction.get(system.joints[i].name)
         if i in prescribed_qdd:
             mode.append(False)
-            given.append(prescribed_qdd[i])
+            given_qdd.append(prescribed_qdd[i])
             dry.append(0.0)
             continue
         in_torque_mode: Truth = True
@@ -106,7 +108,7 @@ def derivative(
         elif s is not None:
             in_torque_mode = s != 0.0
         mode.append(in_torque_mode)
-        given.append(drive.qdd if drive is not None else 0.0)
+        given_qdd.append(drive.qdd if drive is not None else 0.0)
         dry.append(0.0 if s is None else s * level_of(system, i, drive, loads))
 
     smooth = [
@@ -118,22 +120,23 @@ def derivative(
         of_states, state_needs = _slopes(system, driven, friction)
         turning = rotors.of(system, drives, y, of_states, friction, prescribed_qdd)
     with part("dynamics"):
-        solved = solve(
-            tree,
-            y.q[:n],
-            y.qd[:n],
-            tau=tuple(a - b for a, b in zip(smooth, dry, strict=True)),
-            qdd=tuple(given),
-            mode=tuple(mode),
-            rotor=tuple(0.0 if drive is None else drive.rotor for drive in drives),
-            spin=None if turning is None else turning.spin,
-            free_rotors=None if turning is None else turning.free,
-            gravity=base.to_base(loads.gravity),
-            base_acceleration=(base.wd, base.a),
-            base_rate=base.w,
-            wrenches=wrenches,
-            velocity_products=system.structure.velocity_products,
-        )
+        given: dict[str, Any] = {
+            "q": y.q[:n],
+            "qd": y.qd[:n],
+            "tau": tuple(a - b for a, b in zip(smooth, dry, strict=True)),
+            "qdd": tuple(given_qdd),
+            "mode": tuple(mode),
+            "rotor": tuple(0.0 if drive is None else drive.rotor for drive in drives),
+            "spin": None if turning is None else turning.spin,
+            "free_rotors": None if turning is None else turning.free,
+            "gravity": base.to_base(loads.gravity),
+            "base_acceleration": (base.wd, base.a),
+            "base_rate": base.w,
+            "wrenches": wrenches,
+            "velocity_products": system.structure.velocity_products,
+        }
+        solved = solve(tree, **given)
+        tell(tree, given, solved)
     if turning is None:
         of_states, state_needs = _slopes(system, driven, friction)
     else:

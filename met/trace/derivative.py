@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
+from met.trace.known import KnownTangents
 from met.trace.nodes import OPERANDS, TRUTHS, ZERO, Node, Nodes
 from met.trace.scalar import Scalar
 
@@ -26,16 +27,32 @@ def derivative(x: Scalar, name: str) -> Scalar:
 
 
 def slopes(
-    graph: Nodes, order: Iterable[int], leaf: Callable[[Node], int], straight: Callable[[int], bool] = lambda _: False
+    graph: Nodes,
+    order: Iterable[int],
+    leaf: Callable[[Node], int],
+    straight: Callable[[int], bool] = lambda _: False,
+    known: KnownTangents | None = None,
 ) -> dict[int, int]:
     """References of the derivatives of nodes by position, made in the same graph; a truth's is 0.
 
     order     positions of the nodes, each after its operands
     leaf      gives the reference of a leaf's own derivative
     straight  tells of a `floor` or `rint` by its position whether it counts as the straight line through its steps
+    known     derivatives that are known in closed form; None: each operation goes by its own rule
     """
     found: dict[int, int] = {}
+    closed: dict[int, int] = {}
+
+    def tangent(ref: int) -> int:
+        return found.get(ref >> 1, ZERO) ^ (ref & 1)
+
     for i in order:
+        if known is not None:
+            if i not in closed:
+                closed |= known.at(i, tangent)
+            if i in closed:
+                found[i] = closed[i]
+                continue
         op, *rest = graph.nodes[i]
         operands = [ref for ref in rest[: OPERANDS[op]] if graph.nodes[ref >> 1][0] not in TRUTHS]
         moving = any(found[ref >> 1] & -2 != ZERO for ref in operands)
@@ -69,6 +86,17 @@ def _flip(graph: Nodes, sign: Scalar, move: Scalar, bit: int) -> Scalar:
     return Scalar(graph, graph.flip(move.ref, sign.ref, bit))
 
 
+def _is_sign(graph: Nodes, chosen: list[Scalar]) -> bool:
+    """True of the sign of a number, 1, -1 or the number itself where it is 0: there it jumps, and else it rests."""
+    mask, above, rest = (each.ref for each in chosen)
+    condition, inner = graph.nodes[mask >> 1], graph.nodes[rest >> 1]
+    if mask & 1 or condition[:2] != ("lt", ZERO) or graph.value(above) is None or inner[0] != "where" or inner[1] & 1:
+        return False
+    x, below = condition[2], inner[2] ^ (rest & 1)
+    same = graph.nodes[inner[1] >> 1] in (("lt", x, ZERO), ("lt", ZERO, x ^ 1)) and inner[3] ^ (rest & 1) == x
+    return same and graph.value(below) is not None
+
+
 _RULES: dict[str, Rule] = {
     "add": lambda g, _, y, x, dx: dx[0] + dx[1],
     "sub": lambda g, _, y, x, dx: dx[0] - dx[1],
@@ -78,7 +106,7 @@ _RULES: dict[str, Rule] = {
     "sqrt": lambda g, _, y, x, dx: dx[0] / (2.0 * y),
     "abs": lambda g, _, y, x, dx: _flip(g, x[0], dx[0], 63),
     "flip": lambda g, rest, y, x, dx: _flip(g, x[1], dx[0], rest[0]),
-    "where": lambda g, _, y, x, dx: Scalar(g, g.where(x[0].ref, dx[1].ref, dx[2].ref)),
+    "where": lambda g, _, y, x, dx: Scalar(g, ZERO if _is_sign(g, x) else g.where(x[0].ref, dx[1].ref, dx[2].ref)),
     "significand": lambda g, _, y, x, dx: dx[0] * (y / x[0]),
 }
 """Rules of differentiation by operation. Those not here have no derivative, or none but at jumps."""

@@ -67,9 +67,10 @@ ZERO, ONE, FALSE, TRUE = 0, 2, 4, 5
 class Nodes:
     """Nodes made so far, and the rules by which new ones are made (head of this file), all by reference."""
 
-    __slots__ = ("_constants", "_literals", "_made", "nodes")
+    __slots__ = ("_constants", "_literals", "_made", "known", "nodes")
 
     def __init__(self) -> None:
+        self.known: list[Any] = []  # of `met.trace.known`
         self.nodes: list[Node] = [("const", 0.0), ("const", 1.0), ("false",)]
         self._made: dict[Node, int] = {}
         self._literals: dict[float, int] = {0.0: ZERO, 1.0: ONE}

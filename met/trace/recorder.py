@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 from met.trace import check
 from met.trace.fuse import fused
@@ -109,6 +110,7 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
                     tuple((column, value.ref) for column, value in sorted(tape.records.items())),
                     tuple((number, value.ref) for number, value in sorted(tape.outputs.items())),
                     tuple(tape.parts),
+                    tuple(tape.graph.known),
                 )
             )
         return made[key]
@@ -219,7 +221,7 @@ def _storing(section: CodeSection, read: set[str]) -> CodeSection:
     stores = tuple(store for store in section.stores if store[0] in read)
     if stores == section.stores:
         return section
-    return CodeSection(section.name, section.nodes, stores, section.records, section.outputs, section.parts)
+    return replace(section, stores=stores)
 
 
 def _fused(sections: list[CodeSection], program: Program, body: tuple[RecordedControl, ...]) -> list[CodeSection]:
@@ -233,7 +235,7 @@ def _fused(sections: list[CodeSection], program: Program, body: tuple[RecordedCo
     for one in sections:
         leading = None if program.state_outputs is None else slice_roots(one, cells, outputs)
         nodes = fused(one.nodes, one.roots, leading)
-        result.append(CodeSection(one.name, tuple(nodes), one.stores, one.records, one.outputs, one.parts))
+        result.append(replace(one, nodes=tuple(nodes)))
     return result
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from functools import cached_property
 
 from met.frozen import frozen
+from met.trace.known import KnownDerivative
 from met.trace.nodes import Node, live
 from met.trace.program import Every, Program, Unless0, WhileAny
 
@@ -19,6 +20,7 @@ class CodeSection:
     stores    (cell, reference), in order of writing; the value a cell has afterwards
     records   (column, reference);  outputs (number of the output, reference)
     parts     (position of the node that a part begins at, its name): the phase's, then those of `Tape.part` in it
+    known     derivatives that are known in closed form
     """
 
     name: str
@@ -27,6 +29,7 @@ class CodeSection:
     records: tuple[tuple[int, int], ...]
     outputs: tuple[tuple[int, int], ...]
     parts: tuple[tuple[int, str], ...] = ()
+    known: tuple[KnownDerivative, ...] = ()
 
     @property
     def roots(self) -> list[int]:

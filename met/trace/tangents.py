@@ -14,6 +14,7 @@ from typing import Any
 
 from met.frozen import frozen
 from met.trace.derivative import STEPS, rounds, slopes
+from met.trace.known import KnownTangents
 from met.trace.nodes import OPERANDS, TRUTHS, ZERO, Node, Nodes, live
 from met.trace.primitives import PLAIN
 from met.trace.recording import CodeSection
@@ -114,7 +115,7 @@ def with_tangents(
         moves = node[1] in (moving if node[0] == "cell" else inputs)
         return graph.make(node[0], HEAD + node[1]) if moves else ZERO
 
-    found = slopes(graph, section.order, leaf, lambda i: straight(section, i))
+    found = slopes(graph, section.order, leaf, lambda i: straight(section, i), KnownTangents(graph, section.known))
 
     def tangent(ref: int) -> int:
         return found.get(ref >> 1, ZERO) ^ (ref & 1)

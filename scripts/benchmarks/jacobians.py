@@ -1,8 +1,9 @@
 """Derivatives, in compiled kernels: ns per Jacobian and case, and how many times what is differentiated they cost.
 
-    dynamics    all of d(qdd)/d(q, qd) of an arm with a rotor behind each joint, beside the evaluation itself
+    dynamics    all of d(qdd)/d(q, qd, tau) of an arm with a rotor behind each joint, beside the evaluation itself
     direction   a whole run of the Panda with its seven servos, carried along one direction, beside the plain run: what
-                a gradient costs for each number (`met.analysis.linear.gradient`); a Jacobian of a step is 21 of them
+                a gradient costs for each number (`met.analysis.linear.gradient`)
+    step        the same run with the Jacobian of each whole step, by 21 states (`met.analysis.linear.many`)
 
 Many cases on one core; time is the core's.
 """
@@ -21,15 +22,16 @@ from benchmarks import evaluation
 from benchmarks.arms import ARMS, GRAVITY, Arm
 from benchmarks.benchmark import Benchmark, Derived, Target, ratio
 from met import run as engine
-from met.analysis.linear.period import is_converter
+from met.analysis.linear.many import PeriodJacobians
+from met.analysis.linear.period import PeriodProgram, is_converter
 from met.backends.llvm import kernel
+from met.dynamics.linearised import LinearisedDynamics, linearised
 from met.dynamics.recursion import solve
 from met.dynamics.tree import Tree
-from met.trace.derivative import slopes
+from met.trace import Real
 from met.trace.differentiated import differentiated
 from met.trace.program import Phase, Program, RunPhase, Tape
 from met.trace.recorder import record
-from met.trace.scalar import Scalar
 
 TITLE = "derivatives in compiled kernels, one core, many cases"
 
@@ -55,12 +57,14 @@ def program(arm: Arm, *, jacobian: bool) -> Program:
 
     def tick(tape: Tape) -> None:
         q, qd, tau = ([tape.read(f"{name}.{i}") for i in numbers] for name in names)
-        qdd = solve(tree, q, qd, tau=tau, gravity=GRAVITY, rotor=[evaluation.ROTOR] * len(numbers)).qdd
+        solved = solve(tree, q, qd, tau=tau, gravity=GRAVITY, rotor=[evaluation.ROTOR] * len(numbers))
+        qdd = solved.qdd
         for i in numbers:
             tape.write(f"q.{i}", q[i] + evaluation.STEP * qd[i])
             tape.write(f"qd.{i}", qd[i] + evaluation.STEP * qdd[i])
         if jacobian:
-            tape.write("sum", sum((entry for row in _rows(qdd, (*q, *qd)) for entry in row), tape.read("sum")))
+            rows = _rows(linearised(tree, qd, solved), len(numbers))
+            tape.write("sum", sum((entry for row in rows for entry in row), tape.read("sum")))
 
     def end(tape: Tape) -> None:
         tape.output("sum", tape.read("sum"))
@@ -73,16 +77,12 @@ def program(arm: Arm, *, jacobian: bool) -> Program:
     )  # fmt: skip
 
 
-def _rows(results: tuple[Scalar, ...], leaves: tuple[Scalar, ...]) -> list[list[Scalar]]:
-    """The derivatives of results by each of the leaves of their graph, in the graph; a list a leaf."""
-    graph = results[0].graph
-    order = graph.live([each.ref for each in results])
-    rows = []
-    for leaf in leaves:
-        of = graph.nodes[leaf.ref >> 1]
-        found = slopes(graph, order, lambda node, of=of: graph.constant(float(node == of)))
-        rows.append([Scalar(graph, found[each.ref >> 1] ^ (each.ref & 1)) for each in results])
-    return rows
+def _rows(of: LinearisedDynamics, n: int) -> list[list[Real]]:
+    """The derivatives of the accelerations by each q, qd and tau; a list a direction."""
+    still = [0.0] * n
+    units = [[float(i == k) for i in range(n)] for k in range(n)]
+    moves = [move for e in units for move in ((e, still, still), (still, e, still), (still, still, e))]
+    return [of.along(*move, still)[0] for move in moves]
 
 
 def _dynamics(arm: Arm, jacobian: bool) -> Callable[[], float]:
@@ -119,10 +119,10 @@ def _panda() -> engine.Prepared:
     return engine.prepare(found)
 
 
-def _run(tangents: bool) -> Callable[[], float]:
+def _run(tangents: bool, *, jacobian: bool = False) -> Callable[[], float]:
     prepared = _panda()
     inputs = engine.inputs(prepared.experiment, np.arange(CASES))
-    made = prepared.kernel
+    made = PeriodJacobians(PeriodProgram(prepared.experiment)).kernel if jacobian else prepared.kernel
     if tangents:
         recording = differentiated(prepared.recording, prepared.program.inputs, is_converter)
         made = kernel.from_recording(recording)
@@ -141,11 +141,13 @@ _ARMS = {arm.name: arm for arm in ARMS}
 BENCHMARKS: tuple[Benchmark | Derived, ...] = (
     Benchmark("dynamics.7R", "torque mode, rotors", "ns", partial(_dynamics, _ARMS["7R"], False)),
     Benchmark(
-        "jacobian.7R", "its Jacobian by q and qd, with it", "ns", partial(_dynamics, _ARMS["7R"], True), Target(300.0)
+        "jacobian.7R", "its Jacobian by q, qd, tau, with it", "ns", partial(_dynamics, _ARMS["7R"], True), Target(300.0)
     ),
     ratio("jacobian.times.7R", "times the evaluation", over="jacobian.7R", under="dynamics.7R"),
     Benchmark("jacobian.compiling.7R", "machine code of it", "s", partial(_compiling, _ARMS["7R"]), Target(1.0), 3),
     Benchmark("run.panda", "a step of the Panda's run", "ns", partial(_run, False)),
     Benchmark("direction.panda", "a step with its tangent along one direction", "ns", partial(_run, True)),
     ratio("direction.times.panda", "times the plain step", over="direction.panda", under="run.panda"),
+    Benchmark("step.panda", "a step with its whole Jacobian", "ns", partial(_run, False, jacobian=True)),
+    ratio("step.times.panda", "times the plain step", over="step.panda", under="run.panda", target=Target(5.0)),
 )  # fmt: skip

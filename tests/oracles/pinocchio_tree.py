@@ -82,6 +82,12 @@ class PinocchioTree:
         v = self.vector
         return pin.aba(self.model, self.data, v(q), v(qd), v(tau), on_joints(self, wrenches))[self.at]
 
+    def acceleration_slopes(self, q, qd, tau, wrenches) -> tuple[np.ndarray, ...]:
+        """The derivatives of `accelerations` by q, qd and tau, [joint, joint]."""
+        v, at = self.vector, np.ix_(self.at, self.at)
+        found = pin.computeABADerivatives(self.model, self.data, v(q), v(qd), v(tau), on_joints(self, wrenches))
+        return tuple(np.array(each)[at] for each in found)
+
     def torques(self, q, qd, qdd, wrenches) -> np.ndarray:
         """Inverse dynamics, rotor inertia included."""
         v = self.vector

@@ -25,6 +25,7 @@ from met.trace import (
     gather,
     log,
     rint,
+    sign,
     sin,
     sqrt,
     tan,
@@ -111,3 +112,11 @@ def test_the_derivative_of_a_derivative_is_the_second() -> None:
     # another n^2
     found = Formulas.of(graph, [second]).replay({"x": x})[0]
     np.testing.assert_allclose(found, -4.0 * np.sin(2.0 * x), rtol=0, atol=1e-12)
+
+
+def test_a_sign_moves_with_nothing() -> None:
+    graph = Graph()
+    x = graph.input("x")
+    for inner in (x, -x, x * x - x, -(x * x - x)):
+        found = derivative(3.0 * sign(inner) + x, "x")
+        assert [Formulas.of(graph, [found]).replay({"x": at}) for at in (-2.0, 0.0, 0.5, 1.0)] == [[1.0]] * 4
