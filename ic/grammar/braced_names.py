@@ -84,6 +84,8 @@ def name_length(tokens: Sequence[Token], at: int) -> int:
 def _leading_length(tokens: Sequence[Token], at: int) -> int:
     """The number of tokens of the braces at token `at` that a name begins with; 0 where a block begins."""
     length = braces_length(tokens, at)
+    if length and at and tokens[at - 1].text == "." and adjacent(tokens[at - 1], tokens[at]):
+        return length  # `bodies.{ side }.mass`: behind a point stands a name
     before, after = tokens[at + length - 1 : at + length + 1] if at + length < len(tokens) else (tokens[at],) * 2
     if length and after.kind in (NAME, WHOLE) and adjacent(before, after):
         return length

@@ -47,6 +47,7 @@ def same(desk: Desk, one: str, other: str) -> bool:
     ("for side in [left, right] { let {side}_x = 1; }", "let left_x = 1; let right_x = 1;"),
     ("for i in 1 .. 2 { let a_{ i } = b_{ i - 1 }.x; let c{ i } = 0; }",
      "let a_1 = b_0.x; let c1 = 0; let a_2 = b_1.x; let c2 = 0;"),
+    ("for s_ in [p, q] { let {s_}_x = t.{ s_ }.mass; }", "let p_x = t.p.mass; let q_x = t.q.mass;"),
     ("for s_ in [p, q] { let { s_ }_x = t_{ s_ }_{ s_ }; }", "let p_x = t_p_p; let q_x = t_q_q;"),
     ("for n in [3, 1 + 1] { let a{n} = 1; }", "let a3 = 1; let a2 = 1;"),
     ("arm a { for s_ in [p, q] { joint {s_} revolute { parent = s_;  child = {s_}; } } }",
