@@ -148,6 +148,8 @@ BENCHMARKS: tuple[Benchmark | Derived, ...] = (
     Benchmark("run.panda", "a step of the Panda's run", "ns", partial(_run, False)),
     Benchmark("direction.panda", "a step with its tangent along one direction", "ns", partial(_run, True)),
     ratio("direction.times.panda", "times the plain step", over="direction.panda", under="run.panda"),
-    Benchmark("step.panda", "a step with its whole Jacobian", "ns", partial(_run, False, jacobian=True)),
+    Benchmark(
+        "step.panda", "a step with its whole Jacobian", "ns", partial(_run, False, jacobian=True), slow=True
+    ),
     ratio("step.times.panda", "times the plain step", over="step.panda", under="run.panda", target=Target(5.0)),
 )  # fmt: skip
