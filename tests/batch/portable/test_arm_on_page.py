@@ -113,6 +113,8 @@ def test_keys_and_mouse_turn_the_view_and_ghosts_and_frames_come_and_go(
         old = pixels(page, tmp_path)
         page.key(key)
         assert changed(old, pixels(page, tmp_path)) > 0.0005, key
+    page.run("MET.shown.haunt([])")  # nobody is told of no other cases
+    assert page.run("document.querySelector('.stage .tools').innerText.split(/\\s+/)") == ["frames", "fit"]
     page.close()
 
 
