@@ -147,8 +147,12 @@ class ValueChecks:
             )
             if bound is not None
         ]
-        sound = isinstance(value, float) and math.isfinite(value) and (not wanted.whole or value.is_integer())
-        if sound and all(holds(value, bound) for bound, _, holds in bounds):
+        if (
+            isinstance(value, float)
+            and math.isfinite(value)
+            and (not wanted.whole or value.is_integer())
+            and all(holds(value, bound) for bound, _, holds in bounds)
+        ):
             return
         text = owner.unit(wanted)[0]
         unit = "" if text == "1" else f" {text}"
