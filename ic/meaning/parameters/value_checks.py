@@ -149,9 +149,12 @@ class ValueChecks:
             )
             if bound is not None
         ]
-        number = value if isinstance(value, float) else math.nan
-        whole = not wanted.whole or number.is_integer()
-        if math.isfinite(number) and whole and all(holds(number, bound) for bound, _, holds in bounds):
+        if (
+            isinstance(value, float)
+            and math.isfinite(value)
+            and (not wanted.whole or value.is_integer())
+            and all(holds(value, bound) for bound, _, holds in bounds)
+        ):
             return
         text = owner.unit(wanted)[0]
         unit = "" if text == "1" else f" {text}"
