@@ -121,7 +121,8 @@ def find_paths(experiment: Experiment, path: str, also: Mapping[str, Sequence[st
     as_run = (
         ".".join(filter(None, (joint, "servo", own))) if definition == "servos" else ""
     )  # as the run's block has it
-    near = [as_run] if as_run in known else _three_nearest(path, known)
+    beyond = [name for name in known if not path.startswith(f"{name}.")]  # what it is of is no other name for it
+    near = [as_run] if as_run in known else _three_nearest(path, beyond)
     helps = [f"did you mean `{'`, `'.join(near)}`?"] if near else []
     last = path.rpartition(".")[2]
     same = [name for name in known if name.rpartition(".")[2] == last and name not in near]

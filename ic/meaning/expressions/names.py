@@ -54,13 +54,15 @@ class Names:
 
     @property
     def named(self) -> Collection[str]:
-        """Names whose values were asked for and found, those behind them included."""
-        return self._worth.keys()
+        """Names whose values were asked for and found, those behind them included, and tables' of which a cell was."""
+        return self._worth.keys() | {path.partition(".")[0] for path in self.cells}
 
     def take_over(self, others: Names) -> None:
         """Take over what others found, which is the same here."""
         for name, worth in others._worth.items():
             self._worth.setdefault(name, worth)
+        self.cells |= others.cells
+        self._read |= others._read
 
     def evaluate(self, expression: Expression) -> Value | ValueList:
         return evaluate(expression, self.find)
