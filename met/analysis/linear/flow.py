@@ -60,7 +60,6 @@ class Flow:
         self.program, self.inputs, self.tick = program, inputs, tick
         self.cells: dict[str, float] = dict(cells)
         self.tangents: dict[str, np.ndarray] = {}
-        self.rows: dict[int, float] = {}
         self.row_tangents: dict[int, np.ndarray] = {}
         self.edges: list[Edge] = []
         self.opposite: Mapping[int, frozenset[int]] = {}
@@ -113,12 +112,12 @@ class Flow:
 
     def run(self, number: int) -> None:
         """One section."""
-        section = self.program.sections[number]
+        section, moves = self.program.sections[number], bool(self.tangents)
         with np.errstate(all="ignore"):
-            of = values(section, self._leaf, self.opposite.get(self._runs, frozenset()))
+            of = values(section, self._leaf, self.opposite.get(self._runs, frozenset()), plain=not moves)
         cells = [(cell, float(of(ref))) for cell, ref in section.stores]
-        tangents = [(cell, of(ref)) for cell, ref in section.tangents]
-        if self.tangents:
+        tangents = [(cell, of(ref)) for cell, ref in section.tangents] if moves else []
+        if moves:
             for kink in section.kinks:
                 a, b = kink.sides
                 if of(a) == of(b) and np.any(of(kink.move) != 0.0):
@@ -127,8 +126,7 @@ class Flow:
             self.cells[cell] = value
             self.tangents.pop(cell, None)
         self.tangents.update({cell: move for cell, move in tangents if np.any(move != 0.0)})
-        if self._recording:
-            self.rows.update({column: float(of(ref)) for column, ref in section.records})
+        if self._recording and moves:
             self.row_tangents.update({column: of(ref) for column, ref in section.record_tangents})
         self._runs += 1
 
