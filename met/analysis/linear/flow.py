@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from met.analysis.linear.period import PeriodProgram
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.program import cell_names
+from met.program.sticking import Sticking
 from met.program.system import Actuator
 from met.program.values import NamedValues, answer
 from met.servos.servo import JointMotion
@@ -53,6 +54,9 @@ class Edge:
 class Flow:
     """The memory of a case under way, cells by name: numbers, and tangents of those that move, [direction]."""
 
+    shape: tuple[int, ...] = ()
+    """The dimensions of cases, before those of a tangent."""
+
     def __init__(
         self, program: PeriodProgram, inputs: Mapping[str, float], cells: Mapping[str, float], tick: int
     ) -> None:
@@ -62,12 +66,12 @@ class Flow:
         self.tangents: dict[str, np.ndarray] = {}
         self.row_tangents: dict[int, np.ndarray] = {}
         self.edges: list[Edge] = []
-        self.opposite: Mapping[int, frozenset[int]] = {}
+        self.opposite: Mapping[int, Any] = {}
         self._recording, self._runs = False, 0
 
-    def copy(self) -> Flow:
+    def copy(self, *, tangents: bool = True) -> Flow:
         made = Flow(self.program, self.inputs, self.cells, self.tick)
-        made.tangents = dict(self.tangents)
+        made.tangents = dict(self.tangents) if tangents else {}
         return made
 
     def begin(self) -> None:
@@ -84,6 +88,12 @@ class Flow:
         self._recording = recording
         self._follow(self.program.rest)
         self._recording = False
+
+    def period(self) -> None:
+        """All ticks and steps of a period."""
+        for _ in range(self.program.ticks):
+            self.ticks()
+            self.finish()
 
     def locked(self) -> tuple[str, ...]:
         """Joints at rest that a servo without a law keeps there for the whole period that begins here, whatever the arm
@@ -173,12 +183,16 @@ class Flow:
 
     def modes(self) -> dict[str, float]:
         """Modes of all that has dry friction in this case, by the name of a joint or a servo's state: 0 sticks."""
-        step = self.program.builder.step
-        found = {}
-        for each in step.sticking:
-            if each.level is not None or self.cells.get(cell_names.HAS_FRICTION(each.name), 0.0) != 0.0:
-                found[each.name] = self.cells.get(cell_names.FRICTION_MODE(each.name), 0.0)
-        return found
+        sticking = self.program.builder.step.sticking
+        return {each.name: self.mode(each) for each in sticking if each.level is not None or self.rubs(each) != 0.0}
+
+    def rubs(self, each: Sticking) -> float:
+        """Not 0 where a joint or a servo's state, whose friction is a parameter, has dry friction in this case."""
+        return self.cells.get(cell_names.HAS_FRICTION(each.name), 0.0)
+
+    def mode(self, each: Sticking) -> float:
+        """The mode of what has dry friction: 0 sticks."""
+        return self.cells.get(cell_names.FRICTION_MODE(each.name), 0.0)
 
     def _rate(self, name: str) -> float:
         return next(self.cells[each.cell] for each in self.program.builder.step.sticking if each.name == name)
@@ -192,6 +206,11 @@ class Flow:
         do nothing, and a command comes to its own by time alone."""
         uses = [use for use in self.program.builder.limits.uses if use.channels or use.owner]
         return {use.path: self.cells.get(cell_names.AT_LIMIT(use.path), 0.0) for use in uses}
+
+    def refuse(self, truth: Any, what: Callable[[], str]) -> None:
+        """Raise the Problem of an event where this is true. what: gives the event, in words"""
+        if truth:
+            raise self.event(what())
 
     def event(self, what: str, tick: int | None = None) -> Problem:
         """The refusal of a derivative across an event, at a tick, or where the memory stands."""
@@ -219,3 +238,9 @@ def listed(names: list[str]) -> str:
 def added(path: str) -> str:
     """The cell of what is added to an input."""
     return ADDED + path
+
+
+def derive(flow: Flow) -> None:
+    """The slopes of the arm where a flow stands."""
+    (number,) = (k for k, section in enumerate(flow.program.recording.sections) if section.name == "derive")
+    flow.run(number)
