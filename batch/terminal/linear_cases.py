@@ -20,14 +20,13 @@ Answer = Linearized | str
 
 def answered(question: LinearQuestion) -> list[Answer]:
     """The answers of all cases. Raises Problem where the question itself is wrong."""
-    question.program  # noqa: B018 - what is wrong for all cases is no case's
-    found: list[Answer] = []
-    for case in range(question.experiment.cases.count):
-        try:
-            found.append(question.of(case))
-        except Problem as refused:
-            found.append(refused.diagnostics[0].message.partition(": ")[2] or refused.diagnostics[0].message)
-    return found
+    found = question.of_cases(range(question.experiment.cases.count))
+    return [_why_not(each) if isinstance(each, Problem) else each for each in found]
+
+
+def _why_not(refused: Problem) -> str:
+    message = refused.diagnostics[0].message
+    return message.partition(": ")[2] or message
 
 
 def case_lines(question: LinearQuestion, found: Sequence[Answer]) -> Iterator[str]:

@@ -70,6 +70,11 @@ class TangentSection:
         roots += [ref for kink in self.kinks for ref in (*kink.sides, kink.move)]
         return live(self.nodes, roots)
 
+    @cached_property
+    def plain_order(self) -> list[int]:
+        """Positions of the nodes that are live where nothing moves, so that no tangent is asked for."""
+        return live(self.nodes, [ref for pairs in (self.stores, self.records, self.outputs) for _, ref in pairs])
+
 
 Straight = Callable[[CodeSection, int], bool]
 """Tells of a `floor` or `rint` of a section, by its position, whether it counts as the straight line through its steps,
@@ -160,16 +165,17 @@ PRODUCTS: Mapping[str, Callable[..., Any]] = {**PLAIN, "fma": lambda a, b, c: a 
 
 
 def values(
-    section: TangentSection, leaf: Callable[[Node], Any], opposite: Collection[int] = ()
+    section: TangentSection, leaf: Callable[[Node], Any], opposite: Collection[int] = (), *, plain: bool = False
 ) -> Callable[[int], Any]:
     """The worth of each reference of a section: numbers are floats, tangents floats or arrays.
 
     leaf      gives what a cell, an input, the tick and the time are
+    plain     whether numbers alone are asked for, and no tangents
     opposite  positions of nodes of kinks that take the other side
     """
     nodes = section.nodes
     found: list[Any] = [None] * len(nodes)
-    for i in section.order:
+    for i in section.plain_order if plain else section.order:
         node = nodes[i]
         op, count = node[0], OPERANDS[node[0]]
         if count == 0:

@@ -1,11 +1,12 @@
-"""Derivatives, in compiled kernels: ns per Jacobian and case, and how many times what is differentiated they cost.
+"""Derivatives: time per Jacobian and case, and how many times what is differentiated they cost.
 
     dynamics    all of d(qdd)/d(q, qd, tau) of an arm with a rotor behind each joint, beside the evaluation itself
     direction   a whole run of the Panda with its seven servos, carried along one direction, beside the plain run: what
                 a gradient costs for each number (`met.analysis.linear.gradient`)
-    step        the same run with the Jacobian of each whole step, by 21 states (`met.analysis.linear.many`)
+    period      the linearised period of the same run, by its 21 states and seven voltages, of one case by itself and of
+                one of many that are carried side by side (`met.analysis.linear.jacobian`)
 
-Many cases on one core; time is the core's.
+Those but the last are compiled kernels. Many cases on one core; time is the core's.
 """
 
 from __future__ import annotations
@@ -22,22 +23,26 @@ from benchmarks import evaluation
 from benchmarks.arms import ARMS, GRAVITY, Arm
 from benchmarks.benchmark import Benchmark, Derived, Target, ratio
 from met import run as engine
-from met.analysis.linear.many import PeriodJacobians
+from met.analysis.linear.jacobian import at_instants, period_map, period_maps
 from met.analysis.linear.period import PeriodProgram, is_converter
 from met.backends.llvm import kernel
 from met.dynamics.linearised import LinearisedDynamics, linearised
 from met.dynamics.recursion import solve
 from met.dynamics.tree import Tree
+from met.plan.linear_signals import input_signals
 from met.trace import Real
 from met.trace.differentiated import differentiated
 from met.trace.program import Phase, Program, RunPhase, Tape
 from met.trace.recorder import record
 
-TITLE = "derivatives in compiled kernels, one core, many cases"
+TITLE = "derivatives, one core, many cases"
 
 CASES = evaluation.CASES
 TICKS = 200
 """Jacobians of a case that are timed together."""
+
+ABREAST = 128
+"""Cases whose periods are linearised together."""
 
 STEPS = 1000
 """Steps of the Panda's run that are timed together."""
@@ -119,10 +124,29 @@ def _panda() -> engine.Prepared:
     return engine.prepare(found)
 
 
-def _run(tangents: bool, *, jacobian: bool = False) -> Callable[[], float]:
+def _period(*, abreast: bool) -> Callable[[], float]:
+    """Milliseconds of the core for the map of a period of a case."""
+    experiment = _panda().experiment
+    laws = [each for each in input_signals(experiment.structure) if each.is_output]
+    program = PeriodProgram(experiment, laws)
+    begun = at_instants(program, engine.inputs(experiment, np.arange(ABREAST if abreast else 1)), STEPS, threads=1)
+    flows = [flow for flow in begun if flow is not None]
+
+    def measure() -> float:
+        begun = time.thread_time()
+        if abreast:
+            period_maps(program, flows)
+        else:
+            period_map(program, flows[0])
+        return (time.thread_time() - begun) * 1e3 / len(flows)
+
+    return measure
+
+
+def _run(tangents: bool) -> Callable[[], float]:
     prepared = _panda()
     inputs = engine.inputs(prepared.experiment, np.arange(CASES))
-    made = PeriodJacobians(PeriodProgram(prepared.experiment)).kernel if jacobian else prepared.kernel
+    made = prepared.kernel
     if tangents:
         recording = differentiated(prepared.recording, prepared.program.inputs, is_converter)
         made = kernel.from_recording(recording)
@@ -148,8 +172,7 @@ BENCHMARKS: tuple[Benchmark | Derived, ...] = (
     Benchmark("run.panda", "a step of the Panda's run", "ns", partial(_run, False)),
     Benchmark("direction.panda", "a step with its tangent along one direction", "ns", partial(_run, True)),
     ratio("direction.times.panda", "times the plain step", over="direction.panda", under="run.panda"),
-    Benchmark(
-        "step.panda", "a step with its whole Jacobian", "ns", partial(_run, False, jacobian=True), slow=True
-    ),
-    ratio("step.times.panda", "times the plain step", over="step.panda", under="run.panda", target=Target(5.0)),
+    Benchmark("period.panda", "the map of a period, of one case by itself", "ms", partial(_period, abreast=False)),
+    Benchmark("period.abreast.panda", "the same, of one of many side by side", "ms", partial(_period, abreast=True)),
+    ratio("period.times.panda", "times less", over="period.panda", under="period.abreast.panda"),
 )  # fmt: skip

@@ -1,14 +1,13 @@
 """Cases under way side by side, and their periods linearised at once: numbers are columns, of a row a case.
 
 The operations are those that one case by itself has (`flow`), rounded alike: a case has the same bits in any company.
-What is out of the ordinary in a case (an event, a kink that its memory stands on, a loop that it leaves at another
-turn) is no matter of this file: such a case is noted, and is to be looked at by itself.
+A case that an event comes to on the way is noted, and is to be looked at by itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -19,32 +18,54 @@ from met.trace.primitives import ARRAYS
 from met.trace.recording import Branch
 from met.trace.tangents import PRODUCTS, TangentSection
 
+Key = TypeVar("Key")
+
 EVENTS = frozenset({"crossing", *HANDS_OVER})
 """Loops that have a turn where something happens across which there is no derivative, by the cell that they go by."""
 
 SETTLED = 1e-12
 """Share of its numbers by which a turn of a loop changes them once they have settled."""
 
+MOST_ABREAST = 64
+"""Cases that are carried side by side: more take hardly less time each, and more memory."""
+
 
 class FlowAbreast(Flow):
     """The memories of several cases under way, cells by name: a float that all have, or a column [case, 1]; tangents of
     those that move, [direction] or [case, direction].
 
-    unusual  [case]: True of one that is to be looked at by itself; its numbers mean nothing from there on
+    unusual   [case]: True of one that is to be looked at by itself; its numbers mean nothing from there on
+    on_kink   [case]: True of one that stands on a kink on the way;  kinks: by the number of the section in the order of
+              the period, nodes of kinks with the cases that stand on them, [case, 1]
+    opposite  nodes, as `kinks` has them, that take the other side
     """
 
     def __init__(
         self, program: PeriodProgram, inputs: Mapping[str, Any], cells: Mapping[str, Any], tick: int, count: int
     ) -> None:
         super().__init__(program, inputs, cells, tick)
-        self.count = count
-        self.unusual = np.zeros(count, dtype=bool)
+        self.count, self.shape = count, (count,)
+        self.unusual, self.on_kink = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+        self.kinks: dict[int, dict[int, np.ndarray]] = {}
+        self.sections_run: list[int] = []
+        self._going = np.ones(count, dtype=bool)
         self._settles = False
 
-    def begin(self) -> None:
+    @classmethod
+    def of(cls, flows: Sequence[Flow]) -> FlowAbreast:
+        """Flows of one program at one tick, side by side, without their tangents."""
+        inputs, cells = _joined([each.inputs for each in flows]), _joined([each.cells for each in flows])
+        return cls(flows[0].program, inputs, cells, flows[0].tick, len(flows))
+
+    def case(self, place: int) -> Flow:
+        """A case by itself, without its tangents."""
+        inputs, cells = ({n: of_case(x, place) for n, x in some.items()} for some in (self.inputs, self.cells))
+        return Flow(self.program, inputs, cells, self.tick)
+
+    def begin_settled(self) -> None:
         """The start of a run, in which what goes round until it has settled goes no farther than that."""
         self._settles = True
-        super().begin()
+        self.begin()
         self._settles = False
 
     def begin_as(self, begun: Mapping[str, Any]) -> None:
@@ -55,21 +76,41 @@ class FlowAbreast(Flow):
 
     def run(self, number: int) -> None:
         """One section, of all cases."""
-        section = self.program.sections[number]
+        section, moves = self.program.sections[number], bool(self.tangents)
         with np.errstate(all="ignore"):
-            of = values_abreast(section, self._leaf, self.opposite.get(self._runs, frozenset()))
+            of = values_abreast(section, self._leaf, self.opposite.get(self._runs, {}), plain=not moves)
             cells = [(cell, of(ref)) for cell, ref in section.stores]
-            tangents = [(cell, of(ref)) for cell, ref in section.tangents]
-            if self.tangents:
-                for kink in section.kinks:
-                    self.unusual |= self._of_each(of(kink.sides[0]) == of(kink.sides[1])) & self._any(of(kink.move))
+            tangents = [(cell, of(ref)) for cell, ref in section.tangents] if moves else []
+            for kink in section.kinks if moves else ():
+                self._note(kink.nodes, self._of_each(of(kink.sides[0]) == of(kink.sides[1])) & self._any(of(kink.move)))
         for cell, value in cells:
             self.cells[cell] = value
             self.tangents.pop(cell, None)
         self.tangents.update({cell: move for cell, move in tangents if np.any(move != 0.0)})
-        if self._recording:
+        if self._recording and moves:
             self.row_tangents.update({column: of(ref) for column, ref in section.record_tangents})
+        self.sections_run.append(number)
         self._runs += 1
+
+    def _note(self, nodes: Sequence[int], stands: np.ndarray) -> None:
+        """Note the cases that stand on a kink, [case]."""
+        stands = stands & self._going & ~self.unusual
+        if stands.any():
+            self.on_kink |= stands
+            here = self.kinks.setdefault(self._runs, {})
+            here |= {node: stands[:, None] | here.get(node, False) for node in nodes}
+
+    def refuse(self, truth: Any, what: Callable[[], str]) -> None:
+        """Note the cases of which this is true as unusual."""
+        self.unusual |= self._of_each(truth)
+
+    def modes(self) -> dict[str, Any]:
+        """Modes of all that may have dry friction, as columns or numbers; 1 of what has none in a case."""
+        found = {}
+        for each in self.program.builder.step.sticking:
+            has, mode = each.level is not None or self.rubs(each) != 0.0, self.mode(each)
+            found[each.name] = np.where(has, mode, 1.0) if np.ndim(has) else mode if has else 1.0
+        return found
 
     def _of_each(self, truth: Any) -> np.ndarray:
         """A truth of each case, [case]."""
@@ -81,27 +122,79 @@ class FlowAbreast(Flow):
 
     def _loop(self, step: Branch) -> None:
         condition: Any = step.condition
+        outer = self._going
         for _ in range(condition.at_most):
-            goes = self._of_each(self.cells.get(condition.cell, 0.0) != 0.0)
+            goes = self._of_each(self.cells.get(condition.cell, 0.0) != 0.0) & outer & ~self.unusual
             if self.tangents and condition.cell in EVENTS:
                 self.unusual |= goes
-            usual = goes[~self.unusual]
-            if not usual.any():
                 break
-            self.unusual |= ~goes
-            before = dict(self.cells) if self._settles else {}
+            if not goes.any():
+                break
+            cells, tangents, self._going = dict(self.cells), dict(self.tangents), goes
             self._follow(step.body)
-            if before and all(_near(value, before.get(name)) for name, value in self.cells.items()):
+            if not goes.all():
+                self._stay(cells, tangents, goes[:, None])
+            if self._settles and all(_near(value, cells.get(name)) for name, value in self.cells.items()):
                 break
+        self._going = outer
+
+    def _stay(self, cells: Mapping[str, Any], tangents: Mapping[str, Any], goes: np.ndarray) -> None:
+        """The memory as it was before, of the cases that do not go round. goes: [case, 1]"""
+        several: tuple[tuple[Any, Mapping[str, Any]], ...]
+        several = (self.cells, cells), (self.tangents, tangents)
+        for now, before in several:
+            for name in now.keys() | before.keys():
+                new, old = now.get(name, 0.0), before.get(name, 0.0)
+                if new is not old:
+                    now[name] = np.where(goes, new, old)
+
+
+def together(flows: Sequence[Flow], go: Callable[[Flow], object]) -> list[Flow]:
+    """The flows, of one program at one tick, after something is done with each that needs no tangents."""
+    found = []
+    for at in range(0, len(flows), MOST_ABREAST):
+        moved = side_by_side(flows[at : at + MOST_ABREAST])
+        go(moved)
+        found += [moved.case(k) for k in range(moved.count)] if isinstance(moved, FlowAbreast) else [moved]
+    return found
+
+
+def side_by_side(flows: Sequence[Flow]) -> Flow:
+    """Flows of one program at one tick, without their tangents; of one flow a copy, which takes least time."""
+    return flows[0].copy(tangents=False) if len(flows) == 1 else FlowAbreast.of(flows)
+
+
+def alike(keys: Iterable[Key]) -> Iterator[tuple[Key, list[int]]]:
+    """Each key with the places where it stands, so few at a time as are carried side by side."""
+    places = dict[Key, list[int]]()
+    for place, key in enumerate(keys):
+        places.setdefault(key, []).append(place)
+    for key, of in places.items():
+        yield from ((key, of[at : at + MOST_ABREAST]) for at in range(0, len(of), MOST_ABREAST))
+
+
+def of_case(value: Any, place: int) -> float:
+    """The number of a case, of one that all have or a column."""
+    return float(value[place, 0]) if np.ndim(value) else float(value)
+
+
+def _joined(several: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+    """Numbers of cases by name: a float where all have the same bits, else a column."""
+    names = list(dict.fromkeys(name for each in several for name in each))
+    table = np.array([[each.get(name, 0.0) for name in names] for each in several], dtype=np.float64)
+    bits = table.view(np.int64)
+    alike = np.all(bits == bits[0], axis=0).tolist()
+    return {name: float(table[0, k]) if alike[k] else table[:, k : k + 1].copy() for k, name in enumerate(names)}
 
 
 def values_abreast(
-    section: TangentSection, leaf: Callable[[Node], Any], opposite: Collection[int] = ()
+    section: TangentSection, leaf: Callable[[Node], Any], opposite: Mapping[int, np.ndarray], *, plain: bool
 ) -> Callable[[int], Any]:
-    """The worth of each reference of a section, as `met.trace.tangents.values` has it, where numbers may be columns."""
+    """The worth of each reference of a section, as `met.trace.tangents.values` has it, where numbers may be columns.
+    opposite: of nodes that take the other side, the cases in which they do, [case, 1]"""
     nodes = section.nodes
     found: list[Any] = [None] * len(nodes)
-    for i in section.order:
+    for i in section.plain_order if plain else section.order:
         node = nodes[i]
         op, count = node[0], OPERANDS[node[0]]
         if count == 0:
@@ -118,7 +211,7 @@ def values_abreast(
         of_columns = op != "fma" and (several if op != "where" else operands[0].__class__ is np.ndarray)
         value = (ARRAYS if of_columns else PRODUCTS)[op](*operands, *node[1 + count :])
         if i in opposite:
-            value = _not(value) if op in TRUTHS else -value
+            value = np.where(opposite[i], _not(value) if op in TRUTHS else -value, value)
         found[i] = value
 
     def value_of(ref: int) -> Any:

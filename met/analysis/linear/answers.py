@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -12,10 +12,10 @@ import numpy as np
 from met import run as engine
 from met.analysis.linear.creeping import CreepingRate, creeping
 from met.analysis.linear.flow import Flow
-from met.analysis.linear.jacobian import PeriodMap, at_instant, period_map
+from met.analysis.linear.jacobian import PeriodMap, at_instants, failed, period_maps
 from met.analysis.linear.margins import FARTHEST, STABLE, LoopMargins, ScalarLoop, comes_back, gain_limits, margins
 from met.analysis.linear.period import PeriodProgram
-from met.analysis.linear.plant import PlantModel, plant
+from met.analysis.linear.plant import PlantModel, plants
 from met.analysis.linear.standing import moves, refusal, settled, standing, weak
 from met.diagnostic import Problem, error
 from met.frozen import frozen
@@ -26,6 +26,9 @@ from met.plan.linear_signals import InputSignal, input_signals
 
 MOST_TICKS = 5000
 """Ticks of the base rate in a period, at most: each takes some 10 ms."""
+
+MOST_TOGETHER = 256
+"""Cases that are run up to an instant together, so that their memory fits beside all else."""
 
 SETTLED = 1e-12
 """Size of a pole, of a period, up to which nothing is left of it after one."""
@@ -203,31 +206,57 @@ class LinearQuestion:
         """The loops that are opened, each by the signals at which it is: those of `opened`, and all of them at once."""
         return [(path,) for path in self.opened] + ([self.opened] if len(self.opened) > 1 else [])
 
-    def lifted(self, flow: Flow) -> LiftedPeriod:
-        """The map of the period that begins where a flow of `program` stands. Raises Problem D370."""
-        found = period_map(self.program, flow)
-        kept = _kept(self.program, found)
-        states = tuple(found.states[place] for place in kept)
-        return LiftedPeriod(
-            found.A[np.ix_(kept, kept)], found.B[kept], found.C[:, kept], found.Wx[:, kept], found.Wu, states,
-            self.program, found,
-        )  # fmt: skip
+    def flows(self, given: np.ndarray, threads: int | None = None) -> list[Flow | None]:
+        """Cases where the answer's period begins, as the run has them; None of one that has failed before. given: the
+        program's inputs, [case, input]"""
+        return at_instants(self.program, given, self.program.begin(self.at), threads)
+
+    def lifted(self, flows: Sequence[Flow]) -> list[LiftedPeriod | Problem]:
+        """The maps of the periods that begin where flows of `program` stand; the Problem D370 of one across an event"""
+        return [
+            found if isinstance(found, Problem) else _lifted(self.program, found)
+            for found in period_maps(self.program, flows)
+        ]
 
     def of(self, case: int) -> Linearized:
         """The answers about a row of the case table. Raises Problem D370 where an event is in the period, D371 where
-        the run has failed before, D377 where the arm does
-        not stand, and as `program` does."""
-        program, inputs = self.program, self.inputs
-        flow = at_instant(program, case, program.begin(self.at))
-        if self.stands:
-            solved = settled(program, flow)
-            if solved is None:
-                too_weak = weak(self.experiment, engine.inputs(self.experiment, np.array([case])))[0]
-                raise refusal(self.experiment, too_weak or moves(program, flow))
-            flow = solved
-        slow, tick = creeping(flow), flow.tick
-        lifted = self.lifted(flow)
-        found, states = lifted.found, lifted.states
+        the run has failed before, D377 where the arm does not stand, and as `program` does."""
+        (found,) = self.of_cases([case])
+        if isinstance(found, Problem):
+            raise found
+        return found
+
+    def of_cases(self, rows: Sequence[int]) -> Iterator[Linearized | Problem]:
+        """What `of` returns or raises of each of these rows, of the same bits. Raises Problem as `program` does."""
+        for at in range(0, len(rows), MOST_TOGETHER):
+            some = rows[at : at + MOST_TOGETHER]
+            given = engine.inputs(self.experiment, np.array(some))
+            stand, refused = list[Flow](), dict[int, Problem]()
+            begun = self.flows(given)
+            solved = iter(settled(self.program, [each for each in begun if each]) if self.stands else begun)
+            for place, flow in enumerate(begun):
+                stood = None if flow is None else next(solved)
+                if flow is None:
+                    refused[place] = failed(self.experiment, self.program.begin(self.at))
+                elif stood is None:
+                    too_weak = weak(self.experiment, given[place : place + 1])[0]
+                    refused[place] = refusal(self.experiment, too_weak or moves(self.program, flow))
+                else:
+                    stand.append(stood)
+            answers = iter(self._answers([case for k, case in enumerate(some) if k not in refused], stand))
+            yield from (refused[k] if k in refused else next(answers) for k in range(len(some)))
+
+    def _answers(self, cases: Sequence[int], flows: Sequence[Flow]) -> Iterator[Linearized | Problem]:
+        """The answers about cases where their flows stand, or why there are none."""
+        found = self.lifted(flows)
+        there = [(flow, each) for flow, each in zip(flows, found, strict=True) if not isinstance(each, Problem)]
+        own = [flow for flow, _ in there]
+        more = zip(creeping(own), plants(self.program, own, [each.states for _, each in there]), strict=True)
+        for case, lifted in zip(cases, found, strict=True):
+            yield lifted if isinstance(lifted, Problem) else self._answer(case, lifted, *next(more))
+
+    def _answer(self, case: int, lifted: LiftedPeriod, slow: tuple[CreepingRate, ...], plant: PlantModel) -> Linearized:
+        program, inputs, found = self.program, self.inputs, lifted.found
         paths = [program.inputs[each.entry].path for each in found.ticks]
 
         def summed(columns: np.ndarray) -> np.ndarray:
@@ -235,11 +264,21 @@ class LinearQuestion:
             return np.array(own).T.reshape(len(columns), len(inputs))
 
         return Linearized(
-            self.experiment.name, case, tick / program.schedule.base_hz, found.seconds, states, inputs,
-            found.outputs, lifted.A, summed(lifted.B), lifted.C, summed(found.D), plant(program, flow, states),
+            self.experiment.name, case, found.tick / program.schedule.base_hz, found.seconds, lifted.states, inputs,
+            found.outputs, lifted.A, summed(lifted.B), lifted.C, summed(found.D), plant,
             tuple(lifted.opened(each) for each in self.loops), found.held, slow, found.at_limit,
             {name: program.joint_of(name) for name in program.states}, self.stands, found.locked,
         )  # fmt: skip
+
+
+def _lifted(program: PeriodProgram, found: PeriodMap) -> LiftedPeriod:
+    """A period's map, of those states that act on something."""
+    kept = _kept(program, found)
+    states = tuple(found.states[place] for place in kept)
+    return LiftedPeriod(
+        found.A[np.ix_(kept, kept)], found.B[kept], found.C[:, kept], found.Wx[:, kept], found.Wu, states,
+        program, found,
+    )  # fmt: skip
 
 
 def linear(

@@ -45,7 +45,7 @@ class BedLoop:
         rate = 0.5 * motor.tau_max * motor.resistance / (motor.kt * motor.kt * motor.ratio)
         inputs = {**given, ARM: 1.0, RATE: float(rate)}
         begun = FlowAbreast(self.program, inputs, {}, 0, 1)
-        begun.begin()
+        begun.begin_settled()
         return CaseLoop(self.program, inputs, begun.cells, float(motor.ratio * motor.ratio * motor.inertia))
 
 
@@ -73,7 +73,7 @@ class CaseLoop:
         found = np.stack([np.broadcast_to(flow.tangent(name), (len(arms), n)) for name in names], axis=1)
         act = np.flatnonzero(np.any(found != np.eye(n), axis=(0, 1)))
         found = found[:, act][:, :, act]
-        found[flow.unusual] = np.nan
+        found[flow.unusual | flow.on_kink] = np.nan
         return found, tuple(names[place] for place in act)
 
     def radii(self, ratios: Sequence[float]) -> np.ndarray:

@@ -7,7 +7,10 @@ run tells it from rest by nothing else.
 
 from __future__ import annotations
 
-from met.analysis.linear.flow import Flow
+from collections.abc import Sequence
+
+from met.analysis.linear.abreast import together
+from met.analysis.linear.flow import Flow, derive
 from met.frozen import frozen
 from met.plan.channel import joint_unit
 from met.program import cell_names
@@ -23,32 +26,30 @@ class CreepingRate:
     unit: str
 
 
-def creeping(flow: Flow) -> tuple[CreepingRate, ...]:
-    """Joints that creep where a flow stands, before its computers tick there."""
-    now = flow.copy()
-    now.ticks()
-    program = now.program
-    step = program.schedule.dynamics / program.schedule.base_hz
-    found = []
-    for each in program.builder.step.sticking:
-        mode = now.modes().get(each.name, 0.0)
-        rate = now.cells[each.cell]
-        if mode == 0.0 or rate == 0.0:
-            continue
-        slowing = 0.5 * abs(_slope(now, each, mode) - _slope(now, each, -mode))
-        if abs(rate) < slowing * step:
-            found.append(CreepingRate(each.name, rate, _unit(now, each)))
-    return tuple(found)
+def creeping(flows: Sequence[Flow]) -> list[tuple[CreepingRate, ...]]:
+    """Joints that creep where each of these flows stands, before its computers tick there."""
+    after, found = together(flows, Flow.ticks), [list[CreepingRate]() for _ in flows]
+    program = flows[0].program if flows else None
+    for each in program.builder.step.sticking if program else ():
+        modes = {k: now.modes().get(each.name, 0.0) for k, now in enumerate(after) if now.cells[each.cell] != 0.0}
+        slides = [k for k, mode in modes.items() if mode != 0.0]
+        on = _slopes([after[k] for k in slides], each, [modes[k] for k in slides])
+        back = _slopes([after[k] for k in slides], each, [-modes[k] for k in slides])
+        for k, a, b in zip(slides, on, back, strict=True):
+            now, schedule = after[k], after[k].program.schedule
+            rate, slowing = now.cells[each.cell], 0.5 * abs(a - b)
+            if abs(rate) < slowing * schedule.dynamics / schedule.base_hz:
+                found[k].append(CreepingRate(each.name, rate, _unit(now, each)))
+    return [tuple(of) for of in found]
 
 
-def _slope(flow: Flow, each: Sticking, mode: float) -> float:
-    """d(rate)/dt with this mode of its friction."""
-    tried = flow.copy()
-    tried.tangents = {}
-    tried.cells[cell_names.FRICTION_MODE(each.name)] = mode
-    (number,) = (k for k, section in enumerate(flow.program.recording.sections) if section.name == "derive")
-    tried.run(number)
-    return tried.cells[cell_names.SLOPE(each.name) if each.state else f"{each.name}.qdd"]
+def _slopes(flows: Sequence[Flow], each: Sticking, modes: Sequence[float]) -> list[float]:
+    """d(rate)/dt with these modes of its friction, where flows stand."""
+    tried = [flow.copy(tangents=False) for flow in flows]
+    for flow, mode in zip(tried, modes, strict=True):
+        flow.cells[cell_names.FRICTION_MODE(each.name)] = mode
+    cell = cell_names.SLOPE(each.name) if each.state else f"{each.name}.qdd"
+    return [flow.cells[cell] for flow in together(tried, derive)]
 
 
 def _unit(flow: Flow, each: Sticking) -> str:

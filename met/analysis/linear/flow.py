@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from met.analysis.linear.period import PeriodProgram
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.program import cell_names
+from met.program.sticking import Sticking
 from met.program.system import Actuator
 from met.program.values import NamedValues, answer
 from met.servos.servo import JointMotion
@@ -53,6 +54,9 @@ class Edge:
 class Flow:
     """The memory of a case under way, cells by name: numbers, and tangents of those that move, [direction]."""
 
+    shape: tuple[int, ...] = ()
+    """The dimensions of cases, before those of a tangent."""
+
     def __init__(
         self, program: PeriodProgram, inputs: Mapping[str, float], cells: Mapping[str, float], tick: int
     ) -> None:
@@ -60,15 +64,14 @@ class Flow:
         self.program, self.inputs, self.tick = program, inputs, tick
         self.cells: dict[str, float] = dict(cells)
         self.tangents: dict[str, np.ndarray] = {}
-        self.rows: dict[int, float] = {}
         self.row_tangents: dict[int, np.ndarray] = {}
         self.edges: list[Edge] = []
-        self.opposite: Mapping[int, frozenset[int]] = {}
+        self.opposite: Mapping[int, Any] = {}
         self._recording, self._runs = False, 0
 
-    def copy(self) -> Flow:
+    def copy(self, *, tangents: bool = True) -> Flow:
         made = Flow(self.program, self.inputs, self.cells, self.tick)
-        made.tangents = dict(self.tangents)
+        made.tangents = dict(self.tangents) if tangents else {}
         return made
 
     def begin(self) -> None:
@@ -85,6 +88,12 @@ class Flow:
         self._recording = recording
         self._follow(self.program.rest)
         self._recording = False
+
+    def period(self) -> None:
+        """All ticks and steps of a period."""
+        for _ in range(self.program.ticks):
+            self.ticks()
+            self.finish()
 
     def locked(self) -> tuple[str, ...]:
         """Joints at rest that a servo without a law keeps there for the whole period that begins here, whatever the arm
@@ -113,12 +122,12 @@ class Flow:
 
     def run(self, number: int) -> None:
         """One section."""
-        section = self.program.sections[number]
+        section, moves = self.program.sections[number], bool(self.tangents)
         with np.errstate(all="ignore"):
-            of = values(section, self._leaf, self.opposite.get(self._runs, frozenset()))
+            of = values(section, self._leaf, self.opposite.get(self._runs, frozenset()), plain=not moves)
         cells = [(cell, float(of(ref))) for cell, ref in section.stores]
-        tangents = [(cell, of(ref)) for cell, ref in section.tangents]
-        if self.tangents:
+        tangents = [(cell, of(ref)) for cell, ref in section.tangents] if moves else []
+        if moves:
             for kink in section.kinks:
                 a, b = kink.sides
                 if of(a) == of(b) and np.any(of(kink.move) != 0.0):
@@ -127,8 +136,7 @@ class Flow:
             self.cells[cell] = value
             self.tangents.pop(cell, None)
         self.tangents.update({cell: move for cell, move in tangents if np.any(move != 0.0)})
-        if self._recording:
-            self.rows.update({column: float(of(ref)) for column, ref in section.records})
+        if self._recording and moves:
             self.row_tangents.update({column: of(ref) for column, ref in section.record_tangents})
         self._runs += 1
 
@@ -175,12 +183,16 @@ class Flow:
 
     def modes(self) -> dict[str, float]:
         """Modes of all that has dry friction in this case, by the name of a joint or a servo's state: 0 sticks."""
-        step = self.program.builder.step
-        found = {}
-        for each in step.sticking:
-            if each.level is not None or self.cells.get(cell_names.HAS_FRICTION(each.name), 0.0) != 0.0:
-                found[each.name] = self.cells.get(cell_names.FRICTION_MODE(each.name), 0.0)
-        return found
+        sticking = self.program.builder.step.sticking
+        return {each.name: self.mode(each) for each in sticking if each.level is not None or self.rubs(each) != 0.0}
+
+    def rubs(self, each: Sticking) -> float:
+        """Not 0 where a joint or a servo's state, whose friction is a parameter, has dry friction in this case."""
+        return self.cells.get(cell_names.HAS_FRICTION(each.name), 0.0)
+
+    def mode(self, each: Sticking) -> float:
+        """The mode of what has dry friction: 0 sticks."""
+        return self.cells.get(cell_names.FRICTION_MODE(each.name), 0.0)
 
     def _rate(self, name: str) -> float:
         return next(self.cells[each.cell] for each in self.program.builder.step.sticking if each.name == name)
@@ -194,6 +206,11 @@ class Flow:
         do nothing, and a command comes to its own by time alone."""
         uses = [use for use in self.program.builder.limits.uses if use.channels or use.owner]
         return {use.path: self.cells.get(cell_names.AT_LIMIT(use.path), 0.0) for use in uses}
+
+    def refuse(self, truth: Any, what: Callable[[], str]) -> None:
+        """Raise the Problem of an event where this is true. what: gives the event, in words"""
+        if truth:
+            raise self.event(what())
 
     def event(self, what: str, tick: int | None = None) -> Problem:
         """The refusal of a derivative across an event, at a tick, or where the memory stands."""
@@ -221,3 +238,9 @@ def listed(names: list[str]) -> str:
 def added(path: str) -> str:
     """The cell of what is added to an input."""
     return ADDED + path
+
+
+def derive(flow: Flow) -> None:
+    """The slopes of the arm where a flow stands."""
+    (number,) = (k for k, section in enumerate(flow.program.recording.sections) if section.name == "derive")
+    flow.run(number)

@@ -7,13 +7,15 @@ where the memory stands on a kink whose other side has another derivative.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial, reduce
+from operator import and_, or_
 from typing import Any
 
 import numpy as np
 
 from met import run as engine
+from met.analysis.linear.abreast import FlowAbreast, alike, of_case, together
 from met.analysis.linear.flow import Edge, Flow, added, listed
 from met.analysis.linear.period import PeriodProgram
 from met.analysis.linear.shafts import held_rates
@@ -21,9 +23,6 @@ from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.passing import run_past
 from met.plan import Experiment
-
-ABREAST = 256
-"""Cases that are run up to an instant side by side, so that their memory fits beside all else."""
 
 SAME = 1e-9
 """Share of the largest number of its row by which the derivatives of two sides may differ and be one."""
@@ -75,38 +74,26 @@ def at_instant(program: PeriodProgram, case: int, tick: int) -> Flow:
     return flow
 
 
-def at_instants(
-    program: PeriodProgram, given: np.ndarray, tick: int, threads: int | None = None
-) -> Iterator[Flow | None]:
-    """Cases at an instant, one after the other; None for one that has failed before. given: the program's inputs,
-    [case, input]."""
+def at_instants(program: PeriodProgram, given: np.ndarray, tick: int, threads: int | None = None) -> list[Flow | None]:
+    """Cases at an instant; None of one that has failed before. given: the program's inputs, [case, input]."""
     prepared = program.prepared
-    failure, cells = prepared.program.outputs.index("failure"), prepared.recording.cells
-    for at in range(0, len(given), ABREAST):
-        some = given[at : at + ABREAST]
-        if tick:
-            _, outputs, memory = run_past(
-                prepared.kernel, some, tick - 1, [tick - 1], record=False, threads=threads
-            )  # fmt: skip
-        for place, row in enumerate(some):
-            inputs = dict(zip(prepared.program.inputs, row.tolist(), strict=True))
-            if not tick:
-                flow = Flow(program, inputs, {}, 0)
-                flow.begin()
-                yield flow
-            elif outputs[place, failure] != 0.0:
-                yield None
-            else:
-                yield _gone_on(program, inputs, dict(zip(cells, memory[place, 0].tolist(), strict=True)), tick)
-
-
-def _gone_on(program: PeriodProgram, inputs: Mapping[str, float], cells: Mapping[str, float], tick: int) -> Flow:
-    """The flow from a memory at the end of the tick before, to where the step is finished that ends at this one."""
-    if lost := program.remembered - cells.keys():
+    inputs = [dict(zip(prepared.program.inputs, row, strict=True)) for row in given.tolist()]
+    if not tick:
+        return [*together([Flow(program, each, {}, 0) for each in inputs], Flow.begin)]
+    _, outputs, memory = run_past(
+        prepared.kernel, given, tick - 1, [tick - 1], record=False, threads=threads
+    )  # fmt: skip
+    cells = prepared.recording.cells
+    if len(given) and (lost := program.remembered - set(cells)):
         raise ValueError(f"the run keeps no {sorted(lost)}, which a period begins with")
-    flow = Flow(program, inputs, cells, tick - 1)
-    flow.finish()
-    return flow
+    done = np.flatnonzero(outputs[:, prepared.program.outputs.index("failure")] == 0.0).tolist()
+    before = [
+        Flow(program, inputs[k], dict(zip(cells, memory[k, 0].tolist(), strict=True)), tick - 1) for k in done
+    ]  # fmt: skip
+    found: list[Flow | None] = [None] * len(given)
+    for place, flow in zip(done, together(before, Flow.finish), strict=True):
+        found[place] = flow
+    return found
 
 
 def failed(experiment: Experiment, tick: int) -> Problem:
@@ -124,98 +111,180 @@ def failed(experiment: Experiment, tick: int) -> Problem:
 
 def period_map(program: PeriodProgram, flow: Flow) -> PeriodMap:
     """The linearised period that begins where the flow stands. Raises Problem D370 where an event is on the way."""
-    start = flow.copy()
-    flow = start.copy()
-    flow.ticks()
-    locked = start.locked()
-    rates = held_rates(start)
-    held = (*(name for name, mode in flow.modes().items() if mode == 0.0), *rates.values(), *locked)
-    if going := flow.breaking_away():
-        raise flow.event(f"{listed(going)} {'breaks' if len(going) == 1 else 'break'} away")
-    stuck = {f"{name}.{part}" for name in held for part in ("q", "qd")} | {*held, *rates}
-    states = tuple(name for name in program.states if name not in stuck)
-    ticks = tuple(
-        InputTick(number, after)
-        for number, each in enumerate(program.inputs)
-        for after in range(0, program.ticks, each.divisor)
-    )
-    carried = partial(_carried, program, start, states, ticks)
+    after = flow.copy()
+    after.ticks()
+    held = _held(flow, after)
+    carried = partial(_carried, flow.copy, held.states)
     found = carried({})
-    if found.edges:
+    if found.flow.edges:
         _refuse_kinks(found, carried)
-    for each in (found.A, found.C, found.Wx, found.B, found.D, found.Wu):
-        if not np.isfinite(each).all():
-            raise start.event("a derivative is no number")
-    return PeriodMap(
-        start.tick, program.seconds, states, ticks, program.columns,
-        found.A, found.B, found.C, found.D, found.Wx, found.Wu, held, found.at_limit, locked,
-    )  # fmt: skip
+    if not found.finite:
+        raise flow.event("a derivative is no number")
+    return found.map_of(held)
+
+
+def period_maps(program: PeriodProgram, flows: Sequence[Flow]) -> list[PeriodMap | Problem]:
+    """The linearised periods that begin where these flows stand, all at one tick: what `period_map` returns or raises
+    of each, to the bit. They are carried side by side, those in which the same is held; what an event or a kink is in
+    the way of is looked at by itself."""
+    found: list[PeriodMap | Problem | None] = [None] * len(flows)
+    helds = list[_Held | None]()
+    for place, (flow, after) in enumerate(zip(flows, together(flows, Flow.ticks), strict=True)):
+        try:
+            helds.append(_held(flow, after))
+        except Problem as refused:
+            helds.append(None)
+            found[place] = refused
+    for states, places in alike(None if each is None else each.states for each in helds):
+        if states is not None and len(places) > 1:
+            maps = _side_by_side([flows[k] for k in places], states, [held for k in places if (held := helds[k])])
+            for place, each in zip(places, maps, strict=True):
+                found[place] = each
+    return [_by_itself(program, flow) if each is None else each for flow, each in zip(flows, found, strict=True)]
+
+
+def _side_by_side(flows: Sequence[Flow], states: tuple[str, ...], helds: Sequence[_Held]) -> Iterator[PeriodMap | None]:
+    """The maps of flows in which the same is held; None of one that is to be looked at by itself."""
+    carried = partial(_carried, partial(FlowAbreast.of, flows), states)
+    found = carried({})
+    flow: Any = found.flow
+    unusual = flow.unusual | ~found.finite
+    if flow.on_kink.any():
+        other = carried(flow.kinks)
+        # of one that jumps at a kink others may be led another way: its kinks are then not those of the other side
+        led: Any = other.flow
+        astray = led.unusual | (led.sections_run != flow.sections_run)
+        unusual = unusual | (flow.on_kink & (astray | found.differs(other)))
+    for place, held in enumerate(helds):
+        yield None if unusual[place] else found.map_of(held, place)
+
+
+def _by_itself(program: PeriodProgram, flow: Flow) -> PeriodMap | Problem:
+    try:
+        return period_map(program, flow)
+    except Problem as refused:
+        return refused
+
+
+@frozen
+class _Held:
+    """What is held in a case where a period begins, the joints that are locked among it, and what is then a state."""
+
+    held: tuple[str, ...]
+    locked: tuple[str, ...]
+    states: tuple[str, ...]
+
+
+def _held(start: Flow, after: Flow) -> _Held:
+    """What is held where a period begins. after: its first ticks. Raises Problem where something breaks away."""
+    locked, rates = start.locked(), held_rates(start)
+    held = (*(name for name, mode in after.modes().items() if mode == 0.0), *rates.values(), *locked)
+    if going := after.breaking_away():
+        raise after.event(f"{listed(going)} {'breaks' if len(going) == 1 else 'break'} away")
+    stuck = {f"{name}.{part}" for name in held for part in ("q", "qd")} | {*held, *rates}
+    return _Held(held, locked, tuple(name for name in start.program.states if name not in stuck))
 
 
 @frozen
 class _Carried:
-    """A period carried out with tangents, as `PeriodMap` has them; edges: the kinks that it stood on."""
+    """A period carried out with tangents, as `PeriodMap` has them; of a `FlowAbreast` [case, ...] each.
 
+    at_limit  paths of limits, with the number of steps that begin at them;  flow: at the end
+    """
+
+    tick: int
+    states: tuple[str, ...]
+    ticks: tuple[InputTick, ...]
     A: np.ndarray
     B: np.ndarray
     C: np.ndarray
     D: np.ndarray
     Wx: np.ndarray
     Wu: np.ndarray
-    at_limit: tuple[str, ...]
-    edges: tuple[Edge, ...]
+    at_limit: Mapping[str, Any]
     flow: Flow
 
-    def differs(self, other: _Carried) -> bool:
-        pairs = ((self.A, other.A), (self.B, other.B), (self.C, other.C), (self.Wx, other.Wx), (self.Wu, other.Wu))
-        for a, b in pairs:
-            largest = np.max(np.abs(a), axis=1, keepdims=True, initial=0.0)
-            if not np.all(np.abs(a - b) <= SAME * np.maximum(largest, 1e-300)):
-                return True
-        return False
+    def _matrices(self) -> tuple[np.ndarray, ...]:
+        return self.A, self.B, self.C, self.Wx, self.Wu, self.D
+
+    @property
+    def finite(self) -> Any:
+        """True where all are numbers."""
+        return reduce(and_, (np.isfinite(each).all((-2, -1)) for each in self._matrices()))
+
+    def differs(self, other: _Carried) -> Any:
+        """True where a derivative is another, of states, of what comes to inputs, or of outputs by states."""
+        *pairs, _ = zip(self._matrices(), other._matrices(), strict=True)
+        return reduce(or_, (_differ(a, b) for a, b in pairs))
+
+    def map_of(self, held: _Held, place: int | None = None) -> PeriodMap:
+        """The map, of a `FlowAbreast` that of the case at a place."""
+        program, own = self.flow.program, [each if place is None else each[place] for each in self._matrices()]
+        A, B, C, Wx, Wu, D = own
+        at_limit = tuple(path for path, steps in self.at_limit.items() if of_case(steps, place or 0))
+        return PeriodMap(
+            self.tick, program.seconds, self.states, self.ticks, program.columns, A, B, C, D, Wx, Wu,
+            held.held, at_limit, held.locked,
+        )  # fmt: skip
 
 
-def _carried(
-    program: PeriodProgram,
-    start: Flow,
-    states: Sequence[str],
-    ticks: Sequence[InputTick],
-    opposite: Mapping[int, frozenset[int]],
-) -> _Carried:
-    flow, n, m = start.copy(), len(states), len(ticks)
-    unit = np.eye(n + m)
+def _differ(a: np.ndarray, b: np.ndarray) -> Any:
+    """True where some entry of two matrices differs by more than a rounding error of its row."""
+    largest = np.max(np.abs(a), axis=-1, keepdims=True, initial=0.0)
+    return ~np.all(np.abs(a - b) <= SAME * np.maximum(largest, 1e-300), axis=(-2, -1))
+
+
+def _carried(begin: Callable[[], Flow], states: tuple[str, ...], opposite: Mapping[int, Any]) -> _Carried:
+    """A period from where a flow begins. opposite: as the flow has it"""
+    flow = begin()
+    program, tick, n = flow.program, flow.tick, len(states)
+    ticks = tuple(
+        InputTick(number, after)
+        for number, each in enumerate(program.inputs)
+        for after in range(0, program.ticks, each.divisor)
+    )
+    width = n + len(ticks)
+    unit = np.eye(width)
     flow.opposite = opposite
-    flow.tangents = seeds(program, flow, states, n + m)
-    W, modes, limits = np.zeros((m, n + m)), None, list[dict[str, float]]()
+    flow.tangents = seeds(program, flow, states, width)
+    W: list[Any] = [0.0] * len(ticks)
+    modes: dict[str, float] | None = None
+    at_limit, steps = dict[str, Any](), 0
     for after in range(program.ticks):
         for place, each in enumerate(ticks):
-            cell = added(program.inputs[each.entry].path)
             if each.after == after:
-                flow.tangents[cell] = unit[n + place]
+                flow.tangents[added(program.inputs[each.entry].path)] = unit[n + place]
         flow.ticks(recording=after == 0)
         for place, each in enumerate(ticks):
             path = program.inputs[each.entry].path
             if each.after == after:
                 flow.tangents.pop(added(path))
                 W[place] = flow.tangent(path)
-        if modes is None:
-            modes = flow.modes()
-        elif flow.modes() != modes:
-            now = flow.modes()
-            changed = [f"`{name}` {_became(now[name])}" for name in now if now[name] != modes.get(name)]
-            raise flow.event(", ".join(changed))
+        now = flow.modes()
+        modes = now if modes is None else modes
+        flow.refuse(reduce(or_, (now[name] != modes[name] for name in now), False), partial(_changed, now, modes))
         before = flow.limits()
         flow.finish()
-        limits.append({path: count - before[path] for path, count in flow.limits().items()})
-        limits[-1] = limits[-1] if flow.tick % program.schedule.dynamics == 0 else {}
-    at_limit = _at_all(flow, [each for each in limits if each])
-    ends = end_tangents(program, flow, states, n + m)
-    rows = np.zeros((len(program.columns), n + m))
-    for column, move in flow.row_tangents.items():
-        rows[column] = move
+        if flow.tick % program.schedule.dynamics == 0:
+            steps += 1
+            for path, count in flow.limits().items():
+                at_limit[path] = at_limit.get(path, 0) + (count - before[path] > 0.0)
+    for path, count in at_limit.items():
+        flow.refuse((count > 0) & (count < steps), partial("`{}` is reached or left".format, path))
+    ends = end_tangents(program, flow, states, width)
+    rows = tangent_rows(flow, [flow.row_tangents.get(column, 0.0) for column in range(len(program.columns))], width)
+    own = tangent_rows(flow, W, width)
     return _Carried(
-        ends[:, :n], ends[:, n:], rows[:, :n], rows[:, n:], W[:, :n], W[:, n:], at_limit, tuple(flow.edges), flow
-    )
+        tick, states, ticks, ends[..., :n], ends[..., n:], rows[..., :n], rows[..., n:], own[..., :n], own[..., n:],
+        at_limit, flow,
+    )  # fmt: skip
+
+
+def tangent_rows(flow: Flow, moves: Sequence[Any], width: int) -> np.ndarray:
+    """Tangents as rows, [row, direction], of a `FlowAbreast` [case, row, direction]. A zero has no sign, by which else
+    it might be seen which cases were carried together."""
+    rows = [np.broadcast_to(move, (*flow.shape, width)) for move in moves]
+    return np.stack(rows, axis=-2) + 0.0 if rows else np.zeros((*flow.shape, 0, width))
 
 
 def seeds(program: PeriodProgram, flow: Flow, states: Sequence[str], width: int) -> dict[str, np.ndarray]:
@@ -223,46 +292,41 @@ def seeds(program: PeriodProgram, flow: Flow, states: Sequence[str], width: int)
     unit, found = np.eye(len(states), width), dict[str, np.ndarray]()
     places = {name: unit[place] for place, name in enumerate(states)}
     for body in program.bodies:
-        turns = np.array([places[f"{name}.q"] for name in body.coordinates[3:]])
+        a, b, c = (places[f"{name}.q"] for name in body.coordinates[3:])
         w, x, y, z = (flow.cells[cell] for cell in body.orientation)
-        moves = 0.5 * np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]]) @ turns
-        found |= dict(zip(body.orientation, moves, strict=True))
+        moves = (-x * a - y * b - z * c, w * a - z * b + y * c, z * a + w * b - x * c, x * b - y * a + w * c)
+        found |= {cell: 0.5 * move for cell, move in zip(body.orientation, moves, strict=True)}
     found |= {name: move for name, move in places.items() if name not in program.turns}
     return found
 
 
 def end_tangents(program: PeriodProgram, flow: Flow, states: Sequence[str], width: int) -> np.ndarray:
-    """The tangents of the states where a flow stands: [state, direction]."""
+    """The tangents of the states where a flow stands: [state, direction], of a `FlowAbreast` [case, ...]."""
     found: dict[str, Any] = {name: flow.tangent(name) for name in states}
     for body in program.bodies:
-        moves = np.array([np.broadcast_to(flow.tangent(cell), width) for cell in body.orientation])
+        a, b, c, d = (flow.tangent(cell) for cell in body.orientation)
         w, x, y, z = (flow.cells[cell] for cell in body.orientation)
-        turns = 2.0 * np.array([[-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w]]) @ moves
-        found |= {f"{name}.q": turn for name, turn in zip(body.coordinates[3:], turns, strict=True)}
-    return np.array([np.broadcast_to(found[name], width) for name in states]).reshape(len(states), width)
+        turns = (w * b - x * a + z * c - y * d, w * c - y * a - z * b + x * d, y * b - z * a - x * c + w * d)
+        found |= {f"{name}.q": 2.0 * turn for name, turn in zip(body.coordinates[3:], turns, strict=True)}
+    return tangent_rows(flow, [found[name] for name in states], width)
+
+
+def _changed(now: Mapping[str, float], before: Mapping[str, float]) -> str:
+    return ", ".join(f"`{name}` {_became(now[name])}" for name in now if now[name] != before[name])
 
 
 def _became(mode: float) -> str:
     return "comes to rest" if mode == 0.0 else "breaks away"
 
 
-def _at_all(flow: Flow, limits: Sequence[Mapping[str, float]]) -> tuple[str, ...]:
-    """The limits at which every step of the period begins. Raises Problem where one is reached or left within it."""
-    counts = {path: sum(each[path] > 0.0 for each in limits) for path in (limits[0] if limits else ())}
-    for path, count in counts.items():
-        if 0 < count < len(limits):
-            raise flow.event(f"`{path}` is reached or left")
-    return tuple(path for path, count in counts.items() if count)
-
-
 def _refuse_kinks(found: _Carried, carried: Any) -> None:
     """Raises Problem where the derivative is another from the other side of a kink that the memory stands on."""
-    if not found.differs(carried(_all(found.edges))):
+    if not found.differs(carried(_all(found.flow.edges))):
         return
-    for edge in found.edges:
+    for edge in found.flow.edges:
         if found.differs(carried(_all([edge]))):
             raise found.flow.event(f"{edge.subject} is just where something begins to act", edge.tick)
-    raise found.flow.event("several numbers are just where something begins to act", found.edges[0].tick)
+    raise found.flow.event("several numbers are just where something begins to act", found.flow.edges[0].tick)
 
 
 def _all(edges: Sequence[Edge]) -> dict[int, frozenset[int]]:

@@ -14,9 +14,8 @@ from functools import partial
 import numpy as np
 
 from met import run as engine
-from met.analysis.linear.answers import LiftedPeriod, LinearQuestion, OpenLoop, of_deck
+from met.analysis.linear.answers import MOST_TOGETHER, LiftedPeriod, LinearQuestion, OpenLoop, of_deck
 from met.analysis.linear.flow import Flow
-from met.analysis.linear.jacobian import at_instants
 from met.analysis.linear.standing import settled
 from met.diagnostic import Problem
 from met.passing import Memories
@@ -110,24 +109,32 @@ def _answer(
     wanted = [each for each in prepared.experiment.linear_metrics if each.of == use.name]
     columns, why = [names.index(METRIC + each.name) for each in wanted], names.index(WHY_ANSWER + use.name)
     done = np.flatnonzero(outputs[:, names.index("failure")] == 0.0)
-    tick, given = asked.program.begin(use.at), engine.inputs(prepared.experiment, rows[done])
-    flows = at_instants(asked.program, given, tick, threads)
-    for place, flow in zip(done.tolist(), flows, strict=True):
-        if flow is not None:
-            outputs[place, columns], outputs[place, why] = _figures(asked, wanted, flow)
-        if progress is not None:
-            progress(place + 1)
+    given = engine.inputs(prepared.experiment, rows[done])
+    for at in range(0, len(done), MOST_TOGETHER):
+        some = done[at : at + MOST_TOGETHER].tolist()
+        begun = asked.flows(given[at : at + MOST_TOGETHER], threads)
+        places = [place for place, flow in zip(some, begun, strict=True) if flow is not None]
+        stood = _standing(asked, [flow for flow in begun if flow is not None])
+        maps = iter(asked.lifted([flow for flow in stood if flow is not None]))
+        for place, flow in zip(places, stood, strict=True):
+            found = NO_EQUILIBRIUM if flow is None else next(maps)
+            outputs[place, columns], outputs[place, why] = _figures(asked, wanted, found)
+            if progress is not None:
+                progress(place + 1)
 
 
-def _figures(asked: LinearQuestion, wanted: Sequence[MetricUse], flow: Flow) -> tuple[list[float], float]:
-    """The figures of a case, and why one or all of them are none: `ANSWERED` where they all are."""
-    try:
-        solved = settled(asked.program, flow) if asked.stands else flow
-        if solved is None:
-            return [math.nan] * len(wanted), float(NO_EQUILIBRIUM)
-        lifted = asked.lifted(solved)
-    except Problem:
-        return [math.nan] * len(wanted), float(EVENT)
+def _standing(asked: LinearQuestion, flows: Sequence[Flow]) -> Sequence[Flow | None]:
+    """The flows where the question is about: None of one that is to stand still and does not."""
+    return settled(asked.program, flows) if asked.stands else flows
+
+
+def _figures(
+    asked: LinearQuestion, wanted: Sequence[MetricUse], lifted: LiftedPeriod | Problem | int
+) -> tuple[list[float], float]:
+    """The figures of a case, and why one or all of them are none: `ANSWERED` where they all are. lifted: its period, or
+    why it has none"""
+    if not isinstance(lifted, LiftedPeriod):
+        return [math.nan] * len(wanted), float(EVENT if isinstance(lifted, Problem) else lifted)
     loops = [lifted.opened(each) for each in asked.loops] if any(FIGURES[e.model].of_loops for e in wanted) else []
     found = [_figure(FIGURES[each.model], lifted, loops) for each in wanted]
     return [value for value, _ in found], float(max(why for _, why in found))

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from met.analysis.linear.flow import Flow
-from met.analysis.linear.jacobian import seeds
+from met.analysis.linear.abreast import alike, side_by_side
+from met.analysis.linear.flow import Flow, derive
+from met.analysis.linear.jacobian import seeds, tangent_rows
 from met.analysis.linear.period import PeriodProgram
 from met.frozen import frozen
 from met.program import cell_names
@@ -24,28 +25,36 @@ class PlantModel:
     B: np.ndarray
 
 
-def plant(program: PeriodProgram, flow: Flow, kept: Sequence[str]) -> PlantModel:
-    """The plant where a flow stands, before its computers tick there; kept: states, of which those of the arm are its
-    own."""
-    step = program.builder.step
+def plants(program: PeriodProgram, flows: Sequence[Flow], kept: Sequence[Sequence[str]]) -> list[PlantModel]:
+    """The plant where each of these flows stands, before its computers tick there. kept: states of each, of which those
+    of the arm are its own"""
+    step, found = program.builder.step, dict[int, PlantModel]()
     arm = {*program.positions, *program.rates, *step.states}
-    states = tuple(name for name in kept if name in arm)
-    now = flow.copy()
-    now.ticks()
+    own = [tuple(name for name in names if name in arm) for names in kept]
     inputs = tuple(
         f"{actuator.path}.{output.name}"
         for actuator in program.system.working
         if actuator.ticks
         for output in actuator.parts.outputs
     )
-    n, width = len(states), len(states) + len(inputs)
+    for states, places in alike(own):
+        A, B = _slopes(side_by_side([flows[k] for k in places]), states, inputs)
+        for number, place in enumerate(places):
+            found[place] = PlantModel(states, inputs, *((A, B) if A.ndim == 2 else (A[number], B[number])))
+    return [found[place] for place in range(len(flows))]
+
+
+def _slopes(now: Flow, states: tuple[str, ...], inputs: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """A and B where a flow stands, of a `FlowAbreast` [case, ...] each."""
+    program, n, width = now.program, len(states), len(states) + len(inputs)
+    step = program.builder.step
+    now.ticks()
     now.tangents = {name: move for name, move in seeds(program, now, states, width).items() if name not in inputs}
     unit = np.eye(width)
     for place, path in enumerate(inputs):
         now.tangents[path] = now.tangents[cell_names.FIRST(path)] = unit[n + place]
     moves: dict[str, Any] = dict(now.tangents)
-    (number,) = (k for k, each in enumerate(program.recording.sections) if each.name == "derive")
-    now.run(number)
+    derive(now)
     slopes: dict[str, Any] = {}
     for name in step.coordinates:
         slopes[f"{name}.q"] = moves.get(f"{name}.qd", 0.0)
@@ -58,5 +67,5 @@ def plant(program: PeriodProgram, flow: Flow, kept: Sequence[str]) -> PlantModel
         for k, name in enumerate(body.coordinates[3:]):
             i, j = (k + 1) % 3, (k + 2) % 3
             slopes[f"{name}.q"] = dw[k] + theta[i] * w[j] - theta[j] * w[i]
-    rows = np.array([np.broadcast_to(slopes[name], width) for name in states]).reshape(n, width)
-    return PlantModel(states, inputs, rows[:, :n], rows[:, n:])
+    rows = tangent_rows(now, [slopes[name] for name in states], width)
+    return rows[..., :n], rows[..., n:]

@@ -53,7 +53,5 @@ def _goes_to_0(flow: Flow, cell: str, rate: float) -> bool:
     """True where a period that begins with this rate ends with none."""
     moved = flow.copy()
     moved.cells[cell] = rate
-    for _ in range(flow.program.ticks):
-        moved.ticks()
-        moved.finish()
+    moved.period()
     return moved.cells[cell] == 0.0

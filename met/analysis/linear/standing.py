@@ -12,9 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from met.analysis.linear.abreast import together
 from met.analysis.linear.flow import Flow
 from met.analysis.linear.injected import ADDED
-from met.analysis.linear.jacobian import period_map
+from met.analysis.linear.jacobian import PeriodMap, period_map, period_maps
 from met.analysis.linear.period import PeriodProgram
 from met.analysis.linear.shafts import bring_to_rest, loose_beds
 from met.diagnostic import Problem, error
@@ -84,66 +85,69 @@ def _of_unheld(of: Unheld) -> str:
     return f"{takes}: {of.reason}"
 
 
-def settled(program: PeriodProgram, flow: Flow) -> Flow | None:
-    """The flow where nothing changes over a period, by Newton's method with the exact derivative; None: there is none.
+def settled(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow | None]:
+    """Each of these flows where nothing changes over a period, by Newton's method with the exact derivative; None of
+    one that has no such place.
 
     The joints stay where they are; what is sought is all else that the arm and its laws remember, and what is added to
     each servo's command: behind a gear that is wound up, a law sees another position than the joint's.
     """
+    found: list[Flow | None] = [None] * len(flows)
     if program.bodies:
-        return None
-    commands = [number for number, each in enumerate(program.inputs) if not each.is_output]
-    flow = flow.copy()
-    for name in program.states:
-        flow.cells.setdefault(name, 0.0)  # what the run has not written yet
-    flow, fixed = _under_way(program, flow), _places(program)
+        return found
+    never = dict.fromkeys(program.states, 0.0)  # what the run has not written yet
+    begun = [Flow(program, each.inputs, never | each.cells, each.tick) for each in flows]
+    moving = dict(enumerate(_under_way(program, begun)))
     for _ in range(MOST_STEPS):
-        bring_to_rest(flow)
-        try:
-            found = period_map(program, flow)
-        except Problem:  # a limit that is reached, or something breaks away: it does not stand
-            return None
-        after = flow.copy()
-        for _ in range(program.ticks):
-            after.ticks()
-            after.finish()
-        now = np.array([flow.cells[name] for name in found.states])
-        change = np.array([after.cells[name] for name in found.states]) - now
-        if not np.isfinite(change).all():
-            return None
-        if np.all(np.abs(change) <= CLOSE * np.maximum(np.abs(now), 1.0)):
-            return None if loose_beds(flow) else flow
-        sought = [place for place, name in enumerate(found.states) if name not in fixed]
-        added = [[k for k, each in enumerate(found.ticks) if each.entry == number] for number in commands]
-        columns = [(found.A - np.eye(len(now)))[:, sought], *(found.B[:, ticks].sum(1)[:, None] for ticks in added)]
-        moves_by = np.hstack(columns)
-        sizes = np.linalg.norm(moves_by, axis=0)
-        sizes[sizes == 0.0] = 1.0  # what moves nothing stays as it is, as the integral of a joint that sticks
-        step = np.linalg.lstsq(moves_by / sizes, -change, rcond=1e-13)[0] / sizes
-        for place, size in zip(sought, step, strict=False):
-            flow.cells[found.states[place]] += float(size)
-        for number, size in zip(commands, step[len(sought) :], strict=True):
-            cell = ADDED + program.inputs[number].path
-            flow.cells[cell] = flow.cells.get(cell, 0.0) + float(size)
+        now = list(moving.values())
+        for flow in now:
+            bring_to_rest(flow)
+        maps, later = period_maps(program, now), together(now, Flow.period)
+        for place, of, after in zip(list(moving), maps, later, strict=True):
+            # a limit that is reached, or something breaks away: it does not stand
+            stands = False if isinstance(of, Problem) else _step(moving[place], after, of)
+            if stands is not None:
+                flow = moving.pop(place)
+                found[place] = flow if stands and not loose_beds(flow) else None
+    return found
+
+
+def _step(flow: Flow, after: Flow, found: PeriodMap) -> bool | None:
+    """A step of Newton's method: the flow is moved. True where it stands already, False where it never will. after: a
+    period later;  found: of that period"""
+    program = flow.program
+    now = np.array([flow.cells[name] for name in found.states])
+    change = np.array([after.cells[name] for name in found.states]) - now
+    if not np.isfinite(change).all():
+        return False
+    if np.all(np.abs(change) <= CLOSE * np.maximum(np.abs(now), 1.0)):
+        return True
+    fixed = _places(program)
+    commands = [number for number, each in enumerate(program.inputs) if not each.is_output]
+    sought = [place for place, name in enumerate(found.states) if name not in fixed]
+    added = [[k for k, each in enumerate(found.ticks) if each.entry == number] for number in commands]
+    columns = [(found.A - np.eye(len(now)))[:, sought], *(found.B[:, ticks].sum(1)[:, None] for ticks in added)]
+    moves_by = np.hstack(columns)
+    sizes = np.linalg.norm(moves_by, axis=0)
+    sizes[sizes == 0.0] = 1.0  # what moves nothing stays as it is, as the integral of a joint that sticks
+    step = np.linalg.lstsq(moves_by / sizes, -change, rcond=1e-13)[0] / sizes
+    for place, size in zip(sought, step, strict=False):
+        flow.cells[found.states[place]] += float(size)
+    for number, size in zip(commands, step[len(sought) :], strict=True):
+        cell = ADDED + program.inputs[number].path
+        flow.cells[cell] = flow.cells.get(cell, 0.0) + float(size)
     return None
 
 
-def _under_way(program: PeriodProgram, flow: Flow) -> Flow:
-    """The flow with beds under way: their amplifiers hold, and their queues have, what laws ask for where it stands.
+def _under_way(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow]:
+    """The flows with beds under way: their amplifiers hold, and their queues have, what laws ask for where they stand.
     All else stays as the run begins it."""
-    found, heads = (
-        flow.copy(),
-        tuple(f"{each.use.joint}{part}" for each, _, _ in program.system.mounted for part in HOLD),
-    )
+    found = [flow.copy(tangents=False) for flow in flows]
+    heads = tuple(f"{each.use.joint}{part}" for each, _, _ in program.system.mounted for part in HOLD)
+    rates = {cell_names.REFERENCE_RATE(each.use.joint): 0.0 for each, _, law in program.system.mounted if law.observer}
     for _ in range(QUEUE + 1 if heads else 0):
-        later = found.copy()
-        for _ in range(program.ticks):
-            later.ticks()
-            later.finish()
-        found.cells |= {name: value for name, value in later.cells.items() if name.startswith(heads)}
-        found.cells |= {
-            cell_names.REFERENCE_RATE(each.use.joint): 0.0 for each, _, law in program.system.mounted if law.observer
-        }
+        for flow, later in zip(found, together(found, Flow.period), strict=True):
+            flow.cells |= {name: value for name, value in later.cells.items() if name.startswith(heads)} | rates
     return found
 
 
@@ -165,12 +169,9 @@ def moves(program: PeriodProgram, flow: Flow) -> Reason:
     """The part of an arm that changes its rate most within a period that begins where a flow stands, in words."""
     if program.bodies:
         return f"`{program.bodies[0].name}` moves freely"
-    flow = _under_way(program, flow)
+    (flow,) = _under_way(program, [flow])
     bring_to_rest(flow)
-    after = flow.copy()
-    for _ in range(program.ticks):
-        after.ticks()
-        after.finish()
+    (after,) = together([flow], Flow.period)
     found = {name: abs(after.cells[name] - flow.cells[name]) / program.seconds for name in program.rates}
     faults = ", ".join(f"`{path}`" for path in _faults(program))
     if program.of_beds and faults:

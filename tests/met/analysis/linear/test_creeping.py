@@ -46,7 +46,8 @@ def test_the_edge_is_the_rate_that_friction_takes_in_a_step(tmp_path: Path, way:
     """Weight pulls one way, and back-EMF slows: the edge is that of friction alone, in closed form."""
 
     def told(rate: float) -> tuple[CreepingRate, ...]:
-        return creeping(at_instant(question(tmp_path, rate, -0.7).program, 0, 0))
+        (found,) = creeping([at_instant(question(tmp_path, rate, -0.7).program, 0, 0)])
+        return found
 
     slow, fast = way * STOPPED * (1.0 - 1e-9), way * STOPPED * (1.0 + 1e-9)
     assert told(slow) == (CreepingRate("hinge", slow, "rad/s"),) and told(fast) == ()
@@ -75,5 +76,5 @@ def test_a_motor_behind_an_elastic_gear_creeps_by_its_own_friction(tmp_path: Pat
     text = DECK.replace("kp", elastic, 1).replace("100 Hz", "1 kHz").replace("PULL", "0.0")
     (tmp_path / "deck.ic").write_text(text.replace("RATE", repr(times * slow)))
     (experiment,) = ic.compile(tmp_path / "deck.ic").experiments
-    found = creeping(at_instant(LinearQuestion(experiment).program, 0, 0))
+    (found,) = creeping([at_instant(LinearQuestion(experiment).program, 0, 0)])
     assert [(each.name, each.unit) for each in found] == [("hinge.servo.motor_rate", "rad/s")] * creeps

@@ -60,7 +60,7 @@ run there like hold {
 def solved(folder: Path, run: str, block: str) -> tuple[LinearQuestion, Flow]:
     """A question, and the flow where its arm stands."""
     asked = of_deck(experiment(folder, ARM, select=[run]), block)
-    found = settled(asked.program, at_instant(asked.program, 0, 0))
+    (found,) = settled(asked.program, [at_instant(asked.program, 0, 0)])
     assert found is not None
     return asked, found
 

@@ -42,7 +42,7 @@ def test_an_arm_on_a_bed_that_is_put_there_stays_and_moves_as_its_map_says(
     deck = DECK.replace("emulated;  law = velocity_tracking", f"emulated(delay = {delay});  law = {law}")
     asked = of_deck(experiment(tmp_path, deck, select=["there"]))
     program = asked.program
-    flow = settled(program, at_instant(program, 0, program.begin(0.0)))
+    (flow,) = settled(program, [at_instant(program, 0, program.begin(0.0))])
     assert flow is not None
     later = flow.copy()
     for _ in range(300):
