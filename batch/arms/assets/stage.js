@@ -10,7 +10,7 @@ MET.stage = (() => {
   const TRACED = 240;  // points of the tip's path
   const FILM = 6;  // pictures on paper
   const rgb = (hex, alpha = 1) => [...[1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255), alpha];
-  const BODY = { light: ["#c3ccd6", "#6f7a86", "#e0a02a"], dark: ["#aab6c3", "#66717d", "#e0b44a"] };
+  const BODY = { light: MET.look.colours, dark: ["#aab6c3", "#66717d", "#e0b44a"] };
   const AXES = { x: "#d8434e", y: "#3a9d4f", z: "#3d6fe0" };
   const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 50];
   const LONG = 20;  // s, longer than which nobody looks at a run
