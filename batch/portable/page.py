@@ -146,11 +146,12 @@ def page_of(experiment: Experiment, data: dict[str, Any]) -> str:
     style = f"{inlined.style()}\n{arm_style()}\n{(_ASSETS / 'view.css').read_text(encoding='utf-8')}"
     head = page_head(experiment.name, generator=GENERATOR, style=style, script=script, allowed=_CODE)
     by = "by the code that the archive was made with" if data["same_code"] else f"{OTHER_CODE} (MET {VERSION})"
+    when = "Move a slider, and the run is computed again, here," if data["count"] > 1 else "The run is computed here,"
     header = el(
         "header",
         el("p", "A page that simulates", cls="kicker"),
         el("h1", experiment.name),
-        el("p", f"Move a slider, and the run is computed again, here, {by}.", cls="lede"),
+        el("p", f"{when} {by}.", cls="lede"),
     )
     none = el("p", "This page needs scripts and WebAssembly, which this reader does not run.")
     body = lines([header, el("main", none), Html(f"<script>{script}</script>")])

@@ -43,10 +43,10 @@ MET.camera = (() => {
     };
     made.zoom = (factor, least, most) => { made.distance = Math.min(most, Math.max(least, made.distance * factor)); };
 
-    // So that all these pills ({ends, radius}) are seen, the eye where it stands.
-    made.fit = (pills) => {
+    // So that all these pills ({ends, radius}) are seen, the eye where it stands, below a share of the height.
+    made.fit = (pills, share = 0) => {
       const { right, up, back } = made.axes();
-      const [fx, fy] = [FIELD * made.aspect, FIELD];
+      const [fx, fy] = [FIELD * made.aspect, FIELD * (1 - share)];
       const box = [right, up].map((axis) => {
         let [low, high] = [Infinity, -Infinity];
         pills.forEach(({ ends, radius }) => ends.forEach((p) => {
@@ -61,6 +61,7 @@ MET.camera = (() => {
         const v = plus(p, made.target, -1);
         return Math.max(most, dot(back, v) + Math.max((Math.abs(dot(right, v)) + radius) / fx, (Math.abs(dot(up, v)) + radius) / fy));
       }, far), 0);
+      made.target = plus(made.target, up, share * FIELD * made.distance);
     };
 
     // From where the most of these points' spread is seen; from higher where it is flat.

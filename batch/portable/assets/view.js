@@ -193,7 +193,7 @@
   }
 
   main.replaceChildren(room,
-    node("div", { class: "knobs" }, node("label", { class: "knob" }, "Case", chosen, node("output", null, `of ${data.count}`)), knobs.map((knob) => knob.box)),
+    ...(cases.length > 1 ? [node("div", { class: "knobs" }, node("label", { class: "knob" }, "Case", chosen, node("output", null, `of ${data.count}`)), knobs.map((knob) => knob.box))] : []),
     came, node("table", { class: "answers" }, answers), panels);
   knobs.forEach((knob) => knob.put());
   update();
