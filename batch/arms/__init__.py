@@ -2,5 +2,6 @@
 
 placing   the links' frames in the world, from the numbers of a case
 shapes    simple solids and lines, fixed to the links' frames
+look      sizes, colours and the viewpoint
 scene     both as formulas of what a case records and a sweep varies, which a page replays
 """

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from functools import cache
 from pathlib import Path
+
+from batch.arms.look import look_json
 
 FOLDER = Path(__file__).with_name("assets")
 
@@ -13,7 +16,8 @@ SCRIPTS = ("formulas.js", "arm.js", "camera.js", "webgl.js", "painter.js", "stag
 
 @cache
 def arm_scripts() -> str:
-    return "\n".join((FOLDER / name).read_text(encoding="utf-8").strip() for name in SCRIPTS)
+    texts = [(FOLDER / name).read_text(encoding="utf-8").strip() for name in SCRIPTS]
+    return "\n".join([f"MET.look = {json.dumps(look_json())};", *texts])
 
 
 @cache

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup, reading
+from batch.arms.look import BASE, FIELD, LINK, PAYLOAD
 from batch.arms.scene import ArmScene, arm_scene, lacking
 from batch.plotting import layout
 from batch.plotting.projection import PicturedSolid, Viewpoint, facets, solids, upright, viewpoint
@@ -24,7 +25,7 @@ SHOWN, FITTED = 5, 48
 WIDTH, ASPECT = 8.6, 1.5
 """Inches of a screen's picture; its width against its height."""
 
-BODY, BASE, PAYLOAD, PATH, SHADOW, PAPER = "#c3ccd6", "#76818d", "#e0a02a", "#0a5a9c", "#d5dade", "#ffffff"
+PATH, SHADOW, PAPER = "#0a5a9c", "#d5dade", "#ffffff"
 PALE = 0.62
 """Share of the paper's colour in the first instant that is drawn; less in each later one."""
 
@@ -65,9 +66,8 @@ def arm_picture(
         _draw(axes, solids(scene, numbers[row]), view, pale, 3 + number)
         x, y = path[row, :2]
         axes.plot([x], [y], "o", color=PAPER, markeredgecolor=PATH, markersize=4, zorder=30)
-    fit = math.tan(math.radians(13.0))
     top = 0.9 * height if not sheet.paper else height
-    axes.set(xlim=(-fit * width / height, fit * width / height), ylim=(-fit * top / height, fit * top / height))
+    axes.set(xlim=(-FIELD * width / height, FIELD * width / height), ylim=(-FIELD * top / height, FIELD * top / height))
     axes.set_aspect("equal", adjustable="datalim")
     times = ", ".join(number_text(float(time[row])) for row in shown)
     below = f"{case_text(group, position)} · at {times} s · grid {number_text(_step(scene.reach))} m"
@@ -150,7 +150,7 @@ def _draw(axes: Any, found: Sequence[PicturedSolid], view: Viewpoint, pale: floa
 def _colour(solid: PicturedSolid) -> str:
     if solid.role == "joint" and solid.joint >= 0:
         return JOINTS[solid.joint % len(JOINTS)]
-    return {"link": BODY, "payload": PAYLOAD}.get(solid.role, BASE)
+    return {"link": LINK, "payload": PAYLOAD}.get(solid.role, BASE)
 
 
 def _mixed(colour: str, light: float, pale: float) -> tuple[float, float, float]:

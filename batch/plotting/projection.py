@@ -7,19 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from batch.arms.look import AZIMUTH, CUBE, FIELD, FLAT, FOOT, HIGH, JOINT, LOW, RAIL, ROOM
 from batch.arms.scene import POSE_NUMBERS, SHAPE_NUMBERS, ArmScene
 from met.frozen import frozen
 
-FIELD = math.tan(math.radians(13.0))
-"""Half the height that is seen, at a distance of 1; the same in `batch/arms/assets/camera.js`, as are those below."""
-
 ROUND = 28
 """Corners of a circle."""
-
-JOINT, RAIL, FOOT = (1.32, 2.9), 0.4, (2.6, 0.5)
-"""Radius and length of a joint, radius of a rail, radius and height of the disc under a base; in limbs."""
-
-AZIMUTH, LOW, HIGH, FLAT, ROOM = -0.95, 0.34, 0.85, 0.02, 1.08
 
 
 @frozen
@@ -59,7 +52,7 @@ def solids(scene: ArmScene, numbers: np.ndarray) -> list[PicturedSolid]:
         elif shape.kind == "sphere":
             length, radius = 0.0, x
         elif shape.kind == "box":
-            kind, edges = "block", np.full(3, 2.4 * limb) if shape.role == "joint" else np.array([x, y, z])
+            kind, edges = "block", np.full(3, CUBE * limb) if shape.role == "joint" else np.array([x, y, z])
             axes = 0.5 * edges[:, None] * R.T
             length, radius, way = float(edges[2]), float(math.hypot(edges[0], edges[1])) / 2.0, R[:, 2]
         else:

@@ -7,6 +7,7 @@ by its digest, and WebAssembly; module and numbers stand in that script, so that
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,9 @@ from batch.archive.stored import Unlike
 from batch.arms.scene import arm_scene, lacking, scene_json
 from batch.arms.scripts import arm_scripts, arm_style
 from batch.portable.description import MOST_CASES, described
+from batch.queries.deck_units import DeckUnits
 from batch.queries.groups import groups_named
-from batch.queries.signals import pretty_unit
+from batch.queries.signals import Panel, deck_unit, pretty_unit
 from batch.report.html import inlined
 from batch.report.html.head import page_head
 from batch.report.html.markup import Html, el, lines
@@ -52,10 +54,10 @@ def view(archive: str | Path, names: tuple[str, ...] = ()) -> str:
             )
         (group,) = groups
         experiment = next(each for each in file.plan().experiments if each.name == group.name)
-        return page_of(experiment, data_of(experiment, group))
+        return page_of(experiment, data_of(experiment, file, group))
 
 
-def data_of(experiment: Experiment, group: ArchiveGroup) -> dict[str, Any]:
+def data_of(experiment: Experiment, archive: ArchiveFile, group: ArchiveGroup) -> dict[str, Any]:
     """Data that the script needs: the module, its description, and what the archive has of the first cases."""
     prepared = prepare(experiment)
     module = compiled(prepared.recording)
@@ -67,10 +69,12 @@ def data_of(experiment: Experiment, group: ArchiveGroup) -> dict[str, Any]:
     known = {name.removeprefix("metrics."): name for name in stored}
     shown: dict[str, Any] = _visible(told)
     metrics = [*told["metrics"], *told["not_computed"]]
+    columns = _in_deck_units(DeckUnits(archive, group), told["columns"])
     lacking = [each["name"] for each in metrics if each["name"] not in known]
     with reading(group.path):
         if lacking:
             raise Unlike(f"the plan of `{experiment.name}` has a metric `{lacking[0]}`, and it has none")
+        metric_units = [deck_unit(stored[known[each["name"]]]) for each in metrics]
     return {
         "module": base64.b64encode(module.code).decode("ascii"),
         "description": shown,
@@ -83,10 +87,22 @@ def data_of(experiment: Experiment, group: ArchiveGroup) -> dict[str, Any]:
         ],
         "labels": [visible(each["name"]) for each in told["inputs"]],
         "units": [_unit(each["unit"]) for each in told["inputs"]],
-        "metricUnits": [_unit(each["unit"]) for each in metrics],
-        "columnUnits": [_unit(each["unit"]) for each in told["columns"]],
+        "metricUnits": [visible(unit) for _, unit in metric_units],
+        "metricScales": [scale for scale, _ in metric_units],
+        "columnUnits": [_unit(unit) for _, unit in columns],
+        "columnScales": [scale for scale, _ in columns],
         "arm": _arm(experiment),
     }  # fmt: skip
+
+
+def _in_deck_units(units: DeckUnits, columns: Sequence[Mapping[str, str]]) -> list[tuple[float, str]]:
+    """Of each column the number that its SI values are divided by, and the unit they are then in."""
+    out = []
+    for each in columns:
+        panel = Panel(each["signal"], "", each["unit"], each["signal"], (), ())
+        shown = units.panel(panel)
+        out.append((shown.scale, shown.unit))
+    return out
 
 
 def _arm(experiment: Experiment) -> dict[str, Any]:
@@ -130,11 +146,12 @@ def page_of(experiment: Experiment, data: dict[str, Any]) -> str:
     style = f"{inlined.style()}\n{arm_style()}\n{(_ASSETS / 'view.css').read_text(encoding='utf-8')}"
     head = page_head(experiment.name, generator=GENERATOR, style=style, script=script, allowed=_CODE)
     by = "by the code that the archive was made with" if data["same_code"] else f"{OTHER_CODE} (MET {VERSION})"
+    when = "Move a slider, and the run is computed again, here," if data["count"] > 1 else "The run is computed here,"
     header = el(
         "header",
         el("p", "A page that simulates", cls="kicker"),
         el("h1", experiment.name),
-        el("p", f"Move a slider, and the run is computed again, here, {by}.", cls="lede"),
+        el("p", f"{when} {by}.", cls="lede"),
     )
     none = el("p", "This page needs scripts and WebAssembly, which this reader does not run.")
     body = lines([header, el("main", none), Html(f"<script>{script}</script>")])

@@ -5,8 +5,7 @@
 MET.arm = (() => {
   const POSE = 12;  // numbers of a body: the rows of its rotation, its origin
   const SHAPE = 9;  // of a shape: middle, axis, size
-  const JOINT = [1.32, 2.9];  // radius and length of a joint, in limbs
-  const FOOT = [2.6, 0.5];  // of the disc under a base that stays
+  const { joint: JOINT, cube: CUBE, rail: RAIL, foot: FOOT } = MET.look;
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const plus = (a, b, k = 1) => [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]];
@@ -73,9 +72,9 @@ MET.arm = (() => {
         if (kind === "line") [middle, stretch[3]] = [plus(middle, axis, 0.5), size(axis)];
         else if (kind === "rod") stretch[3] = sizes[2];
         else if (kind === "sphere") stretch = [...sizes, 0];
-        else if (kind === "box") [mesh, own, stretch] = ["block", [[1, 0, 0], [0, 1, 0], [0, 0, 1]], role === "joint" ? [2.4 * limb, 2.4 * limb, 2.4 * limb, 0] : [...sizes, 0]];
+        else if (kind === "box") [mesh, own, stretch] = ["block", [[1, 0, 0], [0, 1, 0], [0, 0, 1]], role === "joint" ? [CUBE * limb, CUBE * limb, CUBE * limb, 0] : [...sizes, 0]];
         else [mesh, stretch] = ["can", role === "joint" ? [JOINT[0] * limb, JOINT[0] * limb, JOINT[0] * limb, JOINT[1] * limb] : [sizes[0], sizes[0], sizes[0], sizes[2]]];
-        if (role === "rail") stretch = [0.4 * limb, 0.4 * limb, 0.4 * limb, stretch[3]];
+        if (role === "rail") stretch = [RAIL * limb, RAIL * limb, RAIL * limb, stretch[3]];
         return { mesh, role, joint, at: up(plus(origin(numbers, body), turn(R, middle))), axes: own.map((each) => up(turn(R, each))), size: stretch };
       });
       if (!scene.moves) out.push({ mesh: "can", role: "base", joint: -1, at: [0, 0, FOOT[1] * limb / 2], axes: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], size: [FOOT[0] * limb, FOOT[0] * limb, 0.4 * limb, FOOT[1] * limb] });

@@ -3,12 +3,11 @@
 
 MET.camera = (() => {
   const { dot, cross, plus, unit } = MET.arm;
-  const FIELD = Math.tan(Math.PI / 180 * 13);  // of half the height
+  const { field: FIELD, room: ROOM, azimuth: AZIMUTH, low: LOW, high: FLAT_FROM, flat: FLAT } = MET.look;
   const HIGH = 1.53;  // rad, at most above or below
-  const ROOM = 1.07;
 
   function make() {
-    const made = { azimuth: -0.9, elevation: 0.3, distance: 3, target: [0, 0, 0], aspect: 1.6 };
+    const made = { azimuth: AZIMUTH, elevation: LOW, distance: 3, target: [0, 0, 0], aspect: 1.6 };
     made.axes = () => {
       const { azimuth: a, elevation: e } = made;
       const back = [Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)];
@@ -44,10 +43,10 @@ MET.camera = (() => {
     };
     made.zoom = (factor, least, most) => { made.distance = Math.min(most, Math.max(least, made.distance * factor)); };
 
-    // So that all these pills ({ends, radius}) are seen, the eye where it stands.
-    made.fit = (pills) => {
+    // So that all these pills ({ends, radius}) are seen, the eye where it stands, below a share of the height.
+    made.fit = (pills, share = 0) => {
       const { right, up, back } = made.axes();
-      const [fx, fy] = [FIELD * made.aspect, FIELD];
+      const [fx, fy] = [FIELD * made.aspect, FIELD * (1 - share)];
       const box = [right, up].map((axis) => {
         let [low, high] = [Infinity, -Infinity];
         pills.forEach(({ ends, radius }) => ends.forEach((p) => {
@@ -62,6 +61,7 @@ MET.camera = (() => {
         const v = plus(p, made.target, -1);
         return Math.max(most, dot(back, v) + Math.max((Math.abs(dot(right, v)) + radius) / fx, (Math.abs(dot(up, v)) + radius) / fy));
       }, far), 0);
+      made.target = plus(made.target, up, share * FIELD * made.distance);
     };
 
     // From where the most of these points' spread is seen; from higher where it is flat.
@@ -69,12 +69,12 @@ MET.camera = (() => {
       const mean = points.reduce((a, b) => plus(a, b, 1 / points.length), [0, 0, 0]);
       const spread = (u, v) => points.reduce((sum, p) => sum + dot(u, plus(p, mean, -1)) * dot(v, plus(p, mean, -1)), 0);
       const [z, [xx, yy]] = [[0, 0, 1], [[1, 0, 0], [0, 1, 0]].map((axis) => spread(axis, axis))];
-      made.elevation = spread(z, z) < 0.02 * (xx + yy) ? 0.85 : 0.34;
+      made.elevation = spread(z, z) < FLAT * (xx + yy) ? FLAT_FROM : LOW;
       let best = -1;
       for (let n = 0; n < 36; n++) {
-        made.azimuth = -0.95 + (n * Math.PI) / 18;
+        made.azimuth = AZIMUTH + (n * Math.PI) / 18;
         const { right, up } = made.axes();
-        const area = spread(right, right) * spread(up, up) - spread(right, up) ** 2 + 1e-3 * (1 + Math.cos(made.azimuth + 0.95)) * (xx + yy) ** 2;
+        const area = spread(right, right) * spread(up, up) - spread(right, up) ** 2 + 1e-3 * (1 + Math.cos(made.azimuth - AZIMUTH)) * (xx + yy) ** 2;
         if (area > best) [best, made.best] = [area, made.azimuth];
       }
       made.azimuth = made.best;

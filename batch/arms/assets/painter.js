@@ -65,7 +65,7 @@ MET.painter = (() => {
       const lines = Array.from({ length: 2 * count + 1 }, (_, n) => (n - count) * step);
       const across = lines.flatMap((at) => [[[x + at, y - count * step], [x + at, y + count * step]], [[x - count * step, y + at], [x + count * step, y + at]]]);
       under.push(node("path", { d: across.map((line) => d(line.map(([px, py]) => seen([px, py, floor])), false)).join(""), stroke: css(colours.grid), "stroke-opacity": 0.5, "stroke-width": 0.7, fill: "none" }));
-      under.push(node("svg", { opacity: colours.shade[3] }, solids.map((each) => {
+      if (picture.shadow) under.push(node("svg", { opacity: colours.shade[3] }, solids.map((each) => {
         const { ends: two, radius } = ends(each);
         const [a, b] = two.map((p) => seen([p[0], p[1], floor]));
         return node("path", { d: d([a, [b[0] + 0.01, b[1]]], false), stroke: css(colours.shade), "stroke-linecap": "round", "stroke-width": (2 * radius * scale((a[2] + b[2]) / 2)).toFixed(1) });

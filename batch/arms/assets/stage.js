@@ -5,12 +5,13 @@
 MET.stage = (() => {
   const { node, number, palette } = MET;
   const [FITTED, FITTED_OF_GHOSTS] = [48, 5];  // instants of a run that are fitted into the view
+  const BAR = 44;  // px of the view's upper edge where words and buttons stand
   const FAR = 1e4;  // reaches, farther than which nothing is fitted
   const [REST, SLOW] = [120, 45];  // ms after which a picture that stands is drawn fine; of a picture, more than which is slow
   const TRACED = 240;  // points of the tip's path
   const FILM = 6;  // pictures on paper
   const rgb = (hex, alpha = 1) => [...[1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255), alpha];
-  const BODY = { light: ["#c3ccd6", "#6f7a86", "#e0a02a"], dark: ["#aab6c3", "#66717d", "#e0b44a"] };
+  const BODY = { light: MET.look.colours, dark: ["#aab6c3", "#66717d", "#e0b44a"] };
   const AXES = { x: "#d8434e", y: "#3a9d4f", z: "#3d6fe0" };
   const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 50];
   const LONG = 20;  // s, longer than which nobody looks at a run
@@ -78,16 +79,24 @@ MET.stage = (() => {
       };
     }
 
-    function picture(at, all = true) {
+    function picture(at, all = true, fine = still) {
       const numbers = chosen.at(at);
       const solids = [...arm.solids(numbers), ...(frames ? arm.frames(numbers) : [])];
       const shown = all && ghostly ? others : [];
-      return { camera, solids, ghosts: shown.map((each) => arm.solids(each.at(at))), trace: path, floor, step, reach: arm.reach, limb: arm.limb, colours: colours() };
+      return { camera, solids, ghosts: shown.map((each) => arm.solids(each.at(at))), trace: path, floor, step, reach: arm.reach, limb: arm.limb, colours: colours(), fine, shadow: !scene.moves };
     }
 
-    // Everything that a case comes to, as pills; what has run away is left out.
+    // Everything that a case comes to, as pills. What has run away is left out, and a payload that is more than a reach from
+    // the box round all that the arm comes to: it comes into view.
     const near = ({ ends }) => ends.flat().every((x) => Math.abs(x) < FAR * arm.reach);
-    const pills = (each, count) => Array.from({ length: count }, (_, n) => arm.solids(each.at((end * n) / (count - 1))).map(MET.arm.ends)).flat().filter(near);
+    const pills = (each, count) => {
+      const all = Array.from({ length: count }, (_, n) => arm.solids(each.at((end * n) / (count - 1)))).flat()
+        .map((one) => ({ ...MET.arm.ends(one), own: one.role !== "payload" })).filter(near);
+      const box = [0, 1, 2].map((axis) => all.filter((one) => one.own).flatMap(({ ends }) => ends.map((p) => p[axis])))
+        .map((places) => [places.reduce((a, b) => Math.min(a, b), Infinity), places.reduce((a, b) => Math.max(a, b), -Infinity)]);
+      const beside = (p) => Math.hypot(...box.map(([low, high], axis) => Math.max(low - p[axis], p[axis] - high, 0))) <= arm.reach;
+      return all.filter((one) => one.own || beside(one.ends[0]));
+    };
 
     // Everything in view, seen from where most is seen of the chosen case.
     function home() {
@@ -96,7 +105,7 @@ MET.stage = (() => {
       const lowest = all.reduce((low, { ends, radius }) => Math.min(low, ends[0][2] - radius, ends[1][2] - radius), Infinity);
       floor = scene.moves ? lowest - 0.25 * arm.reach : Math.min(0, lowest);
       camera.choose(all.flatMap(({ ends }) => ends));
-      camera.fit([...all, ...(ghostly ? others.flatMap((each) => pills(each, FITTED_OF_GHOSTS)) : [])]);
+      camera.fit([...all, ...(ghostly ? others.flatMap((each) => pills(each, FITTED_OF_GHOSTS)) : [])], BAR / view.clientHeight);
     }
 
     // Dots of the canvas; fine: as many as make edges smooth.
@@ -259,7 +268,7 @@ MET.stage = (() => {
       if (renderer) sized(false);
       const begun = performance.now();
       for (let n = 0; n < count; n++) {
-        const made = picture((end * n) / count);
+        const made = picture((end * n) / count, true, false);
         if (renderer) { renderer.draw(made); renderer.finish(); } else MET.painter.draw(made, view.clientWidth, view.clientHeight);
       }
       return (performance.now() - begun) / count;

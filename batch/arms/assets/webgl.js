@@ -1,6 +1,7 @@
 // Draws a picture of an arm by WebGL 2: meshes of unit size, stretched and turned instance by instance; a floor with a grid
 // and shadows on it. `make` gives null where there is no WebGL.
-//   picture  {camera, solids, ghosts: [solids], trace: [points], floor (its height, or null), step (of the grid, m), colours}
+//   picture  {camera, solids, ghosts: [solids], trace: [points], floor (its height, or null), step (of the grid, m), colours,
+//            fine: it stands, and may take longer; shadow: whether the arm casts one}
 "use strict";
 
 MET.webgl = (() => {
@@ -25,11 +26,10 @@ MET.webgl = (() => {
     }`, `#version 300 es
     precision highp float;
     in vec3 normal; in vec3 place; in vec4 colour;
-    uniform vec3 eye; uniform vec3 key; uniform vec4 shadow; uniform vec4 shade; uniform float plain;
+    uniform vec3 eye; uniform vec3 key; uniform vec4 shadow; uniform vec4 shade;
     out vec4 done;
     void main() {
       if (shadow.w > 0.0) { done = shade; return; }
-      if (plain > 0.0) { done = vec4(colour.rgb * (0.9 + 0.2 * normal.z) * colour.a, colour.a); return; }
       vec3 n = normalize(normal), v = normalize(eye - place);
       float lit = 0.5 + 0.5 * dot(n, key), sky = 0.5 + 0.5 * n.z;
       vec3 c = colour.rgb * (0.42 + 0.66 * lit * lit) * mix(0.84, 1.04, sky);
@@ -37,6 +37,32 @@ MET.webgl = (() => {
       c += 0.1 * pow(1.0 - max(dot(n, v), 0.0), 3.0);
       done = vec4(min(c, 1.0) * colour.a, colour.a);
     }`];
+
+  // Ghosts and paths, of which there are many: one varying, little light. What has no normals is a ribbon that faces the
+  // eye: shape is its place across and along, and which end it is of.
+  const GHOST = [`#version 300 es
+    layout(location=0) in vec4 shape; layout(location=1) in vec3 bent;
+    layout(location=2) in vec3 at; layout(location=3) in vec3 x; layout(location=4) in vec3 y; layout(location=5) in vec3 z;
+    layout(location=6) in vec4 size; layout(location=7) in vec4 tint;
+    uniform mat4 view; uniform vec3 back; uniform vec3 right;
+    out vec4 colour;
+    void main() {
+      vec3 own = shape.xyz * size.xyz + vec3(0.0, 0.0, shape.w * size.w);
+      vec3 place = own.x * x + own.y * y + own.z * z;
+      float light = 0.9 + 0.2 * (bent.x * x.z + bent.y * y.z + bent.z * z.z);
+      if (bent == vec3(0.0)) {
+        vec3 across = cross(back, z);
+        across = length(across) > 1e-3 ? normalize(across) : right;
+        place = shape.w * size.w * z + size.x * (shape.x * across + shape.y * cross(across, back));
+        light = 1.0;
+      }
+      colour = vec4(tint.rgb * light * tint.a, tint.a);
+      gl_Position = view * vec4(at + place, 1.0);
+    }`, `#version 300 es
+    precision mediump float;
+    in vec4 colour;
+    out vec4 done;
+    void main() { done = colour; }`];
 
   const FLOOR = [`#version 300 es
     layout(location=0) in vec4 shape;
@@ -84,6 +110,16 @@ MET.webgl = (() => {
       return [Math.cos(turn), Math.sin(turn), end, Math.cos(turn), Math.sin(turn)];
     }));
     return lathe(rings, sides);
+  }
+
+  // A pill as it is seen: a strip with round ends.
+  function ribbon(steps) {
+    const vertices = [0.5, -0.5].flatMap((end) => Array.from({ length: steps + 1 }, (_, n) => {
+      const turn = Math.PI * (n / steps - (end > 0 ? 0.5 : -0.5));
+      return [Math.sin(turn), Math.cos(turn), 0, end, 0, 0, 0];
+    })).flat();
+    const count = 2 * (steps + 1);
+    return { vertices, faces: Array.from({ length: count - 2 }, (_, n) => [0, n + 1, n + 2]).flat() };
   }
 
   function can(sides) {
@@ -139,8 +175,9 @@ MET.webgl = (() => {
       return { made, uniforms };
     }
 
-    const [solid, floor] = [program(SOLID), program(FLOOR)];
+    const [solid, ghost, floor] = [program(SOLID), program(GHOST), program(FLOOR)];
     const instances = gl.createBuffer();
+    let lately = {};  // the path that was drawn last
 
     function mesh({ vertices, faces }) {
       const array = gl.createVertexArray();
@@ -156,8 +193,10 @@ MET.webgl = (() => {
       return { array, count: faces.length };
     }
     const fine = { pill: mesh(pill(28, 8)), can: mesh(can(36)), block: mesh(block()) };
+    const quick = { pill: mesh(pill(14, 3)), can: mesh(can(18)), block: fine.block };  // while a processor draws it moving
     const coarse = { pill: mesh(pill(10, 2)), can: mesh(can(10)), block: fine.block };
-    const sparse = { ...coarse, pill: mesh(pill(6, 1)) };
+    const sparse = { ...coarse, pill: mesh(ribbon(3)) };
+    const kept = software ? { frame: gl.createFramebuffer(), dots: gl.createRenderbuffer(), of: "" } : null;
 
     // Instances by mesh, their numbers one after another.
     function packed(groups) {
@@ -182,53 +221,85 @@ MET.webgl = (() => {
       });
     }
 
-    function draw({ camera, solids, ghosts, trace, floor: height, step, reach, colours, limb }) {
+    function drawFloor({ camera, floor: height, step, reach, colours }, view) {
+      if (height === null) return;
+      gl.disable(gl.DEPTH_TEST);
+      gl.useProgram(floor.made);
+      gl.uniformMatrix4fv(floor.uniforms.view, false, view);
+      gl.uniform4f(floor.uniforms.middle, camera.target[0], camera.target[1], height, 2.6 * reach);
+      gl.uniform1f(floor.uniforms.step_, step);
+      gl.uniform4f(floor.uniforms.line, ...colours.grid);
+      gl.uniform4f(floor.uniforms.ground, ...colours.ground);
+      gl.bindVertexArray(fine.block.array);
+      gl.drawElements(gl.TRIANGLES, 6, gl.UNSIGNED_SHORT, 2 * 30);  // its upper side
+    }
+
+    // The floor as it was, unless it is seen from elsewhere: it has the most dots of all, and a processor is slow at them.
+    function copyFloor(picture, view) {
+      const of = [...view, canvas.width, canvas.height, picture.floor, ...picture.colours.grid, ...picture.colours.ground].join();
+      const size = [canvas.width, canvas.height];
+      if (of !== kept.of) {
+        gl.bindFramebuffer(gl.FRAMEBUFFER, kept.frame);
+        if (kept.size !== String(size)) {
+          kept.size = String(size);
+          gl.bindRenderbuffer(gl.RENDERBUFFER, kept.dots);
+          gl.renderbufferStorage(gl.RENDERBUFFER, gl.RGBA8, ...size);
+          gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.RENDERBUFFER, kept.dots);
+        }
+        gl.clear(gl.COLOR_BUFFER_BIT);
+        drawFloor(picture, view);
+        kept.of = of;
+      }
+      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, kept.frame);
+      gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
+      gl.blitFramebuffer(0, 0, ...size, 0, 0, ...size, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    }
+
+    function draw(picture) {
+      const { camera, solids, ghosts, trace, floor: height, colours, limb } = picture;
       const { right, up, back, eye } = camera.axes();
       const view = camera.matrix();
+      const detail = software && !picture.fine ? quick : fine;
       gl.viewport(0, 0, canvas.width, canvas.height);
       gl.clearColor(0, 0, 0, 0);
-      gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-      if (height !== null) {
-        gl.disable(gl.DEPTH_TEST);
-        gl.useProgram(floor.made);
-        gl.uniformMatrix4fv(floor.uniforms.view, false, view);
-        gl.uniform4f(floor.uniforms.middle, camera.target[0], camera.target[1], height, 2.6 * reach);
-        gl.uniform1f(floor.uniforms.step_, step);
-        gl.uniform4f(floor.uniforms.line, ...colours.grid);
-        gl.uniform4f(floor.uniforms.ground, ...colours.ground);
-        gl.bindVertexArray(fine.block.array);
-        gl.drawElements(gl.TRIANGLES, 6, gl.UNSIGNED_SHORT, 2 * 30);  // its upper side
-      }
+      gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);  // first: after a copy, all would be cleared
+      if (kept) copyFloor(picture, view);
+      else drawFloor(picture, view);
       gl.useProgram(solid.made);
       gl.uniformMatrix4fv(solid.uniforms.view, false, view);
       gl.uniform3f(solid.uniforms.eye, ...eye);
       gl.uniform3f(solid.uniforms.key, ...unit(plus(plus(back.map((x) => 0.75 * x), right, -0.5), up, 0.8)));
       const own = packed([{ solids, colour: colours.solid }]);
-      if (height !== null && eye[2] > height) {
+      if (picture.shadow && height !== null && eye[2] > height) {
         gl.enable(gl.STENCIL_TEST);
         gl.stencilFunc(gl.EQUAL, 0, 1);
         gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
         gl.uniform4f(solid.uniforms.shadow, ...SUN, 1);
         gl.uniform4f(solid.uniforms.shade, ...colours.shade);
         gl.uniform1f(solid.uniforms.height, height);
-        put(coarse, own);
+        put(detail === fine ? quick : coarse, own);
         gl.disable(gl.STENCIL_TEST);
       }
       gl.uniform4f(solid.uniforms.shadow, 0, 0, 0, 0);
       gl.enable(gl.DEPTH_TEST);
       gl.enable(gl.CULL_FACE);
-      put(fine, own);
-      put(coarse, packed([{ solids: threads(trace, 0.1 * limb), colour: () => colours.trace }]));
+      put(detail, own);
+      gl.useProgram(ghost.made);
+      gl.uniformMatrix4fv(ghost.uniforms.view, false, view);
+      gl.uniform3f(ghost.uniforms.back, ...back);
+      gl.uniform3f(ghost.uniforms.right, ...right);
+      if (lately.trace !== trace || lately.of !== String(colours.trace))
+        lately = { trace, of: String(colours.trace), packs: packed([{ solids: threads(trace, 0.1 * limb), colour: () => colours.trace }]) };
+      put(sparse, lately.packs);
       if (ghosts.length) {
         gl.depthMask(false);
         gl.enable(gl.POLYGON_OFFSET_FILL);  // behind what is solid, where they coincide
         gl.polygonOffset(2, 400);
         const many = ghosts.length > FEW;
-        gl.uniform1f(solid.uniforms.plain, 1);
         put(many ? sparse : coarse, packed(ghosts.map((each, n) => ({ solids: (many ? thin : plain)(each), colour: () => colours.ghost(n) }))));
-        gl.uniform1f(solid.uniforms.plain, 0);
         gl.disable(gl.POLYGON_OFFSET_FILL);
         gl.depthMask(true);
       }

@@ -57,7 +57,7 @@
     const took = performance.now() - begun;
     const { tick, failed, rows } = ended(found.outputs);
     const width = told.columns.length;
-    lines = told.columns.map((_, c) => Array.from(time, (_t, row) => (row < rows ? found.rows[row * width + c] : null)));
+    lines = told.columns.map((_, c) => Array.from(time, (_t, row) => (row < rows ? found.rows[row * width + c] / data.columnScales[c] : null)));
     draw();
     const which = cases.findIndex((each) => same(each, values));
     chosen.value = which < 0 ? "" : which;
@@ -145,16 +145,16 @@
         const met = judged(each, given[m]);
         return node("div", { class: met ? "met" : "missed" }, `${each.text}: ${met ? "met" : "missed"}`);
       });
-      const value = given[m] === null ? "not computed here" : `${number(given[m])} ${data.metricUnits[m]}`.trim();
+      const value = given[m] === null ? "not computed here" : `${number(given[m] / data.metricScales[m])} ${data.metricUnits[m]}`.trim();
       const whose = given[m] === null || m < measured.length ? "" : ", from the archive";
       return node("tr", null, node("td", null, node("code", null, metric.name)), node("td", null, value + whose), node("td", null, verdicts));
     }));
   }
 
-  // A plot a signal.
-  const signals = [...new Set(told.columns.map((column) => column.signal))];
-  const of = (signal) => told.columns.flatMap((column, n) => (column.signal === signal ? [n] : []));
-  const drawn = (signal) => [time, ...of(signal).map((n) => lines[n])];
+  // A plot a signal, of unlike units one a unit: the columns of each.
+  const plotted = (n) => `${told.columns[n].signal}\n${data.columnUnits[n]}`;
+  const signals = [...new Set(told.columns.map((_, n) => plotted(n)))].map((which) => told.columns.flatMap((_, n) => (plotted(n) === which ? [n] : [])));
+  const drawn = (columns) => [time, ...columns.map((n) => lines[n])];
 
   function draw() {
     if (plots.length) plots.forEach((plot, n) => plot.setData(drawn(signals[n])));
@@ -167,28 +167,33 @@
     panels.replaceChildren();
     const font = "12px " + getComputedStyle(document.body).fontFamily;
     const axis = { stroke: colours.muted, font, grid: { stroke: colours.line, width: 1 }, ticks: { stroke: colours.faint, width: 1, size: 4 } };
-    plots = signals.map((signal) => {
-      const columns = of(signal);
+    plots = signals.map((columns) => {
+      const { signal } = told.columns[columns[0]];
+      const joints = data.arm.scene ? data.arm.scene.joints.map((joint) => `${joint}.${signal}`) : [];
+      const inks = columns.map((n, nth) => {  // a joint's is that of the arm's joint
+        const joint = joints.indexOf(told.columns[n].channel);
+        return colours.lines[(joint < 0 ? nth : joint) % colours.lines.length];
+      });
       const frame = node("div", { class: "frame", role: "img", "aria-label": `${signal} against time` });
       const names = columns.map((n, nth) => {
         const { channel } = told.columns[n];
         const name = node("span", null, `— ${channel.endsWith(`.${signal}`) ? channel.slice(0, -signal.length - 1) : channel}`);
-        name.style.color = colours.lines[nth % colours.lines.length];
+        name.style.color = inks[nth];
         return name;
       });
       panels.append(node("div", { class: "panel" }, node("div", { class: "head" }, node("b", null, node("code", null, signal), data.columnUnits[columns[0]] ? ` (${data.columnUnits[columns[0]]})` : ""),
         node("div", { class: "reading" }, names)), frame));
       return new uPlot({ width: MET.width(frame), height: 190, padding: [8, 14, 0, 0], legend: { show: false },
         scales: { x: { time: false } }, cursor: { y: false, sync: { key: "time" } }, hooks: { setCursor: [pointed] },
-        series: [{}, ...columns.map((_, nth) => ({ stroke: colours.lines[nth % colours.lines.length], width: 1.6, points: { show: false }, spanGaps: false }))],
+        series: [{}, ...columns.map((_, nth) => ({ stroke: inks[nth], width: 1.6, points: { show: false }, spanGaps: false }))],
         axes: [{ ...axis, size: 26, values: (self, v) => ticks(v) }, { ...axis, size: 62, space: 32, values: (self, v) => ticks(v) }],
-      }, drawn(signal), frame);
+      }, drawn(columns), frame);
     });
     if (stage) requestAnimationFrame(() => point(stage.time()));
   }
 
   main.replaceChildren(room,
-    node("div", { class: "knobs" }, node("label", { class: "knob" }, "Case", chosen, node("output", null, `of ${data.count}`)), knobs.map((knob) => knob.box)),
+    ...(cases.length > 1 ? [node("div", { class: "knobs" }, node("label", { class: "knob" }, "Case", chosen, node("output", null, `of ${data.count}`)), knobs.map((knob) => knob.box))] : []),
     came, node("table", { class: "answers" }, answers), panels);
   knobs.forEach((knob) => knob.put());
   update();

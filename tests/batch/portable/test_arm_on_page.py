@@ -140,6 +140,17 @@ def test_arm_and_signals_have_one_clock(webgl: Chromium, pages: Path, tmp_path: 
 
 
 @pytest.mark.browser
+def test_the_floor_stays_while_pictures_follow_one_another(webgl: Chromium, pages: Path, tmp_path: Path) -> None:
+    page = opened(webgl, pages / "tuned.view.html", width=400, scale=2)
+    start = pixels(page, tmp_path)
+    page.run("MET.shown.seek(1)")
+    for shown in (start, pixels(page, tmp_path)):
+        lines = np.abs(np.diff(shown[-60:-10, 400:-20].mean(axis=-1), axis=1)).max(axis=1)
+        assert np.all(lines > 0.02)
+    page.close()
+
+
+@pytest.mark.browser
 def test_a_slider_moves_the_solid_arm_and_leaves_the_view_where_it_was(
     webgl: Chromium, pages: Path, tmp_path: Path
 ) -> None:

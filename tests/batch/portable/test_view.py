@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 import xarray
 
@@ -241,6 +242,52 @@ def test_a_case_that_runs_away_fails_in_the_page_as_in_the_archive(chromium: Chr
     page.close()
 
 
+UNITS = """\
+arm crane {
+    link cart { mass = 1 kg; shape = box(size = [0.1, 0.1, 0.1] m); }
+    link boom { mass = 1 kg; shape = cylinder(radius = 2 cm, length = 0.5 m, along = x); }
+    joint slide prismatic { parent = base; child = cart; axis = x; }
+    joint turn  revolute  { parent = cart; child = boom; axis = z; }
+}
+run it {
+    arm = crane;  initial { slide.qd = 0.5 m/s;  turn.q = -20 deg; }
+    rates { dynamics = 100 Hz; record = 100 Hz; }  duration = 1 s;  record = [q];
+    metric far = final { of = slide.q; }   require far < 70 cm;
+    metric low = min   { of = turn.q; }    require low > -30 deg;
+}
+sweep cranes of it { vary links.cart.mass = [900, 2000] g; }
+"""
+
+PLOTTED = """(() => { const made = uPlot, seen = [];
+    uPlot = function (options, data, frame) { seen.push(data); return new made(options, data, frame); };
+    dispatchEvent(new Event('resize'));  uPlot = made;
+    return seen.map(data => data.slice(1).map(line => Array.from(line))); })()"""
+
+
+@pytest.mark.browser
+def test_numbers_are_in_the_decks_units_and_a_signal_of_two_has_two_plots(chromium: Chromium, tmp_path: Path) -> None:
+    (tmp_path / "deck.ic").write_text(UNITS, encoding="utf-8")
+    archive = tmp_path / "a.h5"
+    assert cli.main(["run", str(tmp_path / "deck.ic"), "cranes", "-q", "--no-picture", "-o", str(archive)]) == cli.YES
+    assert cli.main(["view", str(archive), "-q"]) == 0
+    page = chromium.open(tmp_path / "a.view.html")
+    page.settle()
+    with xarray.open_dataset(archive) as data:
+        metrics = [100.0 * float(data["far"][1]), float(np.degrees(data["low"][1]))]
+        slide, turn = (data["q"].isel(recorded_case=1).sel(joint=joint).values for joint in ("slide", "turn"))
+    page.run(f"{CHOOSE}(1)")
+    cells = page.run("Array.from(document.querySelectorAll('.answers tr'), e => e.cells[1].innerText.split(' '))")
+    assert [unit for _, unit in cells] == ["cm", "deg"]
+    assert [float(value) for value, _ in cells] == pytest.approx(metrics, rel=1e-3)
+    heads = page.run("Array.from(document.querySelectorAll('.panel .head'), e => e.innerText.replace(/\\s+/g, ' '))")
+    assert heads == ["q (cm) — slide", "q (deg) — turn"]
+    lines = [panel[0] for panel in page.run(PLOTTED)]
+    assert lines[0] == pytest.approx((100.0 * slide).tolist(), rel=1e-12)
+    assert lines[1] == pytest.approx(np.degrees(turn).tolist(), rel=1e-12)
+    quiet(page)
+    page.close()
+
+
 def test_an_archive_without_a_metric_of_its_plan_is_damaged(
     sent: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -258,7 +305,7 @@ HOSTILE = "</script><img src=x onerror=\"document.title='hurt'\">\u202e"
 def test_texts_of_an_archive_are_texts_whatever_they_hold(chromium: Chromium, sent: Path, tmp_path: Path) -> None:
     with ArchiveFile(sent / "tuned.h5") as file:
         experiment = file.plan().experiments[0]
-        data = portable_page.data_of(experiment, file.groups[0])
+        data = portable_page.data_of(experiment, file, file.groups[0])
     assert data["same_code"] and "by the code that the archive was made with" in portable_page.page_of(experiment, data)
     data["same_code"] = False
     data["arm"]["scene"]["bodies"] = [[HOSTILE, carrier] for _, carrier in data["arm"]["scene"]["bodies"]]
