@@ -21,7 +21,7 @@ from met.diagnostic import Problem, error
 from met.plan import Command, Experiment, Origin, Quantity, Structure
 from met.program import cell_names
 from met.program.control.substituted import QUEUE
-from met.program.unheld import Unheld, unheld
+from met.program.unheld import Unheld, holding_torques, unheld
 
 CLOSE = 1e-11
 """Change of a number over a period, as a share of it and at most this itself, that is none."""
@@ -76,7 +76,7 @@ _ZERO = Quantity(0.0, "", Origin("default"))
 
 def weak(experiment: Experiment, given: np.ndarray) -> list[Reason]:
     """For each of these inputs, [case, input], why servos cannot hold an arm that is to stand; "" where they can."""
-    return ["; ".join(map(_of_unheld, joints)) for joints in unheld(experiment, given)]
+    return ["; ".join(map(_of_unheld, joints)) for joints in unheld(experiment, given, commanded=True)]
 
 
 def _of_unheld(of: Unheld) -> str:
@@ -93,7 +93,8 @@ def settled(program: PeriodProgram, flow: Flow) -> Flow | None:
     if program.bodies:
         return None
     commands = [number for number, each in enumerate(program.inputs) if not each.is_output]
-    flow = flow.copy()
+    of_torque = _of_torque(program)
+    flow = _commanded(program, flow).copy()
     for name in program.states:
         flow.cells.setdefault(name, 0.0)  # what the run has not written yet
     flow, fixed = _under_way(program, flow), _places(program)
@@ -114,7 +115,10 @@ def settled(program: PeriodProgram, flow: Flow) -> Flow | None:
         if np.all(np.abs(change) <= CLOSE * np.maximum(np.abs(now), 1.0)):
             return None if loose_beds(flow) else flow
         sought = [place for place, name in enumerate(found.states) if name not in fixed]
-        added = [[k for k, each in enumerate(found.ticks) if each.entry == number] for number in commands]
+        # while friction holds a joint, several torques do, of which the one that it begins with is as good as any
+        stays = {path for path, joint in of_torque.items() if {joint, f"{joint}.bed"} & {*found.held}}
+        asked = [number for number in commands if program.inputs[number].path not in stays]
+        added = [[k for k, each in enumerate(found.ticks) if each.entry == number] for number in asked]
         columns = [(found.A - np.eye(len(now)))[:, sought], *(found.B[:, ticks].sum(1)[:, None] for ticks in added)]
         moves_by = np.hstack(columns)
         sizes = np.linalg.norm(moves_by, axis=0)
@@ -122,10 +126,32 @@ def settled(program: PeriodProgram, flow: Flow) -> Flow | None:
         step = np.linalg.lstsq(moves_by / sizes, -change, rcond=1e-13)[0] / sizes
         for place, size in zip(sought, step, strict=False):
             flow.cells[found.states[place]] += float(size)
-        for number, size in zip(commands, step[len(sought) :], strict=True):
+        for number, size in zip(asked, step[len(sought) :], strict=True):
             cell = ADDED + program.inputs[number].path
             flow.cells[cell] = flow.cells.get(cell, 0.0) + float(size)
     return None
+
+
+def _of_torque(program: PeriodProgram) -> dict[str, str]:
+    """Joints whose servos are commanded a torque that can be solved for, by the paths of these commands."""
+    kinds = {actuator.use.joint: actuator.command_kind for actuator in program.system.working}
+    return {each.path: each.joint for each in program.inputs if not each.is_output and kinds[each.joint] == "torque"}
+
+
+def _commanded(program: PeriodProgram, flow: Flow) -> Flow:
+    """The flow as it is where servos that are commanded a torque are commanded, from the run's start on, the one that
+    keeps their joints from accelerating: from 0 on it would be sought across all torques that friction holds."""
+    of_torque = _of_torque(program)
+    if not of_torque:
+        return flow
+    torques = holding_torques(program.experiment, flow.inputs)
+    found = Flow(program, flow.inputs, {}, 0)
+    found.begin()
+    found.cells |= {ADDED + path: torques[joint] for path, joint in of_torque.items() if joint in torques}
+    while found.tick < flow.tick:
+        found.ticks()
+        found.finish()
+    return found
 
 
 def _under_way(program: PeriodProgram, flow: Flow) -> Flow:
@@ -165,7 +191,7 @@ def moves(program: PeriodProgram, flow: Flow) -> Reason:
     """The part of an arm that changes its rate most within a period that begins where a flow stands, in words."""
     if program.bodies:
         return f"`{program.bodies[0].name}` moves freely"
-    flow = _under_way(program, flow)
+    flow = _under_way(program, _commanded(program, flow))
     bring_to_rest(flow)
     after = flow.copy()
     for _ in range(program.ticks):
@@ -189,6 +215,11 @@ def moves(program: PeriodProgram, flow: Flow) -> Reason:
     first = name.removesuffix(".qd")
     sliding = {joint.name for joint in program.experiment.structure.moving if joint.kind == "prismatic"}
     size = f"{found[name]:.3g} {'m/s^2' if first in sliding else 'rad/s^2'}"
+    if first in {a.use.joint for a in program.system.working if a.command_kind == "torque" and not a.ticks}:
+        return (
+            f"`{first}` begins to move, by {size}, and the torque that would hold it is not sought: the law of its "
+            "servo is `continuous`, so give it a `rate`"
+        )
     return f"`{first}` begins to move, by {size}, and no constant command and no state of its servo stop it"
 
 
