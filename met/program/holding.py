@@ -16,7 +16,7 @@ from met.program.balancing import Demand
 from met.program.evaluation import brake_levels, law
 from met.program.system import System
 from met.program.values import NamedValues, answer
-from met.servos.servo import Drive, JointMotion
+from met.servos.servo import Drive, JointMotion, Setpoint
 from met.trace import Real, Truth, absolute, all_of, either, maximum, sign, where
 from met.trace.program import Tape
 
@@ -38,14 +38,17 @@ def first_unheld(system: System, tape: Tape, y: Motion, demands: Sequence[Demand
     return first
 
 
-def holds(demand: Demand, torque: Real, brake: Real) -> Truth:
+def holds(demand: Demand, torque: Real, brake: Real, *, commanded: bool = False) -> Truth:
     """True where the servo, as it begins with what gives its joint this torque (N m; N), gives it and goes on to.
 
-    brake  dry friction of brakes on the joint, N m (N)
+    brake      dry friction of brakes on the joint, N m (N)
+    commanded  whether a servo that is commanded a torque is commanded this one, and not what its deck says
     """
     own = {**demand.starts, **demand.states(torque)}
     if demand.seen.setpoint.kind == "torque":
-        return True  # the command decides what it gives
+        if not commanded:
+            return True  # the command decides what it gives
+        demand = replace(demand, seen=replace(demand.seen, setpoint=Setpoint("torque", torque, 0.0)))
     outputs = _outputs(demand, own)
     drive = _drive(demand, own, outputs)
     qd = demand.seen.qd

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from met.backends.reference.plain import PlainTape
 from met.frozen import frozen
+from met.integrators.integrator import Motion
 from met.plan import Experiment, Joint, ServoUse
 from met.program.balancing import Demand, demands
 from met.program.build import Builder
@@ -55,36 +57,68 @@ class Unheld:
         return f"{named} is too little: raise it or the gear's ratio, or lighten what the joint carries"
 
 
-def unheld(experiment: Experiment, values: np.ndarray) -> list[tuple[Unheld, ...]]:
+def unheld(experiment: Experiment, values: np.ndarray, *, commanded: bool = False) -> list[tuple[Unheld, ...]]:
     """For each case of these inputs, [case, input], the joints that are to begin balanced and cannot be held, in the
-    arm's order."""
+    arm's order. commanded: as `holding.holds` has it."""
     found: list[tuple[Unheld, ...]] = [()] * len(values)
     if not experiment.structure.balanced or not len(values):
         return found
-    system = System(experiment)
-    builder = Builder(system)
-    program = builder.program()
-    columns = values.T if len(values) > 1 else values[0]
-    tape = PlainTape(program, dict(zip(program.inputs, columns, strict=True)), 1)
+    begun = _Begun.of(experiment, values.T if len(values) > 1 else values[0])
+    system = begun.system
     with np.errstate(all="ignore"):
-        begun = builder.begin(tape)
-        y = builder.step.state(tape)
-        brakes = brake_levels(system, tape.read, y, 0.0, 0.0)
-        for demand in demands(system, tape, y, begun):
+        brakes = brake_levels(system, begun.tape.read, begun.y, 0.0, 0.0)
+        for demand in begun.demands():
             joint = system.joints[demand.actuator.index]
-            judged = _Judged(system, tape, demand, brakes.get(joint.name, 0.0), len(values))
+            brake = brakes.get(joint.name, 0.0)
+            judged = _Judged(system, begun.tape, demand, brake, len(values), commanded)
             for case in np.flatnonzero(~judged.held).tolist():
                 found[case] = (*found[case], Unheld(joint, demand.actuator.use, *judged.of(case)))
     return found
 
 
+def holding_torques(experiment: Experiment, inputs: Mapping[str, float]) -> dict[str, float]:
+    """By joint, the torque with which a servo that is commanded a torque keeps its joint from accelerating as a run
+    begins, N m (N). inputs: of one case, by name."""
+    with np.errstate(all="ignore"):
+        found = _Begun.of(experiment, tuple(inputs.values()), tuple(inputs)).demands()
+        return {each.actuator.use.joint: float(each.torque) for each in found if each.actuator.command_kind == "torque"}
+
+
+@frozen
+class _Begun:
+    """A run of one case, or of several side by side, as it begins while its servos are unbalanced."""
+
+    system: System
+    tape: PlainTape
+    y: Motion
+    held: Mapping[str, Mapping[str, Real]]
+
+    @classmethod
+    def of(cls, experiment: Experiment, values: Iterable[Any], names: Sequence[str] | None = None) -> _Begun:
+        """values: of the program's inputs, in the order of these names, or in its own."""
+        system = System(experiment)
+        builder = Builder(system)
+        program = builder.program()
+        tape = PlainTape(program, dict(zip(names or program.inputs, values, strict=True)), 1)
+        with np.errstate(all="ignore"):
+            held = builder.begin(tape)
+            return cls(system, tape, builder.step.state(tape), held)
+
+    def demands(self) -> Iterator[Demand]:
+        """The demands of the start on each servo."""
+        return demands(self.system, self.tape, self.y, self.held)
+
+
 class _Judged:
     """One servo in many cases, whose numbers are arrays over these, or single where they do not vary."""
 
-    def __init__(self, system: System, tape: PlainTape, demand: Demand, brake: Real, cases: int) -> None:
-        self.system, self.tape, self.demand, self.brake, self.cases = system, tape, demand, brake, cases
+    def __init__(
+        self, system: System, tape: PlainTape, demand: Demand, brake: Real, cases: int, commanded: bool
+    ) -> None:
+        self.system, self.tape, self.demand, self.cases = system, tape, demand, cases
+        self._holds = partial(holds, brake=brake, commanded=commanded)
         self.wanted = self._over_cases(demand.torque)
-        self.held = self._over_cases(holds(demand, demand.torque, brake))
+        self.held = self._over_cases(self._holds(demand, demand.torque))
 
     def of(self, case: int) -> tuple[float, float, tuple[tuple[str, str], ...]]:
         """The torque that its joint takes in this case, what it can hold, and the limits that stop it, as `Unheld`
@@ -102,7 +136,7 @@ class _Judged:
         low, high = np.zeros(self.cases), np.ones(self.cases)
         for _ in range(HALVINGS):
             middle: Any = 0.5 * (low + high)
-            held: Any = holds(self.demand, middle * self.demand.torque, self.brake)
+            held: Any = self._holds(self.demand, middle * self.demand.torque)
             low, high = np.where(held, middle, low), np.where(held, high, middle)
         return low
 
@@ -131,7 +165,7 @@ class _Judged:
             actuator.parts.parameters,
             lambda path: np.inf if path.rpartition(".")[2] in names else self.system.value(path, self.tape.read),
         )
-        return self._over_cases(holds(replace(self.demand, p=numbers), self.demand.torque, self.brake))
+        return self._over_cases(self._holds(replace(self.demand, p=numbers), self.demand.torque))
 
     def _over_cases(self, value: object) -> np.ndarray:
         return np.broadcast_to(np.asarray(value), (self.cases,))

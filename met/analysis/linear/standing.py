@@ -22,7 +22,7 @@ from met.diagnostic import Problem, error
 from met.plan import Command, Experiment, Origin, Quantity, Structure
 from met.program import cell_names
 from met.program.control.substituted import QUEUE
-from met.program.unheld import Unheld, unheld
+from met.program.unheld import Unheld, holding_torques, unheld
 
 CLOSE = 1e-11
 """Change of a number over a period, as a share of it and at most this itself, that is none."""
@@ -77,7 +77,7 @@ _ZERO = Quantity(0.0, "", Origin("default"))
 
 def weak(experiment: Experiment, given: np.ndarray) -> list[Reason]:
     """For each of these inputs, [case, input], why servos cannot hold an arm that is to stand; "" where they can."""
-    return ["; ".join(map(_of_unheld, joints)) for joints in unheld(experiment, given)]
+    return ["; ".join(map(_of_unheld, joints)) for joints in unheld(experiment, given, commanded=True)]
 
 
 def _of_unheld(of: Unheld) -> str:
@@ -96,7 +96,8 @@ def settled(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow | None]:
     if program.bodies:
         return found
     never = dict.fromkeys(program.states, 0.0)  # what the run has not written yet
-    begun = [Flow(program, each.inputs, never | each.cells, each.tick) for each in flows]
+    commanded = (_commanded(program, each) for each in flows)
+    begun = [Flow(program, each.inputs, never | each.cells, each.tick) for each in commanded]
     moving = dict(enumerate(_under_way(program, begun)))
     for _ in range(MOST_STEPS):
         now = list(moving.values())
@@ -123,7 +124,10 @@ def _step(flow: Flow, after: Flow, found: PeriodMap) -> bool | None:
     if np.all(np.abs(change) <= CLOSE * np.maximum(np.abs(now), 1.0)):
         return True
     fixed = _places(program)
-    commands = [number for number, each in enumerate(program.inputs) if not each.is_output]
+    # while friction holds a joint, several torques do, of which the one that it begins with is as good as any
+    of_torque, held = _of_torque(program), {*found.held}
+    stays = {path for path, joint in of_torque.items() if {joint, f"{joint}.bed"} & held}
+    commands = [k for k, each in enumerate(program.inputs) if not each.is_output and each.path not in stays]
     sought = [place for place, name in enumerate(found.states) if name not in fixed]
     added = [[k for k, each in enumerate(found.ticks) if each.entry == number] for number in commands]
     columns = [(found.A - np.eye(len(now)))[:, sought], *(found.B[:, ticks].sum(1)[:, None] for ticks in added)]
@@ -137,6 +141,28 @@ def _step(flow: Flow, after: Flow, found: PeriodMap) -> bool | None:
         cell = ADDED + program.inputs[number].path
         flow.cells[cell] = flow.cells.get(cell, 0.0) + float(size)
     return None
+
+
+def _of_torque(program: PeriodProgram) -> dict[str, str]:
+    """Joints whose servos are commanded a torque that can be solved for, by the paths of these commands."""
+    kinds = {actuator.use.joint: actuator.command_kind for actuator in program.system.working}
+    return {each.path: each.joint for each in program.inputs if not each.is_output and kinds[each.joint] == "torque"}
+
+
+def _commanded(program: PeriodProgram, flow: Flow) -> Flow:
+    """The flow as it is where servos that are commanded a torque are commanded, from the run's start on, the one that
+    keeps their joints from accelerating: from 0 on it would be sought across all torques that friction holds."""
+    of_torque = _of_torque(program)
+    if not of_torque:
+        return flow
+    torques = holding_torques(program.experiment, flow.inputs)
+    found = Flow(program, flow.inputs, {}, 0)
+    found.begin()
+    found.cells |= {ADDED + path: torques[joint] for path, joint in of_torque.items() if joint in torques}
+    while found.tick < flow.tick:
+        found.ticks()
+        found.finish()
+    return found
 
 
 def _under_way(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow]:
@@ -169,7 +195,7 @@ def moves(program: PeriodProgram, flow: Flow) -> Reason:
     """The part of an arm that changes its rate most within a period that begins where a flow stands, in words."""
     if program.bodies:
         return f"`{program.bodies[0].name}` moves freely"
-    (flow,) = _under_way(program, [flow])
+    (flow,) = _under_way(program, [_commanded(program, flow)])
     bring_to_rest(flow)
     (after,) = together([flow], Flow.period)
     found = {name: abs(after.cells[name] - flow.cells[name]) / program.seconds for name in program.rates}
@@ -190,6 +216,11 @@ def moves(program: PeriodProgram, flow: Flow) -> Reason:
     first = name.removesuffix(".qd")
     sliding = {joint.name for joint in program.experiment.structure.moving if joint.kind == "prismatic"}
     size = f"{found[name]:.3g} {'m/s^2' if first in sliding else 'rad/s^2'}"
+    if first in {a.use.joint for a in program.system.working if a.command_kind == "torque" and not a.ticks}:
+        return (
+            f"`{first}` begins to move, by {size}, and the torque that would hold it is not sought: the law of its "
+            "servo is `continuous`, so give it a `rate`"
+        )
     return f"`{first}` begins to move, by {size}, and no constant command and no state of its servo stop it"
 
 

@@ -111,6 +111,44 @@ def test_a_motor_too_weak_has_none(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.02])
+def test_a_servo_that_is_commanded_a_torque_is_commanded_the_weight(friction: float, tmp_path: Path) -> None:
+    """In closed form, also where the weight is more than its friction holds."""
+    pushed = ARM.replace("command = rate(0.4 rad/s)", f"f_c = {friction} N*m; command = torque(0 N*m)")
+    asked = of_deck(experiment(tmp_path, pushed, select=["hold"]), "up")
+    flow = settled(asked.program, at_instant(asked.program, 0, 0))
+    weight = 9.81 * 0.5 * math.cos(math.radians(-30.0))
+    assert weight > 100.0 * friction and flow is not None
+    assert flow.cells["added:knee.servo.command"] == pytest.approx(weight, rel=1e-9)
+
+
+def test_a_servo_that_is_commanded_a_torque_may_be_too_weak(tmp_path: Path) -> None:
+    pushed = ARM.replace("command = rate(0.4 rad/s)", "f_c = 0.02 N*m; command = torque(0 N*m)")
+    with pytest.raises(Problem) as refused:
+        weak = pushed.replace("weak like hold { servos { hinge", "weak like hold { servos { knee").replace(
+            "0.1", "0.01"
+        )
+        of_deck(experiment(tmp_path, weak, select=["weak"]), "up").of(0)
+    (said,) = refused.value.diagnostics
+    takes = 9.81 * 0.5 * math.cos(math.radians(-30.0))
+    assert said.message == (
+        f"`weak` has no operating point in this pose: `knee` takes {takes:.3g} N m, and its servo can hold 3 N m: "
+        "`tau_max`, 0.01 N*m, is too little: raise it or the gear's ratio, or lighten what the joint carries"
+    )
+
+
+def test_a_torque_of_a_law_that_is_continuous_is_not_sought(tmp_path: Path) -> None:
+    pushed = ARM.replace("command = rate(0.4 rad/s)", "rate = continuous; command = torque(0 N*m)")
+    pushed = pushed.replace("[hinge.servo.voltage, knee.servo.voltage]", "hinge.servo.voltage")
+    with pytest.raises(Problem) as refused:
+        of_deck(experiment(tmp_path, pushed, select=["hold"]), "up").of(0)
+    (said,) = refused.value.diagnostics
+    assert said.code == "D377" and said.message.startswith("`hold` has no operating point in this pose: `knee` begins")
+    assert said.message.endswith(
+        "and the torque that would hold it is not sought: the law of its servo is `continuous`, so give it a `rate`"
+    )
+
+
 def test_what_no_servo_holds_has_none(tmp_path: Path) -> None:
     with pytest.raises(Problem, match="`knee` begins to move, by") as refused:
         of_deck(experiment(tmp_path, ARM, select=["limp"]), "up").of(0)

@@ -29,6 +29,7 @@ run there {
     linear up { at = equilibrium(q = [0.3] rad);  open = hinge.servo.voltage; }
 }
 run smooth like there { servos { hinge { f_c = 0 N*m; } } }
+run by_torque like there { servos { hinge { command = torque(0 N*m); } } }
 run faulty like there { hinge { bed = emulated(tachometer = 0.1 rad/s);  law = velocity_tracking; } }
 """
 LAWS = ["velocity_tracking", "torque_balance_observer", "torque_balance", "bare", "measured_acceleration"]
@@ -81,6 +82,27 @@ def test_a_shaft_that_no_friction_holds_has_no_derivative_at_rest(tmp_path: Path
         "and an emulated bed stops a shaft that would turn back for the rest of a substep, so that there is no "
         "derivative at rest"
     )
+
+
+@pytest.mark.parametrize("delay", [0, 2])
+@pytest.mark.parametrize("law", LAWS)
+def test_a_bed_whose_servo_is_commanded_a_torque_stands_by_the_one_that_bears_the_weight(
+    law: str, delay: int, tmp_path: Path
+) -> None:
+    """Not by friction's share, which is less than the weight here."""
+    deck = DECK.replace("emulated;  law = velocity_tracking", f"emulated(delay = {delay});  law = {law}")
+    asked = of_deck(experiment(tmp_path, deck, select=["by_torque"]))
+    flow = settled(asked.program, at_instant(asked.program, 0, asked.program.begin(0.0)))
+    assert flow is not None
+    weight = 20.0 * 9.81 * 0.5 * np.cos(0.3)
+    assert weight > 2.0 * 1570.0 * 0.0205
+    assert flow.cells["added:hinge.servo.command"] == pytest.approx(weight, rel=1e-12)
+    assert period_map(asked.program, flow).held[0] == "hinge.bed"
+    later = flow.copy()
+    for _ in range(300):
+        later.ticks()
+        later.finish()
+    assert max(abs(later.cells[name] - flow.cells[name]) for name in asked.program.states) < 1e-9
 
 
 def test_a_bed_with_noise_does_not_stand_still(tmp_path: Path) -> None:
