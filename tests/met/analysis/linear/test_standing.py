@@ -116,7 +116,7 @@ def test_a_servo_that_is_commanded_a_torque_is_commanded_the_weight(friction: fl
     """In closed form, also where the weight is more than its friction holds."""
     pushed = ARM.replace("command = rate(0.4 rad/s)", f"f_c = {friction} N*m; command = torque(0 N*m)")
     asked = of_deck(experiment(tmp_path, pushed, select=["hold"]), "up")
-    flow = settled(asked.program, at_instant(asked.program, 0, 0))
+    (flow,) = settled(asked.program, [at_instant(asked.program, 0, 0)])
     weight = 9.81 * 0.5 * math.cos(math.radians(-30.0))
     assert weight > 100.0 * friction and flow is not None
     assert flow.cells["added:knee.servo.command"] == pytest.approx(weight, rel=1e-9)

@@ -92,7 +92,7 @@ def test_a_bed_whose_servo_is_commanded_a_torque_stands_by_the_one_that_bears_th
     """Not by friction's share, which is less than the weight here."""
     deck = DECK.replace("emulated;  law = velocity_tracking", f"emulated(delay = {delay});  law = {law}")
     asked = of_deck(experiment(tmp_path, deck, select=["by_torque"]))
-    flow = settled(asked.program, at_instant(asked.program, 0, asked.program.begin(0.0)))
+    (flow,) = settled(asked.program, [at_instant(asked.program, 0, asked.program.begin(0.0))])
     assert flow is not None
     weight = 20.0 * 9.81 * 0.5 * np.cos(0.3)
     assert weight > 2.0 * 1570.0 * 0.0205
