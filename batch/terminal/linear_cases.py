@@ -46,10 +46,14 @@ def case_lines(question: LinearQuestion, found: Sequence[Answer]) -> Iterator[st
         yield ""
         yield "least damped pole that swings"
         yield from _table(question, found, ("damping", "Hz", "joint"), _swing)
-    refused = sum(isinstance(each, str) for each in found)
-    if refused:
+    reasons = {case: each for case, each in enumerate(found) if isinstance(each, str)}
+    if reasons:
         yield ""
-        yield f"  {count(refused, 'case')} of {len(found)} without an answer: an event is on the way, or the run failed"
+        yield f"no answer in {count(len(reasons), 'case')} of {len(found):,}"
+        listed = list(reasons.items())[:MOST_ROWS]
+        yield from columns([(f"#{question.experiment.cases.table[case]}", why) for case, why in listed])
+        if len(reasons) > len(listed):
+            yield f"  and {len(reasons) - len(listed):,} more: `--format json` has them all"
 
 
 def _table(
@@ -63,7 +67,7 @@ def _table(
     rows = [("case", *heads, *head)]
     for case, each in enumerate(found[:MOST_ROWS]):
         values = (number(float(one.values[case]) / one.scale) for one in varied)
-        told = cells(each) if isinstance(each, Linearized) else (each,)
+        told = cells(each) if isinstance(each, Linearized) else ("no answer",)
         rows.append((f"#{question.experiment.cases.table[case]}", *values, *told))
     yield from columns(rows, right=range(1, 1 + len(varied)))
     if len(found) > MOST_ROWS:

@@ -21,7 +21,7 @@ from met.analysis.linear.shafts import bring_to_rest, loose_beds
 from met.diagnostic import Problem, error
 from met.plan import Command, Experiment, Origin, Quantity, Structure
 from met.program import cell_names
-from met.program.control.substituted import QUEUE
+from met.program.control.substituted import LIMITED, QUEUE
 from met.program.unheld import Unheld, holding_torques, unheld
 
 CLOSE = 1e-11
@@ -221,11 +221,17 @@ def moves(program: PeriodProgram, flow: Flow) -> Reason:
             f"`{first}` begins to move, by {size}, and the torque that would hold it is not sought: the law of its "
             "servo is `continuous`, so give it a `rate`"
         )
+    mounted = {each.use.joint for each, _, _ in program.system.mounted}
+    if first in mounted and after.cells.get(LIMITED, 0.0) > flow.cells.get(LIMITED, 0.0):
+        return (
+            f"`{first}` begins to move, by {size}: the load motor of its bed is at its limit, "
+            f"`{first}.bed.i_max` times `{first}.bed.kt_load`, and does not give the torque of the arm"
+        )
     return f"`{first}` begins to move, by {size}, and no constant command and no state of its servo stop it"
 
 
 def refusal(experiment: Experiment, why: Reason) -> Problem:
     """The refusal of an operating point that is none."""
     message = f"`{experiment.name}` has no operating point in this pose: {why}"
-    helps = "another pose or a stronger servo; `at = TIME` asks of a motion instead"
+    helps = "another pose, a stronger servo or bed; `at = TIME` asks of a motion instead"
     return Problem(error("D377", message, experiment.place, help=helps))

@@ -30,6 +30,7 @@ run there {
 }
 run smooth like there { servos { hinge { f_c = 0 N*m; } } }
 run by_torque like there { servos { hinge { command = torque(0 N*m); } } }
+run weak like there { hinge { bed = emulated(i_max = 0.5 A);  law = velocity_tracking; } }
 run faulty like there { hinge { bed = emulated(tachometer = 0.1 rad/s);  law = velocity_tracking; } }
 """
 LAWS = ["velocity_tracking", "torque_balance_observer", "torque_balance", "bare", "measured_acceleration"]
@@ -103,6 +104,18 @@ def test_a_bed_whose_servo_is_commanded_a_torque_stands_by_the_one_that_bears_th
         later.ticks()
         later.finish()
     assert max(abs(later.cells[name] - flow.cells[name]) for name in asked.program.states) < 1e-9
+
+
+def test_a_bed_whose_load_motor_is_too_weak_is_told_of_with_what_limits_it(tmp_path: Path) -> None:
+    """0.036 N m of 0.0597 that the weight asks of it, of which friction takes 0.0205; 1 A does."""
+    told = _refused(tmp_path, "weak")
+    assert told.endswith(
+        ": the load motor of its bed is at its limit, `hinge.bed.i_max` times `hinge.bed.kt_load`, and does not give "
+        "the torque of the arm"
+    ), told
+    deck = DECK.replace("i_max = 0.5 A", "i_max = 1 A")
+    asked = of_deck(experiment(tmp_path, deck, select=["weak"]))
+    assert settled(asked.program, [at_instant(asked.program, 0, asked.program.begin(0.0))]) != [None]
 
 
 def test_a_bed_with_noise_does_not_stand_still(tmp_path: Path) -> None:
