@@ -28,6 +28,9 @@ ABREAST = 256
 SAME = 1e-9
 """Share of the largest number of its row by which the derivatives of two sides may differ and be one."""
 
+NOTHING = 1e-12
+"""Difference of two numbers, SI, that is rounding."""
+
 
 @frozen
 class InputTick:
@@ -154,7 +157,10 @@ def period_map(program: PeriodProgram, flow: Flow) -> PeriodMap:
 
 @frozen
 class _Carried:
-    """A period carried out with tangents, as `PeriodMap` has them; edges: the kinks that it stood on."""
+    """A period carried out with tangents, as `PeriodMap` has them.
+
+    ends   states at its end, and what is recorded at its begin;  edges: the kinks that it stood on
+    """
 
     A: np.ndarray
     B: np.ndarray
@@ -162,11 +168,15 @@ class _Carried:
     D: np.ndarray
     Wx: np.ndarray
     Wu: np.ndarray
+    ends: np.ndarray
     at_limit: tuple[str, ...]
     edges: tuple[Edge, ...]
     flow: Flow
 
     def differs(self, other: _Carried) -> bool:
+        """True where the derivatives are others, or what they are the derivatives of."""
+        if np.any(np.abs(self.ends - other.ends) > SAME * np.abs(self.ends) + NOTHING):
+            return True
         pairs = ((self.A, other.A), (self.B, other.B), (self.C, other.C), (self.Wx, other.Wx), (self.Wu, other.Wu))
         for a, b in pairs:
             largest = np.max(np.abs(a), axis=1, keepdims=True, initial=0.0)
@@ -210,11 +220,21 @@ def _carried(
         limits[-1] = limits[-1] if flow.tick % program.schedule.dynamics == 0 else {}
     at_limit = _at_all(flow, [each for each in limits if each])
     ends = end_tangents(program, flow, states, n + m)
+    numbers = np.array([flow.cells[each] for each in states if each in flow.cells] + list(flow.rows.values()))
     rows = np.zeros((len(program.columns), n + m))
     for column, move in flow.row_tangents.items():
         rows[column] = move
     return _Carried(
-        ends[:, :n], ends[:, n:], rows[:, :n], rows[:, n:], W[:, :n], W[:, n:], at_limit, tuple(flow.edges), flow
+        ends[:, :n],
+        ends[:, n:],
+        rows[:, :n],
+        rows[:, n:],
+        W[:, :n],
+        W[:, n:],
+        numbers,
+        at_limit,
+        tuple(flow.edges),
+        flow,
     )
 
 
