@@ -101,5 +101,6 @@ def linear(source: str, name: str | None, form: str, **options: Any) -> int:
         files.write(found, output)
     if drawn is not None:
         picture.draw(found, drawn)
-    say(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(linear_lines(found)))
+    lines = linear_lines(found, experiment.cases.count)
+    say(json.dumps(as_data(found), indent=1) if form == "json" else "\n".join(lines))
     return NO if any(loop.unstable for loop in found.loops) else YES

@@ -17,9 +17,9 @@ LEAST_SHARE = 0.05
 """Share of a mode from which on who takes part is named."""
 
 
-def linear_lines(found: Linearized) -> Iterator[str]:
-    """The answers in lines."""
-    case = f", case #{found.case}" if found.case else ""
+def linear_lines(found: Linearized, cases: int = 1) -> Iterator[str]:
+    """The answers in lines. cases: so many the experiment has, of which this is one."""
+    case = f", case #{found.case} of {cases}" if cases > 1 else ""
     states = count(len(found.states), "state")
     yield f"{found.experiment}{case}: linear {found.where}, a period of {_time(found.seconds)}, {states}"
     for name in found.held:

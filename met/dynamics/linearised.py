@@ -360,12 +360,13 @@ def tell(tree: Tree, given: Mapping[str, Any], solved: Solved) -> None:
     if tree.floating is not None or not scalars:
         return
     held = _scalars({"tree": tree} | {name: value for name, value in given.items() if name not in MOVING})
-    taken = {x.ref >> 1 for x in (*scalars, *held)}
+    # a result that was there before all that it is found from is another pass's too, which knows less, or is given
+    last = max(x.ref >> 1 for x in (*scalars, *held))
     found = (
         *solved.qdd,
         *(x if mode is not True else 0.0 for x, mode in zip(solved.tau_load, solved.mode, strict=True)),
     )
-    places = [place for place, x in enumerate(found) if isinstance(x, Scalar) and x.ref >> 1 not in taken]
+    places = [place for place, x in enumerate(found) if isinstance(x, Scalar) and x.ref >> 1 > last]
     if not places:
         return
     if not given["velocity_products"]:

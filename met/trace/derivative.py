@@ -86,15 +86,22 @@ def _flip(graph: Nodes, sign: Scalar, move: Scalar, bit: int) -> Scalar:
     return Scalar(graph, graph.flip(move.ref, sign.ref, bit))
 
 
-def _is_sign(graph: Nodes, chosen: list[Scalar]) -> bool:
-    """True of the sign of a number, 1, -1 or the number itself where it is 0: there it jumps, and else it rests."""
-    mask, above, rest = (each.ref for each in chosen)
+def sign_of(graph: Nodes, chosen: Sequence[int]) -> int | None:
+    """The reference of the number of which a `where` of these operands is the sign, 1, -1 or the number itself where it
+    is 0: there it jumps, and else it rests. None: it is no sign."""
+    mask, above, rest = chosen
     condition, inner = graph.nodes[mask >> 1], graph.nodes[rest >> 1]
     if mask & 1 or condition[:2] != ("lt", ZERO) or graph.value(above) is None or inner[0] != "where" or inner[1] & 1:
-        return False
+        return None
     x, below = condition[2], inner[2] ^ (rest & 1)
     same = graph.nodes[inner[1] >> 1] in (("lt", x, ZERO), ("lt", ZERO, x ^ 1)) and inner[3] ^ (rest & 1) == x
-    return same and graph.value(below) is not None
+    return int(x) if same and graph.value(below) is not None else None
+
+
+def _choice(graph: Nodes, x: list[Scalar], dx: list[Scalar]) -> Scalar:
+    if sign_of(graph, [each.ref for each in x]) is not None:
+        return Scalar(graph, ZERO)
+    return Scalar(graph, graph.where(x[0].ref, dx[1].ref, dx[2].ref))
 
 
 _RULES: dict[str, Rule] = {
@@ -106,7 +113,7 @@ _RULES: dict[str, Rule] = {
     "sqrt": lambda g, _, y, x, dx: dx[0] / (2.0 * y),
     "abs": lambda g, _, y, x, dx: _flip(g, x[0], dx[0], 63),
     "flip": lambda g, rest, y, x, dx: _flip(g, x[1], dx[0], rest[0]),
-    "where": lambda g, _, y, x, dx: Scalar(g, ZERO if _is_sign(g, x) else g.where(x[0].ref, dx[1].ref, dx[2].ref)),
+    "where": lambda g, _, y, x, dx: _choice(g, x, dx),
     "significand": lambda g, _, y, x, dx: dx[0] * (y / x[0]),
 }
 """Rules of differentiation by operation. Those not here have no derivative, or none but at jumps."""

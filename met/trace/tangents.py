@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Any
 
 from met.frozen import frozen
-from met.trace.derivative import STEPS, rounds, slopes
+from met.trace.derivative import STEPS, rounds, sign_of, slopes
 from met.trace.known import KnownTangents
 from met.trace.nodes import OPERANDS, TRUTHS, ZERO, Node, Nodes, live
 from met.trace.primitives import PLAIN
@@ -31,7 +31,8 @@ SIGN = 63
 
 @frozen
 class Kink:
-    """A place in a section where the derivative may be another from the other side: where two numbers are equal.
+    """A place in a section where the derivative may be another from the other side, or the number itself, of a sign:
+    where two numbers are equal.
 
     sides   references of the two;  move: of the tangent of their difference
     nodes   positions of what goes by their order, the opposite of which is the other side
@@ -137,10 +138,16 @@ def with_tangents(
 
 
 def _kinks(graph: Nodes, order: Iterable[int], found: Mapping[int, int], roots: Iterable[int]) -> tuple[Kink, ...]:
-    """The kinks on which these tangents depend: of comparisons by size, and of signs. Two numbers that are asked for
-    being equal are none: that is how a quotient is kept from 0/0 where it has a limit."""
+    """The kinks on which these tangents depend: of comparisons by size, and of the bit that is a sign; and all signs of
+    numbers that move, which jump. Two numbers that are asked for being equal are none: that is how a quotient is kept
+    from 0/0 where it has a limit."""
     needed = frozenset(live(graph.nodes, roots))
     kinks, of_sign = [], dict[int, list[int]]()
+    for i in order:
+        op, *rest = graph.nodes[i]
+        x = sign_of(graph, rest) if op == "where" else None
+        if x is not None and (found.get(x >> 1, ZERO) & -2) != ZERO:
+            kinks.append(Kink((x, ZERO), found[x >> 1] ^ (x & 1), (rest[0] >> 1,)))
     for i in sorted(needed):
         op, *rest = graph.nodes[i]
         if op in ("lt", "le"):

@@ -88,6 +88,7 @@ class FlowAbreast(Flow):
             self.tangents.pop(cell, None)
         self.tangents.update({cell: move for cell, move in tangents if np.any(move != 0.0)})
         if self._recording and moves:
+            self.rows.update({column: of(ref) for column, ref in section.records})
             self.row_tangents.update({column: of(ref) for column, ref in section.record_tangents})
         self.sections_run.append(number)
         self._runs += 1

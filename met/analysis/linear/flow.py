@@ -64,6 +64,7 @@ class Flow:
         self.program, self.inputs, self.tick = program, inputs, tick
         self.cells: dict[str, float] = dict(cells)
         self.tangents: dict[str, np.ndarray] = {}
+        self.rows: dict[int, Any] = {}
         self.row_tangents: dict[int, np.ndarray] = {}
         self.edges: list[Edge] = []
         self.opposite: Mapping[int, Any] = {}
@@ -137,6 +138,7 @@ class Flow:
             self.tangents.pop(cell, None)
         self.tangents.update({cell: move for cell, move in tangents if np.any(move != 0.0)})
         if self._recording and moves:
+            self.rows.update({column: of(ref) for column, ref in section.records})
             self.row_tangents.update({column: of(ref) for column, ref in section.record_tangents})
         self._runs += 1
 

@@ -27,6 +27,9 @@ from met.plan import Experiment
 SAME = 1e-9
 """Share of the largest number of its row by which the derivatives of two sides may differ and be one."""
 
+NOTHING = 1e-12
+"""Difference of two numbers, SI, that is rounding."""
+
 
 @frozen
 class InputTick:
@@ -189,6 +192,7 @@ def _held(start: Flow, after: Flow) -> _Held:
 class _Carried:
     """A period carried out with tangents, as `PeriodMap` has them; of a `FlowAbreast` [case, ...] each.
 
+    numbers   states at its end, and what is recorded at its begin
     at_limit  paths of limits, with the number of steps that begin at them;  flow: at the end
     """
 
@@ -201,6 +205,7 @@ class _Carried:
     D: np.ndarray
     Wx: np.ndarray
     Wu: np.ndarray
+    numbers: np.ndarray
     at_limit: Mapping[str, Any]
     flow: Flow
 
@@ -213,9 +218,11 @@ class _Carried:
         return reduce(and_, (np.isfinite(each).all((-2, -1)) for each in self._matrices()))
 
     def differs(self, other: _Carried) -> Any:
-        """True where a derivative is another, of states, of what comes to inputs, or of outputs by states."""
+        """True where a derivative is another, of states, of what comes to inputs, or of outputs by states; or what they
+        are derivatives of."""
         *pairs, _ = zip(self._matrices(), other._matrices(), strict=True)
-        return reduce(or_, (_differ(a, b) for a, b in pairs))
+        jumps = np.any(np.abs(self.numbers - other.numbers) > SAME * np.abs(self.numbers) + NOTHING, axis=-1)
+        return reduce(or_, (_differ(a, b) for a, b in pairs), jumps)
 
     def map_of(self, held: _Held, place: int | None = None) -> PeriodMap:
         """The map, of a `FlowAbreast` that of the case at a place."""
@@ -274,9 +281,11 @@ def _carried(begin: Callable[[], Flow], states: tuple[str, ...], opposite: Mappi
     ends = end_tangents(program, flow, states, width)
     rows = tangent_rows(flow, [flow.row_tangents.get(column, 0.0) for column in range(len(program.columns))], width)
     own = tangent_rows(flow, W, width)
+    reached = [flow.cells[each] for each in states if each in flow.cells] + list(flow.rows.values())
+    numbers = np.concatenate([np.broadcast_to(each, (*flow.shape, 1)) for each in (*reached, 0.0)], axis=-1)
     return _Carried(
         tick, states, ticks, ends[..., :n], ends[..., n:], rows[..., :n], rows[..., n:], own[..., :n], own[..., n:],
-        at_limit, flow,
+        numbers, at_limit, flow,
     )  # fmt: skip
 
 

@@ -87,6 +87,13 @@ def test_a_case_of_it_says_the_same(folder: Path) -> None:
     assert every[1] == one
 
 
+def test_a_case_of_several_says_which_it_is_also_where_none_is_asked_for(folder: Path) -> None:
+    said = met(folder, "linear", swept(folder), "gains", *OPEN, status=0).splitlines()[0]
+    assert said.startswith("gains, case #0 of 3: linear at t = 0 s, ")
+    other = met(folder, "linear", "deck.ic", "gains", "--case", "#1", *OPEN, status=0).splitlines()[0]
+    assert other == said.replace("#0", "#1")
+
+
 def test_what_cases_have_no_answer_is_told_below_with_the_reason_of_each(folder: Path) -> None:
     text = DECK.replace("hinge.qd = 0.1 rad/s", "hinge.q = 0 rad")
     (folder / "deck.ic").write_text(text + "sweep loads of hold { vary links.bar.mass = [1, 2] kg; }\n")

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from met.dynamics.linearised import LinearisedDynamics, linearised
+from met.dynamics.linearised import LinearisedDynamics, linearised, tell
 from met.dynamics.recursion import Solved, solve
 from met.dynamics.tree import Body, Tree
 from met.trace.derivative import slopes
 from met.trace.fuse import fused
-from met.trace.graph import Formulas
+from met.trace.graph import Formulas, Graph
+from met.trace.known import KnownTangents
 from met.trace.nodes import live
 from met.trace.scalar import Scalar
 from tests.met.dynamics.passes import forest, passed
@@ -76,6 +77,41 @@ def test_rounding_does_not_grow_along_a_chain(joints: int) -> None:
     theirs = PinocchioTree(bodies, gravity, still).acceleration_slopes(q, qd, still, {})
     for some, other in zip(np.split(ours, 3, axis=1), theirs, strict=True):
         np.testing.assert_allclose(some, other, rtol=0, atol=CLOSE * np.abs(other).max())
+
+
+def test_a_result_that_two_passes_share_moves_the_others_of_the_second_with_what_that_was_given() -> None:
+    """Of two joints on branches of their own, of which the second pass gives one another torque, by what the first one
+    found: the same nodes of a graph are what the other joint does in both."""
+    bodies = tuple(
+        Body(f"rod{i}", f"hinge{i}", "revolute", -1, axis=(0.0, 1.0, 0.0), mass=1.0, com=(0.3, 0.0, 0.0),
+             inertia=(0.1, 0.1, 0.1, 0.0, 0.0, 0.0)) for i in range(2)
+    )  # fmt: skip
+    tree, graph = Tree.build(bodies), Graph()
+    values = {"q0": 0.3, "q1": 0.5, "tau0": 0.1, "tau1": 0.7}
+    q, tau = (tuple(graph.input(f"{name}{i}") for i in range(2)) for name in ("q", "tau"))
+
+    def passed_with(tau: tuple[Scalar, Scalar]) -> Solved:
+        given: dict[str, Any] = {
+            "q": q, "qd": (0.0, 0.0), "tau": tau, "qdd": (0.0, 0.0), "mode": (True, True), "rotor": (0.0, 0.0),
+            "gravity": (0.0, 0.0, -9.81), "wrenches": {}, "velocity_products": True,
+        }  # fmt: skip
+        found = solve(tree, **given)
+        tell(tree, given, found)
+        return found
+
+    first = passed_with(tau)
+    second = passed_with((tau[0], tau[1] - 0.5 * first.qdd[1]))
+    results = [Scalar(graph, scalar(Recorder(), x)) for x in second.qdd]
+    assert results[0].ref == scalar(Recorder(), first.qdd[0])
+    order = graph.live([each.ref for each in results])
+    for name in values:
+        moved = [
+            slopes(graph, order, lambda node, name=name: graph.constant(float(node == ("input", name))), known=known)
+            for known in (None, KnownTangents(graph, graph.known))
+        ]
+        alike = [Scalar(graph, each[x.ref >> 1] ^ (x.ref & 1)) for each in moved for x in results]
+        by_operation, told = np.reshape(Formulas.of(graph, alike).replay(values), (2, 2))
+        np.testing.assert_allclose(told, by_operation, rtol=1e-13)
 
 
 def depth_first(bodies: Sequence[Body]) -> tuple[Body, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from met import models
+from met.analysis.linear.answers import linear
 from met.analysis.linear.jacobian import PeriodMap, at_instant, period_map
 from met.analysis.linear.period import PeriodProgram
 from met.diagnostic import Problem
@@ -176,6 +177,21 @@ def test_at_a_kink_it_is_refused_only_where_the_other_side_is_another(tmp_path: 
     np.testing.assert_allclose(mapped(made).A, [[1.0, 1e-3], [0.0, 1.0]], rtol=1e-12)
     with pytest.raises(Problem, match=r"`hinge\.q` is just where something begins to act, t = 0 s"):
         mapped(swing(tmp_path, SERVO=passive, ENVIRONMENT=stop.replace("LOWER", "0.2 rad")))
+
+
+def test_where_a_sign_jumps_it_is_refused_if_what_is_recorded_or_remembered_jumps_with_it(tmp_path: Path) -> None:
+    """The derivative of a sign is none on both sides, and yet there is none at its jump."""
+    told = SWING.replace("record = [q, qd];", "signal way = sign(hinge.q); record = [q, qd];")
+    for at, outputs, refused in (("0.2", "signals.way", False), ("0", "signals.way", True), ("0", "q", False)):
+        deck = told.replace("hinge.q = 0.2 rad", f"hinge.q = {at} rad").replace("hinge.qd = RATE;", "")
+        made = experiment(
+            tmp_path, deck.replace("SERVO", "servo drive { model = passive; }").replace("ENVIRONMENT", "")
+        )
+        if refused:
+            with pytest.raises(Problem, match=r"`hinge\.q` is just where something begins to act, t = 0 s"):
+                linear(made, outputs=[outputs])
+        else:
+            assert (linear(made, outputs=[outputs]).C != 0.0).any() == (outputs == "q")
 
 
 def test_a_converter_counts_as_the_straight_line_through_its_steps(tmp_path: Path) -> None:
