@@ -140,9 +140,8 @@ class FlowAbreast(Flow):
 
     def _stay(self, cells: Mapping[str, Any], tangents: Mapping[str, Any], goes: np.ndarray) -> None:
         """The memory as it was before, of the cases that do not go round. goes: [case, 1]"""
-        several: tuple[tuple[Any, Mapping[str, Any]], ...]
-        several = (self.cells, cells), (self.tangents, tangents)
-        for now, before in several:
+        memory: tuple[tuple[Any, Mapping[str, Any]], ...] = ((self.cells, cells), (self.tangents, tangents))
+        for now, before in memory:
             for name in now.keys() | before.keys():
                 new, old = now.get(name, 0.0), before.get(name, 0.0)
                 if new is not old:
