@@ -62,14 +62,27 @@ class TangentSection:
     kinks: tuple[Kink, ...]
 
     @cached_property
-    def order(self) -> list[int]:
-        """Positions of the live nodes, in order of creation."""
+    def roots(self) -> list[int]:
+        """References of all that it leaves, and of what its kinks go by."""
         several = (
             self.stores, self.tangents, self.records, self.record_tangents, self.outputs, self.output_tangents,
         )  # fmt: skip
         roots = [ref for pairs in several for _, ref in pairs]
-        roots += [ref for kink in self.kinks for ref in (*kink.sides, kink.move)]
-        return live(self.nodes, roots)
+        return roots + [ref for kink in self.kinks for ref in (*kink.sides, kink.move)]
+
+    @cached_property
+    def order(self) -> list[int]:
+        """Positions of the live nodes, in order of creation."""
+        return live(self.nodes, self.roots)
+
+    @cached_property
+    def last_uses(self) -> Mapping[int, list[int]]:
+        """By position of a live node, the nodes that nothing asks for after it."""
+        last = {ref >> 1: i for i in self.order for ref in self.nodes[i][1 : 1 + OPERANDS[self.nodes[i][0]]]}
+        found: dict[int, list[int]] = {}
+        for node in last.keys() - {ref >> 1 for ref in self.roots}:
+            found.setdefault(last[node], []).append(node)
+        return found
 
     @cached_property
     def plain_order(self) -> list[int]:

@@ -141,9 +141,8 @@ class FlowAbreast(Flow):
 
     def _stay(self, cells: Mapping[str, Any], tangents: Mapping[str, Any], goes: np.ndarray) -> None:
         """The memory as it was before, of the cases that do not go round. goes: [case, 1]"""
-        several: tuple[tuple[Any, Mapping[str, Any]], ...]
-        several = (self.cells, cells), (self.tangents, tangents)
-        for now, before in several:
+        memory: tuple[tuple[Any, Mapping[str, Any]], ...] = ((self.cells, cells), (self.tangents, tangents))
+        for now, before in memory:
             for name in now.keys() | before.keys():
                 new, old = now.get(name, 0.0), before.get(name, 0.0)
                 if new is not old:
@@ -195,6 +194,7 @@ def values_abreast(
     opposite: of nodes that take the other side, the cases in which they do, [case, 1]"""
     nodes = section.nodes
     found: list[Any] = [None] * len(nodes)
+    done: Mapping[int, list[int]] = {} if plain else section.last_uses  # as tangents of many cases are large
     for i in section.plain_order if plain else section.order:
         node = nodes[i]
         op, count = node[0], OPERANDS[node[0]]
@@ -214,6 +214,8 @@ def values_abreast(
         if i in opposite:
             value = np.where(opposite[i], _not(value) if op in TRUTHS else -value, value)
         found[i] = value
+        for k in done.get(i, ()):
+            found[k] = None
 
     def value_of(ref: int) -> Any:
         return -found[ref >> 1] if ref & 1 else found[ref >> 1]

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -53,7 +54,21 @@ class ScalarLoop:
 
     def response(self, w: np.ndarray) -> np.ndarray:
         """L at angular frequencies, rad/s: [frequency]."""
-        return np.array([self.at(cmath.exp(1j * each * self.period)) for each in w])
+        z = np.exp(1j * np.asarray(w, dtype=np.float64) * self.period)[:, None, None]
+        B = np.broadcast_to(self.B[:, None], (len(z), len(self.B), 1))
+        moved = np.linalg.solve(z * np.eye(len(self.A)) - self.A, B)
+        found: np.ndarray = -(moved[..., 0] @ self.C + self.D)
+        return found
+
+    def sizes(self, w: Sequence[float]) -> Iterator[tuple[float, float]]:
+        """|L| at angular frequencies, rad/s, each with the frequency."""
+        return zip(np.abs(self.response(np.array(w))).tolist(), w, strict=True)
+
+    @cached_property
+    def poles(self) -> np.ndarray:
+        """The poles of the states, as the loop is open."""
+        found: np.ndarray = np.linalg.eigvals(self.A)
+        return found
 
     def closed(self, gain: float = 1.0) -> np.ndarray:
         """A of the loop closed with this times its gain."""
@@ -201,8 +216,7 @@ def _is_number(loop: ScalarLoop, w: float) -> bool:
     """True where L, of a loop with no states but its own, has a value: no pole lies there. A pole of several turns out
     as several beside it, by the root of the rounding error that is as many times."""
     z = cmath.exp(1j * w * loop.period)
-    poles = np.linalg.eigvals(loop.A)
-    poles = poles[np.argsort(np.abs(poles - z))]
+    poles = loop.poles[np.argsort(np.abs(loop.poles - z))]
     # rounding spreads a pole of several around itself, by the root of it that is as many times; their mean stays
     return not any(
         abs(poles[many - 1] - z) <= 20.0 * 2.2e-16 ** (1.0 / many) + 1e-9 and abs(poles[:many].mean() - z) <= 1e-9
@@ -237,14 +251,14 @@ def _disk(loop: ScalarLoop) -> tuple[float, float]:
     T = ScalarLoop(A, B, gain * loop.C, gain - 0.5, loop.period)  # S - 1/2, of P: S = 1/(1 - P)
     nyquist = math.pi / loop.period
     tried = [nyquist * k / 16 for k in range(1, 17)] + [
-        abs(cmath.phase(z)) / loop.period for z in np.linalg.eigvals(A).tolist() if abs(z) > 0.0
+        abs(cmath.phase(z)) / loop.period for z in T.poles.tolist() if abs(z) > 0.0
     ]
-    size, at = max((abs(T.at(cmath.exp(1j * w * T.period))), w) for w in tried if _is_number(T, w))
+    size, at = max(T.sizes([w for w in tried if _is_number(T, w)]))
     for _ in range(60):
         level = size * (1.0 + 1e-12)
         crossings = sorted({1e-9 * nyquist, *_where_size_is(T, level), nyquist})
         middles = [math.sqrt(a * b) for a, b in pairwise(crossings)]
-        best, where = max((abs(T.at(cmath.exp(1j * w * T.period))), w) for w in [*middles, *crossings])
+        best, where = max(T.sizes([*middles, *crossings]))
         if best <= level:
             break
         size, at = best, where
@@ -263,6 +277,12 @@ def comes_back(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> bo
 FARTHEST, STRIDE = 1e4, 1.05
 """Times the gain up to which a limit of several ticks or loops is looked for, and from one tried to the next."""
 
+AT_ONCE = 16
+"""Gains that are tried at once."""
+
+HUGE = 1e300
+"""A pole of a loop that has no value."""
+
 
 def gain_limits(
     A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, drift: float = STABLE
@@ -271,33 +291,35 @@ def gain_limits(
     at none that was looked at, or they are unstable as they are. C x + D u comes back, of u that stands at the open
     places; drift: as `ScalarLoop` has it."""
 
-    def size(gain: float) -> float:
-        """The largest of the closed loop's poles."""
-        try:
-            closed = A + gain * B @ np.linalg.solve(np.eye(len(D)) - gain * D, C)
-        except np.linalg.LinAlgError:
-            return math.inf
-        return float(np.max(np.abs(np.linalg.eigvals(closed)), initial=0.0))
+    from scipy.optimize import brentq
 
-    own = size(1.0)
+    def sizes(gains: Sequence[float]) -> np.ndarray:
+        """The largest of the closed loop's poles for each gain."""
+        each = np.array(gains)[:, None, None]
+        try:
+            back = np.linalg.solve(np.eye(len(D)) - each * D, np.broadcast_to(C, (len(gains), *C.shape)))
+        except np.linalg.LinAlgError:
+            return np.concatenate([sizes([gain]) for gain in gains]) if len(gains) > 1 else np.array([HUGE])
+        poles = np.linalg.eigvals(A + each * (B @ back)) if len(A) else np.zeros((len(gains), 0))
+        largest: np.ndarray = np.max(np.abs(poles), axis=-1, initial=0.0)
+        return largest
+
+    own = float(sizes([1.0])[0])
     if own > 1.0 + drift:
         return None, None
-
-    def grows(gain: float) -> bool:
-        return size(gain) > max(1.0, own) + 1e-2 * STABLE
-
+    edge = max(1.0, own) + 1e-2 * STABLE
     found: list[float | None] = []
     for stride in (1.0 / STRIDE, STRIDE):
-        good, bad = 1.0, stride
-        while not grows(bad) and 1.0 / FARTHEST < bad < FARTHEST:
-            good, bad = bad, bad * stride
-        if not grows(bad):
-            found.append(None)
-            continue
-        while abs(bad / good - 1.0) > 1e-12:
-            middle = math.sqrt(good * bad)
-            if middle in (good, bad):
+        tried = [1.0]
+        while 1.0 / FARTHEST < tried[-1] < FARTHEST:
+            tried.append(tried[-1] * stride)
+        for at in range(1, len(tried), AT_ONCE):
+            grows = np.flatnonzero(sizes(tried[at : at + AT_ONCE]) > edge)
+            if len(grows):
+                good, bad = tried[at + int(grows[0]) - 1 : at + int(grows[0]) + 1]
+                root = brentq(lambda gain: sizes([gain])[0] - edge, good, bad, xtol=1e-18, rtol=1e-13, maxiter=1000)
+                found.append(float(root))
                 break
-            good, bad = (good, middle) if grows(middle) else (middle, bad)
-        found.append(math.sqrt(good * bad))
+        else:
+            found.append(None)
     return found[0], found[1]

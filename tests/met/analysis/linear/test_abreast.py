@@ -18,6 +18,8 @@ from met.analysis.linear.jacobian import PeriodMap, at_instants, period_map, per
 from met.analysis.linear.period import PeriodProgram
 from met.diagnostic import Problem
 from met.plan.linear_signals import input_signals
+from met.trace.nodes import OPERANDS
+from met.trace.tangents import TangentSection
 from tests.ic.small_decks import ARM, RUN, SERVO, experiment
 from tests.met.analysis.linear.oracles import scattered, shipped, shipped_experiment
 from tests.met.analysis.linear.test_jacobian import swing
@@ -98,7 +100,8 @@ def test_cases_of_which_one_sticks_one_slides_one_breaks_away_and_one_is_at_its_
     for tick, maps in ((0, 1), (10, 5), (200, 5)):
         flows = at_instants(program, given, tick)
         assert agree(program, [flow for flow in flows if flow is not None]) == maps
-    assert {each.at_limit for each in period_maps(program, at_instants(program, given, 10))} != {()}
+    there = [flow for flow in at_instants(program, given, 10) if flow is not None]
+    assert any(isinstance(each, PeriodMap) and each.at_limit for each in period_maps(program, there))
 
 
 def moved(program: PeriodProgram, cell: str, values: Sequence[float]) -> list[Flow]:
@@ -181,3 +184,19 @@ def same_answer(question: LinearQuestion, case: int, found: Linearized | Problem
         assert getattr(found, name) == getattr(alone, name)
     assert [loop.margins for loop in found.loops] == [loop.margins for loop in alone.loops]
     return True
+
+
+def test_a_number_is_kept_as_long_as_something_asks_for_it_and_no_longer(tmp_path: Path) -> None:
+    """Of columns with tangents, which are large."""
+    sections = PeriodProgram(swing(tmp_path)).sections.values()
+    for section in sections:
+        asked = {ref >> 1 for ref in section.roots}
+        place = {node: number for number, node in enumerate(section.order)}
+        uses = {node: max(_uses(section, node), default=-1, key=place.__getitem__) for node in section.order}
+        dropped = {node: at for at, nodes in section.last_uses.items() for node in nodes}
+        assert dropped == {node: at for node, at in uses.items() if node not in asked and at >= 0}
+
+
+def _uses(section: TangentSection, node: int) -> list[int]:
+    nodes = section.nodes
+    return [i for i in section.order if node in {ref >> 1 for ref in nodes[i][1 : 1 + OPERANDS[nodes[i][0]]]}]
