@@ -299,7 +299,7 @@ MET.webgl = (() => {
         gl.enable(gl.POLYGON_OFFSET_FILL);  // behind what is solid, where they coincide
         gl.polygonOffset(2, 400);
         const many = ghosts.length > FEW;
-        put(many ? sparse : coarse, packed(ghosts.map((each, n) => ({ solids: (many ? thin : plain)(each), colour: () => colours.ghost(n) }))));
+        put(many ? sparse : picture.fine ? quick : coarse, packed(ghosts.map((each, n) => ({ solids: (many ? thin : plain)(each), colour: () => colours.ghost(n) }))));
         gl.disable(gl.POLYGON_OFFSET_FILL);
         gl.depthMask(true);
       }
