@@ -8,7 +8,7 @@ from typing import Any
 FIELD = math.tan(math.radians(13.0))
 """Half the height that is seen, at a distance of 1."""
 
-ROOM = 1.07
+ROOM = 1.08
 """Distance of the eye, against that at which everything just touches the picture's edges."""
 
 AZIMUTH, LOW, HIGH, FLAT = -0.95, 0.34, 0.85, 0.02

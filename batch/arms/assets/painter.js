@@ -41,11 +41,7 @@ MET.painter = (() => {
         return;
       }
       if (each.mesh === "can") {
-        const ring = (centre) => Array.from({ length: ROUND }, (_, n) => {
-          const t = (2 * Math.PI * n) / ROUND;
-          return seen(plus(plus(centre, each.axes[0], radius * Math.cos(t)), each.axes[1], radius * Math.sin(t)));
-        });
-        const rings = two.map(ring);
+        const rings = two.map((end) => ring(end, each.axes, radius).map(seen));
         path(far, { d: d(hull(rings.flat())), fill: css(colour, 0.86), ...line });
         const [near, normal] = dot(each.axes[2], plus(axes.eye, each.at, -1)) > 0 ? [1, each.axes[2]] : [0, each.axes[2].map((x) => -x)];
         path(far - 1e-9, { d: d(rings[near]), fill: css(colour, shade(normal)), ...line });
@@ -65,9 +61,11 @@ MET.painter = (() => {
       const lines = Array.from({ length: 2 * count + 1 }, (_, n) => (n - count) * step);
       const across = lines.flatMap((at) => [[[x + at, y - count * step], [x + at, y + count * step]], [[x - count * step, y + at], [x + count * step, y + at]]]);
       under.push(node("path", { d: across.map((line) => d(line.map(([px, py]) => seen([px, py, floor])), false)).join(""), stroke: css(colours.grid), "stroke-opacity": 0.5, "stroke-width": 0.7, fill: "none" }));
+      const down = ([px, py]) => seen([px, py, floor]);
       if (picture.shadow) under.push(node("svg", { opacity: colours.shade[3] }, solids.map((each) => {
         const { ends: two, radius } = ends(each);
-        const [a, b] = two.map((p) => seen([p[0], p[1], floor]));
+        if (each.mesh !== "pill") return node("path", { d: d(hull(outline(each).map(down))), fill: css(colours.shade) });
+        const [a, b] = two.map(down);
         return node("path", { d: d([a, [b[0] + 0.01, b[1]]], false), stroke: css(colours.shade), "stroke-linecap": "round", "stroke-width": (2 * radius * scale((a[2] + b[2]) / 2)).toFixed(1) });
       })));
     }
@@ -76,6 +74,19 @@ MET.painter = (() => {
     solids.forEach((each) => solid(each, colours.solid(each), 1));
     items.sort((a, b) => b[0] - a[0]);
     return node("svg", { viewBox: `0 0 ${width} ${height}`, width: "100%", role: "img", "aria-label": "The arm" }, under, items.map(([, drawn]) => drawn));
+  }
+
+  const ring = (centre, [x, y], radius) => Array.from({ length: ROUND }, (_, n) => {
+    const t = (2 * Math.PI * n) / ROUND;
+    return plus(plus(centre, x, radius * Math.cos(t)), y, radius * Math.sin(t));
+  });
+
+  // Points of a can or a block, between which all of it lies.
+  function outline(each) {
+    const { ends: two, radius } = ends(each);
+    if (each.mesh === "can") return two.flatMap((end) => ring(end, each.axes, radius));
+    const half = (axis, sign) => each.axes[axis].map((x) => (sign * x * each.size[axis]) / 2);
+    return two.flatMap((end) => [[1, 1], [1, -1], [-1, 1], [-1, -1]].map(([i, j]) => plus(plus(end, half(0, i)), half(1, j))));
   }
 
   // The points round all others (Andrew's monotone chain).

@@ -30,6 +30,7 @@ MET.stage = (() => {
     let [chosen, others, floor, time, playing, rate, end] = [null, [], null, 0, false, 1, 0];
     let [frames, ghostly, fresh, asked, touched, moved, before] = [false, true, true, false, false, false, 0];
     let [path, still, rest, pace, coarse] = [[], true, 0, 0, 1];
+    const fingers = new Map();  // and mice: places where the view is held, by pointer
 
     const canvas = node("canvas");
     const paper = node("div", { class: "paper" });
@@ -135,7 +136,8 @@ MET.stage = (() => {
       if (!asked) requestAnimationFrame(paint);
       [asked, still] = [true, false];
       clearTimeout(rest);
-      rest = setTimeout(() => requestAnimationFrame(() => {
+      if (!playing && !fingers.size) rest = setTimeout(() => requestAnimationFrame(() => {
+        if (asked || playing || fingers.size) return;  // it goes on
         still = true;
         paint();
       }), REST);
@@ -151,7 +153,10 @@ MET.stage = (() => {
       playing = on;
       sign.setAttribute("d", on ? "M3 2 H6.5 V14 H3 Z M9.5 2 H13 V14 H9.5 Z" : "M3 1.5 L14 8 L3 14.5 Z");
       play.setAttribute("aria-label", on ? "Pause" : "Play");
-      if (!on) return;
+      if (!on) {
+        redraw();
+        return;
+      }
       if (time >= end) time = 0;
       before = 0;
       requestAnimationFrame(tick);
@@ -170,7 +175,6 @@ MET.stage = (() => {
     }
 
     // Mouse, touch and keys.
-    const fingers = new Map();
     const spread = () => { const [a, b] = [...fingers.values()]; return b ? Math.hypot(a.x - b.x, a.y - b.y) : 0; };
     const least = 0.2 * arm.reach;
     const zoom = (factor) => { camera.zoom(factor, least, 60 * arm.reach); redraw(); };
@@ -193,7 +197,10 @@ MET.stage = (() => {
       touched = moved = true;
       redraw();
     });
-    ["pointerup", "pointercancel"].forEach((kind) => view.addEventListener(kind, (event) => fingers.delete(event.pointerId)));
+    ["pointerup", "pointercancel"].forEach((kind) => view.addEventListener(kind, (event) => {
+      fingers.delete(event.pointerId);
+      redraw();
+    }));
     view.addEventListener("contextmenu", (event) => event.preventDefault());
     view.addEventListener("wheel", (event) => {
       if (!touched && document.activeElement !== view && !event.ctrlKey) return;  // a page that is scrolled goes on

@@ -195,7 +195,7 @@ MET.webgl = (() => {
     const fine = { pill: mesh(pill(28, 8)), can: mesh(can(36)), block: mesh(block()) };
     const quick = { pill: mesh(pill(14, 3)), can: mesh(can(18)), block: fine.block };  // while a processor draws it moving
     const coarse = { pill: mesh(pill(10, 2)), can: mesh(can(10)), block: fine.block };
-    const sparse = { ...coarse, pill: mesh(ribbon(3)) };
+    const sparse = { ...coarse, pill: mesh(ribbon(2)) };
     const kept = software ? { frame: gl.createFramebuffer(), dots: gl.createRenderbuffer(), of: "" } : null;
 
     // Instances by mesh, their numbers one after another.
@@ -299,7 +299,7 @@ MET.webgl = (() => {
         gl.enable(gl.POLYGON_OFFSET_FILL);  // behind what is solid, where they coincide
         gl.polygonOffset(2, 400);
         const many = ghosts.length > FEW;
-        put(many ? sparse : coarse, packed(ghosts.map((each, n) => ({ solids: (many ? thin : plain)(each), colour: () => colours.ghost(n) }))));
+        put(many ? sparse : picture.fine ? quick : coarse, packed(ghosts.map((each, n) => ({ solids: (many ? thin : plain)(each), colour: () => colours.ghost(n) }))));
         gl.disable(gl.POLYGON_OFFSET_FILL);
         gl.depthMask(true);
       }

@@ -62,10 +62,10 @@ def opened(chromium: Chromium, path: Path, **words: object) -> Page:
 
 
 def pixels(page: Page, folder: Path) -> np.ndarray:
-    """The view as the browser shows it, (row, column, rgb) from 0 to 1."""
+    """The view as the browser shows it, without its edge, (row, column, rgb) from 0 to 1."""
     page.run("new Promise(d => { const f = () => MET.shown.isStill() ? d() : setTimeout(f, 20); f(); })")
     page.settle()
-    return image.imread(page.picture(folder / "view.png", ".stage .view", margin=0))[..., :3]
+    return image.imread(page.picture(folder / "view.png", ".stage .view", margin=0))[4:-4, 4:-4, :3]
 
 
 def coloured(shown: np.ndarray) -> float:
