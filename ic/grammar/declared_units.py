@@ -53,16 +53,23 @@ def is_declaration(tokens: Sequence[Token], at: int) -> bool:
     )
 
 
-def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) -> dict[str, Measure]:
-    """The measure of each unit; of one that has none, which is reported, that of a pure number.
+class Unsized(Exception):
+    """Raised where a unit needs one that has no size (already reported)."""
 
-    sizes  the token of each unit's name, and what it is declared to be
+
+def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) -> dict[str, Measure]:
+    """The measure of each unit that has one; why others have none is reported, each mistake once.
+
+    sizes  the token of each unit's name, and what it is declared to be; without those that cannot be read
     """
     known: dict[str, Measure] = {}
+    unsized: set[str] = set()
 
     def find(name: str, within: tuple[str, ...]) -> Measure:
         if name in known:
             return known[name]
+        if name in unsized or name not in sizes:
+            raise Unsized
         token, size = sizes[name]
         if name in within:
             loop = [*within[within.index(name) :], name]
@@ -84,7 +91,9 @@ def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) 
             find(name, ())
         except Problem as problem:
             findings.add(*problem.diagnostics)
-            known[name] = ONE
+            unsized.add(name)
+        except Unsized:
+            unsized.add(name)
     return known
 
 
