@@ -13,7 +13,7 @@ from ic.grammar.syntax import Binary, Expression, Name, Number, Unary, Unit, Wit
 from ic.text.lexer import NAME, Token
 from ic.text.limits import Findings
 from met import units
-from met.diagnostic import Label, Place, Problem, error
+from met.diagnostic import Label, Place, Problem, error, write
 from met.units import ONE, PURE, Measure
 
 UNIT = "unit"
@@ -129,6 +129,9 @@ def _measure(size: Expression, find: Callable[[str], Measure]) -> Measure:
             return _product(left, right if size.operator == "*" else right**-1, place)
         case Name(text="pi"):
             return Measure(PURE, turns=1)
+    if isinstance(size, Name) and size.text in units.ALL_UNITS:
+        helps = write(f"1 {size.text}", f"write `1 {size.text}`", at=place)
+        raise Problem(error("D394", f"`{size.text}` is a unit, and stands behind a number", place, help=helps))
     what = f"`{size.text}` is no number and no unit: a" if isinstance(size, Name) else "a"
     raise Problem(error("D394", f"{what} unit is made of numbers and units, with `*` and `/`", place, help=USAGE))
 
