@@ -16,6 +16,7 @@ from ic.meaning.checks.degrees import remark_degrees
 from ic.meaning.control.servos import check_servo_definition
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.definitions.row_tables import is_row_table
+from ic.meaning.definitions.unused_params import misspelt_params
 from ic.meaning.mechanics.arm import check_arm, resolve_arm
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import allowed_warnings, silence_of_all, warn_of_unneeded
@@ -150,6 +151,7 @@ def compile_deck(
     if not complaints.errors:
         complaints.admit_remarks()
         silence_of_all([each.allowances for each in experiments], complaints)
+        complaints.add(*misspelt_params(deck.entries))
         if select == "all":
             _remark_unused_rows(definitions, scopes, complaints)
         if not settings and not defines:  # which make another deck of it

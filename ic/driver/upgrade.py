@@ -11,6 +11,7 @@ import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,8 @@ from ic.driver.compile import Compiled, check
 from ic.read import read
 from ic.text.edition import EDITION_WORD, LATEST, edition_of
 from ic.text.files import NOTHING_UNSAVED, Files, FoundFile, Unsaved
-from ic.text.lexer import SPACE, Text, logical_lines
+from ic.text.lexer import NAME, NUMBERS, SPACE, Text, logical_lines
+from met import units
 from met.diagnostic import Diagnostic, Label, Place, Problem, error
 from met.frozen import frozen
 from met.messages.edits import edits
@@ -60,6 +62,8 @@ def upgrades(paths: Sequence[str]) -> Upgrades:
     wrong: dict[str, Problem] = {}
     for path, compiled in before.items():
         files = {os.path.realpath(name) for name in compiled.sources} & new.keys()
+        if compiled.plan is not None and not compiled.plan.experiments:
+            files = {each for each in files if not _depends_on_its_decks(old[each])}
         if compiled.plan is None or not files:
             continue
         difference = _difference(path, compiled, new)
@@ -125,6 +129,17 @@ def _with_line(text: str) -> str:
 # The proof
 
 
+def _depends_on_its_decks(text: str) -> bool:
+    """Return True if a name in a file of edition 1 may be a unit, or a value of a deck that includes the file: one of
+    the units that came later, other than directly behind a number."""
+    tokens = [token for line in logical_lines(Text("", text)) for token in line if token.kind != SPACE]
+    return any(
+        token.text in units.FURTHER_UNITS and before.kind not in NUMBERS
+        for before, token in pairwise(tokens)
+        if token.kind == NAME
+    )
+
+
 def _difference(path: str, before: Compiled, new: Mapping[str, str]) -> Problem | None:
     """Why a deck with these texts is not what it was; None where it is."""
     after = _compiled(path, new)
@@ -150,14 +165,25 @@ def _left(path: str, why: str, found: Diagnostic | None = None) -> Diagnostic:
 
 
 def _not_proved(path: str, compiled: Compiled) -> Problem:
+    """Why a file that no deck proves stays: it cannot be read, does not compile, or has no run."""
     first = next((each for each in compiled.diagnostics if each.severity == "error"), None)
     at = Label(first.at.place, f"{first.code}, {first.message}") if first is not None and first.at is not None else None
-    helps = (
-        "what it means cannot be compared before and after",
-        "name a deck that includes it, too: `met fmt --upgrade DECK PART`; or write the line by hand",
-    )
-    message = f"`{path}` stays in its edition: it does not compile by itself"
-    return Problem(error("E346", message, at, help=helps), compiled.sources)
+    include = "name a deck that includes it, too: `met fmt --upgrade DECK PART`; or write the line by hand"
+    why, helps = "it does not compile by itself", ("what it means cannot be compared before and after", include)
+    if first is None:
+        why = "it has no run, and what it means depends on the deck that includes it"
+        helps = (include,)
+    elif not _is_readable(path):
+        why, helps = "it cannot be read", ("mend it first: `met check` shows all that is wrong",)
+    return Problem(error("E346", f"`{path}` stays in its edition: {why}", at, help=helps), compiled.sources)
+
+
+def _is_readable(path: str) -> bool:
+    try:
+        read(path)
+    except Problem:
+        return False
+    return True
 
 
 def _meaning(experiment: Experiment) -> object:

@@ -59,6 +59,7 @@ class Cursor:
         self.unbalanced = False  # whether a brace is missing somewhere, or a bracket too many
         self.indices: Mapping[str, str] = {}  # of the loops around: what each stands for in this turn
         self.declared: Mapping[str, Measure] = {}  # units that the deck declares
+        self.unsized: set[str] = set()  # those whose declarations are wrong (reported already)
         self.depth = 0  # brackets that are open around the tokens
 
     @property

@@ -13,7 +13,7 @@ from ic.grammar.syntax import Binary, Expression, Name, Number, Unary, Unit, Wit
 from ic.text.lexer import NAME, Token
 from ic.text.limits import Findings
 from met import units
-from met.diagnostic import Label, Place, Problem, error
+from met.diagnostic import Label, Place, Problem, error, write
 from met.units import ONE, PURE, Measure
 
 UNIT = "unit"
@@ -53,16 +53,23 @@ def is_declaration(tokens: Sequence[Token], at: int) -> bool:
     )
 
 
-def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) -> dict[str, Measure]:
-    """The measure of each unit; of one that has none, which is reported, that of a pure number.
+class Unsized(Exception):
+    """Raised where a unit needs one that has no size (already reported)."""
 
-    sizes  the token of each unit's name, and what it is declared to be
+
+def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) -> dict[str, Measure]:
+    """The measure of each unit that has one; why others have none is reported, each mistake once.
+
+    sizes  the token of each unit's name, and what it is declared to be; without those that cannot be read
     """
     known: dict[str, Measure] = {}
+    unsized: set[str] = set()
 
     def find(name: str, within: tuple[str, ...]) -> Measure:
         if name in known:
             return known[name]
+        if name in unsized or name not in sizes:
+            raise Unsized
         token, size = sizes[name]
         if name in within:
             loop = [*within[within.index(name) :], name]
@@ -84,7 +91,9 @@ def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) 
             find(name, ())
         except Problem as problem:
             findings.add(*problem.diagnostics)
-            known[name] = ONE
+            unsized.add(name)
+        except Unsized:
+            unsized.add(name)
     return known
 
 
@@ -120,6 +129,9 @@ def _measure(size: Expression, find: Callable[[str], Measure]) -> Measure:
             return _product(left, right if size.operator == "*" else right**-1, place)
         case Name(text="pi"):
             return Measure(PURE, turns=1)
+    if isinstance(size, Name) and size.text in units.ALL_UNITS:
+        helps = write(f"1 {size.text}", f"write `1 {size.text}`", at=place)
+        raise Problem(error("D394", f"`{size.text}` is a unit, and stands behind a number", place, help=helps))
     what = f"`{size.text}` is no number and no unit: a" if isinstance(size, Name) else "a"
     raise Problem(error("D394", f"{what} unit is made of numbers and units, with `*` and `/`", place, help=USAGE))
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from functools import cached_property
+from itertools import pairwise
 from typing import NoReturn
 
 from ic.grammar.cursor import Unreadable, span
-from ic.grammar.declared_units import USAGE, declarations, measures
+from ic.grammar.declared_units import UNIT, USAGE, declarations, is_declaration, measures
 from ic.grammar.loops import Loops
 from ic.grammar.syntax import Expression
 from ic.text.edition import EDITION_WORD, EDITIONS
@@ -18,8 +20,19 @@ from met.units import ONE
 class EditionEntries(Loops):
     """The part of the parser that knows these entries."""
 
+    @cached_property
+    def refused_units(self) -> set[str]:
+        """Files of edition 1 that declare units, of which this is reported."""
+        return set()
+
     def declare_units(self) -> None:
         """Finds the units that the deck declares, wherever it does so, before it is parsed."""
+        self.take_misplaced_editions()
+        self.unsized.update(
+            self.tokens[at + 1].text
+            for at, token in enumerate(self.tokens)
+            if token.text == UNIT and token.source.edition == 1 and is_declaration(self.tokens, at)
+        )
         positions = declarations(self.tokens)
         if not positions:
             return
@@ -32,8 +45,16 @@ class EditionEntries(Loops):
                 sizes[name] = (self.tokens[at], self.value())
             self.operators, self.peak = 0, 0
             self.open.clear()
-        self.declared = {**self.declared, **measures(sizes, self.findings)}
+        known = measures(sizes, self.findings)
+        self.declared = {**self.declared, **known}
+        self.unsized.update(positions.keys() - known.keys())
         self.at, self.units_alone = 0, False
+
+    def take_misplaced_editions(self) -> None:
+        """Reads a file whose `deck 2;` is out of place, which is reported, as it says: all else may be well."""
+        for word, number in pairwise(self.tokens):
+            if word.text == EDITION_WORD and word.source.heading is None and number.text in map(str, EDITIONS):
+                word.source.edition = int(number.text)
 
     def step_over_unit(self) -> None:
         """Steps over `unit NAME = SIZE;`, which has been read, and refuses it where it has no place."""
@@ -42,6 +63,9 @@ class EditionEntries(Loops):
         try:
             if word.source.edition == 1:
                 help = self.as_edition_2(word, "a file of edition 2 declares units")
+                if word.source.name in self.refused_units:  # of the file it is said once
+                    raise Unreadable
+                self.refused_units.add(word.source.name)
                 self.fail("D394", "edition 1 declares no units", span(word, name), help=help)
             if self.depth or depth:
                 self.fail("D394", "a unit is declared outside of blocks and loops", span(word, name), help=USAGE)

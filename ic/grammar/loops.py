@@ -103,7 +103,7 @@ class Loops(Expressions):
         end = Token(END, "", tokens[-1].source, tokens[-1].end, 1)
         turn = type(self)([*tokens, end], self.findings)
         turn.indices, turn.looped, turn.within = known, self.looped, self.within
-        turn.declared, turn.values_of_files = self.declared, self.values_of_files
+        turn.declared, turn.unsized, turn.values_of_files = self.declared, self.unsized, self.values_of_files
         turn.open, turn.depth, turn.operators = [opening], self.depth + len(self.open) - 1, self.operators
         turn.entries(into)
         self.unreadable += turn.unreadable

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 
-from ic.grammar.cursor import span
+from ic.grammar.cursor import Unreadable, span
 from ic.grammar.edition_differences import EditionDifferences
 from ic.grammar.syntax import Expression, Number, Unit, Word
 from ic.text.lexer import NAME, NUMBERS, STRING, WHOLE, Token
@@ -93,6 +93,8 @@ class Quantities(EditionDifferences):
             )
         if len(factors) > MOST_FACTORS:
             self.fail("D030", f"a unit has at most {MOST_FACTORS} factors", token)
+        if not self.units_alone and any(word.text in self.unsized for word, _ in factors):
+            raise Unreadable
         self.not_a_second_unit(start)
         taken = self.tokens[start : self.at]
         self.not_a_value_too(taken)
@@ -106,6 +108,8 @@ class Quantities(EditionDifferences):
         first  it stands behind the number, where no other name may stand
         """
         name = self.tokens[at].text
+        if name in self.unsized:
+            return True
         if self.tokens[at].source.edition > 1:
             return name in units.ALL_UNITS or name in self.declared
         if name not in units.FURTHER_UNITS:

@@ -150,14 +150,17 @@ def _made_by(definitions: Definitions, run: Definition) -> list[Setting]:
 
 
 def check_params(definitions: Definitions, complaints: Complaints) -> None:
-    """Report each `param` that an including deck gives another dimension than its own file. definitions: the deck's
-    own."""
+    """Report each `param` that an including deck gives another dimension than its own file, which is then taken with
+    the value of that: what needs it is not to blame. definitions: the deck's own."""
     names = Names(definitions, {})
-    for let in definitions.lets.values():
+    for name, let in tuple(definitions.lets.items()):
         if let.default is not None:
             with suppress(Problem):  # of one of the two values, reported elsewhere
                 old, new = names.evaluate(let.default), names.find(Name((let.name,), place_of(let.value)))
-                _check_alike(complaints, let.name.text, old, new, let.overrides[-1])
+                before = complaints.error_count
+                _check_alike(complaints, name, old, new, let.overrides[-1])
+                if complaints.error_count > before:
+                    definitions.lets[name] = replace(let, value=let.default, overrides=())
 
 
 def _check_alike(complaints: Complaints, name: str, old: Value | ValueList, new: Value | ValueList, at: Place) -> None:

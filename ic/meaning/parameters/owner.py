@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 from ic.grammar.syntax import Expression
 from ic.language.unit_words import unit_here
@@ -38,6 +38,14 @@ class Owner:
     others: tuple[Parameter, ...] = ()  # all that its model declares, where it is a model
     call: bool = False  # whether its parameters stand in parentheses, as in `rod(length = 1 m, along = x)`
     short: str = ""  # the parameter that a path may leave out: `environment.gravity.x` for `environment.gravity.g.x`
+
+    def as_written_in(self, homes: Sequence[str]) -> Owner:
+        """The same for a value that the first of these definitions writes, and the others take over with `like`: its
+        label names the one that writes it."""
+        label = self.label
+        if homes and self.homes and homes[0] != self.homes[-1]:
+            label = label.replace(f"servo `{self.homes[-1]}`", f"servo `{homes[0]}`")
+        return replace(self, label=label, homes=tuple(homes))
 
     def what(self, wanted: Parameter) -> str:
         return self.called or f"`{wanted.name}` of {self.label}"

@@ -442,7 +442,7 @@ class Scope:
         elif written is not None:
             place = written.place
             with self.complaints.gather():
-                self.value_checks.dimension(replace(owner, homes=homes), wanted, written)
+                self.value_checks.dimension(owner.as_written_in(homes), wanted, written)
                 value = self._plain(written.number)
             origin = self._origin(item, place)
         coordinate = self._coordinate(owner, name, homes)

@@ -59,10 +59,21 @@ def gives(use: Use | None, name: str) -> bool:
     return use is not None and use.command is not None and not use.command.guide and use.command.kind in KINDS[name]
 
 
+def _command_is_lost(scope: Scope, use: Use | None) -> bool:
+    """Return True if the joint's servo has a command that is wrong (already reported)."""
+    servo = scope.definitions.of_kind("servo").get(use.definition) if use is not None and use.command is None else None
+    block = scope.definitions.block(servo) if servo is not None else None
+    return block is not None and block.get(COMMAND) is not None
+
+
 def report_others(scope: Scope, name: str, item: Item, joints: Iterable[Joint], uses: Mapping[str, Use]) -> None:
     """Reports joints for which the deck asks an initial value of commands that have none to give."""
     others = [
-        joint for joint in joints if joint.name not in scope.failed_servos and not gives(uses.get(joint.name), name)
+        joint
+        for joint in joints
+        if joint.name not in scope.failed_servos
+        and not gives(uses.get(joint.name), name)
+        and not _command_is_lost(scope, uses.get(joint.name))
     ]
     if not others:
         return

@@ -35,6 +35,25 @@ error[E346]: `part.ic` stays in its edition: it does not compile by itself
 """
 
 
+NO_RUN = """\
+error[E346]: `part.ic` stays in its edition: it has no run, and what it means depends on the deck that includes it
+ = help: name a deck that includes it, too: `met fmt --upgrade DECK PART`; or write the line by hand
+
+1 error
+"""
+
+BROKEN = """\
+error[E346]: `a.ic` stays in its edition: it cannot be read
+ --> a.ic:1:13
+  |
+1 | let x = 3 kg
+  |             ^ D021, expected `;`
+  = help: mend it first: `met check` shows all that is wrong
+
+1 error
+"""
+
+
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
@@ -106,6 +125,35 @@ def test_a_part_is_proved_by_the_deck_that_includes_it(capsys: pytest.CaptureFix
     assert fmt(capsys, "--upgrade", "deck.ic", "part.ic") == (0, "deck.ic: upgraded\npart.ic: upgraded\n", "")
     assert "1 / (2 rev)" in Path("part.ic").read_text()
     assert meaning("deck.ic") == kept
+
+
+SHARED = """\
+let ft = 0.5 m;
+#include "part.ic"
+arm a { link bar { mass = 1 kg;  shape = rod(length = ft, along = x); }
+        joint j revolute { parent = base;  child = bar;  axis = z; } }
+servo s { model = passive;  friction = load; }
+run r { arm = a;  servos { j = s; }  rates { dynamics = 1 kHz; }  duration = 1 s;  record = [q]; }
+"""
+
+
+def test_a_file_without_a_run_is_proved_by_the_deck_that_includes_it_and_never_by_itself(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    Path("part.ic").write_text("#pragma once\nlet load = 20 N*ft;\n")
+    Path("deck.ic").write_text(SHARED)
+    fmt(capsys, "deck.ic")
+    kept, text = meaning("deck.ic"), Path("part.ic").read_text()
+    assert fmt(capsys, "--upgrade", "part.ic") == (2, "", NO_RUN)  # by itself it would have feet
+    assert Path("part.ic").read_text() == text
+    assert fmt(capsys, "--upgrade", "part.ic", "deck.ic") == (0, "part.ic: upgraded\ndeck.ic: upgraded\n", "")
+    assert Path("part.ic").read_text() == "deck 2;\n\n#pragma once\nlet load = (20 N) * ft;\n"
+    assert meaning("deck.ic") == kept
+
+
+def test_a_file_that_cannot_be_read_is_to_be_mended_first(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("a.ic").write_text("let x = 3 kg\n")
+    assert fmt(capsys, "--upgrade", "a.ic") == (2, "", BROKEN)
 
 
 def test_what_would_not_mean_the_same_is_left_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:

@@ -195,3 +195,13 @@ def test_an_encoder_under_a_continuous_law(tmp_path: Path) -> None:
     run = changed(RUN, ("servos = 1 kHz", "servos = continuous"))
     told_ = messages(check(tmp_path, ARM, SENSED, run))
     assert "error[D106]: an `encoder` reads at ticks, and the law of joint `hinge` is continuous" in told_
+
+
+@pytest.mark.parametrize("wrong", ["0.2", "0.2 m"])
+def test_a_value_of_a_wrong_unit_is_told_of_the_servo_that_writes_it(tmp_path: Path, wrong: str) -> None:
+    like = "servo other like drive { kp = 0.3 V*s/rad;  ki = WRONG; }\n".replace("WRONG", wrong)
+    run = changed(RUN, ("hinge = drive", "hinge = other"))
+    drive = changed(SERVO, ("v_max = 24 V", f"v_max = {wrong}"))
+    (of_other, of_drive) = sorted(each.message for each in check(tmp_path, ARM, drive, like, run).diagnostics)
+    assert of_other.startswith("`ki` of servo `other` is in V/rad")
+    assert of_drive.startswith("`v_max` of servo `drive` is in V")

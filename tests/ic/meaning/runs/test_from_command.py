@@ -184,6 +184,7 @@ def test_a_joint_that_no_command_puts_anywhere_is_told(tmp_path: Path, parts: tu
     assert messages(check(tmp_path, *parts, select=select)) == whole
 
 
-def test_a_mistake_in_the_command_is_told_once(tmp_path: Path) -> None:
-    found = messages(check(tmp_path, ARM, follower("position(ramp(over = 1 s))"), BEGINS))
-    assert found.startswith("error[D075]") and found.endswith("1 error\n")
+@pytest.mark.parametrize(("course", "code"), [("ramp(over = 1 s)", "D075"), ("ramp(to = 2 turn)", "D028")])
+def test_a_mistake_in_the_command_is_told_once(tmp_path: Path, course: str, code: str) -> None:
+    found = messages(check(tmp_path, ARM, follower(f"position({course})"), BEGINS))
+    assert found.startswith(f"error[{code}]") and found.endswith("1 error\n")

@@ -1,0 +1,51 @@
+"""A `param` that nothing uses, and that was meant for one of another file: `param raech = 0.9 m;` above an include."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from ic.grammar.syntax import Entry, Let, Name, Setting
+from met.diagnostic import Diagnostic, Label, write
+from met.messages.alike import meant
+from met.messages.message import shown_place
+
+
+def misspelt_params(entries: Sequence[Entry]) -> Iterator[Diagnostic]:
+    """Warns of each `param` that nothing names, where a file that its own includes has one that is called nearly so
+    (D386)."""
+    params = [entry for entry in entries if isinstance(entry, Let) and entry.is_param]
+    near: dict[str, tuple[Let, Let]] = {}
+    for let in params:
+        others = {other.name.text: other for other in params if _is_included(other, shown_place(let.place).file)}
+        found = None if let.name.text in others else meant(let.name.text, others)
+        if found is not None:
+            near[let.name.text] = let, others[found]
+    named = _named(entries) if near else set()
+    for name, (let, other) in near.items():
+        if name not in named:
+            text = other.name.text
+            message = f"nothing uses `{name}`, so it has no effect"
+            also = Label(other.name.place, f"`{text}`, which an including deck may set")
+            helps = write(text, f"did you mean `{text}`?")
+            yield Diagnostic("D386", message, Label(let.name.place), (also,), (helps,), severity="warning")
+
+
+def _is_included(let: Let, by: str) -> bool:
+    return any(file == by for file, _ in shown_place(let.place).included)
+
+
+def _named(entries: Iterable[Entry]) -> set[str]:
+    """The first words of all paths that a deck's entries name or set."""
+    found: set[str] = set()
+    waiting: list[Any] = list(entries)
+    while waiting:
+        part = waiting.pop()
+        if isinstance(part, Name | Setting) and part.path:
+            found.add(part.path[0].text)
+        if isinstance(part, list | tuple):
+            waiting += part
+        elif is_dataclass(part):
+            waiting += (getattr(part, field.name) for field in fields(part))
+    return found

@@ -1,0 +1,46 @@
+"""Warnings of a `param` that nothing uses and that was meant for one of an included file; which values the others keep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import ic
+from tests.ic.small_decks import ARM, RUN, SERVO
+
+PART = "#pragma once\nparam reach = 0.5 m;\n" + ARM + SERVO
+
+
+def codes(folder: Path, *, before: str = "", behind: str = "", part: str = PART) -> list[str]:
+    (folder / "part.ic").write_text(part)
+    (folder / "deck.ic").write_text(f'{before}\n#include "part.ic"\n{behind}\n{RUN}')
+    return [each.code for each in ic.check(str(folder / "deck.ic")).diagnostics]
+
+
+@pytest.mark.parametrize(
+    ("before", "behind", "expected"),
+    [
+        ("param raech = 0.9 m;", "", ["D386"]),
+        ("", "param raech = 0.9 m;", ["D386"]),
+        ("param reach = 0.9 m;", "", []),
+        ("param depth = 0.9 m;", "", []),
+        ("let raech = 0.9 m;", "", []),
+        ("param reach_2 = 0.9 m;\nlet twice = 2 * reach_2;", "", []),
+    ],
+)
+def test_a_param_that_nothing_uses_is_told_where_an_included_file_has_one_like_it(
+    tmp_path: Path, before: str, behind: str, expected: list[str]
+) -> None:
+    assert codes(tmp_path, before=before, behind=behind) == expected
+
+
+def test_an_included_file_may_have_params_that_a_deck_does_not_use(tmp_path: Path) -> None:
+    part = PART.replace("param reach", "param reach_2 = 0.7 m;\nparam reach")
+    assert codes(tmp_path, part=part) == []
+
+
+def test_a_param_of_another_dimension_is_one_error(tmp_path: Path) -> None:
+    part = PART.replace("arm ", "let twice = reach + 1 m;\narm ", 1)
+    other = "run other like hold { with reach = 0.9 m; }"
+    assert codes(tmp_path, before="param reach = 0.7 s;", behind=other, part=part) == ["D061"]
