@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from ic.editor.completion import first_line, parameters_of
+from ic.editor.completion import parameters_of
 from ic.editor.index import DeckIndex, ValueInDeck
 from ic.editor.names import NamesInTexts
 from ic.editor.structure import DeckText, TextEntry
 from ic.language import BLOCKS, DEFINITIONS
+from ic.printing.models import summary
 from ic.text.lexer import NAME, Token
 from met import models
 from met.diagnostic import Place
@@ -52,7 +53,7 @@ def _of_model(token: Token) -> Iterator[str]:
     for kind in models.GROUPS:
         model = models.available(kind).get(token.text)
         if model is not None:
-            yield f"{kind} model `{token.text}`: {first_line(model)}"
+            yield f"{kind} model `{token.text}`: {summary(model)}"
 
 
 def _of_unit(text: DeckText, token: Token) -> Iterator[str]:
