@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import json
 import zipfile
+import zlib
 from collections.abc import Mapping
-from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
@@ -57,12 +57,12 @@ def vsix() -> bytes:
 
 def is_extension(path: Path) -> bool:
     """True for a file of this extension, of any version of MET. Raises OSError."""
-    with open_regular(path) as file, suppress(zipfile.BadZipFile, KeyError, RuntimeError, NotImplementedError):
-        with zipfile.ZipFile(file) as archive, archive.open(MANIFEST) as manifest:
-            described = package()
-            own = f"Id={quoteattr(str(described['name']))} "
+    own = f"Id={quoteattr(str(package()['name']))} "
+    try:
+        with open_regular(path) as file, zipfile.ZipFile(file) as archive, archive.open(MANIFEST) as manifest:
             return own.encode() in manifest.read(MOST_OF_MANIFEST)
-    return False
+    except (zipfile.BadZipFile, zlib.error, KeyError, RuntimeError, NotImplementedError):
+        return False  # no ZIP file, none with a manifest, or one that cannot be read
 
 
 def _manifest(described: Mapping[str, object]) -> str:
