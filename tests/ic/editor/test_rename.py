@@ -103,6 +103,17 @@ def test_what_cannot_be_renamed_is_refused_with_the_reason(
     assert refused(editor, deck, mark, new) == reason
 
 
+def test_a_refusal_is_an_answer_and_no_failure_that_is_logged(editor: Editor, deck: Path) -> None:
+    logged = editor.errors()
+    line, column = at(DECK, "duration")
+    with pytest.raises(AssertionError):
+        editor.about("textDocument/prepareRename", deck, line, column)
+    refused(editor, deck, "duration")
+    refused(editor, deck, "gearbox like", "sqrt")
+    editor.settle()
+    assert editor.errors() == logged
+
+
 def test_a_name_of_a_loop_is_refused(tmp_path: Path, editor: Editor) -> None:
     path = tmp_path / "chain.ic"
     path.write_text(CHAIN)
