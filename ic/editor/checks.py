@@ -134,6 +134,20 @@ class DeckChecks:
         """All that is known of the open texts that no other one includes."""
         return [self.checked[uri] for uri in self._roots() if uri in self.checked]
 
+    def request(self, deck: OpenText) -> CheckRequest:
+        """What a check of a deck is asked, with all texts as they are now."""
+        folder, name = os.path.split(deck.path) if deck.path is not None else (os.getcwd(), "")
+        exists = os.path.isdir(folder)
+        return CheckRequest(
+            folder if exists else os.getcwd(),
+            name if exists else deck.path or "",
+            deck.text if deck.path is None else None,
+            self.include_dirs,
+            self.defines,
+            self.unsaved(),
+            self._known.get(deck.uri, {}),
+        )
+
     async def rest(self) -> None:
         """Wait until all that is told is of what the texts are now."""
         await self._resting.wait()
@@ -202,17 +216,7 @@ class DeckChecks:
 
     async def _check(self, uri: str) -> None:
         deck = self.texts[uri]
-        folder, name = os.path.split(deck.path) if deck.path is not None else (os.getcwd(), "")
-        texts = dict(self.texts)
-        request = CheckRequest(
-            folder if os.path.isdir(folder) else os.getcwd(),
-            name if os.path.isdir(folder) else deck.path or "",
-            deck.text if deck.path is None else None,
-            self.include_dirs,
-            self.defines,
-            self.unsaved(),
-            self._known.get(uri, {}),
-        )
+        texts, request = dict(self.texts), self.request(deck)
         self._running, self._outdated, self._auditing = uri, False, False
         self._stale.pop(uri, None)
         self._failed.discard(uri)

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 
 from lsprotocol import types
 
 from ic.editor.index import DeckIndex
 from ic.editor.names import REMOVED, NamesInTexts
-from ic.editor.structure import NAMING, DeckText, TextEntry
+from ic.editor.structure import NAMING, UNIT, DeckText, TextEntry
 from ic.find import library_files
-from ic.language import BLOCKS, DEFINITIONS, EXPERIMENTS, OF_A_RUN
+from ic.language import BLOCKS, DEFINITIONS, EXPERIMENTS, OF_A_RUN, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
 from ic.language.unit_words import units_of
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, USAGE
 from ic.meaning.mechanics.shapes import SHAPES
 from ic.printing.models import summary
+from ic.text.edition import EDITION_WORD, EDITIONS
 from ic.text.lexer import NAME, NUMBERS, STRING, Token
 from ic.text.preprocess import DIRECTIVES
 from met import models
@@ -101,14 +103,17 @@ def _of_entry(
         if not words:
             yield from (Offer(each, types.CompletionItemKind.Keyword, BLOCKS[each].doc) for each in EXPERIMENTS)
             return
+    if texts == [EDITION_WORD] and around is None:
+        yield from (Offer(str(each), types.CompletionItemKind.Constant, "an edition") for each in EDITIONS)
+        return
     if last.text == ".":
         yield from _rest_of_path(words, names, index)
         return
     if last.kind in NUMBERS or (last.text in ("]", ")") and "=" in texts):
-        yield from _units(_parameter(texts, around, names))
+        yield from _units(_parameter(texts, around, names), names)
         return
     if last.text in ("*", "/") and len(words) > 1 and (words[-2].text in UNITS or words[-2].kind in NUMBERS):
-        yield from _units(None)
+        yield from _units(None, names)
         if words[-2].kind not in NUMBERS:
             return
     if last.text == "like":
@@ -135,8 +140,8 @@ def _beginnings(around: TextEntry | None, names: NamesInTexts) -> Iterator[Offer
     """The words that an entry of a block may begin with."""
     if around is None:
         yield from (Offer(each, types.CompletionItemKind.Keyword, BLOCKS[each].doc) for each in DEFINITIONS)
-        yield Offer("let", types.CompletionItemKind.Keyword, "a name for a value: `let reach = 2 m;`")
-        yield Offer("param", types.CompletionItemKind.Keyword, "the same, which others may set: `param reach = 2 m;`")
+        for entry in TOP_LEVEL.entries:
+            yield Offer(entry.name, types.CompletionItemKind.Keyword, f"{entry.doc}: `{entry.written}`")
         yield Offer("default", types.CompletionItemKind.Keyword, "marks the run that `met run` takes")
         yield from _named(names, "macro")
         return
@@ -188,8 +193,8 @@ def _parameter(texts: list[str], around: TextEntry | None, names: NamesInTexts) 
     return entries[0].parameter if entries else None
 
 
-def _units(wanted: Parameter | None) -> Iterator[Offer]:
-    """The units of the table, those that fit first; where a compound one is wanted it stands before all."""
+def _units(wanted: Parameter | None, names: NamesInTexts) -> Iterator[Offer]:
+    """The units of the table, those that fit first, and the deck's; a compound one that is wanted stands before all."""
     fit: list[str] = []
     if wanted is not None and wanted.unit not in ("", "1"):
         try:
@@ -204,7 +209,9 @@ def _units(wanted: Parameter | None) -> Iterator[Offer]:
         if fit:
             yield from (Offer(each, types.CompletionItemKind.Unit, UNITS[each].word) for each in fit)
             if shown in UNITS:
+                yield from _named(names, UNIT)
                 return  # of others a unit that does not fit may be a factor: `deg/s`
+    yield from _named(names, UNIT)
     yield from (Offer(each, types.CompletionItemKind.Unit, UNITS[each].word) for each in UNITS)
 
 
@@ -225,6 +232,11 @@ def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> 
         if path.startswith(head):
             part, _, more = path[len(head) :].partition(".")
             about.setdefault(part, "" if more else "signal")
+    begins = re.compile(re.sub(r"\\{.*?\\}", r"\\w+", re.escape(head)))  # `bodies.{side}_arm.`, in a loop
+    for path in index.cells:
+        if found_head := begins.match(path):
+            part, _, more = path[found_head.end() :].partition(".")
+            about.setdefault(part, "" if more else "in the table")
     yield from (Offer(part, types.CompletionItemKind.Field, said) for part, said in about.items())
     for found in names.by_name.get(head[:-1], ()):
         if found.kind == "servo" and found.entry is not None:
@@ -288,6 +300,7 @@ def _named(names: NamesInTexts, *kinds: str, around: TextEntry | None = None) ->
         "let": types.CompletionItemKind.Variable,
         "macro": types.CompletionItemKind.Constant,
         "run": types.CompletionItemKind.Function,
+        "unit": types.CompletionItemKind.Unit,
     }
     owners = names.owners(around) if around is not None else []
     for kind in kinds:

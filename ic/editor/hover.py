@@ -8,7 +8,7 @@ from ic.editor.completion import parameters_of
 from ic.editor.index import DeckIndex, ValueInDeck
 from ic.editor.names import NamesInTexts
 from ic.editor.structure import DeckText, TextEntry
-from ic.language import BLOCKS, DEFINITIONS
+from ic.language import BLOCKS, DEFINITIONS, TOP_LEVEL
 from ic.printing.models import summary
 from ic.text.lexer import NAME, Token
 from met import models
@@ -47,6 +47,9 @@ def _of_key(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Itera
             return
     if around is None and token.text in DEFINITIONS:
         yield f"`{BLOCKS[token.text].written}`\n\n{BLOCKS[token.text].doc}"
+    for entry in TOP_LEVEL.entries if around is None else ():
+        if entry.name == token.text:
+            yield f"`{entry.written}`\n\n{entry.doc}"
 
 
 def _of_model(token: Token) -> Iterator[str]:

@@ -43,11 +43,13 @@ class DeckIndex:
     """The values of a deck, and the signals that its runs can record, with their units.
 
     cases  how many each run, sweep and search has, by name
+    cells  the paths of the values of tables by row name, `bodies.boom.mass`
     """
 
     values: tuple[ValueInDeck, ...]
     signals: tuple[str, ...]
     cases: Mapping[str, int] = field(default_factory=dict)
+    cells: tuple[str, ...] = ()
 
 
 def index_of(compiled: Compiled) -> DeckIndex:
@@ -58,7 +60,16 @@ def index_of(compiled: Compiled) -> DeckIndex:
     for experiment in compiled.plan.experiments:
         name = experiment.name.partition(" ")[0]  # one of several structures is called `NAME CHOICES`
         cases[name] = cases.get(name, 0) + experiment.cases.count
-    return DeckIndex(tuple(islice(_values(compiled), MOST_VALUES)), tuple(signals), cases)
+    values, cells = (tuple(islice(each(compiled), MOST_VALUES)) for each in (_values, _cells))
+    return DeckIndex(values, tuple(signals), cases, cells)
+
+
+def _cells(compiled: Compiled) -> Iterator[str]:
+    """The paths of all values of the deck's tables."""
+    for scope in compiled.scopes[:1]:
+        for name in scope.definitions.lets:
+            table = scope.names.row_table(name)
+            yield from (f"{name}.{path}" for path in table.paths()) if table is not None else ()
 
 
 def _values(compiled: Compiled) -> Iterator[ValueInDeck]:

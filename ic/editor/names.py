@@ -30,7 +30,8 @@ _OF_KEY: Mapping[str, tuple[str, ...]] = MappingProxyType({
 })  # fmt: skip
 """The kinds of the names that are values of these keys."""
 
-_VALUES = ("let", "macro", "guide", "joint", "metric", "signal", "require", "sweep", "run", "servo", "link", "linear")
+_VALUES = ("let", "macro", "guide", "joint", "metric", "signal", "require", "sweep", "run", "servo", "link", "linear",
+           "unit")  # fmt: skip
 """The kinds of names in any other value, the likeliest first."""
 
 REMOVED = ("metric", "require", "guide", "sensor", "payload", "signal", "linear")

@@ -18,7 +18,7 @@ _KINDS: Mapping[str, types.SymbolKind] = MappingProxyType({
     "arm": types.SymbolKind.Class, "servo": types.SymbolKind.Class, "link": types.SymbolKind.Struct,
     "joint": types.SymbolKind.Field, "run": types.SymbolKind.Function, "sweep": types.SymbolKind.Array,
     "search": types.SymbolKind.Array, "tune": types.SymbolKind.Array, "let": types.SymbolKind.Variable,
-    "param": types.SymbolKind.Variable,
+    "param": types.SymbolKind.Variable, "unit": types.SymbolKind.Constant,
     "metric": types.SymbolKind.Property, "require": types.SymbolKind.Boolean,
 })  # fmt: skip
 

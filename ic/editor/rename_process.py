@@ -59,7 +59,7 @@ async def rename(
     reason = refusal_of_word(new) or refusal_of_name(token, asked.names.meant_in(asked.text, token))
     if reason:
         raise CannotRename(reason)
-    first = _request(checks, deck)
+    first = checks.request(deck.deck)
     roots = tuple(os.path.realpath(each) for each in (*folders, first.folder))
     others = tuple(_others(checks, deck, token.text, roots))
     if len(others) > MOST_DECKS:
@@ -90,14 +90,6 @@ async def _proved(request: RenameRequest) -> Renamed:
     return done
 
 
-def _request(checks: DeckChecks, deck: CheckedDeck) -> CheckRequest:
-    text = deck.deck.text if deck.deck.path is None else None
-    return CheckRequest(
-        os.path.abspath(deck.folder), deck.name if text is None else "", text, checks.include_dirs, checks.defines,
-        checks.unsaved(),
-    )  # fmt: skip
-
-
 def _others(checks: DeckChecks, deck: CheckedDeck, word: str, roots: Iterable[str]) -> Iterator[CheckRequest]:
     """The other decks with a word, open ones and those in the folders that are open; one more than are taken."""
     has_word = re.compile(rf"\b{re.escape(word)}\b")
@@ -105,7 +97,7 @@ def _others(checks: DeckChecks, deck: CheckedDeck, word: str, roots: Iterable[st
     for other in checks.decks():
         if other.deck.identity not in known:
             known.add(other.deck.identity)
-            yield _request(checks, other)
+            yield checks.request(other.deck)
     unsaved = checks.unsaved()
     found = 0
     for path in _decks_in(roots):

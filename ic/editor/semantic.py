@@ -14,7 +14,7 @@ from lsprotocol import types
 from ic.editor.completion import parameters_of
 from ic.editor.names import NamesInTexts
 from ic.editor.structure import LOOP, DeckText, TextEntry, flattened
-from ic.language import BLOCKS
+from ic.language import BLOCKS, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
 from ic.meaning.expressions.evaluate import FUNCTIONS
 from ic.text.lexer import NAME, Token
@@ -29,8 +29,9 @@ MODIFIERS = ("definition", "defaultLibrary")
 LEGEND = types.SemanticTokensLegend(token_types=list(TYPES), token_modifiers=list(MODIFIERS))
 DEFINES, OF_LIBRARY = 1, 2
 
+_OF_DECK = tuple(entry.name for entry in TOP_LEVEL.entries)
 _OF_NAME: Mapping[str, str] = MappingProxyType({
-    "macro": "macro", "parameter": "parameter", "link": "struct", "joint": "struct", "arm": "struct",
+    "macro": "macro", "parameter": "parameter", "unit": "type", "link": "struct", "joint": "struct", "arm": "struct",
     "payload": "struct", "servo": "class", "run": "method", "sweep": "method", "search": "method", "tune": "method",
 })  # fmt: skip
 
@@ -131,7 +132,7 @@ def _may_precede_unit(text: DeckText, token: Token) -> bool:
 def _key(token: Token, entry: TextEntry, names: NamesInTexts) -> tuple[str, int] | None:
     around = entry.within
     if around is None:
-        return ("keyword", 0) if token.text in (*BLOCKS, "let", "param", LOOP) else None
+        return ("keyword", 0) if token.text in (*BLOCKS, *_OF_DECK, LOOP) else None
     block = BLOCKS.get(around.block)
     declared = {each.name.split()[0]: each for each in block.entries} if block is not None else {}
     if token.text in declared:

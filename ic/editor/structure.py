@@ -19,13 +19,16 @@ from met.frozen import frozen
 LETS = ("let", "param")
 """Words that give a value a name."""
 
+UNIT = "unit"
+"""The word that declares a unit."""
+
 LOOP = "for"
 
 INSIDE_SERVO = "sensor"
 """A word that names something in a run, and is followed by a quantity in a servo."""
 
 NAMING = frozenset({
-    *DEFINITIONS, *LETS, "require", *(word for block in BLOCKS.values() for word in block.named),
+    *DEFINITIONS, *LETS, UNIT, "require", *(word for block in BLOCKS.values() for word in block.named),
 }) - {"substitute", "with"}  # fmt: skip
 """Words that a new name follows."""
 

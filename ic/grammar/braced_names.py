@@ -86,9 +86,10 @@ def _leading_length(tokens: Sequence[Token], at: int) -> int:
     length = braces_length(tokens, at)
     if length and at and tokens[at - 1].text == "." and adjacent(tokens[at - 1], tokens[at]):
         return length  # `bodies.{ side }.mass`: behind a point stands a name
-    before, after = tokens[at + length - 1 : at + length + 1] if at + length < len(tokens) else (tokens[at],) * 2
-    if length and after.kind in (NAME, WHOLE) and adjacent(before, after):
-        return length
+    if length and at + length < len(tokens):
+        before, after = tokens[at + length - 1 : at + length + 1]
+        if after.kind in (NAME, WHOLE) and adjacent(before, after):
+            return length
     return braces_length(tokens, at, touching=True)
 
 

@@ -12,7 +12,7 @@ and so are `inertia.xx` to `inertia.yz`, in the order that `inertia` of a link h
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final, TypeGuard
 
 from ic.grammar.syntax import Call, Expression, Name, String, Word
@@ -78,6 +78,13 @@ class RowTable:
                 helps = "fill it in, or leave the entry that asks for it out"
                 raise Problem(error("D383", f"row `{row.text}` has no value here", cell.place, also=also, help=helps))
         return found
+
+    def paths(self) -> Iterator[str]:
+        """The paths of all values, without the table's name: `boom.mass`; of a vector also the one of all of it."""
+        columns = dict.fromkeys(column.name for column in self.csv.columns[1:])
+        heads = dict.fromkeys(head for name in columns for head, dot, _ in [name.rpartition(".")] if dot)
+        whole = [head for head in heads if any(all(f"{head}.{part}" in columns for part in parts) for parts in VECTORS)]
+        return (f"{row}.{name}" for row in self.rows for name in (*whole, *columns))
 
     def _columns(self, words: Sequence[Word]) -> tuple[CsvColumn, ...]:
         """The column of this name, or those of the vector of this name."""

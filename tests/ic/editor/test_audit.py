@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
+from ic.editor.checking import EARLY, CheckRequest, first_replies
+from ic.text.files import LIBRARY
 from tests.ic.editor.client import Editor, uri
 
 DECK = """\
@@ -13,6 +16,7 @@ run light like nominal { duration = 1 s; }
 sweep spares of light { vary spare = [1 kg, 2 kg]; }
 sweep noise of light { repeat 2; }
 """
+NO_EFFECT = "`spare` changes nothing in this run"
 NO_NOISE = "there is no noise in this run, so a repeat is the same case again"
 
 
@@ -31,7 +35,32 @@ def test_what_a_definition_means_is_told_before_the_audit_begins(tmp_path: Path,
     editor.forget()
     editor.change(deck, DECK)
     editor.settle()
-    assert ["`spare`" in each for each in told(editor, deck)[-1]] == [True], "errors leave no program to look into"
+    *meanwhile, last = told(editor, deck)
+    assert last == [NO_EFFECT], "errors leave no program to look into"
+    assert meanwhile in ([], [[]]), "where a check takes long, what is found by then: here nothing, of arms and servos"
+
+
+def replies(text: str, seconds: float) -> list[list[str]]:
+    """The messages of each reply before the audit, where each look at the clock takes so long."""
+    ticks = itertools.count()
+    request = CheckRequest(str(LIBRARY), "", text, (), (), {})
+    found = list(first_replies(request, lambda: seconds * next(ticks)))
+    assert not any(each.audited for each in found)
+    return [[each.message for each in reply.diagnostics] for reply in found]
+
+
+def test_all_mistakes_of_definitions_are_told_together_where_that_is_quick() -> None:
+    wrong = DECK.replace("vary spare", "vary spar").replace("duration = 1 s", "duration = 1")
+    bare, unknown = "`duration` of run `light` is in s, and this is a bare number", "no parameter `spar` in this run"
+    assert replies(wrong, 0.0) == [[bare, unknown]]
+    assert replies(DECK, 0.0) == [[NO_EFFECT]]
+
+
+def test_mistakes_of_an_arm_are_told_first_where_the_rest_takes_long() -> None:
+    wrong = "arm bad { link a { mass = 1 m; } }\n" + DECK.replace("vary spare", "vary spar")
+    first, every = replies(wrong, 2 * EARLY)
+    assert "`mass` of link `a` is in kg, and this is in m" in first
+    assert every == [*first, "no parameter `spar` in this run"]
 
 
 def test_a_change_of_another_deck_need_not_wait_for_an_audit(tmp_path: Path, editor: Editor) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from ic.find import library_files
-from ic.language import BLOCKS, DEFINITIONS
+from ic.language import BLOCKS, DEFINITIONS, TOP_LEVEL
 from ic.printing.models import summary
 from ic.text.files import LIBRARY
 from met import models
@@ -114,6 +114,44 @@ def test_what_may_stand_here_comes_first(editor: Editor, deck: Path, written: st
         assert set(first) <= set(found)
     else:
         assert found[: len(first)] == first and (first or not found)
+
+
+def test_words_of_a_deck_itself_are_offered_and_shown_as_the_language_declares_them(
+    editor: Editor, tmp_path: Path
+) -> None:
+    deck = tmp_path / "own.ic"
+    text = "deck 2;\nunit ozin = 7.061552e-3 N*m;\n"
+    editor.open(deck, text)
+    declared = [entry.name for entry in TOP_LEVEL.entries]
+    assert declared == ["deck", "let", "param", "unit"]
+    assert words(editor, deck, text + "|")[len(DEFINITIONS) :][: len(declared)] == declared
+    assert words(editor, deck, "deck |") == ["1", "2"]
+    assert "ozin" in words(editor, deck, text + "servo s { model = rigid_gearbox;  tau_max = 5 |")
+    editor.change(deck, text + "let most = 5 ozin;\n")
+    editor.settle()
+    for mark, entry in (("deck", "deck"), ("unit", "unit")):
+        shown = editor.about("textDocument/hover", deck, *at(text, mark))["contents"]["value"]
+        assert f"`{TOP_LEVEL[entry].written}`" in shown and TOP_LEVEL[entry].doc in shown
+    assert places(editor.about("textDocument/definition", deck, 2, 13)) == [(uri(deck), 1, 5)]
+    outline = editor.ask("textDocument/documentSymbol", {"textDocument": {"uri": uri(deck)}})
+    assert [each["name"] for each in outline] == ["ozin", "most"]
+
+
+TABLE = "link, mass [kg], com.x [m], com.y [m], com.z [m]\nboom, 2, 0.1, 0, 0\nstick_left, 1, 0.2, 0, 0\n"
+
+
+def test_rows_and_columns_stand_behind_the_name_of_a_table(editor: Editor, tmp_path: Path) -> None:
+    (tmp_path / "bodies.csv").write_text(TABLE)
+    deck = tmp_path / "own.ic"
+    text = 'let bodies = csv("bodies.csv");\n#include <two_link.ic>\n'
+    editor.open(deck, text)
+    assert editor.of(deck) == []
+    columns = ["com", "mass", "com.x", "com.y", "com.z"]
+    assert words(editor, deck, text + "arm a { link b { mass = bodies.|") == ["boom", "stick_left"]
+    assert words(editor, deck, text + "arm a { link b { mass = bodies.boom.|") == columns[:2]
+    assert words(editor, deck, text + "arm a { link b { mass = bodies.boom.com.|") == ["x", "y", "z"]
+    looped = "arm a { for side in [left] { link b_{side} { mass = bodies.stick_{side}.|"
+    assert words(editor, deck, text + looped) == columns[:2]
 
 
 def test_parts_of_a_signal_are_offered(editor: Editor, deck: Path) -> None:

@@ -63,6 +63,24 @@ def test_a_fix_of_an_included_file_changes_that_file(tmp_path: Path, editor: Edi
     assert edited(part.read_text(), fix["edit"]["changes"][uri(part)]) == "run more like nominal { duration = 5 s; }\n"
 
 
+@pytest.mark.parametrize(
+    ("written", "code", "fixed"),
+    [
+        ("let rev = 2;\nlet a = 3 kg*rev;\n", "D392", ["let rev = 2;\nlet a = (3 kg)*rev;\n"]),
+        ("let a = 1/2 m;\n", "D392", ["let a = 1/(2 m);\n", "let a = (1/2) m;\n"]),
+        ("deck 2;\nlet a = 1/2 m;\n", "D393", ["deck 2;\nlet a = 1/(2 m);\n", "deck 2;\nlet a = (1/2) m;\n"]),
+    ],
+)
+def test_what_editions_mean_differently_has_quick_fixes(
+    tmp_path: Path, editor: Editor, written: str, code: str, fixed: list[str]
+) -> None:
+    deck = tmp_path / "arm.ic"
+    editor.open(deck, written)
+    (found,) = [each for each in editor.of(deck) if each["code"] == code]
+    offered = fixes(editor, deck, found)
+    assert [edited(written, each["edit"]["changes"][uri(deck)]) for each in offered] == fixed
+
+
 def test_nothing_is_offered_for_a_text_that_has_changed_since_it_was_checked(tmp_path: Path, editor: Editor) -> None:
     deck = tmp_path / "arm.ic"
     editor.open(deck, BAD)

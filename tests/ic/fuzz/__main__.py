@@ -2,13 +2,13 @@
 
 Every deck goes through all of `ic.check` with every run and sweep, its messages and its plan are printed, the plan is
 written and read again. A fault is a traceback, a deck that takes more than 20 s of processor time, one that takes more
-than 1 GiB, an error without a place, or a plan that reads back differently. Each kind of fault is told once, with the
-shortest deck found that shows it. Exit status 1 where there was one.
+than 1 GiB, an error without a place, or a plan that reads back differently. Each kind of fault is told when it is first
+found, and again in the end, then with the shortest deck found that shows it. Exit status 1 where there was one.
 
     --seconds N     how long [60]
     --seed N        of the series [the time]; the same seed on the same tree makes the same decks
     --first N       number of the first deck of the series [0]
-    --keep FOLDER   write there what was found, a file each
+    --keep FOLDER   write there what is found, as it comes: NUMBER.ic, the shortest deck so far, and NUMBER.txt
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from met.frozen import frozen
@@ -43,34 +44,42 @@ class Findings:
     slowest: tuple[float, int]
 
 
-def fuzz(seed: int, seconds: float, first: int = 0) -> Findings:
-    """Checks decks of the series from number `first` on, in processes of their own that may die."""
+def fuzz(seed: int, seconds: float, first: int = 0, tell: Callable[[int, Fault], None] | None = None) -> Findings:
+    """Checks decks of the series from number `first` on, in processes of their own that may die.
+
+    tell  is called with each fault as it comes, and with the number of its kind, from 0; again with a shorter deck
+    """
     end = time.monotonic() + seconds
     faults: dict[str, Fault] = {}
     number, slowest = first, (0.0, first)
+
+    def take(fault: Fault) -> None:
+        if fault.name not in faults or len(fault.deck) < len(faults[fault.name].deck):
+            faults[fault.name] = fault
+            if tell is not None:
+                tell(list(faults).index(fault.name), fault)
+
     while time.monotonic() < end:
-        with tempfile.TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+") as complaints:
             words = [sys.executable, "-m", "tests.ic.fuzz.worker", str(seed), str(number), str(end - time.monotonic())]
-            worker = subprocess.Popen(
-                [*words, folder], cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-            )
-            output, complaint = worker.communicate()
             last: dict[str, object] = {}
-            for line in output.splitlines():
-                last = json.loads(line)
-                if "fault" in last:
-                    one = Fault(str(last["fault"]), int(str(last["number"])), str(last["deck"]), str(last["traceback"]))
-                    if one.name not in faults or len(one.deck) < len(faults[one.name].deck):
-                        faults[one.name] = one
-                number = int(str(last.get("done", last.get("begun", number))))
+            with subprocess.Popen(
+                [*words, folder], cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=complaints
+            ) as worker:
+                for line in worker.stdout or ():
+                    last = json.loads(line)
+                    if "fault" in last:
+                        name, deck, told_of = (str(last[key]) for key in ("fault", "deck", "traceback"))
+                        take(Fault(name, int(str(last["number"])), deck, told_of))
+                    number = int(str(last.get("done", last.get("begun", number))))
+            complaints.seek(0)
             if "done" in last:
                 slowest = max(slowest, tuple(last["slowest"]))  # type: ignore[arg-type, call-overload]
-            elif not output:
-                raise RuntimeError(f"the worker did not begin: {complaint}")
+            elif not last:
+                raise RuntimeError(f"the worker did not begin: {complaints.read()}")
             else:
-                name = f"the process ended with {worker.returncode}"
                 deck = Path(folder, "deck.ic").read_bytes().decode("utf-8", "backslashreplace")
-                faults.setdefault(name, Fault(name, number, deck, complaint[-4000:]))
+                take(Fault(f"the process ended with {worker.returncode}", number, deck, complaints.read()[-4000:]))
                 number += 1
     return Findings(number - first, tuple(faults.values()), slowest)
 
@@ -79,9 +88,11 @@ def told(found: Findings, seed: int) -> str:
     """The findings as text."""
     seconds, slowest = found.slowest
     lines = [f"{found.decks} decks of seed {seed}; the slowest, number {slowest}, took {seconds:.1f} s"]
-    for fault in found.faults:
-        lines += ["", f"=== {fault.name} (deck {fault.number})", fault.traceback, "--- the deck", fault.deck]
-    return "\n".join(lines)
+    return "\n".join([*lines, *map(_fault_told, found.faults)])
+
+
+def _fault_told(fault: Fault) -> str:
+    return "\n".join(["", f"=== {fault.name} (deck {fault.number})", fault.traceback, "--- the deck", fault.deck])
 
 
 def main() -> int:
@@ -94,13 +105,17 @@ def main() -> int:
     asked = parser.parse_args()
     seed = asked.seed if asked.seed is not None else int(time.time())
     print(f"seed {seed}", flush=True)
-    found = fuzz(seed, asked.seconds, asked.first)
-    print(told(found, seed))
     if asked.keep is not None:
         asked.keep.mkdir(parents=True, exist_ok=True)
-        for number, fault in enumerate(found.faults):
-            (asked.keep / f"{number}.ic").write_text(fault.deck, encoding="utf-8")
-            (asked.keep / f"{number}.txt").write_text(f"{fault.name}\n{fault.traceback}", encoding="utf-8")
+
+    def tell(kind: int, fault: Fault) -> None:
+        print(_fault_told(fault), flush=True)
+        if asked.keep is not None:
+            (asked.keep / f"{kind}.ic").write_text(fault.deck, encoding="utf-8")
+            (asked.keep / f"{kind}.txt").write_text(f"{fault.name}\n{fault.traceback}", encoding="utf-8")
+
+    found = fuzz(seed, asked.seconds, asked.first, tell)
+    print(told(found, seed))
     return 1 if found.faults else 0
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import re
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from ic.text.preprocess import DIRECTIVES
 from met import units
@@ -204,6 +205,39 @@ def in_an_edition(rng: random.Random, text: str) -> str:
     return heading + "".join(pieces)
 
 
+def from_a_table(rng: random.Random, text: str) -> str:
+    """A value, or those of a link, taken from a table by row name, some rows or columns of which there may not be."""
+    spots = list(re.finditer(r"(?<![\w.])(\w+)(\s*=\s*)([^;{}=]*)(?=;)", text))
+    if not spots:
+        return text
+    for spot in sorted(rng.sample(spots, min(len(spots), rng.choice([1, 1, 3]))), key=lambda s: -s.start()):
+        row = rng.choice(["bar", "left", "seg_1", "{side}", "seg_{i}", "none", spot[1]])
+        column = rng.choice([spot[1], "mass", "com", "inertia", "com.x", "by", "friction"])
+        value = rng.choice([f"rows.{row}.{column}", f"2 * rows.{row}.{column}", f"rows.{row}", "rows"])
+        text = text[: spot.start(3)] + value + text[spot.end() :]
+    table = (
+        rng.choice(["let", "let", "param"]) + ' rows = csv("' + rng.choice(["rows.csv", "rows.csv", "x.csv"]) + '");'
+    )
+    return f"{table}\n{text}" if rng.random() < 0.8 else f"{text}\n{table}\n"
+
+
+def commanded(rng: random.Random, text: str) -> str:
+    """A command that is a pulse of some quantity, and a start that is as it commands."""
+    number = partial(rng.choice, ("0.1", "1", "-0.5", "0", "1e-9", "3", "1e300", "0.25"))
+    unit = rng.choice(("rad", "rad", "m", "deg", "N*m"))
+    pulse = f"pulse(to = {number()} {unit}/s, slope = {number()} {unit}/s^2, over = {number()} s, begin = {number()} s)"
+    course = f"{rng.choice(('rate', 'rate', 'position', 'torque'))}({pulse})"
+    text = re.sub(r"(?<=command = )[^;{}]*(?=;)", lambda old: course if rng.random() < 0.5 else old[0], text)
+    start = rng.choice(("q = command;", "q = command; qd = command;", "* = command;", "q = [command, 0 rad];"))
+    runs = list(re.finditer(r"(?:run|sweep) [^;{}]*\{", text))
+    if not runs or rng.random() < 0.2:
+        return text
+    if "initial {" in text and rng.random() < 0.8:
+        return text.replace("initial {", f"initial {{ {start}", 1)
+    at = rng.choice(runs).end()
+    return f"{text[:at]} initial {{ {start} }} {text[at:]}"
+
+
 def nested(rng: random.Random, text: str) -> str:
     """Something repeated very often, or very deep."""
     spots = [match.start() for match in re.finditer(r"[=;{]", text)] or [0]
@@ -240,7 +274,7 @@ def _solid(pieces: Sequence[str]) -> list[int]:
 
 GENTLE: Sequence[Callable[[random.Random, str], str]] = (
     word_of_its_kind, word_of_its_kind, changed_number, changed_entry, other_block, other_block, in_a_loop,
-    in_an_edition,
+    in_an_edition, from_a_table, commanded,
 )  # fmt: skip
 _WILD: Sequence[Callable[[random.Random, str], str]] = (
     *GENTLE, changed_word, changed_word, changed_word, through_macro, through_macro, nested, long_line, spliced,

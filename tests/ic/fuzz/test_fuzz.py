@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import random
+import signal
 import subprocess
 import sys
 import time
@@ -124,6 +126,42 @@ Traceback ...
 --- the deck
 x = 1;"""
     )
+
+
+STAND_IN = """\
+import sys
+from tests.ic.fuzz import __main__ as fuzzer
+fuzzer.sys.executable = sys.argv[1]
+sys.argv[1:] = ["--seconds", "600", "--seed", "5", "--keep", sys.argv[2]]
+fuzzer.main()
+"""
+FINDS_AND_STAYS = """\
+#!/bin/sh
+echo '{"begun": 7}'
+echo '{"fault": "KeyError in a.py:f", "number": 7, "traceback": "Traceback ...", "deck": "x = 1;"}'
+exec sleep 600
+"""
+
+
+def test_a_fault_is_told_and_kept_before_the_fuzzer_ends(tmp_path: Path) -> None:
+    worker = tmp_path / "worker"
+    worker.write_text(FINDS_AND_STAYS)
+    worker.chmod(0o755)
+    command = [sys.executable, "-c", STAND_IN, str(worker), str(tmp_path / "kept")]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, start_new_session=True) as fuzzer:
+        assert fuzzer.stdout is not None
+        try:
+            lines = [fuzzer.stdout.readline() for _ in range(6)]
+        finally:
+            os.killpg(fuzzer.pid, signal.SIGKILL)
+    assert lines == [
+        "seed 5\n",
+        "\n",
+        "=== KeyError in a.py:f (deck 7)\n",
+        "Traceback ...\n",
+        "--- the deck\n",
+        "x = 1;\n",
+    ]
 
 
 @pytest.mark.slow
