@@ -197,6 +197,16 @@ def test_a_model_is_shown_with_its_own_words(editor: Editor, deck: Path) -> None
     assert summary(profile) in {each["detail"] for each in offered if each["label"] == "pulse"}
 
 
+def test_a_unit_of_the_deck_is_shown_with_its_size_wherever_it_stands(editor: Editor, deck: Path) -> None:
+    declared = "unit turn = 360 deg;\nunit ozin = 7.061552e-3 N*m;\nlet slow = 0.01 turn/s;\nlet most = 2.5 ozin;"
+    text = "deck 2;\n" + ARM.replace("let slow = 3 deg/s;", declared)
+    editor.change(deck, text)
+    assert editor.of(deck) == []
+    for mark, size in (("turn =", "6.283185307 rad"), ("turn/s", "6.283185307 rad"), ("ozin;", "0.007061552 N*m")):
+        shown = editor.about("textDocument/hover", deck, *at(text, mark))["contents"]["value"]
+        assert shown.startswith(f"unit `{mark[:4]}`: {size} in SI\n\n```met\nunit {mark[:4]} = "), shown
+
+
 def places(found: list[Any]) -> list[tuple[str, int, int]]:
     return [(each["uri"], *each["range"]["start"].values()) for each in found]
 

@@ -84,6 +84,16 @@ def test_a_name_is_changed_in_all_files_and_the_plan_but_for_the_name_is_what_it
         assert same_but_for(old, new, encode(Plan, plan), encode(Plan, after))
 
 
+def test_a_unit_of_the_deck_is_changed_wherever_it_stands(editor: Editor, deck: Path) -> None:
+    deck.write_text("deck 2;\n" + DECK.replace("let slow = 3 deg/s", "unit turn = 360 deg;\nlet slow = 0.01 turn/s"))
+    editor.change(deck, deck.read_text())
+    assert editor.of(deck) == []
+    (edits,) = rename(editor, deck, "turn =", "lap").values()
+    assert len(edits) == 2
+    assert edited(deck.read_text(), edits) == deck.read_text().replace("turn", "lap")
+    assert "`rev` is a unit already" in refused(editor, deck, "turn =", "rev")
+
+
 @pytest.mark.parametrize(
     ("mark", "new", "reason"),
     [
