@@ -39,23 +39,32 @@ def check_regular(output: Path, *, code: str) -> None:
 
 
 def check_overwrite(
-    output: Path, is_own: Callable[[Path], bool], *, code: str, because: str, remedy: str = "remove the file"
+    output: Path,
+    is_own: Callable[[Path], bool],
+    *,
+    code: str,
+    because: str,
+    remedy: str = "remove the file",
+    option: str = "-o",
 ) -> None:
     """Refuse to overwrite a file that holds anything, unless it is one that MET may replace unasked.
 
     is_own   True for such a file
     because  the rest of "`output` exists ...", as "and is no report of MET"
     remedy   what to do besides giving another name
+    option   the one that gives the name
 
     Raises Problem, OSError.
     """
     if output.exists() and output.stat().st_size > 0 and not is_own(output):
-        raise Problem(not_overwritten(output, code=code, because=because, remedy=remedy))
+        raise Problem(not_overwritten(output, code=code, because=because, remedy=remedy, option=option))
 
 
-def not_overwritten(output: Path, *, code: str, because: str, remedy: str = "remove the file") -> Any:
+def not_overwritten(
+    output: Path, *, code: str, because: str, remedy: str = "remove the file", option: str = "-o"
+) -> Any:
     """The error that `output` exists and is left as it is, as `check_overwrite` has it."""
-    helps = f"give another name with `-o`, or {remedy}"
+    helps = f"give another name with `{option}`, or {remedy}"
     return error(code, f"{output} exists{because}: it is not written over", help=helps)
 
 

@@ -310,6 +310,12 @@ def same(a: Dimension, b: Dimension) -> bool:
     return counted(a) == counted(b)
 
 
+def size_in_si(measure: Measure) -> str:
+    """The size of a unit in SI, as a deck would write it: `0.007061552 N*m`."""
+    unit = text(measure.dimension)
+    return f"{measure.scale:.10g}" + (f" {unit}" if unit != "1" else "")
+
+
 def text(dimension: Dimension) -> str:
     """The dimension in SI units, as a deck would write it: `N*m`, `rad/s`, `1` for a pure number."""
     spoken = _SPOKEN.get(dimension)

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from ic.editor.lenses import LastRun
 
 from met.diagnostic import Problem, error
+from met.host.files import whole_file
+from met.outputs import cannot_write, check_overwrite, check_place, quoted
 
 
 @click.command(short_help="Serve an editor: messages as you type, completion, what a word means.")
@@ -56,14 +58,17 @@ def lsp(include_dirs: tuple[str, ...], defines: tuple[str, ...], stdio: bool, vs
 
 
 def write_extension(path: Path) -> None:
-    """Write the extension for VS Code, and say how it is installed."""
-    from ic.editor.extension import vsix
+    """Write the extension for VS Code, and say how it is installed. Raises Problem E305."""
+    from ic.editor.extension import is_extension, vsix
 
     try:
-        path.write_bytes(vsix())
+        check_place(path, code="E305")
+        check_overwrite(path, is_extension, code="E305", because=" and is no extension of MET", option="--vscode")
+        with whole_file(path) as file:
+            file.write(vsix())
     except OSError as reason:
-        raise Problem(error("E338", f"cannot write `{path}`: {reason.strerror}")) from None
-    click.echo(f"{path} is the extension for VS Code; `code --install-extension {path}` installs it")
+        raise cannot_write(path, reason, code="E305") from reason
+    click.echo(f"{path} is the extension for VS Code; `code --install-extension {quoted(path)}` installs it")
 
 
 def _last_runs(deck: str) -> Mapping[str, LastRun]:

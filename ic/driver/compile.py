@@ -33,6 +33,7 @@ from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan import Allowance, Experiment, Plan
 from met.plan import Source as File
+from met.units import Measure
 
 Select = Sequence[str] | Literal["all"] | None
 
@@ -44,6 +45,7 @@ class Compiled:
     """A plan, None where an error stands in its way; all diagnostics, warnings too; every file's text by name.
 
     allowed  the warnings that are not among the diagnostics, for a run allows them, each with what does
+    units    those that the deck declares
     """
 
     plan: Plan | None
@@ -51,6 +53,7 @@ class Compiled:
     sources: Mapping[str, str] = field(default_factory=dict)
     scopes: tuple[Scope, ...] = field(default=(), repr=False)  # one for each experiment: what `explain` looks into
     allowed: tuple[tuple[Diagnostic, Allowance], ...] = ()
+    units: Mapping[str, Measure] = field(default_factory=dict)
 
 
 def check(
@@ -166,6 +169,7 @@ def compile_deck(
         texts,
         tuple(scopes),
         allowed_warnings(experiments, complaints),
+        deck.units,
     )
 
 

@@ -16,6 +16,7 @@ from ic.language.bodies import JOINT_KINDS
 from ic.language.unit_words import units_of
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, USAGE
 from ic.meaning.mechanics.shapes import SHAPES
+from ic.printing.models import summary
 from ic.text.edition import EDITION_WORD, EDITIONS
 from ic.text.lexer import NAME, NUMBERS, STRING, Token
 from ic.text.preprocess import DIRECTIVES
@@ -156,7 +157,7 @@ def _beginnings(around: TextEntry | None, names: NamesInTexts) -> Iterator[Offer
     yield from (_of_parameter(each) for each in parameters_of(around, names))
     if around.kind == "environment":
         for name in models.available("environment"):
-            yield Offer(name, types.CompletionItemKind.Class, first_line(models.available("environment")[name]))
+            yield Offer(name, types.CompletionItemKind.Class, summary(models.available("environment")[name]))
     yield from _named(names, "macro")
 
 
@@ -269,13 +270,13 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
         return
     if kind is not None and "=" in texts and "(" not in texts:
         for name, model in models.available(kind).items():
-            yield Offer(name, types.CompletionItemKind.Class, first_line(model))
+            yield Offer(name, types.CompletionItemKind.Class, summary(model))
         if key != "command":
             return
         yield from (Offer(each, types.CompletionItemKind.Function, "of what is commanded") for each in COMMAND_UNIT)
     if texts[-1] == "(" and texts[-2] in COMMAND_UNIT:
         for name, model in models.available("command").items():
-            yield Offer(name, types.CompletionItemKind.Class, first_line(model))
+            yield Offer(name, types.CompletionItemKind.Class, summary(model))
         yield from _named(names, "guide")
     if key in _PATHS or "vary" in texts:
         heads = dict.fromkeys(each.path.partition(".")[0] for each in index.values)
@@ -312,7 +313,3 @@ def _named(names: NamesInTexts, *kinds: str, around: TextEntry | None = None) ->
 def _of_parameter(parameter: Parameter) -> Offer:
     unit = f" in {parameter.unit}" if parameter.unit not in ("", "1") else ""
     return Offer(parameter.name, types.CompletionItemKind.Property, f"{parameter.doc}{unit}")
-
-
-def first_line(model: object) -> str:
-    return (type(model).__doc__ or getattr(model, "doc", "") or "").strip().split("\n")[0]

@@ -8,15 +8,20 @@ from __future__ import annotations
 
 import json
 import zipfile
+import zlib
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
 from ic.printing.textmate import grammar
+from met.host.files import open_regular
 
 FOLDER = Path(__file__).parent / "vscode"
 DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a ZIP file can hold: a build's clock is no part of it
+
+MANIFEST = "extension.vsixmanifest"
+MOST_OF_MANIFEST = 20_000  # bytes of it that are looked at
 
 _TYPES = {"json": "application/json", "js": "application/javascript", "vsixmanifest": "text/xml"}
 
@@ -32,7 +37,7 @@ def files() -> dict[str, bytes]:
     found = {f"extension/{path.name}": path.read_bytes() for path in sorted(FOLDER.iterdir()) if path.is_file()}
     found["extension/met.tmLanguage.json"] = (json.dumps(grammar(), indent=2) + "\n").encode()
     return {
-        "extension.vsixmanifest": _manifest(package()).encode(),
+        MANIFEST: _manifest(package()).encode(),
         "[Content_Types].xml": _content_types().encode(),
         **found,
     }
@@ -48,6 +53,16 @@ def vsix() -> bytes:
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, data)
     return made.getvalue()
+
+
+def is_extension(path: Path) -> bool:
+    """True for a file of this extension, of any version of MET. Raises OSError."""
+    own = f"Id={quoteattr(str(package()['name']))} "
+    try:
+        with open_regular(path) as file, zipfile.ZipFile(file) as archive, archive.open(MANIFEST) as manifest:
+            return own.encode() in manifest.read(MOST_OF_MANIFEST)
+    except (zipfile.BadZipFile, zlib.error, KeyError, RuntimeError, NotImplementedError):
+        return False  # no ZIP file, none with a manifest, or one that cannot be read
 
 
 def _manifest(described: Mapping[str, object]) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from ic.editor.completion import first_line, parameters_of
+from ic.editor.completion import parameters_of
 from ic.editor.index import DeckIndex, ValueInDeck
 from ic.editor.names import NamesInTexts
-from ic.editor.structure import DeckText, TextEntry
+from ic.editor.structure import UNIT, DeckText, TextEntry
 from ic.language import BLOCKS, DEFINITIONS, TOP_LEVEL
+from ic.printing.models import summary
 from ic.text.lexer import NAME, Token
 from met import models
 from met.diagnostic import Place
@@ -25,7 +26,7 @@ def about(text: DeckText, token: Token, names: NamesInTexts, index: DeckIndex, f
     """
     entry = names.entry_at(text, token)
     found = [*_of_key(token, entry, names), *_of_model(token), *_of_unit(text, token)]
-    return [*found, *_of_name(text, token, names), *_of_values(index, token, entry, file)]
+    return [*found, *_of_name(text, token, names, index), *_of_values(index, token, entry, file)]
 
 
 def _of_key(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Iterator[str]:
@@ -55,7 +56,7 @@ def _of_model(token: Token) -> Iterator[str]:
     for kind in models.GROUPS:
         model = models.available(kind).get(token.text)
         if model is not None:
-            yield f"{kind} model `{token.text}`: {first_line(model)}"
+            yield f"{kind} model `{token.text}`: {summary(model)}"
 
 
 def _of_unit(text: DeckText, token: Token) -> Iterator[str]:
@@ -65,11 +66,13 @@ def _of_unit(text: DeckText, token: Token) -> Iterator[str]:
         yield f"unit `{token.text}`: {unit.word}, {unit.measure.scale:g} in SI"
 
 
-def _of_name(text: DeckText, token: Token, names: NamesInTexts) -> Iterator[str]:
+def _of_name(text: DeckText, token: Token, names: NamesInTexts, index: DeckIndex) -> Iterator[str]:
     for found in names.meant_in(text, token)[:2] if token.kind == NAME else ():
         source = found.token.source
         line = source.text.split("\n")[source.line(found.token.offset) - 1].strip()
-        yield f"{found.kind} `{found.token.text}`\n\n```met\n{line}\n```"
+        size = index.units.get(token.text) if found.kind == UNIT else None
+        said = f": {size} in SI" if size is not None else ""
+        yield f"{found.kind} `{found.token.text}`{said}\n\n```met\n{line}\n```"
 
 
 def _of_values(index: DeckIndex, token: Token, entry: TextEntry | None, file: str) -> Iterator[str]:

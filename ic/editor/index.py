@@ -15,6 +15,7 @@ from met.frozen import frozen
 from met.messages.message import shown_place
 from met.plan.channel import recordable
 from met.trace import Scalar
+from met.units import size_in_si
 
 MOST_VALUES = 20_000  # of a deck
 MOST_NUMBERS = 6  # of a list, that are shown
@@ -43,6 +44,7 @@ class DeckIndex:
     """The values of a deck, and the signals that its runs can record, with their units.
 
     cases  how many each run, sweep and search has, by name
+    units  the sizes in SI of those that the deck declares
     cells  the paths of the values of tables by row name, `bodies.boom.mass`
     """
 
@@ -50,6 +52,7 @@ class DeckIndex:
     signals: tuple[str, ...]
     cases: Mapping[str, int] = field(default_factory=dict)
     cells: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 def index_of(compiled: Compiled) -> DeckIndex:
@@ -61,7 +64,8 @@ def index_of(compiled: Compiled) -> DeckIndex:
         name = experiment.name.partition(" ")[0]  # one of several structures is called `NAME CHOICES`
         cases[name] = cases.get(name, 0) + experiment.cases.count
     values, cells = (tuple(islice(each(compiled), MOST_VALUES)) for each in (_values, _cells))
-    return DeckIndex(values, tuple(signals), cases, cells)
+    units = {name: size_in_si(measure) for name, measure in compiled.units.items()}
+    return DeckIndex(values, tuple(signals), cases, cells, units)
 
 
 def _cells(compiled: Compiled) -> Iterator[str]:

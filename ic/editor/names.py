@@ -8,9 +8,9 @@ from functools import lru_cache
 from types import MappingProxyType
 
 from ic.editor.expansions import MacrosInTexts
-from ic.editor.structure import LETS, DeckText, TextEntry, flattened, innermost_around
+from ic.editor.structure import LETS, UNIT, DeckText, TextEntry, flattened, innermost_around
 from ic.language import OF_A_RUN
-from ic.text.lexer import NAME, Token
+from ic.text.lexer import NAME, NUMBERS, Token
 from met.frozen import frozen
 
 BASE_WORDS = {"like": None, "of": "run"}
@@ -234,6 +234,8 @@ def _wanted(token: Token, entry: TextEntry | None) -> Sequence[str]:
         return ("joint",)
     if entry.kind == "remove":
         return REMOVED
+    if at and (words[at - 1].kind in NUMBERS or (before in ("*", "/", ")", "]") and entry.kind == UNIT)):
+        return (UNIT, *_VALUES)
     if before == ".":
         return (UNDER[words[at - 2].text],) if at >= 2 and words[at - 2].text in UNDER else ()
     if behind == ".":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import os
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -18,15 +19,23 @@ from ic.editor.fixes import QuickFix, actions, quick_fixes
 from ic.editor.lenses import FindLastRuns, lenses
 from ic.editor.outline import folds, symbols
 from ic.editor.positions import Texts, file_named, lines_of, path_of, uri_of
-from ic.editor.rename_process import nameable, rename
+from ic.editor.rename_process import CannotRename, nameable, rename
 from ic.editor.semantic import LEGEND, semantic_tokens
 from ic.editor.structure import DeckText
 from ic.editor.told import in_editor
 from met.diagnostic import Problem
 from met.version import VERSION
 
+PYGLS_LOG = "pygls.protocol.json_rpc"
+"""The logger to which pygls writes each error that is an answer, with where it was raised."""
+
 OPTIONS = ("includeDirs", "defines", "helpInMessage")
 """The keys that an editor may give in its `initializationOptions`."""
+
+
+def _is_no_refusal(record: logging.LogRecord) -> bool:
+    """True but for an answer that refuses a name, which is no fault of the server's and belongs in no log."""
+    return record.exc_info is None or not isinstance(record.exc_info[1], CannotRename)
 
 
 class DeckServer(LanguageServer):
@@ -299,6 +308,7 @@ def make(
 def serve(include_dirs: Sequence[str] = (), defines: Sequence[str] = (), last_runs: FindLastRuns | None = None) -> None:
     """Serve an editor until it says that it ends, or has gone. last_runs: finds what archives say, for lenses."""
     server = make(include_dirs, defines, last_runs)
+    logging.getLogger(PYGLS_LOG).addFilter(_is_no_refusal)
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever prints does not print into the protocol
     try:

@@ -102,9 +102,9 @@ def _check_name(token: Token) -> None:
     name = token.text
     if name in units.ALL_UNITS:
         unit = units.ALL_UNITS[name]
-        si = f"{unit.measure.scale:.10g} {units.text(unit.measure.dimension)}"
         helps = f"leave this entry out; a unit of another size needs another name, such as `my_{name}`"
-        raise Problem(error("D394", f"`{name}` is a unit already: {unit.word}, {si}", token.place, help=helps))
+        message = f"`{name}` is a unit already: {unit.word}, {units.size_in_si(unit.measure)}"
+        raise Problem(error("D394", message, token.place, help=helps))
     if name in TAKEN:
         message = f"`{name}` is a word of the language, so it cannot be a unit"
         raise Problem(error("D394", message, token.place, help="choose another name"))

@@ -9,7 +9,8 @@ from typing import Any
 from ic.driver.compile import Compiled
 from ic.driver.explain import explanations_of, with_all_settings
 from ic.printing.explain import NO_MORE, explain_json, find_paths, print_explain, with_settings
-from met.diagnostic import Label, Problem
+from met import units
+from met.diagnostic import Label, Problem, error
 from met.frozen import frozen
 from met.plan import Experiment, Plan
 
@@ -82,7 +83,7 @@ def _found(sources: Sources, path: str) -> list[ExplainedExperiment]:
             try:
                 find_paths(whole, path, found.known)
             except Problem as one:
-                problem = problem or one
+                problem = problem or _of_unit(path, compiled) or one
             else:
                 made.append(found)
         if made:
@@ -90,3 +91,16 @@ def _found(sources: Sources, path: str) -> list[ExplainedExperiment]:
             return [replace(each, alone=alone) for each in made]
     assert problem is not None  # each source has an experiment, and none knew the path
     raise problem
+
+
+def _of_unit(path: str, compiled: Compiled | None) -> Problem | None:
+    """The error that a path is a unit, the deck's or the language's; None where it is none."""
+    declared = compiled.units.get(path) if compiled is not None else None
+    known = units.ALL_UNITS.get(path)
+    if declared is not None:
+        what, help = "a unit that the deck declares", f"1 {path} is {units.size_in_si(declared)}"
+    elif known is not None:
+        what, help = "a unit", f"{known.word}, {units.size_in_si(known.measure)}: `met doc units`"
+    else:
+        return None
+    return Problem(error("D170", f"`{path}` is {what}, and no parameter", help=help))

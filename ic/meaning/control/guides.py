@@ -218,7 +218,7 @@ def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration
     rate = None
     scope.not_sweepable[owner.path] = not_sweepable.model("a guide", owner.path)
     if guide.steer is not None and body.get("rate") is not None:
-        rate = fixed_rate(scope, owner, body.items["rate"], owner.label)
+        rate = fixed_rate(scope, owner, body.items["rate"], owner.label, doc="how often its law ticks")
     scope.not_sweepable[owner.join("rate")] = not_sweepable.COMPILED_ALONE
     fastest = None
     if guide.fastest is not None and values is not None:

@@ -99,7 +99,8 @@ def _sensor(scope: Scope, item: Item, arm: ResolvedArm, payloads: tuple[Payload,
     check_names(scope, owner, sensor.parameters, body, arm=arm.name, known=known, failed=arm.failed)
     values = use_model(scope, owner, sensor.parameters, body, ["rate"])
     scope.not_sweepable[owner.path] = not_sweepable.model("a sensor", owner.path)
-    rate = fixed_rate(scope, owner, body.items["rate"], owner.label) if body.get("rate") is not None else None
+    given = body.get("rate")
+    rate = fixed_rate(scope, owner, given, owner.label, doc="how often it reads") if given is not None else None
     words = [each for each in sensor.parameters if each.shape == "word" and not each.names]
     return Sensing(item.name, sensor.name, words_chosen(words, body), rate, values or {}, item.place)
 

@@ -353,7 +353,14 @@ def unit_written(found: Iterable[Settled], wanted: str) -> tuple[str, float]:
 
 
 def fixed_rate(
-    scope: Scope, owner: Owner, item: Item, label: str, name: str = "rate", *, continuous: bool = False
+    scope: Scope,
+    owner: Owner,
+    item: Item,
+    label: str,
+    name: str = "rate",
+    *,
+    continuous: bool = False,
+    doc: str = RATE.doc,
 ) -> Rate | None:
     """A rate in Hz, which no sweep can vary; `CONTINUOUS` Hz where it may be `continuous`, and is."""
     if word_of(item.value) == "continuous" and not isinstance(item.value, Call):
@@ -367,7 +374,7 @@ def fixed_rate(
             "D106", f"`{name}` cannot be continuous: only the law of a servo can", place, help="write a rate in Hz"
         )
         return None
-    wanted = replace(RATE, name=name)
+    wanted = replace(RATE, name=name, doc=doc)
     hz = scope.constant(owner, wanted, item)
     place = place_of(item.value) if item.value is not None else item.place
     return Rate(label, hz, place) if hz is not None and SLOWEST <= hz <= FASTEST else None

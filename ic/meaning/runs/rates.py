@@ -46,7 +46,8 @@ def resolve_rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate
                 help=[*did_you_mean(part.name, RATES.keys), known_words("rates", RATES.keys)],
             )
             continue
-        rate = fixed_rate(scope, owner, part, f"`{part.name}`", part.name, continuous=part.name == "servos")
+        may_be_continuous, doc = part.name == "servos", RATES[part.name].doc
+        rate = fixed_rate(scope, owner, part, f"`{part.name}`", part.name, continuous=may_be_continuous, doc=doc)
         if rate is not None:
             rates[part.name] = rate
     if "dynamics" not in body.items and item.body is not None:

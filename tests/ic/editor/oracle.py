@@ -348,9 +348,9 @@ class Oracle:
 
     def _model(self, word: Word, kind: str) -> None:
         known = models.available(kind)  # type: ignore[arg-type]
-        doc = (known[word.text].__doc__ or getattr(known[word.text], "doc", "") or "").strip().split("\n")[0]
-        names = set(known)
-        self._note(word, f"model of {kind}", defined=set(), said={word.text, doc}, offered=names)
+        doc = " ".join(known[word.text].doc.split())
+        begins = re.split(r"[.:] |[.:]$", doc)[0]  # its own words, not those of the class that declares it
+        self._note(word, f"model of {kind}", defined=set(), said={word.text, begins}, offered=set(known))
 
     def _units(self, unit: Unit) -> None:
         for n, (word, _) in enumerate(unit.factors):

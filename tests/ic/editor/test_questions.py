@@ -9,6 +9,7 @@ import pytest
 
 from ic.find import library_files
 from ic.language import BLOCKS, DEFINITIONS, TOP_LEVEL
+from ic.printing.models import summary
 from ic.text.files import LIBRARY
 from met import models
 from met.units import UNITS
@@ -178,6 +179,32 @@ def test_a_word_is_shown_with_what_it_means(editor: Editor, deck: Path) -> None:
     assert "`slow` = 0.0523599 rad/s" in hovered(editor, deck, "slow =")
     assert "#define ROD(NAME, MASS)" in hovered(editor, deck, "ROD(upper")
     assert "let reach = 2 m;" in hovered(editor, deck, "reach, 0")
+
+
+def test_a_rate_is_shown_with_what_comes_at_that_rate(editor: Editor, deck: Path) -> None:
+    for name in ("dynamics", "servos", "record"):
+        shown = hovered(editor, deck, f"{name} = {100 if name == 'servos' else 25} Hz")
+        assert shown.count(BLOCKS["rates"][name].doc) == 2, "of the key, and of its value"
+        assert "ticks of the servos" in shown or "computer" not in shown
+
+
+def test_a_model_is_shown_with_its_own_words(editor: Editor, deck: Path) -> None:
+    profile = models.find("command", "pulse")
+    editor.change(deck, ARM.replace("rate(slow)", "rate(pulse(to = slow, slope = 1 deg/s^2, over = 9 s))"))
+    shown = editor.about("textDocument/hover", deck, *at(ARM, "slow);"))["contents"]["value"]
+    assert f"command model `pulse`: {summary(profile)}" in shown and summary(profile) in " ".join(profile.doc.split())
+    offered = editor.about("textDocument/completion", deck, *at(ARM, "slow);"))
+    assert summary(profile) in {each["detail"] for each in offered if each["label"] == "pulse"}
+
+
+def test_a_unit_of_the_deck_is_shown_with_its_size_wherever_it_stands(editor: Editor, deck: Path) -> None:
+    declared = "unit turn = 360 deg;\nunit ozin = 7.061552e-3 N*m;\nlet slow = 0.01 turn/s;\nlet most = 2.5 ozin;"
+    text = "deck 2;\n" + ARM.replace("let slow = 3 deg/s;", declared)
+    editor.change(deck, text)
+    assert editor.of(deck) == []
+    for mark, size in (("turn =", "6.283185307 rad"), ("turn/s", "6.283185307 rad"), ("ozin;", "0.007061552 N*m")):
+        shown = editor.about("textDocument/hover", deck, *at(text, mark))["contents"]["value"]
+        assert shown.startswith(f"unit `{mark[:4]}`: {size} in SI\n\n```met\nunit {mark[:4]} = "), shown
 
 
 def places(found: list[Any]) -> list[tuple[str, int, int]]:

@@ -84,6 +84,16 @@ def test_a_name_is_changed_in_all_files_and_the_plan_but_for_the_name_is_what_it
         assert same_but_for(old, new, encode(Plan, plan), encode(Plan, after))
 
 
+def test_a_unit_of_the_deck_is_changed_wherever_it_stands(editor: Editor, deck: Path) -> None:
+    deck.write_text("deck 2;\n" + DECK.replace("let slow = 3 deg/s", "unit turn = 360 deg;\nlet slow = 0.01 turn/s"))
+    editor.change(deck, deck.read_text())
+    assert editor.of(deck) == []
+    (edits,) = rename(editor, deck, "turn =", "lap").values()
+    assert len(edits) == 2
+    assert edited(deck.read_text(), edits) == deck.read_text().replace("turn", "lap")
+    assert "`rev` is a unit already" in refused(editor, deck, "turn =", "rev")
+
+
 @pytest.mark.parametrize(
     ("mark", "new", "reason"),
     [
@@ -101,6 +111,17 @@ def test_what_cannot_be_renamed_is_refused_with_the_reason(
     editor: Editor, deck: Path, mark: str, new: str, reason: str
 ) -> None:
     assert refused(editor, deck, mark, new) == reason
+
+
+def test_a_refusal_is_an_answer_and_no_failure_that_is_logged(editor: Editor, deck: Path) -> None:
+    logged = editor.errors()
+    line, column = at(DECK, "duration")
+    with pytest.raises(AssertionError):
+        editor.about("textDocument/prepareRename", deck, line, column)
+    refused(editor, deck, "duration")
+    refused(editor, deck, "gearbox like", "sqrt")
+    editor.settle()
+    assert editor.errors() == logged
 
 
 def test_a_name_of_a_loop_is_refused(tmp_path: Path, editor: Editor) -> None:

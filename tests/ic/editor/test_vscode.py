@@ -17,6 +17,7 @@ from batch.cli.lsp import lsp
 from ic.editor.extension import FOLDER, files, package, vsix
 from ic.language import BLOCKS
 from ic.printing.textmate import grammar
+from met import cli
 from met.host import interpreter
 
 ROOT = Path(__file__).parents[3]
@@ -44,6 +45,28 @@ def test_a_package_has_all_that_it_names(tmp_path: Path) -> None:
     assert all(f"extension/{name.removeprefix('./')}" in found for name in named)
     assert json.loads(found["extension/met.tmLanguage.json"]) == grammar()
     assert vsix() == target.read_bytes(), "equal versions make equal bytes"
+
+
+def test_only_an_extension_of_met_is_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "met.vsix"
+    assert cli.main(["lsp", "--vscode", str(target)]) == cli.main(["lsp", "--vscode", str(target)]) == 0
+    foreign = tmp_path / "other.vsix"
+    with zipfile.ZipFile(foreign, "w") as archive:
+        archive.writestr("extension.vsixmanifest", '<Identity Id="other" Version="1"/>')
+    mine = tmp_path / "mine.txt"
+    mine.write_text("what I wrote")
+    capsys.readouterr()
+    for path in (mine, foreign):
+        before = path.read_bytes()
+        assert cli.main(["lsp", "--vscode", str(path)]) == 2
+        assert path.read_bytes() == before
+        assert capsys.readouterr() == (
+            "",
+            f"error[E305]: {path} exists and is no extension of MET: it is not written over\n"
+            " = help: give another name with `--vscode`, or remove the file\n\n1 error\n",
+        )
+    assert cli.main(["lsp", "--vscode", str(tmp_path / "none" / "met.vsix")]) == 2
+    assert "error[E305]: cannot write" in capsys.readouterr().err
 
 
 def test_a_manifest_says_what_the_package_says() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from met import cli
+from met.units import UNITS
 from tests.ic.small_decks import ARM, RUN, SERVO, changed
 
 SWEEP = "sweep sizes of hold { vary links.bar.shape.length = [1, 2] m; }\n"
@@ -155,3 +156,14 @@ def test_the_base_is_explained_of_a_deck_and_of_a_plan(capsys: pytest.CaptureFix
             "base.x.model": "sine",
         }
     assert explained(capsys, "a.ic", "base")["base"][0] == "fixed"
+
+
+def test_a_unit_is_no_parameter_and_has_a_size(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("own.ic").write_text('deck 2;\n#include "a.ic"\nunit ozin = 7.061552e-3 N*m;\n')
+    for path, what, size in (
+        ("ozin", "a unit that the deck declares", "1 ozin is 0.007061552 N*m"),
+        ("rpm", "a unit", f"{UNITS['rpm'].word}, 0.1047197551 rad/s: `met doc units`"),
+    ):
+        assert cli.main(["explain", "own.ic", path]) == 2
+        said = f"error[D170]: `{path}` is {what}, and no parameter\n = help: {size}\n\n1 error\n"
+        assert capsys.readouterr() == ("", said)
