@@ -61,6 +61,8 @@ class Names:
         """Take over what others found, which is the same here."""
         for name, worth in others._worth.items():
             self._worth.setdefault(name, worth)
+        self.cells = {**others.cells, **self.cells}
+        self._read = {**others._read, **self._read}
 
     def evaluate(self, expression: Expression) -> Value | ValueList:
         return evaluate(expression, self.find)
