@@ -188,14 +188,15 @@ class Definitions:
                 )
         written = name.text[len(roof) + 1 :] if roof else name.text
         file = library_defines(kind, written)
-        include = [add_include(file, name.place)] if file else did_you_mean(written, known)
-        include = self.stays_away(name.text) or include
+        helps = self.stays_away(name.text) or (
+            [add_include(file, name.place)] if file else list(did_you_mean(written, known))
+        )
         raise Problem(
             error(
                 "D041",
                 f"no {kind} `{written}`",
                 name.place,
-                help=[*include, known_words(f"{kind}s of this deck", known)],
+                help=[*helps, known_words(f"{kind}s of this deck", known)],
             )
         )
 
