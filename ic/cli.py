@@ -148,7 +148,8 @@ def _whoever_includes(part: object) -> object:
     if isinstance(part, tuple):
         return tuple(map(_whoever_includes, part))
     if is_dataclass(part):
-        return tuple(_whoever_includes(getattr(part, each.name)) for each in fields(part) if each.name != "included")
+        names = (each.name for each in fields(part) if each.name not in ("included", "used"))
+        return tuple(_whoever_includes(getattr(part, name)) for name in names)
     return part
 
 

@@ -7,16 +7,21 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from ic.grammar.parse import Parsed, parse_on
-from ic.grammar.syntax import Deck
-from ic.text.files import LIBRARY, NOTHING_UNSAVED, Unsaved
+from ic.grammar.parse import Parsed
+from ic.grammar.syntax import NO_ROOFS, Deck
+from ic.text.files import DECK_IN_MEMORY, LIBRARY, NOTHING_UNSAVED, Files, FoundFile, Unsaved
+from ic.text.lexer import COMMAND_LINE
 from ic.text.limits import Findings, GiveUp
-from ic.text.preprocess import preprocess
+from ic.text.preprocess import preprocess_on
 from ic.text.source import SourceFile
+from ic.used_decks import UsedDecks
 from met.diagnostic import Diagnostic, Problem
 from met.messages.message import shown_place
 
-UNKNOWN_TEXT = ("D001", "D002", "D005", "D006", "D007", "D008", "D009", "D010", "D014", "D016", "D018")
+UNKNOWN_TEXT = (
+    "D001", "D002", "D005", "D006", "D007", "D008", "D009", "D010", "D014", "D016", "D018",
+    "D395", "D396", "D397",
+)  # fmt: skip
 """Errors after which it is not known what the deck says: a file or a branch of it may be lacking."""
 
 
@@ -40,29 +45,34 @@ def read(
 
     Raises Problem with every error and warning found, in the order of the text, and the text of every file read.
     """
-    seen = preprocess(path, include_dirs, defines, library=library, text=text, unsaved=unsaved)
+    files = Files(include_dirs, library, unsaved)
     findings = Findings()
-    parsed = Parsed()
-    with suppress(GiveUp):
-        findings.add(*seen.diagnostics)
-        if seen.complete:
-            parsed = parse_on(seen.tokens, findings)
-    found = in_order(findings.all, seen.sources)
-    sound = parsed.sound and despite_errors and not any(each.code in UNKNOWN_TEXT for each in findings.errors)
-    if not seen.complete or (findings.errors and not sound):
-        raise Problem(found, {source.name: source.text for source in seen.sources})
+    used = UsedDecks(files, findings)
+    file = files.deck(path) if text is None else None
+    seen = preprocess_on(files, findings, lambda: file or files.given(text or ""), defines)
+    parsed, roofs = Parsed(), NO_ROOFS
+    if seen.complete:
+        with suppress(GiveUp):
+            parsed, roofs = used.parse(seen, file or FoundFile(DECK_IN_MEMORY, DECK_IN_MEMORY))
+    sources = (*files.read_so_far.values(), *(each for each in seen.sources if each.name == COMMAND_LINE))
+    found = in_order(findings.all, sources)
+    complete = seen.complete and used.complete
+    sound = used.sound and despite_errors and not any(each.code in UNKNOWN_TEXT for each in findings.errors)
+    if not complete or (findings.errors and not sound):
+        raise Problem(found, {source.name: source.text for source in sources})
     return Deck(
-        seen.sources[0].name,
+        sources[0].name,
         parsed.entries,
-        seen.sources,
+        sources,
         found,
         tuple(os.fspath(each) for each in include_dirs),
         os.fspath(path),
         tuple(defines),
-        parsed.unreadable,
+        tuple(used.unreadable),
         text,
         unsaved,
         parsed.units,
+        roofs,
     )
 
 

@@ -170,12 +170,13 @@ class _Keys:
         loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
         before, *sets = complaints.known_before
         told = [before, *(sorted(map(repr, each)) for each in sets)]  # type: ignore[call-overload]
-        shared = (deck.file, deck.defines, names, lets, told, loaded)
+        shared = (deck.file, deck.defines, names, lets, told, loaded, sorted(deck.roofs.items()))
         arms, servos = (
             {name: self._own[id(each)] for name, each in definitions.of_kind(kind).items()} for kind in ("arm", "servo")
         )
         told_of, values = pickle.dumps(shared), [pickle.dumps(lets), *arms.values()]
-        named = [body for name, body in servos.items() if any(name.encode() in each for each in values)]
+        plain = {name: name.rpartition(".")[2].encode() for name in servos}  # as its own deck calls it
+        named = [body for name, body in servos.items() if any(plain[name] in each for each in values)]
         self._shared = {
             "arm": _digest([told_of, *arms.values(), *named]),
             "servo": _digest([told_of, *servos.values()]),

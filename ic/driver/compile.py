@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Literal
 
+from ic.grammar.roofs import with_full_names
 from ic.grammar.settings import command_line, read_settings
 from ic.grammar.syntax import Deck, Setting
 from ic.language import EXPERIMENTS
@@ -190,7 +191,8 @@ def _with_settings(deck: Deck, settings: Sequence[str], complaints: Complaints) 
     files = (source for source in deck.sources if source.name != COMMAND_LINE)
     deck = replace(deck, sources=(*files, command_line(settings, before)))
     with complaints.gather():
-        return deck, read_settings(settings, before, edition=deck.edition, units=deck.units)
+        read_entries = read_settings(settings, before, edition=deck.edition, units=deck.units)
+        return deck, tuple(each for each in with_full_names(read_entries, deck.roofs) if isinstance(each, Setting))
     return deck, ()
 
 
@@ -219,7 +221,7 @@ def asked_definitions(
                 complaints.error(
                     "D164",
                     f"no run or sweep `{name}` in this deck",
-                    help=[*did_you_mean(name, known), known_words("it has", known)],
+                    help=definitions.stays_away(name) or [*did_you_mean(name, known), known_words("it has", known)],
                 )
         return [known[name] for name in names if name in known]
     own = {name: definition for name, definition in known.items() if definitions.writes(definition)}

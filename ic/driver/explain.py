@@ -140,7 +140,7 @@ def _let(scope: Scope, name: str) -> Settled | None:
 
 def _cells(scope: Scope, path: str) -> Settled | None:
     """The value of a table by row name that the run asked for, `bodies.boom.mass`; None where it asked for none."""
-    cells, table = scope.names.cells.get(path), scope.names.row_table(path.partition(".")[0])
+    cells, table = scope.names.cells.get(path), scope.names.row_table(scope.definitions.split(path)[0])
     if cells is None or table is None:
         return None
     found = [table.csv.quantity(cell) for cell in cells]
@@ -181,7 +181,7 @@ def _names(scope: Scope, expression: Expression) -> Iterator[Label]:
     for _ in range(DEEPEST):
         below = []
         for each in level:
-            for name in names_in(each):
+            for name in map(scope.definitions.in_full, names_in(each)):
                 cells = scope.names.cells.get(name.text)
                 if cells is not None and name.text not in seen:
                     seen.add(name.text)

@@ -15,6 +15,7 @@ from pathlib import Path
 from ic.driver.compile import Compiled, compile_deck
 from ic.driver.explain import explanations_of
 from ic.grammar.parse import parse
+from ic.grammar.roofs import with_full_names
 from ic.grammar.syntax import Deck, Entry
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import Checks
@@ -107,7 +108,7 @@ class GivenRun:
         text = _sweep(f"{name} of {self.name}", varied, repeat)
         deck = replace(
             self.deck,
-            entries=(*self.deck.entries, *_entries(text)),
+            entries=(*self.deck.entries, *with_full_names(_entries(text), self.deck.roofs)),
             sources=(*self.deck.sources, SourceFile(GIVEN, _shown(text), "")),
         )
         compiled = compile_deck(deck, select=name, defines=self.defines, settings=settings)

@@ -15,6 +15,7 @@ from ic.editor.index import DeckIndex
 from ic.editor.names import NameInText, NamesInTexts, deck_text
 from ic.editor.positions import Texts, lines_of, uri_of
 from ic.editor.structure import DeckText
+from ic.editor.used import uses_in
 from ic.text.files import LIBRARY, Files, FoundFile, file_at
 from ic.text.lexer import NAME, Token
 
@@ -122,14 +123,21 @@ class Asked:
                 yield use
 
     def _included(self) -> str | None:
-        """The address of the file that the include at the position names."""
+        """The address of the file that the include or the use at the position names."""
+        for use in uses_in(self.text):
+            if use.first.offset <= self.offset < use.last.end:
+                return self._address(use.file, use.angled)
         for line in self.text.directives:
             if line.name != "include" or not line.tokens[0].offset <= self.offset <= line.tokens[-1].end:
                 continue
             written = self.text.source.text[line.tokens[1].end : line.tokens[-1].end].strip()
-            found = self._files().find(written[1:-1], self._files().where(self._found_file(), written[:1] == "<"))
-            return None if found is None else uri_of(os.path.abspath(found.path))
+            return self._address(written[1:-1], written[:1] == "<")
         return None
+
+    def _address(self, file: str, angled: bool) -> str | None:
+        """The address of a file that the text names; None where there is none."""
+        found = self._files().find(file, self._files().where(self._found_file(), angled))
+        return None if found is None else uri_of(os.path.abspath(found.path))
 
     def _files(self) -> Files:
         return Files(self._checks.include_dirs, unsaved=self._checks.unsaved())

@@ -19,6 +19,7 @@ from ic.editor.checker_process import CheckerProcess
 from ic.editor.checking import CheckReply, CheckRequest, Crash
 from ic.editor.index import DeckIndex
 from ic.editor.positions import file_named, path_of
+from ic.editor.used import used_files
 from met.frozen import frozen
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ class CheckedDeck:
     deck    the text that was checked; folder: what names of files are seen from; name: the deck's own
     texts   all texts that were open then, by address
     files   the identities of all files that were read
+    used    names, without folders, of those that it uses, and which are decks of their own
     """
 
     deck: OpenText
@@ -63,6 +65,7 @@ class CheckedDeck:
     name: str
     texts: dict[str, OpenText]
     files: frozenset[str]
+    used: frozenset[str]
     reply: CheckReply
 
 
@@ -197,7 +200,9 @@ class DeckChecks:
                 continue
             identity = self.texts[uri].identity
             for m, other in enumerate(order):
-                includes = other != uri and other in self.checked and identity in self.checked[other].files
+                known = self.checked.get(other) if other != uri else None
+                includes = known is not None and identity in known.files
+                includes = includes and known is not None and os.path.basename(identity) not in known.used
                 back = uri in self.checked and self.texts[other].identity in self.checked[uri].files
                 if includes and (m < n or not back):
                     break
@@ -249,6 +254,7 @@ class DeckChecks:
             answer = replace(answer, known=None)
         paths = (file_named(name, request.folder) for name in answer.sources)
         files = frozenset(os.path.realpath(path) for path in paths if path is not None)
+        used = frozenset(name for text in answer.sources.values() for name in used_files(text))
         name = request.name if request.text is None else next(iter(answer.sources), "")
-        self.checked[deck.uri] = CheckedDeck(deck, request.folder, name, texts, files, answer)
+        self.checked[deck.uri] = CheckedDeck(deck, request.folder, name, texts, files, used, answer)
         self._tell(self.decks())

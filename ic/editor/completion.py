@@ -10,6 +10,7 @@ from lsprotocol import types
 from ic.editor.index import DeckIndex
 from ic.editor.names import REMOVED, NamesInTexts
 from ic.editor.structure import NAMING, UNIT, DeckText, TextEntry
+from ic.editor.used import DEFINED, texts_under
 from ic.find import library_files
 from ic.language import BLOCKS, DEFINITIONS, EXPERIMENTS, OF_A_RUN, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
@@ -238,6 +239,11 @@ def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> 
             part, _, more = path[found_head.end() :].partition(".")
             about.setdefault(part, "" if more else "in the table")
     yield from (Offer(part, types.CompletionItemKind.Field, said) for part, said in about.items())
+    text = next((each for each in names.texts if each.source.name == words[0].source.name), None)
+    files = texts_under(text, head[:-1], names.texts) if text is not None else set()
+    for name, defined in names.by_name.items() if files else ():
+        kinds = [each.kind for each in defined if each.kind in DEFINED and each.file in files]
+        yield from (Offer(name, types.CompletionItemKind.Reference, kind) for kind in kinds[:1])
     for found in names.by_name.get(head[:-1], ()):
         if found.kind == "servo" and found.entry is not None:
             yield from (_of_parameter(each) for each in parameters_of(found.entry, names))

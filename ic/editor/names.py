@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 from ic.editor.expansions import MacrosInTexts
 from ic.editor.structure import LETS, UNIT, DeckText, TextEntry, flattened, innermost_around
+from ic.editor.used import DEFINED, texts_under, uses_in
 from ic.language import OF_A_RUN
 from ic.text.lexer import NAME, NUMBERS, Token
 from met.frozen import frozen
@@ -118,6 +119,9 @@ class NamesInTexts:
         found = self.by_name.get(token.text) or self._made_by_loops(token.text)
         if any(_same(each.token, token) for each in found):
             return [each for each in found if _same(each.token, token)]
+        under = self._under_roof(token, entry)
+        if under is not None:
+            return under
         for kind in _wanted(token, entry):
             of_kind = [each for each in found if each.kind == kind]
             if of_kind:
@@ -127,8 +131,29 @@ class NamesInTexts:
                 )
         return found if entry is None else []
 
+    def _under_roof(self, token: Token, entry: TextEntry | None) -> list[NameInText] | None:
+        """The definitions that a word behind a roof means, `d1` of `panda.d1`, and the roof that one before means; None
+        where there is no roof."""
+        text = next((each for each in self.texts if each.source.name == token.source.name), None)
+        roofs = {use.roof.text: use for use in uses_in(text)} if text is not None else {}
+        words = entry.words if entry is not None and roofs else []
+        at = next((i for i, word in enumerate(words) if word.offset == token.offset), None)
+        if text is None or at is None:
+            return None
+        before, behind = [word.text for word in words[max(0, at - 3) : at]], words[at + 1 : at + 2]
+        if before[-1:] == ["."] and before[-2] in roofs and before[-3:-2] != ["."]:
+            files = texts_under(text, before[-2], self.texts)
+            return [each for each in self.by_name.get(token.text, ()) if each.kind in DEFINED and each.file in files]
+        if token.text in roofs and before[-1:] != ["."] and behind and behind[0].text == ".":
+            return [NameInText("roof", roofs[token.text].roof, None)]
+        return None
+
     def _of_owner(self, found: list[NameInText], entry: TextEntry | None) -> list[NameInText]:
-        """Those of the arm or the run that an entry is about, where some are."""
+        """Those of the arm or the run that an entry is about, where some are; of a deck's own, where decks that are
+        used have such names too, those of the file."""
+        here = [each for each in found if entry is not None and each.file == entry.words[0].source.name]
+        if here and len(here) < len(found) and all(each.kind in DEFINED for each in found):
+            return here
         if len(found) < 2 or entry is None:
             return found
         for owner in self.owners(entry):

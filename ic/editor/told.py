@@ -72,8 +72,11 @@ def _related(diagnostic: Diagnostic, shown: Place) -> Iterator[tuple[Place, str]
     if diagnostic.at is not None:
         for step in diagnostic.at.place.expansions:
             yield step.use, f"note: in expansion of macro {step.macro}"
-        for file, line in shown_place(diagnostic.at.place).included:
-            yield Place(file, line, 1, 1_000_000), "note: included from here"
+        for file, line, word in shown_place(diagnostic.at.place).came_by:
+            yield (
+                Place(file, line, 1, 1_000_000),
+                "note: used here" if word == "used at" else "note: included from here",
+            )
 
 
 def _in_words(place: Place, text: str, shown: Place) -> str:

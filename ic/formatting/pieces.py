@@ -15,6 +15,7 @@ from ic.grammar.braced_names import name_length
 from ic.grammar.cursor import OPENING
 from ic.grammar.declared_units import TAKEN, declarations
 from ic.grammar.expressions import Expressions
+from ic.grammar.uses import USE
 from ic.text.lexer import END, NAME, NUMBERS, SPACE, STRING, WHOLE, Text, Token, logical_lines
 from ic.text.limits import Findings
 from met import units
@@ -70,6 +71,8 @@ def _cut(row: Row, at: int, parser: Expressions) -> list[RowPiece]:
         else:
             comments.pop(0)
         text = "".join(each.source.text[each.offset : each.end] for each in line[i : i + count])
+        if kind == "string":  # the name of a file may have blanks
+            text = first.source.text[first.offset : line[i + count - 1].end]
         column, last = row.column(first.offset), row.column(line[i + count - 1].end)
         before = column - end if found else 0
         found.append(RowPiece(kind, text, column, last - column, before, tuple(line[i : i + count])))
@@ -95,6 +98,9 @@ def _piece(parser: Expressions, at: int, free: int, before: RowPiece | None, ope
         return "number", _number(parser, at, free)
     if token.kind == STRING:
         return "string", 1
+    if text == "<" and _is_used(parser.tokens[max(0, at - 2) : at]):
+        closed = (n for n, each in enumerate(parser.tokens[at : at + free]) if each.text == ">")
+        return ("string", 1 + length) if (length := next(closed, 0)) else ("operator", 1)
     if text in OPENING:
         return "open", 1
     if text in OPENING.values():
@@ -108,6 +114,11 @@ def _piece(parser: Expressions, at: int, free: int, before: RowPiece | None, ope
             return "name", 1 + _path(parser, at + 1, free - 1)
         return "sign", 1
     return ("operator" if text in OPERATORS else "other"), 1
+
+
+def _is_used(before: Sequence[Token]) -> bool:
+    """Return True behind the `use` that begins an entry, by the two tokens before."""
+    return before[-1:] != [] and before[-1].text == USE and (len(before) == 1 or before[0].text in (";", "}"))
 
 
 def _path(parser: Expressions, at: int, free: int) -> int:

@@ -22,8 +22,21 @@ from typing import NoReturn
 
 from ic.grammar.cursor import OPENING, SHOWN, EndedInsideBlock, Unreadable, span, token_in_words
 from ic.grammar.declared_units import UNIT, is_declaration
-from ic.grammar.edition_entries import EditionEntries
-from ic.grammar.syntax import Broken, Call, Entry, Expression, Group, Let, Name, OverCases, Setting, Statement, Word
+from ic.grammar.syntax import (
+    Broken,
+    Call,
+    Entry,
+    Expression,
+    Group,
+    Let,
+    Name,
+    OverCases,
+    Setting,
+    Statement,
+    UseEntry,
+    Word,
+)
+from ic.grammar.uses import Uses
 from ic.text.edition import EDITION_WORD
 from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import Findings, GiveUp, without_collection
@@ -49,12 +62,14 @@ class Parsed:
     unreadable  the stretches that could not be read
     sound       whether the rest is where it belongs: not where a brace is missing or too many
     units       those that the deck declares
+    uses        the decks that it uses
     """
 
     entries: tuple[Entry, ...] = ()
     unreadable: tuple[UnreadableStretch, ...] = ()
     sound: bool = False
     units: Mapping[str, Measure] = field(default_factory=dict)
+    uses: tuple[UseEntry, ...] = ()
 
 
 def parse(
@@ -66,17 +81,24 @@ def parse(
     return parse_on(tokens, findings, declared).entries, findings.all
 
 
-def parse_on(tokens: Sequence[Token], findings: Findings, declared: Mapping[str, Measure] = NO_UNITS) -> Parsed:
-    """The deck of these tokens; what is wrong with it is in the findings."""
+def parse_on(
+    tokens: Sequence[Token],
+    findings: Findings,
+    declared: Mapping[str, Measure] = NO_UNITS,
+    looped: list[int] | None = None,
+) -> Parsed:
+    """The deck of these tokens; what is wrong with it is in the findings. looped: the tokens of all turns of loops so
+    far, of decks that count together."""
     parser = _Parser(tokens, findings)
     parser.declared = declared
+    parser.looped = looped if looped is not None else parser.looped
     entries: list[Entry] = []
     sound = False
     with without_collection(), suppress(GiveUp, EndedInsideBlock):
         parser.declare_units()
         parser.entries(entries)
         sound = not parser.unbalanced
-    return Parsed(tuple(entries), tuple(parser.unreadable), sound, parser.declared)
+    return Parsed(tuple(entries), tuple(parser.unreadable), sound, parser.declared, tuple(parser.uses))
 
 
 def parse_expression(
@@ -94,7 +116,7 @@ def parse_expression(
     return None
 
 
-class _Parser(EditionEntries):
+class _Parser(Uses):
     def entries(self, into: list[Entry]) -> None:
         """Entries up to the closing brace of the block they stand in, or to the end."""
         depth = len(self.open)
@@ -120,6 +142,8 @@ class _Parser(EditionEntries):
                 operators = self.operators
                 if self.at_loop():
                     self.loop(into)
+                elif self.at_use():
+                    self.use()
                 elif self.at_several():
                     into += self.several()
                 else:
@@ -319,7 +343,10 @@ class _Parser(EditionEntries):
     def let(self, names: list[Token], tail: list[Token]) -> Let:
         name = names[1]
         if tail:
-            self.fail("D020", f"`{names[0].text}` gives a value to one name, without points", span(name, tail[-1]))
+            message = f"`{names[0].text}` gives a value to one name, without points"
+            path = ".".join(each.text for each in (name, *tail))
+            help = f"a value of a deck that is used is set in a run: `with {path} = ...;`"
+            self.fail("D020", message, span(name, tail[-1]), help=help)
         if self.is_reserved(name):
             message = f"`{name.text}` is the unit {units.UNITS[name.text].word}, so it cannot name a value"
             self.tell(

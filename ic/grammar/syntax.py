@@ -20,12 +20,14 @@ what may stand where is decided when the tree is resolved. So a joint may be cal
     require quick: settle < 10 s;                           Statement, words ("require",), name "quick", value
     exclude when kp > 3 V*s/rad and m > 5 kg;               Statement, words ("exclude", "when"), value
     remove settle;                                          Statement, words ("remove",), value a Name
+    use <panda.ic> as panda;                                UseEntry, which no tree of a whole deck has
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
+from types import MappingProxyType
 
 from ic.text.edition import FIRST
 from ic.text.files import Unsaved
@@ -74,10 +76,14 @@ class String:
 
 @frozen
 class Name:
-    """A reference: `slow`, `gearbox.kp`, `shoulder.servo.voltage`, `on`; `*.servo.voltage`, of every joint."""
+    """A reference: `slow`, `gearbox.kp`, `shoulder.servo.voltage`, `on`; `*.servo.voltage`, of every joint.
+
+    roof  of a name that a used deck writes, the roof under which its own names are (`ic.grammar.roofs`)
+    """
 
     path: tuple[Word, ...]
     place: Place
+    roof: str = ""
 
     @property
     def text(self) -> str:
@@ -276,6 +282,36 @@ Entry = Let | Setting | Statement | Group
 
 
 @frozen
+class UseEntry:
+    """`use <panda.ic> as panda;`: the file as it is asked for, whether in < >, and the name of the roof.
+
+    at      the place of the file's name
+    source  the file that the entry stands in, by the name that messages print
+    """
+
+    file: str
+    angled: bool
+    roof: Word
+    at: Place
+    source: str
+
+
+@frozen
+class Roof:
+    """A roof of a deck: the entry that made it, and the kinds of the used deck's runs and sweeps, which stay away."""
+
+    use: UseEntry
+    left: Mapping[str, str] = field(default_factory=dict)
+
+
+Roofs = Mapping[str, Roof]
+"""Roofs by their full names: `panda`, and `cell.panda` of a deck that a used one uses."""
+
+
+NO_ROOFS: Roofs = MappingProxyType({})
+
+
+@frozen
 class Deck:
     """A whole deck after the preprocessor: its entries in order, the files they came from, and warnings so far.
 
@@ -284,6 +320,7 @@ class Deck:
     unsaved: texts that count in place of what files hold.
     unreadable: what could not be read; where there are some, `warnings` holds errors too.
     units: those that the deck declares, which files of its editions may use.
+    roofs: those under which definitions of decks that it uses are among the entries, with full names.
     """
 
     file: str
@@ -297,6 +334,7 @@ class Deck:
     text: str | None = None
     unsaved: Unsaved = field(default_factory=dict, compare=False, repr=False)
     units: Mapping[str, Measure] = field(default_factory=dict)
+    roofs: Roofs = field(default_factory=dict)
 
     @property
     def edition(self) -> int:

@@ -21,6 +21,10 @@ TOP_LEVEL = BlockDeclaration(
             doc="the same, which an including deck, a run, a sweep and `--set` may set", default="none",
         ),
         Entry(
+            name="use", form="statement", written="use <FILE> as ROOF;",
+            doc="the definitions of another deck, as `ROOF.NAME`; without its runs, sweeps and macros", default="none",
+        ),
+        Entry(
             name="unit", form="named", written="unit NAME = NUMBER UNIT;",
             doc="a unit, known in all files of edition 2", default="those of the language",
         ),

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ic.grammar.declared_units import UNIT
+from ic.grammar.uses import AS, USE
 from ic.language import BLOCKS, DEFINITIONS
 from ic.language.bodies import JOINT_KINDS
 from ic.language.runs import BASE_KINDS
@@ -171,6 +172,8 @@ def _entries() -> dict[str, Any]:
         _groups(rf"\b({kinds})\s+({IN_LOOPS})(?=\s+(?:like|of|from)\b|\s*[{{=;])", "storage.type", "entity.name.type"),
         _groups(rf"\b(like|of)\s+({PATH})(?=\s*(?:[{{;]|\bof\b))", "keyword.other", "entity.other.inherited-class"),
         _groups(rf"\b(let|param)\s+({IN_LOOPS})(?=\s*=)", "storage.type", "variable.other.constant"),
+        _groups(rf"^\s*({USE})(?=\s*[<\"])", "keyword.control"),
+        _groups(rf"\b({AS})\s+({NAME})(?=\s*;)", "keyword.control", "entity.name.namespace"),
         _groups(rf"\b({UNIT})\s+({NAME})(?=\s*=)", "storage.type", "entity.name.type.unit"),
         _groups(rf"^\s*({EDITION_WORD})\s+([0-9]+)(?=\s*;)", "keyword.control.edition", "constant.numeric"),
         _groups(rf"\b(for)\s+({NAME})\s+(in)\b", "keyword.control", "variable.parameter", "keyword.control"),

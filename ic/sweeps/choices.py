@@ -69,7 +69,7 @@ Choices = tuple[tuple[ChoiceColumn, Option], ...]
 
 def decides_structure(definitions: Definitions, path: str, values: Expression, names: Names) -> bool:
     """Return True if this path names something that decides the structure; a model's words do."""
-    first, *rest = path.split(".")
+    first, *rest = definitions.split(path)
     if path in definitions.lets:
         return False
     if path in OF_RUN or (first == "rates" and rest) or path in ONE_OF_TWO:
@@ -204,7 +204,7 @@ def _option(item: Expression, names: Names, unit: Unit | None) -> Option:
     """A list's item; one that is a number is named by its value, however it is written."""
     place = place_of(item.inner if isinstance(item, WithUnit) and unit is not None else item)
     is_model = isinstance(item, Call) and item.name.text not in FUNCTIONS
-    if not is_model and not isinstance(item, String) and not (isinstance(item, Name) and not names.knows(item.text)):
+    if not is_model and not isinstance(item, String) and not (isinstance(item, Name) and not names.is_value(item)):
         found = names.evaluate(item)
         if isinstance(found, Value):
             if isinstance(item, WithUnit) and unit is not None:  # whose unit stands behind the list
@@ -246,7 +246,7 @@ def with_choices(definitions: Definitions, run: Definition, choices: Choices) ->
         if column.macro:
             continue
         chosen_values.append(f"{column.path} = {option.text}")
-        first, *rest = column.path.split(".")
+        first, *rest = definitions.split(column.path)
         servo = definitions.of_kind("servo").get(first)
         if servo is not None and rest:
             if len(rest) > 1 and rest[0] != SENSOR:

@@ -123,7 +123,8 @@ class Effects:
         )
 
     def _report_unknown(self, complaints: Complaints, scope: Scope, path: str, entry: Setting, where: str) -> None:
-        first, _, rest = path.partition(".")
+        first, *words = scope.definitions.split(path)
+        rest = ".".join(words)
         joints = list(
             dict.fromkeys(
                 known.split(".")[1] for each in self.scopes for known in each.known if known.startswith("initial.")
@@ -138,7 +139,12 @@ class Effects:
         else:
             known = [each for one in self.scopes for each in (*one.known, *one.not_sweepable)]
             known += [*scope.definitions.lets, *OF_RUN, *(f"{joint}.servo" for joint in joints)]
-            helps = did_you_mean(path, known) or parameters_nearby(scope, path) or paths_ending_in(scope, path)
+            helps = (
+                scope.definitions.stays_away(path)
+                or did_you_mean(path, known)
+                or parameters_nearby(scope, path)
+                or paths_ending_in(scope, path)
+            )
             macro = [] if rest else [f"a macro is defined by `-D {path}=VALUE`"]
             helps = helps or [*macro, *first_words(scope)]
         complaints.error("D234", f"nothing in {where} is called `{path}`", entry.place, also=also, help=helps)
@@ -240,10 +246,11 @@ def _named(definitions: Definitions, entries: Sequence[Entry]) -> set[str]:
         waiting += children(expression)
         if isinstance(expression, Call) and expression.body is not None:
             waiting += _expressions(expression.body)
-        if isinstance(expression, Name) and expression.text not in found:
-            found.add(expression.text)
-            let = definitions.lets.get(expression.path[0].text)
-            if let is not None and (len(expression.path) == 1 or is_row_table(let.value)):
+        if isinstance(expression, Name) and definitions.in_full(expression).text not in found:
+            name = definitions.in_full(expression)
+            found.add(name.text)
+            let = None if name.roof else definitions.lets.get(name.path[0].text)
+            if let is not None and (len(name.path) == 1 or is_row_table(let.value)):
                 found.add(let.name.text)
                 waiting.append(let.value)
     return found

@@ -451,7 +451,10 @@ def _sum(source: DeckSource, definition: Definition, within: tuple[str, ...]) ->
             "D041",
             f"no run or sweep `{named.text}`",
             named.place,
-            help=[*did_you_mean(named.text, known), known_words("runs and sweeps of this deck", known)],
+            help=[
+                *(source.definitions.stays_away(named.text) or did_you_mean(named.text, known)),
+                known_words("runs and sweeps of this deck", known),
+            ],
         )
     if unknown:
         return []

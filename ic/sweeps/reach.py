@@ -30,7 +30,8 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
                 "D122", f"`{path}` cannot vary{' like this' if why.is_choice else ''}", place, help=why.to_vary(path)
             )
             continue
-        first, _, rest = path.partition(".")
+        first, *words = scope.definitions.split(path)
+        rest = ".".join(words)
         if path in ("integrator", "arm", "base") or rest in ("servo", "law", "bed", "servo.model", "servo.command"):
             scope.complaints.error(
                 "D122",
@@ -57,7 +58,8 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
                 "D128",
                 f"no parameter `{path}` in this run",
                 place,
-                help=did_you_mean(path, (*scope.known, *scope.not_sweepable, *scope.definitions.lets))
+                help=scope.definitions.stays_away(path)
+                or did_you_mean(path, (*scope.known, *scope.not_sweepable, *scope.definitions.lets))
                 or parameters_nearby(scope, path)
                 or paths_ending_in(scope, path)
                 or first_words(scope),

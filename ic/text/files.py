@@ -102,6 +102,7 @@ class Files:
         named += [d for d in os.environ.get("MET_DECK_PATH", "").split(os.pathsep) if d]
         self.path = [Directory(d, d) for d in named] + [Directory(os.fspath(library), "<>")]
         self.read_so_far: dict[str, SourceFile] = {}
+        self.found: dict[str, FoundFile] = {}  # those that were read, by name
         self._refused: dict[str, Problem] = {}
 
     def deck(self, path: str | Path) -> FoundFile:
@@ -176,6 +177,7 @@ class Files:
         if len(data) > most:
             raise Problem(_too_large(file, kind, f"{len(data) / 2**20:.1f} MiB", most))
         text, complaint = decode(data, file.name, kind)
+        self.found[file.name] = file
         self.read_so_far[file.name] = SourceFile(file.name, text, hashlib.sha256(data).hexdigest())
         if complaint is not None:
             self._refused[file.name] = Problem(complaint)

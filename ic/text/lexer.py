@@ -69,15 +69,18 @@ _TOKEN = re.compile(
 
 
 class Text:
-    """A file's text under the name that messages print, and the `#include` lines that led to it, innermost first.
+    """A file's text under the name that messages print, and the lines that led to it, as a `Place` has them.
 
     The same file included twice makes two of these, since their chains differ.
     """
 
-    def __init__(self, name: str, text: str, included: tuple[tuple[str, int], ...] = ()) -> None:
+    def __init__(
+        self, name: str, text: str, included: tuple[tuple[str, int], ...] = (), used: tuple[int, ...] = ()
+    ) -> None:
         self.name = name
         self.text = text
         self.included = included
+        self.used = used
 
     @cached_property
     def _starts(self) -> list[int]:
@@ -130,7 +133,9 @@ class Text:
         line = bisect_right(self._starts, offset)
         start = self._starts[line - 1]
         end = self._starts[line] - 1 if line < len(self._starts) else len(self.text)
-        return Place(self.name, line, offset - start + 1, min(length, end - offset) or 1, expansions, self.included)
+        return Place(
+            self.name, line, offset - start + 1, min(length, end - offset) or 1, expansions, self.included, self.used
+        )
 
     def indent(self, offset: int) -> int:
         """The column, from 1, of the first thing on the line that holds `offset`."""

@@ -24,6 +24,7 @@ XML_DEPTH = 40  # of elements within each other
 LONGEST_LINE = 200_000  # characters
 MOST_INCLUDES = 2_000  # files entered, again and again counted
 INCLUDE_DEPTH = 50
+MOST_USED = 100  # decks under roofs, those of used decks counted
 MOST_MACRO_BODY = 4_096  # tokens
 MOST_ARGUMENTS = 20_000  # tokens in one macro call
 MACRO_DEPTH = 64  # macros through which one token may come; calls within arguments of calls

@@ -7,7 +7,7 @@ of conditions, the search for included files, every check, and every message.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -18,7 +18,7 @@ from pcpp import Action, OutputDirective
 from ic.text.complaints import Complaints
 from ic.text.conditions import Refused, evaluate, well_formed, with_defined
 from ic.text.edition import EDITIONS, LATEST
-from ic.text.files import LIBRARY, NOTHING_UNSAVED, Files, FoundFile, Unsaved
+from ic.text.files import LIBRARY, Files, FoundFile
 from ic.text.lexer import BAD, CHARACTER, COMMAND_LINE, END, NAME, NOTHING, SPACE, STRING, Text, Token, logical_lines
 from ic.text.limits import (
     CONDITION_DEPTH,
@@ -50,15 +50,17 @@ class Tokens:
     """A deck after the preprocessor.
 
     tokens       those of the deck, without white space; the last is of kind END
-    sources      every file that was read, in order
+    sources      every file that was read, in order, and behind them the text of what `-D` defines
     diagnostics  errors and warnings so far
     complete     whether all was read; where not, the tokens are not worth parsing
+    count        how many tokens were read, white space included
     """
 
     tokens: tuple[Token, ...]
     sources: tuple[SourceFile, ...]
     diagnostics: tuple[Diagnostic, ...]
     complete: bool
+    count: int
 
 
 def preprocess(
@@ -67,19 +69,35 @@ def preprocess(
     defines: Sequence[str] = (),
     *,
     library: Path = LIBRARY,
-    text: str | None = None,
-    unsaved: Unsaved = NOTHING_UNSAVED,
 ) -> Tokens:
-    """Reads a deck and all that it includes. `defines` are as after `-D`: `NAME` or `NAME=VALUE`. text: of the deck,
-    where it is in no file. unsaved: texts in place of what files hold."""
-    files = Files(include_dirs, library, unsaved)
-    findings = Findings()
-    run = _Preprocessor(files, findings)
+    """Reads a deck and all that it includes. `defines` are as after `-D`: `NAME` or `NAME=VALUE`."""
+    files = Files(include_dirs, library)
+    return preprocess_on(files, Findings(), lambda: files.deck(path), defines)
+
+
+def preprocess_on(
+    files: Files,
+    findings: Findings,
+    deck: Callable[[], FoundFile],
+    defines: Sequence[str] = (),
+    *,
+    included: tuple[tuple[str, int], ...] = (),
+    used: tuple[int, ...] = (),
+    count: int = 0,
+) -> Tokens:
+    """Reads a deck and all that it includes; what is wrong is in the findings.
+
+    deck            finds it; raises Problem
+    defines         as after `-D`
+    included, used  the lines that led to it, as a `Place` has them
+    count           tokens that were read before
+    """
+    run = _Preprocessor(files, findings, count)
     whole = True
     try:
         with without_collection():
             run.define_from_command_line(defines)
-            run.read_deck(files.deck(path) if text is None else files.given(text))
+            run.read_deck(deck(), included, used)
             run.warn_of_names()
     except GiveUp:
         whole = False
@@ -87,7 +105,26 @@ def preprocess(
         whole = False
         Complaints.add(findings, *problem.diagnostics)
     sources = (*files.read_so_far.values(), *run.command_line)
-    return Tokens(tuple(run.output), sources, findings.all, whole)
+    return Tokens(tuple(run.output), sources, findings.all, whole, run.count)
+
+
+def find_file(
+    files: Files, findings: Findings, includer: FoundFile, name: str, angled: bool, at: Place
+) -> FoundFile | None:
+    """The file that an `#include` or a `use` names; None where there is none, which is reported."""
+    directories = files.where(includer, angled)
+    file = files.find(name, directories)
+    if file is None:
+        quoted = f"<{name}>" if angled else f'"{name}"'
+        link = files.dangling(name, directories)
+        near = (
+            did_you_mean(name, files.listed(directories))
+            if link is None
+            else (f"`{link}` is a link to a file that is not there",)
+        )
+        looked = f"looked in {', '.join(dict.fromkeys(d.in_words for d in directories))}"
+        findings.error("D005", f"cannot find {quoted}", at, help=(*near, looked))
+    return file
 
 
 class _Conditional:
@@ -104,7 +141,7 @@ class _Conditional:
 
 
 class _Preprocessor(Macros):
-    def __init__(self, files: Files, findings: Findings) -> None:
+    def __init__(self, files: Files, findings: Findings, count: int) -> None:
         self.files = files
         self.output: list[Token] = []
         self.command_line: tuple[SourceFile, ...] = ()
@@ -116,7 +153,7 @@ class _Preprocessor(Macros):
         self._misspelt_ifs = 0  # such as `#ifdfe`, that no `#endif` has closed
         self._once: set[str] = set()
         self._included = 0
-        self._tokens = 0
+        self.count = count
         self._directive: Token | None = None
         self._conditions = 0
         self._zeros: dict[str, Place] = {}  # names in conditions that are no macros
@@ -136,8 +173,8 @@ class _Preprocessor(Macros):
             self.define(self.tokenstrip(line))
         self.given = {name: macro.name_token for name, macro in self.macros.items()}
 
-    def read_deck(self, file: FoundFile) -> None:
-        source = Text(file.name, self.files.text(file))
+    def read_deck(self, file: FoundFile, included: tuple[tuple[str, int], ...], used: tuple[int, ...]) -> None:
+        source = Text(file.name, self.files.text(file), included, used)
         if self._given_text is not None:  # which is read as the deck is
             self._given_text.edition = source.edition
         self._read(file, source, source.place(0, 1))
@@ -221,8 +258,8 @@ class _Preprocessor(Macros):
         for line in logical_lines(source):
             if headed and line[0].offset < headed:
                 line = [token for token in line if token.kind == SPACE or token.offset >= headed]
-            self._tokens += len(line)
-            if self._tokens > MOST_TOKENS:
+            self.count += len(line)
+            if self.count > MOST_TOKENS:
                 self._give_up("D018", f"more than {MOST_TOKENS} tokens", line[0].place)
             if len(line) > 1 and line[-2].kind == BAD and line[-2].text == "/*":
                 complain_of_stray(line.pop(-2), self.findings)
@@ -263,20 +300,8 @@ class _Preprocessor(Macros):
             return ()
         name, angled, at = header
         includer, source = self._including[-1]
-        directories = self.files.where(includer, angled)
-        file = self.files.find(name, directories)
-        if file is None:
-            quoted = f"<{name}>" if angled else f'"{name}"'
-            link = self.files.dangling(name, directories)
-            near = (
-                did_you_mean(name, self.files.listed(directories))
-                if link is None
-                else (f"`{link}` is a link to a file that is not there",)
-            )
-            looked = f"looked in {', '.join(dict.fromkeys(d.in_words for d in directories))}"
-            self.findings.error("D005", f"cannot find {quoted}", at, help=(*near, looked))
-            return ()
-        if file.identity in self._once:
+        file = find_file(self.files, self.findings, includer, name, angled, at)
+        if file is None or file.identity in self._once:
             return ()
         self._included += 1
         if len(self._including) > INCLUDE_DEPTH:
@@ -284,12 +309,13 @@ class _Preprocessor(Macros):
         if self._included > MOST_INCLUDES:
             self._give_up("D018", f"more than {MOST_INCLUDES} files are included", at)
         included = ((source.name, directive.line), *source.included)
+        used = tuple(n + 1 for n in source.used)
         try:
             text = self.files.text(file)
         except Problem as problem:
-            self.findings.add(*(_reached_by(d, at, included) for d in problem.diagnostics))
+            self.findings.add(*(reached_by(d, at, included, used) for d in problem.diagnostics))
             return ()
-        self._read(file, Text(file.name, text, included), at)
+        self._read(file, Text(file.name, text, included, used), at)
         return ()
 
     def _header(self, tokens: list[Token], directive: Token) -> tuple[str, bool, Place] | None:
@@ -499,9 +525,11 @@ def _shown(directive: Token) -> str:
     return directive.text if directive.kind == NAME else directive.kind
 
 
-def _reached_by(complaint: Diagnostic, at: Place, included: tuple[tuple[str, int], ...]) -> Diagnostic:
-    """The mistake in an included file, moved to the `#include` where it has no place of its own."""
-    place = at if complaint.at is None else replace(complaint.at.place, included=included)
+def reached_by(
+    complaint: Diagnostic, at: Place, included: tuple[tuple[str, int], ...], used: tuple[int, ...]
+) -> Diagnostic:
+    """The mistake in an included file, moved to the line that names it where it has no place of its own."""
+    place = at if complaint.at is None else replace(complaint.at.place, included=included, used=used)
     return replace(complaint, at=Label(place))
 
 

@@ -19,7 +19,8 @@ class Place:
     that a macro or a loop made: the token is then written at this place, in the macro's body, in an argument or in the
     loop's body. Each expansion, innermost first, says through which macro it came and where that macro was used; behind
     those, likewise, come the turns of loops.
-    `included` is the chain of `#include` lines that led to the file, innermost first.
+    `included` is the chain of lines that led to the file, innermost first: `#include`, but for those at the positions
+    `used`, which `use` it.
     """
 
     file: str
@@ -28,9 +29,16 @@ class Place:
     length: int = 1
     expansions: tuple[Expansion, ...] = ()
     included: tuple[tuple[str, int], ...] = ()
+    used: tuple[int, ...] = ()
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line}:{self.column}"
+
+    @property
+    def came_by(self) -> tuple[tuple[str, int, str], ...]:
+        """The chain of lines that led to the file, innermost first: file, line, and "included from" or "used at"."""
+        words = ("used at" if n in self.used else "included from" for n in range(len(self.included)))
+        return tuple((file, line, word) for (file, line), word in zip(self.included, words, strict=True))
 
     @property
     def macros(self) -> tuple[Expansion, ...]:

@@ -87,7 +87,10 @@ def _place_json(place: Place) -> dict[str, Any]:
             {"index": step.macro, "value": step.turn, "loop": _place_json(step.use)} for step in place.turns
         ]
     if place.included:
-        made["included"] = [{"file": file, "line": line} for file, line in place.included]
+        made["included"] = [
+            {"file": file, "line": line, **({"used": True} if word == "used at" else {})}
+            for file, line, word in place.came_by
+        ]
     return made
 
 

@@ -111,8 +111,8 @@ def _came_through(place: Place) -> list[str]:
 
 
 def _came_in(place: Place) -> list[str]:
-    """The includes that led to a file, innermost first."""
-    return _cut([f"note: included from {file}:{line}" for file, line in place.included], "files")
+    """The lines that led to a file, innermost first."""
+    return _cut([f"note: {word} {file}:{line}" for file, line, word in place.came_by], "files")
 
 
 def _cut(steps: list[str], what: str) -> list[str]:

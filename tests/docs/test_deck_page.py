@@ -37,9 +37,8 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 PIECES = re.findall(r"<!-- (?P<where>[\w. ]+?)(?:: (?P<code>D\d+))? -->\n```c\n(?P<text>.*?)```", PAGE, re.DOTALL)
 PICKER = "\n".join(text for where, _, text in PIECES if where == "picker.ic")
 TABLES = dict(re.findall(r"<!-- (\w+\.csv) -->\n```csv\n(.*?)```", PAGE, re.DOTALL))
-FRAGMENTS = [
-    piece for piece in PIECES if piece[0] not in ("picker.ic", "chain.ic", "stick.ic", "swing.ic", "twins.ic", "alone")
-]
+WHOLE = ("picker.ic", "chain.ic", "stick.ic", "swing.ic", "two_sticks.ic", "twins.ic", "alone")
+FRAGMENTS = [piece for piece in PIECES if piece[0] not in WHOLE]
 AROUND = {
     "more": "{}",
     "in arm": "arm another like picker {{ {} }} run other like pick {{ arm = another; }}",
@@ -77,6 +76,7 @@ def test_every_deck_of_the_page_says_where_it_belongs() -> None:
         "picker.ic",
         "chain.ic",
         "stick.ic",
+        "two_sticks.ic",
         "swing.ic",
         "twins.ic",
         "alone",
@@ -191,6 +191,17 @@ def test_the_deck_that_sets_a_param_has_the_reaches_that_it_says(tmp_path: Path)
     middles = [each.parameters["links.bar.com.x"].value for each in (swing, farther)]
     assert middles == [0.45, 0.6]
     assert reaches.cases.coordinates[0].values.tolist() == [0.8, 1.0, 1.2]
+
+
+def test_the_deck_that_uses_others_has_each_value_under_its_roof(tmp_path: Path) -> None:
+    for where, _, text in PIECES:
+        if where in ("stick.ic", "two_sticks.ic"):
+            (tmp_path / where).write_text(text, encoding="utf-8")
+    turn, lengths = ic.compile(tmp_path / "two_sticks.ic", select="all").experiments
+    found = [turn.parameters[path].value for path in ("links.bar.com.x", "links.rod.com.x", "elbow.at.x")]
+    assert found == [0.55, 0.4, 1.1]
+    assert turn.parameters["hinge.servo.kp"].value == 0.025
+    assert [each.path for each in lengths.cases.coordinates] == ["right.reach", "panda.panda_large.ki"]
 
 
 @pytest.mark.parametrize("links", [None, 1, 2])

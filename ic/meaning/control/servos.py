@@ -129,7 +129,7 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
     kind = moving_kind(scope, item, arm, "so no servo can move it")
     if kind is None:
         return None
-    name = word_of(item.value)
+    name = scope.definitions.definition_named(item.value) or word_of(item.value)
     if name is None or (isinstance(item.value, Call) and item.value.positional):
         scope.complaints.error(
             "D146",
@@ -543,14 +543,14 @@ def _asked(scope: Scope, command: Call) -> Expression:
 
 def course_named(scope: Scope, inner: Expression) -> Expression:
     """The name of a course alone, and of nothing else, is that course with nothing written."""
-    if isinstance(inner, Name) and inner.text in models.available("command") and not scope.names.knows(inner.text):
+    if isinstance(inner, Name) and inner.text in models.available("command") and not scope.names.is_value(inner):
         return Call(inner, (), (), None, inner.place)
     return inner
 
 
 def _check_known(scope: Scope, inner: Name) -> None:
     """Raises Problem D278 for the name of nothing, where guides are what a command may follow too."""
-    if len(inner.path) > 1 or scope.names.knows(inner.text) or inner.text in models.available("command"):
+    if len(inner.path) > 1 or scope.names.is_value(inner) or inner.text in models.available("command"):
         return
     raise Problem(
         error(
@@ -566,7 +566,10 @@ def _check_known(scope: Scope, inner: Name) -> None:
 
 
 def _is_guide(scope: Scope, inner: Expression) -> bool:
-    """Return True if this expression names a guide of one of the deck's runs."""
+    """Return True if this expression names a guide of one of the deck's runs, or may name one of those to come: a used
+    deck's servos come without its runs."""
+    if isinstance(inner, Name) and inner.roof and len(inner.path) == 1 and not scope.names.is_value(inner):
+        return True
     runs = [scope.definitions.block(run) for run in scope.definitions.of_kind("run").values()]
     return any(run is not None and run.get(f"guide {word_of(inner)}") is not None for run in runs)
 

@@ -5,12 +5,13 @@ A definition refers to its base, or to the file that it is made from (`merge`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import Any
 
-from ic.grammar.syntax import Binary, Call, Deck, Entry, Group, Let, Name, Setting, Word
+from ic.grammar.roofs import split_path
+from ic.grammar.syntax import Binary, Call, Deck, Entry, Expression, Group, Let, Name, Setting, Word
 from ic.language import DEFINITIONS, EXPERIMENTS, HEADS, OF_A_RUN
 from ic.meaning.definitions.csv_files import csv_files
 from ic.meaning.definitions.merge import MergedBlock, defined_twice, merge
@@ -46,6 +47,11 @@ class Definition:
         return self.group.place
 
     @property
+    def roof(self) -> str:
+        """The roof under which it is; "" of the deck's own."""
+        return self.name.rpartition(".")[0] if self.kind not in EXPERIMENTS else ""
+
+    @property
     def home(self) -> str:
         """The first part of paths that reach its entries; a run with a sweep's choices is called `RUN CHOICES`."""
         return self.name.partition(" ")[0]
@@ -65,6 +71,7 @@ class Definitions:
         self._meant: dict[tuple[str, str], str] = {}  # by kind and name that there is not, the name that was meant
         self._complaints = complaints
         self.memo: dict[object, Any] = {}  # what later rooms make of arms, servos and lets alone
+        self.roofs = deck.roofs
         self._file = deck.file
         self._texts = {source.name: source.text for source in deck.sources}
         self._editions = {source.name: source.edition for source in deck.sources if source.edition > FIRST}
@@ -125,11 +132,49 @@ class Definitions:
     def of_kind(self, kind: str) -> Mapping[str, Definition]:
         return self._by_kind[kind]
 
-    def find(self, kind: str, name: Word) -> Definition:
-        """The definition of this name. Raises D041 with what was probably meant."""
-        known = self._by_kind[kind]
-        if name.text in known:
-            return known[name.text]
+    def in_full(self, name: Name) -> Name:
+        """A name of a value as the deck itself would write it: one that a used deck writes, with its roof. Where the
+        used deck has no such value it stays as it is."""
+        if not name.roof:
+            return name
+        first = name.path[0]
+        full = f"{name.roof}.{first.text}"
+        if full not in self.lets and full not in self._by_kind["servo"]:
+            return name
+        return Name((Word(full, first.place), *name.path[1:]), name.place)
+
+    def split(self, path: str) -> list[str]:
+        """The words of a path, of which the first is a full name where the path begins with a roof."""
+        return split_path(path, self.roofs) if self.roofs else path.split(".")
+
+    def under(self, roof: str, names: Iterable[str]) -> list[str]:
+        """Those of some full names that are under a roof, as its own deck writes them; all of them where it is ""."""
+        return [each[len(roof) + 1 :] for each in names if each.startswith(f"{roof}.")] if roof else list(names)
+
+    def definition_named(self, value: Expression | None) -> str | None:
+        """The full name of a definition that a value names, alone or with a block; None where the deck has no roof, and
+        names are single words."""
+        name = value.name if isinstance(value, Call) else value
+        return name.text if self.roofs and isinstance(name, Name) else None
+
+    def stays_away(self, name: str) -> list[str]:
+        """The remedy for the full name of a run or sweep of a used deck; none for another."""
+        roof, _, own = name.rpartition(".")
+        kind = self.roofs[roof].left.get(own) if roof in self.roofs else None
+        if kind is None:
+            return []
+        file = self.roofs[roof].use.file
+        return [
+            f"`{own}` is a {kind} of the deck that is used, and its runs and sweeps stay away: write one of your own, "
+            f"or include `{file}`"
+        ]
+
+    def find(self, kind: str, name: Word, roof: str = "") -> Definition:
+        """The definition of this name. Raises D041 with what was probably meant. roof: of the used deck that names
+        it."""
+        if name.text in self._by_kind[kind]:
+            return self._by_kind[kind][name.text]
+        known = self.under(roof, self._by_kind[kind])
         for other, definitions in self._by_kind.items():
             if name.text in definitions:
                 raise Problem(
@@ -141,14 +186,17 @@ class Definitions:
                         help=known_words(f"{kind}s of this deck", known),
                     )
                 )
-        file = library_defines(kind, name.text)
-        include = [add_include(file, name.place)] if file else did_you_mean(name.text, known)
+        written = name.text[len(roof) + 1 :] if roof else name.text
+        file = library_defines(kind, written)
+        helps = self.stays_away(name.text) or (
+            [add_include(file, name.place)] if file else list(did_you_mean(written, known))
+        )
         raise Problem(
             error(
                 "D041",
-                f"no {kind} `{name.text}`",
+                f"no {kind} `{written}`",
                 name.place,
-                help=[*include, known_words(f"{kind}s of this deck", known)],
+                help=[*helps, known_words(f"{kind}s of this deck", known)],
             )
         )
 
@@ -165,13 +213,15 @@ class Definitions:
 
         user  what is like it, which itself is not meant
         """
+        roof = user.roof if user is not None else ""
         try:
-            return self.find(kind, name)
+            return self.find(kind, name, roof)
         except Problem as problem:
             known = [
                 each
                 for each in self._by_kind[kind]
-                if user is None or user.name not in self.homes(self._by_kind[kind][each])
+                if (user is None or user.name not in self.homes(self._by_kind[kind][each]))
+                and (not roof or each.startswith(f"{roof}."))
             ]
             near = meant(name.text, known)
             if near is None or any(each.code != "D041" for each in problem.diagnostics):
@@ -203,7 +253,9 @@ class Definitions:
             base = None
             if at.group.like is not None:
                 try:
-                    base = self.find_or_meant(at.kind, _single(at.group.like), self._complaints, user=at)
+                    like = at.group.like
+                    word = Word(like.text, like.place) if self.roofs else _single(like)
+                    base = self.find_or_meant(at.kind, word, self._complaints, user=at)
                 except Problem as problem:
                     self._complaints.add(*problem.diagnostics)
                     self._failed.update((d.kind, d.name) for d in chain)

@@ -50,7 +50,7 @@ class RowTable:
         """The warning of rows that none of these paths names, where the deck asks for it. let: the table's name."""
         if self.all_used is None:
             return None
-        named = {path.split(".")[1] for path in used if path.startswith(f"{let}.")}
+        named = {path[len(let) + 1 :].split(".")[0] for path in used if path.startswith(f"{let}.")}
         others = [name for name in self.rows if name not in named]
         if not others:
             return None

@@ -61,18 +61,26 @@ class Names:
         """Take over what others found, which is the same here."""
         for name, worth in others._worth.items():
             self._worth.setdefault(name, worth)
-        self.cells |= others.cells
-        self._read |= others._read
+        self.cells = {**others.cells, **self.cells}
+        self._read = {**others._read, **self._read}
 
     def evaluate(self, expression: Expression) -> Value | ValueList:
         return evaluate(expression, self.find)
 
     def knows(self, text: str) -> bool:
-        """Return True if a single word has a value."""
+        """Return True if a single word of the deck itself has a value."""
         return text in self.varied or text in self.definitions.lets or text in CONSTANTS
+
+    def is_value(self, name: Name) -> bool:
+        """Return True if a name is a single word that has a value, where it stands."""
+        found = self.definitions.in_full(name)
+        return self.knows(found.text) if not found.roof else found.text in CONSTANTS
 
     def find(self, name: Name) -> Value | ValueList:
         """The value of a name. Raises Problem D065 where there is none, D073 where it needs itself."""
+        name = self.definitions.in_full(name)
+        if name.roof:
+            raise self._unknown_in_used(name)
         table = self.row_table(name.path[0].text, len(name.path))
         if table is not None:
             return self._cells(table, name)
@@ -184,7 +192,7 @@ class Names:
                 and worth.number is value.number
                 and worth.dimension == value.dimension
                 and worth.place != value.place
-                and value.place.length == len(text)
+                and value.place.length in (len(text), len(text.rpartition(".")[2]))
             ):
                 return [Label(let.given_at, f"`{text}` is {'defined' if let.set_at is None else 'set'} here")]
         return []
@@ -232,6 +240,22 @@ class Names:
             helps = [f"define it: `let {first} = ...;`", *(_if_a_unit(each) for each in unit)]
         raise Problem(error("D065", f"no value `{name.text}`", name.place, help=helps))
 
+    def _unknown_in_used(self, name: Name) -> Problem:
+        """The error that a used deck names a value that it does not define."""
+        first, *rest = (word.text for word in name.path)
+        definitions = self.definitions
+        known = definitions.under(name.roof, definitions.lets)
+        known += [*CONSTANTS, *(f"{each}." for each in definitions.under(name.roof, definitions.of_kind("servo")))]
+        helps: list[str] = list(did_you_mean(name.text if rest else first, known))
+        if not helps and not rest:
+            helps = [f"define it there: `let {first} = ...;`"]
+        if first in definitions.lets:
+            helps.append(
+                f"`{first}` of the deck that uses this one is not known here: `with {name.roof}.NAME = ...;` sets a "
+                "value"
+            )
+        return Problem(error("D065", f"no value `{name.text}`", name.place, help=helps))
+
     def check_lets(self) -> list[Problem]:
         """Every mistake in the deck's lets, used or not."""
         problems: list[Problem] = []
@@ -239,11 +263,12 @@ class Names:
             if len(problems) >= MOST_DIAGNOSTICS:  # no more would be reported, and each searches all names
                 break
             try:
-                if text in CONSTANTS or text in RESERVED:
+                own = text.rpartition(".")[2]
+                if own in CONSTANTS or own in RESERVED:
                     raise Problem(
                         error(
                             "D079",
-                            f"`{text}` has a meaning already",
+                            f"`{own}` has a meaning already",
                             let.name.place,
                             help="give the value another name",
                         )

@@ -106,7 +106,10 @@ def _is_as_written(scope: Scope, entered: Scope) -> bool:
     named = entered.names.named
     if not given.isdisjoint(entered.known) or not given.isdisjoint(named):
         return False
-    return not any("." in name for name in named) and not any(path.partition(".")[0] in named for path in given)
+    lets = scope.definitions.lets
+    return not any("." in name and name not in lets for name in named) and not any(
+        path.partition(".")[0] in named for path in given
+    )
 
 
 def _resolved(scope: Scope, definition: Definition) -> ResolvedArm | None:
@@ -222,12 +225,14 @@ def _joint(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str,
         kind = meant(kind, JOINT_KINDS) if kind else None
         if kind is None or (kind != "fixed" and item.body.get("axis") is None and item.body.get("dh") is None):
             return None
-    if item.name in (*HEADS, BASE):
+    roof = scope.definitions.roofs.get(item.name)
+    if item.name in (*HEADS, BASE) or roof is not None:
         scope.complaints.error(
             "D166",
             f"`{item.name}` begins paths of its own, so no joint may be called so",
             item.place,
-            help="give the joint another name",
+            also=[Label(roof.use.roof.place, "a roof")] if roof is not None else [],
+            help="give the joint another name" if roof is None else "give the roof another name, or the joint",
         )
         return None
     body = item.body
@@ -332,7 +337,7 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
         return
     named = _named_axis(item.value)
     value = item.value.operand if isinstance(item.value, Unary) else item.value
-    if named is None and isinstance(value, Name) and len(value.path) == 1 and not scope.names.knows(value.text):
+    if named is None and isinstance(value, Name) and len(value.path) == 1 and not scope.names.is_value(value):
         scope.complaints.error(
             "D065",
             f"no axis and no value `{value.text}`",

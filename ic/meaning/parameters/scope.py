@@ -101,8 +101,8 @@ class Scope:
 
     def depends_on_failed(self, path: str) -> bool:
         """Return True if nothing can be said of this path, because what it leads to has failed (already reported)."""
-        first, _, rest = path.partition(".")
-        thing = rest.partition(".")[0] if first in ("links", "payloads") else first
+        first, *rest = self.definitions.split(path)
+        thing = (rest or [""])[0] if first in ("links", "payloads") else first
         if self.checks.touches_failed(path) or thing in self.failed_parts:
             return True
         return bool(self.failed_servos) and (first in self.failed_servos or first in self.definitions.of_kind("servo"))
@@ -573,7 +573,8 @@ class Scope:
 
     def _origin(self, item: Item, place: Place) -> Origin:
         """The origin of what an item writes; of a cell of a table with its line and column in the file."""
-        note = f"from `{item.value.text}`" if isinstance(item.value, Name) else ""
-        cells = self.names.cells.get(item.value.text, ()) if isinstance(item.value, Name) else ()
+        name = self.definitions.in_full(item.value) if isinstance(item.value, Name) else None
+        note = f"from `{name.text}`" if name is not None else ""
+        cells = self.names.cells.get(name.text, ()) if name is not None else ()
         at = f" ({cells[0].place})" if len(cells) == 1 else ""
         return written_origin(place, item.overrides, note + at)

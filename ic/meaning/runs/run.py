@@ -149,7 +149,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
         for use in uses
     )
     structure = Structure(
-        arm=arm.name,
+        arm=arm.name.rpartition(".")[2],  # as its own deck calls it, whoever uses that
         links=arm.links,
         joints=arm.joints,
         servos=servos,
@@ -322,7 +322,7 @@ def _arm(scope: Scope, run: Owner, item: Item | None) -> ResolvedArm | None:
             run.place, ("arm",), "D112", f"{run.label} has no arm", help=["write `arm = ARM;`", known]
         )
         return None
-    name = word_of(item.value)
+    name = scope.definitions.definition_named(item.value) or word_of(item.value)
     if name is None or not isinstance(item.value, Name):
         at = place_of(item.value) if item.value is not None else item.place
         scope.complaints.error("D112", "the name of an arm is needed here", at, help="write `arm = ARM;`")
