@@ -11,12 +11,16 @@ from batch.cli.instant import Instant
 from met.cli import NO, YES, check_options, deck_options, format_option
 from met.messages.visible import say
 
+EQUILIBRIUM = "write `2 s`; a `linear` block of the run has `at = equilibrium;`, and `--of` asks for it"
+
 
 @click.command(short_help="Linearise the program that runs: poles, modes, margins of loops, A B C D.")
 @click.argument("source", metavar="DECK|PLAN.json")
 @click.argument("name", metavar="[NAME]", required=False)
 @click.option("--of", metavar="LINEAR", help="Ask what a `linear` block of the run does. [its only one]")
-@click.option("--at", type=Instant(), metavar="TIME", help="The instant of the run, `2 s`. [0 s]")
+@click.option(
+    "--at", type=Instant(equilibrium=EQUILIBRIUM), metavar="TIME", help="The instant of the run, `2 s`. [0 s]"
+)
 @click.option("--case", metavar="ID", help="The case of a sweep: the beginning of its id, or '#7'. [#0]")
 @click.option(
     "--all-cases", is_flag=True, help="All cases of a sweep, a row each: margins of opened loops, else damping."

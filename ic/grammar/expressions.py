@@ -210,7 +210,8 @@ class Expressions(Quantities):
         if self.token.text == "[" and adjacent(self.previous, self.token):
             return self.indexed(name, parts[0])
         token = self.token
-        if units.is_unit(token.text) and token.kind == NAME and not self.begins_entry(self.at):
+        known = units.is_unit(token.text) or token.text in self.declared or token.text in self.unsized
+        if known and token.kind == NAME and not self.begins_entry(self.at):
             if self.is_reserved(parts[0]) and len(parts) == 1:
                 self.fail(
                     "D025",
@@ -227,9 +228,9 @@ class Expressions(Quantities):
                     token,
                     help=f"put brackets around the number, as in `(2*pi) {text}`{turn}",
                 )
-            known = name.text[:LONGEST_NUMBER]
-            helps = ("what it names has its unit already", f"if it is a bare number, write `({known}) {text}`")
-            self.fail("D030", f"`{known}` is a name, and only a number takes a unit", token, help=helps)
+            short = name.text[:LONGEST_NUMBER]
+            helps = ("what it names has its unit already", f"if it is a bare number, write `({short}) {text}`")
+            self.fail("D030", f"`{short}` is a name, and only a number takes a unit", token, help=helps)
         return name
 
     def not_a_lone_unit(self) -> None:

@@ -228,7 +228,7 @@ class _Parser(Uses):
         if first.kind != NAME:
             self.not_an_entry()
         names = [self.advance()]
-        if first.text in LETS and self.token.kind not in (NAME, BAD) and self.token.place.macros:
+        if first.text in (*LETS, UNIT) and self.token.kind not in (NAME, BAD) and self.token.place.macros:
             self.replaced_name()
         while self.token.kind == NAME and not (len(names) > 0 and self.line_break_in(names)):
             names.append(self.advance())
@@ -328,7 +328,7 @@ class _Parser(Uses):
         raise Unreadable
 
     def replaced_name(self) -> None:
-        """A macro has put its body where the name of a `let` stands: `-D height=2` and `let height = ...`."""
+        """A macro has put its body where the name of a `let` or `unit` stands: `-D height=2` and `let height = ...`."""
         step = self.token.place.macros[-1]
         message = f"the macro `{step.macro}` has put {token_in_words(self.token)} in the place of this name"
         helps: tuple[str, ...] = ("give one of the two another name",)

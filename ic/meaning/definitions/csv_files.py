@@ -14,7 +14,8 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
+from functools import partial
 
 from ic.grammar.syntax import Deck
 from ic.language.unit_words import in_degrees
@@ -37,12 +38,14 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 @frozen
 class CsvColumn:
-    """A column as its head names it: number, name, unit as written (None where there is none), place of its head."""
+    """A column as its head names it: number, name, unit as written (None where there is none), place of its head, and
+    the names in its unit that are units of the deck's own, which no CSV file has."""
 
     number: int
     name: str
     unit: str | None
     place: Place
+    declared: tuple[str, ...] = ()
 
 
 @frozen
@@ -181,10 +184,18 @@ def _no_number(cell: CsvCell, measure: Measure) -> Problem:
 
 def csv_files(deck: Deck) -> NamedFiles[CsvTable]:
     """The CSV files that a deck names."""
-    return NamedFiles(deck, _table, kind="CSV file", ending=".csv", most=MOST_CSV_BYTES, missing="D190")
+    return NamedFiles(
+        deck,
+        partial(_table, declared=frozenset(deck.units)),
+        kind="CSV file",
+        ending=".csv",
+        most=MOST_CSV_BYTES,
+        missing="D190",
+    )
 
 
-def _table(file: str, text: str) -> CsvTable:
+def _table(file: str, text: str, declared: Collection[str] = ()) -> CsvTable:
+    """A file's table. declared: the units of the deck's own."""
     lines = text.split("\n")
     rows = [(n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
     if not rows:
@@ -206,7 +217,7 @@ def _table(file: str, text: str) -> CsvTable:
             )
         )
     head = rows.pop(0)
-    columns = tuple(_columns(file, *head))
+    columns = tuple(_columns(file, *head, declared))
     for line, row in rows:
         if row.count(",") + 1 != len(columns):
             count = row.count(",") + 1
@@ -223,7 +234,7 @@ def _table(file: str, text: str) -> CsvTable:
     return CsvTable(file, columns, tuple(rows))
 
 
-def _columns(file: str, line: int, row: str) -> Iterator[CsvColumn]:
+def _columns(file: str, line: int, row: str, declared: Collection[str]) -> Iterator[CsvColumn]:
     if all(_NUMBER.fullmatch(_stripped(cell)[0]) for cell in row.split(",")):
         raise Problem(
             error(
@@ -264,7 +275,8 @@ def _columns(file: str, line: int, row: str) -> Iterator[CsvColumn]:
                 )
             )
         seen[name] = place
-        yield CsvColumn(number, name, unit or None, place)
+        own = tuple(each for each in re.findall(r"\w+", unit) if each in declared)
+        yield CsvColumn(number, name, unit or None, place, own)
 
 
 def _stripped(cell: str) -> tuple[str, int]:
@@ -308,6 +320,8 @@ def _meaning(column: CsvColumn, remedy: str, also: Iterable[Label], dimension: D
         near = suggest(column.unit)
         if near is not None and (dimension is None or units.same(parse_unit(near).dimension, dimension)):
             remedy = write(near, f"did you mean `{column.name} [{near}]`?", old=column.unit)
+        if column.declared:
+            remedy = Help("CSV files have the units of the language alone: write the numbers in one of these")
         known = remedy or f"the units: {', '.join(units.ALL_UNITS)}"
         raise Problem(error("D193", f"`{column.unit}` is not a unit", column.place, also=also, help=known)) from None
 

@@ -325,6 +325,7 @@ class Definitions:
                     help=[
                         f"a value: `let {name} = ...;`",
                         f"a definition, its name and a block in braces: {', '.join(DEFINITIONS)}",
+                        "or a `param`, a `unit`, a loop `for`, and `deck 2;` in the first line",
                     ],
                 )
             )

@@ -30,6 +30,8 @@ ONE_INSTANT = NotSweepable("is one for the whole sweep", "write a `linear` block
 EQUILIBRIUM = "equilibrium"
 """The word for an arm that stands still, in place of an instant."""
 
+NO_PLACE = "no servo here has a computer that ticks: a law that is continuous is a part of the arm"
+
 LISTS = {"inputs": "inputs", "outputs": "outputs", "open": "opened"}
 """Keys of a block that are lists of signals, and the fields that hold them."""
 
@@ -157,18 +159,25 @@ def _is_known(scope: Scope, name: Name, key: str, structure: Structure, known: M
     what = "place to open a loop" if key == "open" else "input"
     helps = [*did_you_mean(name.text, places), known_words("there are", places)]
     if not places:
-        helps = ["no servo here has a computer that ticks: a law that is continuous is a part of the arm"]
+        helps = [NO_PLACE]
     scope.complaints.error("D375", f"there is no {what} `{name.text}`", name.place, help=helps)
     return False
 
 
-def resolve_linear_metrics(scope: Scope, block: MergedBlock, answers: Sequence[LinearUse]) -> tuple[MetricUse, ...]:
+def resolve_linear_metrics(
+    scope: Scope, block: MergedBlock, structure: Structure, answers: Sequence[LinearUse]
+) -> tuple[MetricUse, ...]:
     """The metrics of a run that are figures of linear answers."""
-    found = (_metric(scope, item, block, answers) for item in block.of_kind("metric") if is_figure_metric(item))
+    figures = [item for item in block.of_kind("metric") if is_figure_metric(item)]
+    places = [each.path for each in input_signals(structure) if each.is_output] if figures else []
+    found = (_metric(scope, item, block, places, answers) for item in figures)
     return tuple(use for use in found if use is not None)
 
 
-def _metric(scope: Scope, item: Item, block: MergedBlock, answers: Sequence[LinearUse]) -> MetricUse | None:
+def _metric(
+    scope: Scope, item: Item, block: MergedBlock, places: Sequence[str], answers: Sequence[LinearUse]
+) -> MetricUse | None:
+    """The metric of a figure. places: where a loop of the run can be opened."""
     figure = FIGURES[word_of(item.value) or ""]
     body = item.body or MergedBlock()
     if item.value is None or refuse_values(scope, item.value, ["of"]):
@@ -181,7 +190,8 @@ def _metric(scope: Scope, item: Item, block: MergedBlock, answers: Sequence[Line
         message = f"no `linear {named}` in this run" if named else f"a `{figure.name}` is of a `linear` block"
         helps = [*did_you_mean(named, names), known_words("linear blocks of this run", sorted(names))]
         if not names:
-            helps = [write(f"linear {named or 'NAME'} {{ open = JOINT.servo.voltage; }}", where="inside")]
+            opened = places[0] if places else "JOINT.servo.voltage"
+            helps = [write(f"linear {named or 'NAME'} {{ open = {opened}; }}", where="inside")]
         scope.complaints.error("D376", message, _place(item, of), help=helps)
         return None
     use = next((each for each in answers if each.name == of.value.text), None)
@@ -189,7 +199,9 @@ def _metric(scope: Scope, item: Item, block: MergedBlock, answers: Sequence[Line
         return None  # it failed (already reported)
     if figure.of_loops and not use.opened:
         message = f"`linear {use.name}` opens no loop, so it has no `{figure.name}`"
-        scope.complaints.error("D376", message, _place(item, of), help=f"write `{LINEAR['open'].written}` in it")
+        helps = [f"write `open = {places[0]};` in it"] if places else [NO_PLACE]
+        helps += [known_words("places to open a loop", places)] if len(places) > 1 else []
+        scope.complaints.error("D376", message, _place(item, of), help=helps)
         return None
     scope.keep_in_deck(f"metrics.{item.name}.model", figure.name, item)
     scope.keep_in_deck(f"metrics.{item.name}.of", use.name, of)

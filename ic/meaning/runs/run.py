@@ -176,7 +176,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     metrics, watched = resolve_metrics(scope, block, signals)
     structure = replace(structure, metrics=metrics, record=record, expressions=(*structure.expressions, *watched))
     linear = resolve_linear(scope, block, structure)
-    linear_metrics = resolve_linear_metrics(scope, block, linear)
+    linear_metrics = resolve_linear_metrics(scope, block, structure, linear)
     remark_unread(scope, uses, structure)
     check_sampling(scope, structure)
     check_together(scope, uses, structure)

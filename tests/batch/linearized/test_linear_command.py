@@ -55,6 +55,8 @@ def test_an_opened_loop_that_is_unstable_is_exit_status_1(folder: Path) -> None:
 def test_a_word_that_is_no_instant_is_refused(folder: Path) -> None:
     said = CliRunner().invoke(linear, [str(folder / "deck.ic"), "--at", "2 kg"])
     assert said.exit_code == 2 and "`2 kg` is no instant: write `2 s` or `250 ms`" in said.output
+    said = CliRunner().invoke(linear, [str(folder / "deck.ic"), "--at", "equilibrium"])
+    assert said.exit_code == 2 and "a `linear` block of the run has `at = equilibrium;`" in said.output
 
 
 OPEN = ("--open", "hinge.servo.voltage")

@@ -581,6 +581,24 @@ def test_a_mistake_is_told_where_it_is(tmp_path: Path, text: str | bytes, course
 
 
 @pytest.mark.slow
+def test_a_unit_of_the_decks_own_is_none_in_a_file(tmp_path: Path) -> None:
+    (tmp_path / "loads.csv").write_text("link, mass [turn], com [cycle]\nbar, 2, 1\n")
+    deck = 'deck 2;\nunit turn = 360 deg;\nlet loads = csv("loads.csv");\nlet heavy = loads.bar.mass;\n'
+    assert (
+        messages(check(tmp_path, deck))
+        == """\
+error[D193]: `turn` is not a unit
+ --> loads.csv:1:7
+  |
+1 | link, mass [turn], com [cycle]
+  |       ^^^^^^^^^^^
+  = help: CSV files have the units of the language alone: write the numbers in one of these
+
+1 error
+"""
+    )
+
+
 def test_a_file_of_too_many_rows(tmp_path: Path) -> None:
     rows = "".join(f"{i},0\n" for i in range(100_001))
     assert (

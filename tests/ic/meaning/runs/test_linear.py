@@ -98,6 +98,12 @@ WRONG = {
 }
 
 
+def test_a_margin_without_its_loop_is_told_where_this_run_can_open_one(tmp_path: Path) -> None:
+    closed = said(tmp_path, "linear b { } require disk_margin(b) > 1;")
+    assert "= help: write `open = hinge.servo.voltage;` in it\n\n1 error" in closed
+    assert "= help: write `linear b { open = hinge.servo.voltage; }`" in said(tmp_path, "require disk_margin(b) > 1;")
+
+
 @pytest.mark.parametrize("entry", WRONG)
 def test_what_is_wrong_is_said_where_it_is_written(entry: str, tmp_path: Path) -> None:
     first, place, *_ = said(tmp_path, entry).splitlines()
