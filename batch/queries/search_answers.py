@@ -19,7 +19,7 @@ from batch.queries.signals import number_text, pretty_unit
 from ic.driver.written_value import WrittenValue
 from met.plan import Experiment
 from met.plan.outputs import metric_units
-from met.plan.searches import Search
+from met.plan.searches import SHORTEST, Search
 from met.run import DONE
 from met.searches.answer import Answer, answer
 
@@ -175,6 +175,12 @@ class SearchAnswer:
         return f"{self.group.count:,} case{'s' * (self.group.count != 1)} in {generations}"
 
     @property
+    def _tried(self) -> str:
+        """The number of candidates that were tried, with all plants or with some."""
+        count = len(np.unique(self._given[0][:, : len(self.search.parameters)], axis=0))
+        return f"{count:,} candidate{'s' * (count != 1)} tried"
+
+    @property
     def _cause(self) -> list[str]:
         """Why the case fails that stands for the answer, in lines."""
         cause = str(self.group.at("cause", [self.found.case])[0])
@@ -186,14 +192,15 @@ class SearchAnswer:
 
     def _tuned(self) -> list[str]:
         found, search = self.found, self.search
-        out = [
-            f"use {self._chosen}" if found.serves else f"nothing meets all that is required; nearest: {self._chosen}"
-        ]
+        none = f"none of the {self._tried} is found to meet all that is required; nearest: {self._chosen}"
+        out = [f"use {self._chosen}" if found.serves else none]
         if found.failed:
             out += [f"  case #{self.position} of it fails; {self._cases}", *self._cause]
         else:
             among = f" in the worst of {found.tried} cases of {search.against}" if found.all > 1 else ""
             out.append(f"  {search.metric} is {self.value()}{among}; {self._cases}")
+        if found.confirmed and not found.serves and search.at_most - self.group.count < SHORTEST * found.all:
+            out.append(f"  its cases are spent, of {search.at_most:,} at most; a larger `at_most` goes on")
         if not found.confirmed:
             out[0] = f"not tried with all that it must bear: {self._chosen}"
             out.append(

@@ -7,6 +7,8 @@ design, IEEE Trans. Automatic Control 60 (2015) 1857). A candidate is worth what
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from met import optimisers
@@ -26,7 +28,12 @@ GAIN = 1e-3
 """A turn that improves the goal by less than this share of it brings next to nothing."""
 
 IDLE = 2
-"""A tuning ends after so many turns that bring next to nothing; the second has twice as many cases."""
+"""A tuning ends after so many turns that bring next to nothing; the second has twice as many cases. With slopes it
+begins afresh then, and ends after so many fresh beginnings that bring next to nothing."""
+
+AFRESH = 2
+"""The first turn of a fresh beginning takes one in so many of the cases that are left. A short turn comes before: where
+it leads into a wrong valley, steps along slopes go to the floor of that one, and no turn around it comes out again."""
 
 INSIDE = 0.05
 """How far inside the ends of the cube the middle of a turn is, at least: so both sides of it are there."""
@@ -43,6 +50,8 @@ class RobustTuning:
     A turn ends when the optimiser does, or when its share of the cases that are left is spent, and then the steps along
     slopes have ended. A plant that becomes active where these have settled takes steps alone. The tuning ends when no
     plant is worse than the worst active one and two turns brought next to nothing, or when no further turn has room.
+    With slopes it has soon come to the floor of a valley, which may be the wrong one. So it begins afresh with what is
+    left, against the plant that was worst and from the middle of the cube, whatever was found before.
     """
 
     def __init__(self, search: Search, source: SlopeSource | None = None) -> None:
@@ -58,6 +67,9 @@ class RobustTuning:
         self._may_ask = 0
         self._borne: float | None = None
         self._idle = 0
+        self._since_beginning: dict[Candidate, None] = {}
+        self._best_before: float | None = None
+        self._fruitless = 0
         self._begin_turn(None)
 
     def ask(self) -> np.ndarray:
@@ -77,17 +89,35 @@ class RobustTuning:
             self._known[candidate][plant] = value
         self._go_on()
 
+    def _begin_afresh(self) -> None:
+        """Begin once more from the middle of the cube, after steps along slopes; else the tuning is over."""
+        worths = {each: max(known.values()) for each, known in self._known.items() if len(known) == len(self._plants)}
+        least, before = min(worths.values(), default=math.inf), self._best_before
+        better = before is None or (least < before and not hardly_better(least, before))
+        self._best_before, self._fruitless = least, 0 if better else self._fruitless + 1
+        stepped = self.steps is not None and self.steps.cases > 0
+        room = self._left - len(self._plants) + 1
+        if not stepped or not worths or self._fruitless == IDLE or room < SHORTEST:
+            self._confirmed = True
+            return
+        known = self._known[min(worths, key=lambda each: worths[each])]
+        self._active = [max(known, key=lambda each: known[each])]
+        self._since_beginning, self._borne, self._idle = {}, None, 0
+        self._begin_turn(None)
+
     def _begin_turn(self, start: np.ndarray | None) -> None:
-        """Begin a turn, around a good candidate where there is one, if it has room; else the tuning is over."""
+        """Begin a turn, around a good candidate or in the middle, if it has room; else begin afresh."""
         room = self._left - self._reserve
         if room < SHORTEST * len(self._active):
-            self._confirmed = True
+            self._begin_afresh()
             return
         least = SHORTEST * len(self._active)
         first, stepping = self._turn == 0, self.steps is not None and self.steps.cases > 0
         goes_by_slopes = self._search.gradients and (first or stepping)
         settled = first or (self.steps is not None and self.steps.settled)
         share = (EARLIER if goes_by_slopes and settled else SHARE) >> self._idle
+        if start is None and not first:
+            share = AFRESH
         whole = room < 2 * least or (self._reserve == 0 and not goes_by_slopes)
         cases = room if whole else max(room // share, least)
         dimension, seed = len(self._search.parameters), self._search.seed + self._turn
@@ -128,6 +158,7 @@ class RobustTuning:
         for candidate, point in zip(self._batch, points, strict=True):
             self._points.setdefault(candidate, point)
             self._known.setdefault(candidate, {})
+            self._since_beginning[candidate] = None
         return self._unknown(self._batch, self._active)
 
     def _has_room(self, wanted: list[tuple[Candidate, int]]) -> bool:
@@ -168,14 +199,15 @@ class RobustTuning:
             worth, before = self._worst(best), self._borne
             self._idle = self._idle + 1 if before is not None and hardly_better(worth, before) else 0
             if self._converged or self._idle == IDLE:
-                self._confirmed = True
+                self._begin_afresh()
                 return
             self._borne = worth
         self._begin_turn(self._points[best])
 
     def _best(self) -> Candidate:
-        """The candidate that is worth most against the active plants, of those that were tried against all of these."""
-        tried = [each for each, known in self._known.items() if known.keys() >= set(self._active)]
+        """The candidate that is worth most against the active plants, of those that were tried against all of these and
+        were asked for since the beginning."""
+        tried = [each for each in self._since_beginning if self._known[each].keys() >= set(self._active)]
         return min(tried, key=self._worst)
 
     def _worst(self, candidate: Candidate) -> float:
