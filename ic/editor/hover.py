@@ -47,9 +47,9 @@ def _of_key(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Itera
             return
     if around is None and token.text in DEFINITIONS:
         yield f"`{BLOCKS[token.text].written}`\n\n{BLOCKS[token.text].doc}"
-    for entry in TOP_LEVEL.entries if around is None else ():
-        if entry.name == token.text:
-            yield f"`{entry.written}`\n\n{entry.doc}"
+    for declared in TOP_LEVEL.entries if around is None else ():
+        if declared.name == token.text:
+            yield f"`{declared.written}`\n\n{declared.doc}"
 
 
 def _of_model(token: Token) -> Iterator[str]:

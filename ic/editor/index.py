@@ -69,7 +69,7 @@ def index_of(compiled: Compiled) -> DeckIndex:
     for experiment in compiled.plan.experiments:
         name = experiment.name.partition(" ")[0]  # one of several structures is called `NAME CHOICES`
         cases[name] = cases.get(name, 0) + experiment.cases.count
-    values, cells = (tuple(islice(each(compiled), MOST_VALUES)) for each in (_values, _cells))
+    values, cells = tuple(islice(_values(compiled), MOST_VALUES)), tuple(islice(_cells(compiled), MOST_VALUES))
     units = {name: size_in_si(measure) for name, measure in compiled.units.items()}
     return DeckIndex(values, tuple(signals), cases, cells, units, dict(_made(compiled.plan)))
 

@@ -195,3 +195,28 @@ def in_edition_2(text: str, seed: int) -> str:
     body = re.sub(r"= (?P<number>\d[\d.]*(?:e-?\d+)?) (?P<unit>[A-Za-z][A-Za-z*/^0-9]*);", changed, text)
     pick.shuffle(head)
     return "deck 2;\n" + "\n".join(head) + "\n" + body
+
+
+def in_a_table(text: str, seed: int) -> tuple[str, str]:
+    """A deck with the same parameters, whose masses and places of joints stand in `bodies.csv`, and that file's text:
+    some of them, their rows in any order, with rows that nothing uses."""
+    pick = random.Random(seed)
+    rows = {"unused": ["9", "", "", ""]}
+
+    def mass(found: re.Match[str]) -> str:
+        if pick.random() < 0.2:
+            return found[0]
+        rows[found[1]] = [found[2], "", "", ""]
+        return f"link {found[1]} {{ mass = bodies.{found[1]}.mass;"
+
+    def place(found: re.Match[str]) -> str:
+        if pick.random() < 0.2:
+            return found[0]
+        rows[found[1]] = ["", *found[3].split(", ")]
+        return f"joint {found[1]} {found[2]} at = bodies.{found[1]}.at;"
+
+    body = re.sub(r"link (\w+) \{ mass = (\S+) kg;", mass, text)
+    body = re.sub(r"joint (\w+) ([^\n]*?) at = \[([^\]]*)\] m;", place, body)
+    order = pick.sample(list(rows), len(rows))
+    head = "name, mass [kg], at.x [m], at.y [m], at.z [m]"
+    return f'let bodies = csv("bodies.csv");\n{body}', "\n".join([head, *(", ".join([n, *rows[n]]) for n in order), ""])

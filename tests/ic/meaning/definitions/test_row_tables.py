@@ -11,6 +11,7 @@ import ic
 from ic.driver.explain import explain
 from met.plan import keys
 from tests.ic.small_decks import check, experiment, messages
+from tests.oracles.random_deck import in_a_table, random_deck
 
 BODIES = """\
 # measured on the bench
@@ -385,3 +386,21 @@ def test_a_long_table_is_read_in_a_moment(tmp_path: Path) -> None:
     deck = tmp_path / "deck.ic"
     deck.write_text('let long = csv("long.csv"); let one = long.row_49999.mass;' + RUN, encoding="utf-8")
     assert [each.code for each in ic.check(deck).diagnostics] == ["D041"]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_decks_have_the_same_parameters_and_keys_with_their_values_in_a_table(seed: int, tmp_path: Path) -> None:
+    written = random_deck(seed)
+    tabled, rows = in_a_table(written, seed)
+    assert ".mass;" in tabled or ".at;" in tabled
+    (tmp_path / "bodies.csv").write_text(rows, encoding="utf-8")
+    before, after = tmp_path / "before.ic", tmp_path / "after.ic"
+    before.write_text(written, encoding="utf-8")
+    after.write_text(tabled, encoding="utf-8")
+    (one,), (other,) = (ic.compile(path, select="all").experiments for path in (before, after))
+    assert {path: (each.value, each.unit) for path, each in one.parameters.items()} == {
+        path: (each.value, each.unit) for path, each in other.parameters.items()
+    }
+    assert keys.structure_key(one.structure, keys.inputs(one)) == keys.structure_key(
+        other.structure, keys.inputs(other)
+    )
