@@ -54,8 +54,8 @@ class Asked:
         self.file = next((name for name, where in self._addresses.items() if where == uri), uri)
         self._addresses[self.file] = uri
         self.text = texts.setdefault(self.file, deck_text(self.file, current))
-        self.names = NamesInTexts(texts.values())
         self.index = checks.indexes.get(deck.deck.uri, NO_INDEX) if deck is not None else NO_INDEX
+        self.names = NamesInTexts(texts.values(), self.index.made)
         lines = lines_of(current)
         line = lines[position.line] if position.line < len(lines) else ""
         self.offset = self.text.offset(position.line, characters(codec, line, position.character))

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
 from lsprotocol import types
 
 from ic.editor.index import DeckIndex
 from ic.editor.names import REMOVED, NamesInTexts
-from ic.editor.structure import NAMING, UNIT, DeckText, TextEntry
+from ic.editor.structure import NAMING, UNIT, DeckText, TextEntry, indices_around, through_loops
 from ic.editor.used import DEFINED, texts_under
 from ic.find import library_files
 from ic.language import BLOCKS, DEFINITIONS, EXPERIMENTS, OF_A_RUN, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
 from ic.language.unit_words import units_of
+from ic.meaning.definitions.row_tables import ALL as ALL_ROWS
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, USAGE
 from ic.meaning.mechanics.shapes import SHAPES
+from ic.meaning.runs.linear import EQUILIBRIUM
 from ic.printing.models import summary
 from ic.text.edition import EDITION_WORD, EDITIONS
 from ic.text.lexer import NAME, NUMBERS, STRING, Token
@@ -29,6 +31,10 @@ from met.unit_parser import parse_unit
 from met.units import UNITS
 
 _PATHS = ("vary", "require", "record", "exclude", "of", "against", "choose", "maximise", "minimise", "signal")
+
+
+_SIGNALS_ALONE = ("record", "open")
+"""Keys whose values are signals and no parameters."""
 
 
 @frozen
@@ -51,8 +57,16 @@ def offers(text: DeckText, offset: int, names: NamesInTexts, index: DeckIndex, f
     if _is_in_comment_or_string(text, offset):
         return []
     words, around = _before(text, offset, names)
-    found = {offer.word: offer for offer in reversed(list(_of_entry(words, around, names, index, offset)))}
+    macro = names.macros.at(text, offset)
+    indices = indices_around(text.entries if macro is None else names.macros.body(macro), offset)
+    may_stand = [each for each in _of_entry(words, around, names, index, offset) if _has_indices(each.word, indices)]
+    found = {offer.word: offer for offer in reversed(may_stand)}
     return list(reversed(found.values()))
+
+
+def _has_indices(word: str, indices: Collection[str]) -> bool:
+    """True but for a name with braces, `seg_{i-1}`, outside of the loop that gives it its index."""
+    return not any(set(re.findall(r"[A-Za-z_]\w*", each)) - set(indices) for each in re.findall(r"\{(.*?)\}", word))
 
 
 def _of_directive(line: str, files: Iterable[str]) -> Iterator[Offer]:
@@ -78,7 +92,7 @@ def _is_in_comment_or_string(text: DeckText, offset: int) -> bool:
 def _before(text: DeckText, offset: int, names: NamesInTexts) -> tuple[list[Token], TextEntry | None]:
     """The words of the entry before the one that is written, and the entry whose block that is in."""
     around, entries = names.around(text, offset)
-    for entry in entries:
+    for entry in through_loops(entries):
         last = entry.words[-1].end if entry.words else 0
         opened = entry.opened.offset if entry.opened is not None else None
         if (
@@ -225,8 +239,9 @@ def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> 
         parts.append(word.text)
     head = "".join(reversed(parts))
     about: dict[str, str] = {}
+    signals_alone = words[0].text in _SIGNALS_ALONE
     for each in index.values:
-        if each.path.startswith(head):
+        if not signals_alone and each.path.startswith(head):
             part, _, more = each.path[len(head) :].partition(".")
             about.setdefault(part, "" if more else f"{each.value}; {each.doc}")
     for path in index.signals:
@@ -245,7 +260,7 @@ def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> 
         kinds = [each.kind for each in defined if each.kind in DEFINED and each.file in files]
         yield from (Offer(name, types.CompletionItemKind.Reference, kind) for kind in kinds[:1])
     for found in names.by_name.get(head[:-1], ()):
-        if found.kind == "servo" and found.entry is not None:
+        if not signals_alone and found.kind == "servo" and found.entry is not None:
             yield from (_of_parameter(each) for each in parameters_of(found.entry, names))
 
 
@@ -257,6 +272,16 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
         yield from (Offer(each, types.CompletionItemKind.EnumMember, wanted.doc) for each in wanted.words)
         return
     where = around.kind if around is not None else ""
+    if key == "against" and around is not None:
+        yield from _sweeps_of(around.word_behind("of"), names)
+        return
+    if texts[-2:] == ["rows", "="]:
+        yield Offer(ALL_ROWS, types.CompletionItemKind.EnumMember, "every row is to be used")
+        return
+    if where == "initial" and texts[-1] == "=" and texts[-2] in ("q", "qd"):
+        yield Offer("command", types.CompletionItemKind.EnumMember, "where the command of the joint begins")
+    if where == "linear" and texts == ["at", "="]:
+        yield Offer(EQUILIBRIUM, types.CompletionItemKind.Function, "the equilibrium near positions of the joints")
     if where == "servos":
         yield from _named(names, "servo")
         return
@@ -284,10 +309,14 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
         for name, model in models.available("command").items():
             yield Offer(name, types.CompletionItemKind.Class, summary(model))
         yield from _named(names, "guide")
-    if key in _PATHS or "vary" in texts:
-        heads = dict.fromkeys(each.path.partition(".")[0] for each in index.values)
+    if key in _PATHS or key in _SIGNALS_ALONE or "vary" in texts:
+        values = () if key in _SIGNALS_ALONE else index.values
+        heads = dict.fromkeys(each.path.partition(".")[0] for each in values)
         heads |= dict.fromkeys(path.partition(".")[0] for path in index.signals)
         yield from (Offer(each, types.CompletionItemKind.Field, "of a path") for each in heads)
+        if key in _SIGNALS_ALONE:
+            yield from _named(names, "joint", "macro", around=around)
+            return
         yield from _named(names, "joint", "metric", "servo", around=around)
     if "(" in texts:
         opened = len(texts) - 1 - texts[::-1].index("(")
@@ -298,6 +327,14 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
     yield from _named(names, "let", "macro")
     yield from (Offer(each, types.CompletionItemKind.Function, ", ".join(USAGE[each])) for each in FUNCTIONS)
     yield from (Offer(each, types.CompletionItemKind.Constant) for each in CONSTANTS)
+
+
+def _sweeps_of(run: str, names: NamesInTexts) -> Iterator[Offer]:
+    """The sweeps of a run, and those that are made of others."""
+    for offer in _named(names, "sweep"):
+        entries = [each.entry for each in names.by_name[offer.word] if each.kind == "sweep" and each.entry is not None]
+        if any(entry.word_behind("of") in ("", run) for entry in entries):
+            yield offer
 
 
 def _named(names: NamesInTexts, *kinds: str, around: TextEntry | None = None) -> Iterator[Offer]:
@@ -313,7 +350,9 @@ def _named(names: NamesInTexts, *kinds: str, around: TextEntry | None = None) ->
         known = names.of_kind(kind)
         own = [name for name in known if any(names.is_of(name, kind, owner) for owner in owners)]
         for name in own or known:
-            yield Offer(name, shown.get(kind, types.CompletionItemKind.Reference), kind)
+            made = names.written_out(name, kind, owners) if "{" in name else ()
+            for each in (name, *made):
+                yield Offer(each, shown.get(kind, types.CompletionItemKind.Reference), kind)
 
 
 def _of_parameter(parameter: Parameter) -> Offer:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import field
 from itertools import islice
@@ -13,11 +14,13 @@ from ic.printing.columns import quantity, vector
 from met.diagnostic import Place
 from met.frozen import frozen
 from met.messages.message import shown_place
+from met.plan import Plan
 from met.plan.channel import recordable
 from met.trace import Scalar
 from met.units import size_in_si
 
 MOST_VALUES = 20_000  # of a deck
+_PATH = re.compile(r"\w+(\.\w+)*")
 MOST_NUMBERS = 6  # of a list, that are shown
 
 
@@ -45,6 +48,7 @@ class DeckIndex:
 
     cases  how many each run, sweep and search has, by name
     units  the sizes in SI of those that the deck declares
+    made   the names that the compiler knows, written out where loops make them: by kind, and arm or run that has them
     cells  the paths of the values of tables by row name, `bodies.boom.mass`
     """
 
@@ -53,12 +57,14 @@ class DeckIndex:
     cases: Mapping[str, int] = field(default_factory=dict)
     cells: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
+    made: Mapping[tuple[str, str], tuple[str, ...]] = field(default_factory=dict)
 
 
 def index_of(compiled: Compiled) -> DeckIndex:
     """The index of a deck that has a plan."""
     assert compiled.plan is not None
-    signals = {path: None for experiment in compiled.plan.experiments for path in recordable(experiment.structure)}
+    signals = {path: None for each in compiled.plan.experiments for path in recordable(each.structure)}
+    signals = {path: None for path in signals if _PATH.fullmatch(path)}  # no expression, as a metric may watch
     cases: dict[str, int] = {}
     for experiment in compiled.plan.experiments:
         name = experiment.name.partition(" ")[0]  # one of several structures is called `NAME CHOICES`
@@ -66,7 +72,16 @@ def index_of(compiled: Compiled) -> DeckIndex:
     values = tuple(islice(_values(compiled), MOST_VALUES))
     cells = tuple(islice(_cells(compiled), MOST_VALUES))
     units = {name: size_in_si(measure) for name, measure in compiled.units.items()}
-    return DeckIndex(values, tuple(signals), cases, cells, units)
+    return DeckIndex(values, tuple(signals), cases, cells, units, dict(_made(compiled.plan)))
+
+
+def _made(plan: Plan) -> Iterator[tuple[tuple[str, str], tuple[str, ...]]]:
+    """Joints, links and metrics of the plan by kind and by the arm or run that has them."""
+    for experiment in plan.experiments:
+        structure = experiment.structure
+        yield ("joint", structure.arm), tuple(joint.name for joint in structure.joints)
+        yield ("link", structure.arm), tuple(link.name for link in structure.links)
+        yield ("metric", experiment.name.partition(" ")[0]), tuple(metric.name for metric in structure.metrics)
 
 
 def _cells(compiled: Compiled) -> Iterator[str]:

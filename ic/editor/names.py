@@ -39,6 +39,9 @@ REMOVED = ("metric", "require", "guide", "sensor", "payload", "signal", "linear"
 """The kinds of names that `remove` takes away."""
 
 
+NOTHING_MADE: Mapping[tuple[str, str], Sequence[str]] = MappingProxyType({})
+
+
 @lru_cache(maxsize=32)
 def deck_text(name: str, text: str) -> DeckText:
     """The structure of a text; of one that is known, the same."""
@@ -69,9 +72,13 @@ class NameInText:
 
 
 class NamesInTexts:
-    """The definitions of some texts, by name."""
+    """The definitions of some texts, by name.
 
-    def __init__(self, texts: Iterable[DeckText]) -> None:
+    made  by kind and arm or run, the names that it had when the deck was last compiled: what loops make is among them
+    """
+
+    def __init__(self, texts: Iterable[DeckText], made: Mapping[tuple[str, str], Sequence[str]] = NOTHING_MADE) -> None:
+        self._made = made
         self.texts = tuple(texts)
         self.macros = MacrosInTexts(self.texts)
         self.by_name: dict[str, list[NameInText]] = {}
@@ -87,6 +94,12 @@ class NamesInTexts:
     def is_of(self, name: str, kind: str, owner: str) -> bool:
         """True where an arm or a run of that name defines the name."""
         return any(each.kind == kind and each.owner == owner for each in self.by_name.get(name, ()))
+
+    def written_out(self, name: str, kind: str, owners: Sequence[str]) -> list[str]:
+        """The names that a loop makes of one with braces: those of these arms and runs, of all where there are none."""
+        pattern = re.compile(_BRACES.sub(r"\\w+", name))
+        made = (each for (of, owner), each in self._made.items() if of == kind and (not owners or owner in owners))
+        return [each for found in made for each in found if pattern.fullmatch(each)]
 
     def entry_at(self, text: DeckText, token: Token) -> TextEntry | None:
         """The entry that a word of a text stands in, before its block; also one of a macro's body."""

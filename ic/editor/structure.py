@@ -206,6 +206,20 @@ def innermost_around(entries: Iterable[TextEntry], offset: int) -> TextEntry | N
         found, entries = inside[-1], inside[-1].entries
 
 
+def through_loops(entries: Iterable[TextEntry]) -> Iterator[TextEntry]:
+    """Entries of a block with those that loops in it have, as the block is read."""
+    for entry in entries:
+        yield entry
+        if _no_loop(entry) is not entry:
+            yield from through_loops(entry.entries)
+
+
+def indices_around(entries: Iterable[TextEntry], offset: int) -> set[str]:
+    """The indices of the loops in whose bodies an offset is."""
+    loops = (each for each in flattened(entries) if _no_loop(each) is not each and each.opened is not None)
+    return {each.texts[1] for each in loops if each.opened is not None and each.opened.end <= offset < each.closed}
+
+
 @frozen
 class TextMacro:
     """A macro as a text defines it; parameters: None where it has no parentheses."""

@@ -99,6 +99,11 @@ class Oracle:
             for name, text in compiled.sources.items()
             for match in re.finditer(r"^#define (\w+)", text, re.M)
         }
+        self.declared_units = {
+            match[1]: (name, text.count("\n", 0, match.start(1)) + 1, len("unit ") + 1)
+            for name, text in compiled.sources.items()
+            for match in re.finditer(r"^unit (\w+) =", text, re.M)
+        }
         for entry in read(deck).entries:
             self._definition(entry)
 
@@ -184,6 +189,10 @@ class Oracle:
                 key = entry.words[0]
                 if key.text in ("require", "exclude", "remove", "allow", "sample"):
                     self._note(key, "statement", defined=set(), offered={key.text})
+                if key.text == "against" and isinstance(entry.value, Name):
+                    word = entry.value.path[0]
+                    sweeps = self._named("sweep")  # a deck that is asked here has those of one run
+                    self._note(word, "sweep referred to", offered=sweeps, only=sweeps)
                 self._value(entry.value, within, None, key.text)
                 if entry.name is not None:
                     self._note(entry.name, "name of require", defined={at(entry.name.place)})
@@ -228,6 +237,8 @@ class Oracle:
                            offered=joints, only=self._with_macros(joints | also))  # fmt: skip
             for rest in entry.path[1:]:
                 self._note(rest, "part of a path", defined=set())
+            if block == "initial" and isinstance(entry.value, Name) and entry.value.text == "command":
+                self._note(entry.value.path[0], "start as commanded", offered={"command"})
             if block == "servos":
                 value = entry.value
                 servo = value.name if isinstance(value, Call) else value
@@ -357,6 +368,11 @@ class Oracle:
             if word.text in UNITS:
                 said = {f"unit `{word.text}`: {UNITS[word.text].word}"}
                 self._note(word, "unit", defined=set(), said=said, offered={word.text} if n == 0 else set())
+        for word, measure in unit.declared:
+            written = next(each for each, _ in unit.factors if each.text == word)
+            where, said = self.declared_units.get(word), {f"unit `{word}`: {measure.scale:.10g} "}
+            offered = {word} if written is unit.factors[0][0] else set()
+            self._note(written, "unit of the deck", defined={where} if where else None, said=said, offered=offered)
 
     def _path(self, path: tuple[Word, ...], run: str, where: str) -> None:
         """The parts of a path: of signals in a run, of parameters in a sweep."""
@@ -436,10 +452,23 @@ def wrong(editor: Editor, deck: Path, judged: Judged, where: At) -> Iterator[tup
     if judged.offered or judged.only is not None:
         found = editor.about("textDocument/completion", deck, line, column)
         words = {each["label"].split()[0] for each in found}  # `exclude when`
+        if not _is_in_loop(deck.read_text(), line):
+            unwritable = sorted(each["label"] for each in found if re.search(r"[({]", each["label"]))
+            if unwritable:
+                yield "completion", f"{shown}: {unwritable} cannot be written here"
         lacking = sorted({each.split()[0] for each in judged.offered} - words)
         more = sorted(words - judged.only) if judged.only is not None else []
         if lacking or more:
             yield "completion", f"{shown}: lacks {lacking}, and has {more[:6]} too many"
+
+
+def _is_in_loop(text: str, line: int) -> bool:
+    """True for a line, from 0, in a loop of a deck whose loops end on lines of their own."""
+    opened: list[bool] = []
+    for each in text.split("\n")[:line]:
+        opened += [each.strip().startswith("for ")] * max(each.count("{") - each.count("}"), 0)
+        del opened[len(opened) - max(each.count("}") - each.count("{"), 0) :]
+    return any(opened)
 
 
 def _values_in(text: str) -> Iterator[tuple[str, float]]:

@@ -69,6 +69,42 @@ def test_a_block_in_a_loop_has_the_entries_of_its_kind(tmp_path: Path, editor: E
     assert "span" in words(editor, deck, CHAIN.replace("[span,", "[|"))
 
 
+def test_names_that_a_loop_makes_are_offered_and_those_with_braces_in_the_loop_alone(
+    tmp_path: Path, editor: Editor
+) -> None:
+    deck = opened(tmp_path, editor)
+    assert words(editor, deck, CHAIN.replace("{ j_1.q = 0.1 rad; }", "{ |"))[:3] == ["j_0", "j_1", "j_2"]
+    linear = "    linear about { %s; }\n    record "
+    for before, found in (
+        ("open = j_1.|", {"q", "tau"}),
+        ("at = |", {"equilibrium"}),
+        ("open = |", {"j_0", "j_1", "j_2", "q", "links"}),
+    ):
+        offered = words(editor, deck, CHAIN.replace("    record ", linear % before))
+        assert found <= set(offered) and not {"j_{i}", "axis", "at", "duration"} & set(offered), before
+    in_loop = CHAIN.replace("child = seg_{i};", "child = |;")
+    assert {"seg_{i}", "seg_0", "seg_1", "seg_2"} <= set(words(editor, deck, in_loop))
+    in_run = "    for i in 1 .. 2 { metric top_{i} = peak { of = j_{i}.q; }  require | }\n    record "
+    offered = words(editor, deck, CHAIN.replace("    record ", in_run))
+    assert {"top_{i}", "j_{i}", "j_2"} <= set(offered), "and not what a block of a run may begin with"
+    offered = words(editor, deck, CHAIN.replace("    record ", "    require |\n    record "))
+    assert "j_2" in offered and not any("{" in each for each in offered)
+
+
+def test_what_words_alone_may_stand_is_offered_alone(tmp_path: Path, editor: Editor) -> None:
+    deck = opened(tmp_path, editor)
+    sweeps = CHAIN + "run other like swing { }\nsweep a of swing { }\nsweep b of other { }\nsweep both = a + b;\n"
+    assert words(editor, deck, sweeps + "tune t of swing { against |") == ["a", "both"]
+    assert words(editor, deck, 'let bodies = csv("bodies.csv", rows = |);\n' + CHAIN) == ["all"]
+    assert words(editor, deck, CHAIN.replace("j_1.q = 0.1 rad", "j_1.q = |"))[0] == "command"
+    watched = CHAIN.replace("    record ", "    metric size = peak { of = abs(j_1.q); }\n    record ")
+    editor.change(deck, watched)
+    assert editor.of(deck) == []
+    assert not any(
+        "(" in each for each in words(editor, deck, watched.replace("    record ", "    require |\n    record "))
+    )
+
+
 def test_a_value_of_all_turns_is_shown(tmp_path: Path, editor: Editor) -> None:
     deck = opened(tmp_path, editor)
     found = editor.about("textDocument/hover", deck, *at(CHAIN, "mass = 0.1"))["contents"]["value"]
