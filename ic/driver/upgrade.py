@@ -169,13 +169,12 @@ def _not_proved(path: str, compiled: Compiled) -> Problem:
     first = next((each for each in compiled.diagnostics if each.severity == "error"), None)
     at = Label(first.at.place, f"{first.code}, {first.message}") if first is not None and first.at is not None else None
     include = "name a deck that includes it, too: `met fmt --upgrade DECK PART`; or write the line by hand"
-    helps: tuple[str, ...]
-    why, helps = "it does not compile by itself", ("what it means cannot be compared before and after", include)
+    why, helps = "it does not compile by itself", ["what it means cannot be compared before and after", include]
     if first is None:
         why = "it has no run, and what it means depends on the deck that includes it"
-        helps = (include,)
+        helps = [include]
     elif not _is_readable(path):
-        why, helps = "it cannot be read", ("mend it first: `met check` shows all that is wrong",)
+        why, helps = "it cannot be read", ["mend it first: `met check` shows all that is wrong"]
     return Problem(error("E346", f"`{path}` stays in its edition: {why}", at, help=helps), compiled.sources)
 
 
