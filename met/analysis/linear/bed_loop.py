@@ -4,7 +4,8 @@ The loop is an experiment of its own, linearised as any other (`period`), one ti
 at the bed, where the arm is felt: the arm's inertia there is an input of the program, so that many arms are linearised
 side by side. Its operating point is a shaft that turns at a steady rate, at which no limit is reached and no friction
 changes its sign: at rest friction holds the shaft, and there is no loop. There are no faults, whose noise and
-converters would be taken for slopes, and the load's current has no limit, at which nothing would come back.
+converters would be taken for slopes, and no limits of torque, voltage and the load's current, at which nothing would
+come back.
 """
 
 from __future__ import annotations
@@ -19,15 +20,25 @@ from met.analysis.linear.jacobian import seeds
 from met.analysis.linear.period import PeriodProgram
 from met.frozen import frozen
 from met.plan import Command, Coordinate, Experiment, Formula, Joint, Link, Origin, Quantity, Schedule
+from met.program import cell_names
 from met.servos.motor import Motor
 from met.trace.graph import Formulas
 
 LINK = "load"
 """The only link of the arm."""
 
-ARM, RATE = "bench:arm", "bench:rate"
-"""Inputs of the program besides those of the experiment: inertia of the arm, kg m^2 (prismatic: mass, kg), and the rate
-of the joint, rad/s (m/s). No path of a deck's has a colon."""
+ARM, RATE, COMMAND = "bench:arm", "bench:rate", "bench:command"
+"""Inputs of the program besides those of the experiment: inertia of the arm, kg m^2 (prismatic: mass, kg), the rate of
+the joint, and the one that it is commanded, rad/s (m/s). No path of a deck's has a colon."""
+
+PUSHES = (1.0, 2.0, 5.0, 11.0, 40.0, 200.0, 1000.0)
+"""Times its rate that a joint is commanded, one after the other, until its shaft goes on in its direction for a tick:
+where the motor that is there is not as its law takes it to be, the load may turn it back, and an emulated bed stops it
+then, for the rest of a substep. Without limits a push changes no derivative."""
+
+BEYOND = 1e9
+"""Limit of torque, N m (N), and of voltage, V, that no loop is at, also where the motor that is there is not as its law
+takes it to be, and the shaft does not go on as it turned."""
 
 LONG = 1000.0
 """Periods for which a position command goes on at that rate; one of them is looked at."""
@@ -37,32 +48,55 @@ class BedLoop:
     """The loop of a joint of an experiment, for any of its cases."""
 
     def __init__(self, experiment: Experiment, joint: str) -> None:
-        self.program = PeriodProgram(by_itself(experiment, joint))
+        self.joint, self.program = joint, PeriodProgram(by_itself(experiment, joint))
 
     def of_case(self, given: Mapping[str, float], motor: Motor) -> CaseLoop:
         """The loop of a case. given: its inputs of the experiment's program;  motor: the joint's"""
         # back-EMF alone then takes half of the torque there is
         rate = 0.5 * motor.tau_max * motor.resistance / (motor.kt * motor.kt * motor.ratio)
-        inputs = {**given, ARM: 1.0, RATE: float(rate)}
+        inputs = {**given, ARM: 1.0, RATE: float(rate), COMMAND: float(rate)}
         begun = FlowAbreast(self.program, inputs, {}, 0, 1)
         begun.begin_settled()
-        return CaseLoop(self.program, inputs, begun.cells, float(motor.ratio * motor.ratio * motor.inertia))
+        rotor, joint = float(motor.ratio * motor.ratio * motor.inertia), self.joint
+        turning = frozenset({f"{joint}.bed.shaft_rate", cell_names.REFERENCE_RATE(joint)})
+        return CaseLoop(self.program, inputs, begun.cells, rotor, turning)
 
 
 @frozen
 class CaseLoop:
-    """The loop of a case, before its first tick. inputs, cells: of its program; rotor: N^2 J_m, kg m^2 (kg)"""
+    """The loop of a case, before its first tick.
+
+    inputs, cells  of its program;  rotor: N^2 J_m, kg m^2 (kg);  turning: names of what turns on, cells
+    """
 
     program: PeriodProgram
     inputs: Mapping[str, float]
     cells: Mapping[str, float]
     rotor: float
+    turning: frozenset[str]
 
     def maps(self, ratios: Sequence[float]) -> tuple[np.ndarray, tuple[str, ...]]:
         """The map from tick to tick with an arm of each of these r, [arm, state, state], no numbers where an event is
-        in the tick; and its states: those that act on more than themselves, such as no angle that only adds up."""
-        program, arms = self.program, self.rotor * np.array(ratios)[:, None]
-        flow = FlowAbreast(program, {**self.inputs, ARM: arms}, {}, 0, len(arms))
+        in the tick, or the shaft turns back; and its states: those that act on more than themselves, such as no angle
+        that only adds up."""
+        names = self.program.states
+        found = np.full((len(ratios), len(names), len(names)), np.nan)
+        left = np.arange(len(ratios))
+        for push in PUSHES:
+            some = self._maps(np.array(ratios)[left], push)
+            found[left] = some
+            left = left[np.isnan(some).any((1, 2))]
+            if not left.size:
+                break
+        known = found[~np.isnan(found).any((1, 2))]
+        act = np.flatnonzero(np.any(known != np.eye(len(names)), axis=(0, 1)))
+        return found[:, act][:, :, act], tuple(names[place] for place in act)
+
+    def _maps(self, ratios: np.ndarray, push: float) -> np.ndarray:
+        """The maps over all states, [arm, state, state], while the joint is commanded so many times its rate."""
+        program, arms = self.program, self.rotor * ratios[:, None]
+        inputs = {**self.inputs, ARM: arms, COMMAND: np.full_like(arms, push * self.inputs[RATE])}  # as what differs
+        flow = FlowAbreast(program, inputs, {}, 0, len(arms))
         flow.begin_as(self.cells)
         flow.ticks()
         flow.finish()  # no bed is under way before
@@ -71,10 +105,10 @@ class CaseLoop:
         flow.ticks()
         flow.finish()
         found = np.stack([np.broadcast_to(flow.tangent(name), (len(arms), n)) for name in names], axis=1)
-        act = np.flatnonzero(np.any(found != np.eye(n), axis=(0, 1)))
-        found = found[:, act][:, :, act]
-        found[flow.unusual | flow.on_kink] = np.nan
-        return found, tuple(names[place] for place in act)
+        turns = [name for name in names if name in self.turning]
+        back = [np.broadcast_to(flow.cells[name] <= 0.0, (len(arms), 1))[:, 0] for name in turns]
+        found[np.logical_or.reduce([flow.unusual, flow.on_kink, *back])] = np.nan
+        return found
 
     def radii(self, ratios: Sequence[float]) -> np.ndarray:
         """The largest size of a pole of a tick, with an arm of each of these r, [arm]; infinite where one is none."""
@@ -110,17 +144,22 @@ def by_itself(experiment: Experiment, joint: str) -> Experiment:
     )
     n, outputs, over = 2 * len(formulas.nodes), len(formulas.outputs), LONG / schedule.base_hz
     made = Formulas(
-        (*formulas.inputs, ARM, RATE),
-        (*formulas.nodes, ("input", ARM), ("input", RATE), ("const", over), ("mul", n + 2, n + 4)),
-        (*formulas.outputs, n, n + 2, n + 6),
-    )
-    arm, rate, far = (_number(Formula(outputs + k)) for k in range(3))
+        (*formulas.inputs, ARM, RATE, COMMAND),
+        (
+            *formulas.nodes,
+            *(("input", name) for name in (ARM, RATE, COMMAND)), ("const", over), ("mul", n + 4, n + 6),
+        ),
+        (*formulas.outputs, n, n + 2, n + 4, n + 8),
+    )  # fmt: skip
+    arm, rate, commanded, far = (_number(Formula(outputs + k)) for k in range(4))
     told = f"{joint}.servo.command."
     parameters = {
         path: value
         for path, value in experiment.parameters.items()
         if path.startswith((f"{joint}.servo.", f"{joint}.bed.", f"{joint}.law.")) and not path.startswith(told)
     }
+    limits = (f"{joint}.servo.tau_max", f"{joint}.servo.v_max", f"{joint}.bed.tau_max")
+    parameters |= {path: _number(BEYOND) for path in limits if path in parameters}
     places = [f"{joint}.{part}.{axis}" for part in ("at", "rpy", "axis") for axis in "xyz"]
     inertias = [f"inertia.{of}" for of in ("xx", "yy", "zz", "xy", "xz", "yz")]
     body = [f"links.{LINK}.{of}" for of in ("mass", "com.x", "com.y", "com.z", *inertias)]
@@ -130,8 +169,8 @@ def by_itself(experiment: Experiment, joint: str) -> Experiment:
     if kind == "position":
         parameters |= {f"{told}start": _number(0.0), f"{told}to": far, f"{told}over": _number(over)}
     elif kind == "rate":
-        parameters[f"{told}value"] = rate
-    inputs = (Coordinate(path, "", 1.0, np.zeros(experiment.cases.count), ()) for path in (ARM, RATE))
+        parameters[f"{told}value"] = commanded
+    inputs = (Coordinate(path, "", 1.0, np.zeros(experiment.cases.count), ()) for path in (ARM, RATE, COMMAND))
     return replace(
         experiment, structure=alone, parameters=parameters, formulas=made, requirements=(), linear=(),
         linear_metrics=(), step_errors=(), tolerances=(), search=None,

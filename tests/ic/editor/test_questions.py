@@ -124,7 +124,7 @@ def test_words_of_a_deck_itself_are_offered_and_shown_as_the_language_declares_t
     text = "deck 2;\nunit ozin = 7.061552e-3 N*m;\n"
     editor.open(deck, text)
     declared = [entry.name for entry in TOP_LEVEL.entries]
-    assert declared == ["deck", "let", "param", "unit"]
+    assert declared == ["deck", "let", "param", "use", "unit"]
     assert words(editor, deck, text + "|")[len(DEFINITIONS) :][: len(declared)] == declared
     assert words(editor, deck, "deck |") == ["1", "2"]
     assert "ozin" in words(editor, deck, text + "servo s { model = rigid_gearbox;  tau_max = 5 |")
