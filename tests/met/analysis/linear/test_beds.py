@@ -61,8 +61,8 @@ def test_the_limit_of_a_law_is_where_a_pole_leaves_the_unit_circle(
 OTHER = (
     DECK.replace(
         "rigid_gearbox { command",
-        "rigid_gearbox { ratio = 100;  kp = 0.1 V*s/rad;  ki = 1 V/rad;  v_max = 24 V;  resistance = 1 ohm;  kt = 1 N*m/A;"
-        "  tau_max = 1 N*m;  j_m = 1e-4 kg*m^2;  f_c = 0 N*m;  f_v = 0 N*m*s/rad;  command",
+        "rigid_gearbox { ratio = 100;  kp = 0.1 V*s/rad;  ki = 1 V/rad;  v_max = 24 V;  resistance = 1 ohm;"
+        "  kt = 1 N*m/A;  tau_max = 1 N*m;  j_m = 1e-4 kg*m^2;  f_c = 0 N*m;  f_v = 0 N*m*s/rad;  command",
     )
     .replace("initial { hinge.qd = 0.03 rad/s; }", "")
     .replace("0.03 rad/s", "1e-4 rad/s")
