@@ -18,7 +18,7 @@ from met import run as engine
 from met.analysis.linear.abreast import FlowAbreast, alike, of_case, together
 from met.analysis.linear.flow import Edge, Flow, added, listed
 from met.analysis.linear.period import PeriodProgram
-from met.analysis.linear.shafts import held_rates
+from met.analysis.linear.shafts import held_rates, shaft_rates
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.passing import run_past
@@ -261,6 +261,7 @@ def _carried(begin: Callable[[], Flow], states: tuple[str, ...], opposite: Mappi
         for place, each in enumerate(ticks):
             if each.after == after:
                 flow.tangents[added(program.inputs[each.entry].path)] = unit[n + place]
+        turned = shaft_rates(flow)
         flow.ticks(recording=after == 0)
         for place, each in enumerate(ticks):
             path = program.inputs[each.entry].path
@@ -272,6 +273,9 @@ def _carried(begin: Callable[[], Flow], states: tuple[str, ...], opposite: Mappi
         flow.refuse(reduce(or_, (now[name] != modes[name] for name in now), False), partial(_changed, now, modes))
         before = flow.limits()
         flow.finish()
+        for joint, rate in shaft_rates(flow).items():
+            stopped = (turned[joint] != 0.0) & (turned[joint] * rate <= 0.0)
+            flow.refuse(stopped, partial("the shaft of the bed of `{}` stops, or turns back".format, joint))
         if flow.tick % program.schedule.dynamics == 0:
             steps += 1
             for path, count in flow.limits().items():

@@ -8,6 +8,7 @@ for the rest of a substep, so that a push to one side and to the other differ, a
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from met.analysis.linear.flow import Flow
 from met.program import cell_names
@@ -29,10 +30,16 @@ def bring_to_rest(flow: Flow) -> None:
     flow.cells |= {cell: 0.0 for cell, _ in _rates(flow) if abs(flow.cells[cell]) <= SLOW}
 
 
+def shaft_rates(flow: Flow) -> dict[str, Any]:
+    """Rates of the shafts of beds, rad/s, by joint; of a `FlowAbreast` [case, 1] or a number each."""
+    joints = [each.use.joint for each, _, _ in flow.program.system.mounted]
+    cells = {joint: f"{joint}.bed.shaft_rate" for joint in joints}
+    return {joint: flow.cells[cell] for joint, cell in cells.items() if cell in flow.cells}
+
+
 def loose_beds(flow: Flow) -> list[str]:
     """Joints whose bed's shaft stands where a period begins, and does for all of it, though nothing holds it there."""
-    shafts = [each.use.joint for each, _, _ in flow.program.system.mounted]
-    rates = {joint: f"{joint}.bed.shaft_rate" for joint in shafts}
+    rates = {joint: f"{joint}.bed.shaft_rate" for joint in shaft_rates(flow)}
     return [joint for joint, cell in rates.items() if _goes_to_0(flow, cell, 0.0) and not _is_held(flow, cell)]
 
 

@@ -11,6 +11,7 @@ import pytest
 import ic
 from met.analysis.linear.answers import LinearQuestion
 from met.analysis.margin import BedExperiment, margins
+from met.diagnostic import Problem
 from met.plan import Experiment
 
 DECK = """\
@@ -88,3 +89,14 @@ def test_a_motor_that_is_far_from_what_its_law_takes_it_for_is_as_in_the_whole_p
     tape = beds.begun(0)
     loop = beds.loop("hinge", 0, beds.motors(tape)[0])
     np.testing.assert_allclose(loop.radii(loads), largest, rtol=1e-6)
+
+
+def test_a_tick_in_which_the_shaft_of_a_bed_turns_back_has_no_derivative(tmp_path: Path) -> None:
+    """As an emulated bed stops it for the rest of a substep: nothing of its rate comes out of that tick."""
+    deck = OTHER.replace("LAW", "torque_balance").replace("RATE", "1 kHz").replace("delay = DELAY", "kt = 0.065 N*m/A")
+    turning = deck.replace("servos { hinge = drive; }", "servos { hinge = drive; }  initial { hinge.qd = 1e-4 rad/s; }")
+    (tmp_path / "deck.ic").write_text(turning)
+    (made,) = ic.compile(tmp_path / "deck.ic", select=["loads"]).experiments
+    with pytest.raises(Problem, match="the shaft of the bed of `hinge` stops, or turns back") as refused:
+        LinearQuestion(with_loads(made, [1.0]), at=0.001).of(0)
+    assert refused.value.diagnostics[0].code == "D370"
