@@ -455,7 +455,9 @@ def _command(use: Use, experiment: Experiment) -> dict[str, Callable[[Numbers], 
     def course(n: Numbers) -> Any:
         return use.model.course(parameters(n, use, experiment), n.number("t", lambda: n.rng.uniform(0.0, 0.4)))
 
-    return {"course": course}
+    shortest = use.model.shortest
+    more = {} if shortest is None else {"shortest": lambda n: shortest(parameters(n, use, experiment))}
+    return {"course": course, **more}
 
 
 class Poses:
