@@ -37,7 +37,7 @@ LAW = Law(
     name="measured_acceleration",
     doc=__doc__,
     parameters=(
-        Parameter(name="low_pass", unit="Hz", default=math.inf, above=0.0, doc="cut-off of a low-pass; inf: none"),
+        Parameter(name="low_pass", unit="Hz", default=math.inf, above=1e-9, doc="cut-off of a low-pass; inf: none"),
     ),
     balance="none",
     memory=(Memory(name="acceleration", unit="rad/s^2", doc="acceleration of the shaft, as measured"),),

@@ -509,13 +509,17 @@ def _check_room(scope: Scope, owner: Owner, profile: Profile, values: Mapping[st
     """A course that is made of parts has the time for all of them, in every case."""
     assert profile.shortest is not None
     path, item = owner.join("over"), body.get("over")
+    try:
+        least = profile.shortest(SimpleNamespace(**values))
+    except ZeroDivisionError:  # of a number that is out of its range, which is told
+        return
 
     def test(times: np.ndarray) -> tuple[np.ndarray, list[str]]:
         bad = ~(times[:, 0] >= times[:, 1] * (1.0 - ROUNDING))
-        return bad, [f"this is {over:.9g} s, and {least:.9g} s are needed" for over, least in times[bad][:1]]
+        return bad, [f"this is {over:.9g} s, and {needed:.9g} s are needed" for over, needed in times[bad][:1]]
 
     scope.checks.require(
-        (values["over"], profile.shortest(SimpleNamespace(**values))),
+        (values["over"], least),
         test,
         code="D384",
         message=f"`over` of {owner.label} is too short for the way up and down",

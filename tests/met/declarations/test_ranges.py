@@ -28,8 +28,8 @@ from tests.met.small_models import EVERY, SMALLEST, Small, Use, smallest, uses
 
 pytestmark = pytest.mark.slow
 
-UNSTABLE = {"D104"}
-"""What else a number may be refused for: one at its bound may make a servo too fast for the step."""
+UNSTABLE = {"D104", "D384"}
+"""What else a number may be refused for: one at its bound may make a servo too fast for the step, a course too slow."""
 
 
 def ranged(kind: models.Kind, name: str) -> Iterator[tuple[Use, Parameter]]:
