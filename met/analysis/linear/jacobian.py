@@ -14,14 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from met import run as engine
 from met.analysis.linear.abreast import FlowAbreast, alike, of_case, together
 from met.analysis.linear.flow import Edge, Flow, added, listed
 from met.analysis.linear.period import PeriodProgram
 from met.analysis.linear.shafts import held_rates, shaft_rates
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.passing import run_past
 from met.plan import Experiment
 
 SAME = 1e-9
@@ -71,6 +69,8 @@ class PeriodMap:
 
 def at_instant(program: PeriodProgram, case: int, tick: int) -> Flow:
     """A case at an instant, from which a period goes on: as the run has it there. Raises Problem D371."""
+    from met import run as engine
+
     (flow,) = at_instants(program, engine.inputs(program.experiment, np.array([case])), tick)
     if flow is None:
         raise failed(program.experiment, tick)
@@ -83,6 +83,8 @@ def at_instants(program: PeriodProgram, given: np.ndarray, tick: int, threads: i
     inputs = [dict(zip(prepared.program.inputs, row, strict=True)) for row in given.tolist()]
     if not tick:
         return [*together([Flow(program, each, {}, 0) for each in inputs], Flow.begin)]
+    from met.passing import run_past
+
     _, outputs, memory = run_past(
         prepared.kernel, given, tick - 1, [tick - 1], record=False, threads=threads
     )  # fmt: skip

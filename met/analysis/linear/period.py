@@ -13,8 +13,8 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
-from met import run as engine
 from met.analysis.linear.injected import ADDED, InjectedBuilder
 from met.plan import Experiment, Recorded
 from met.plan.linear_signals import InputSignal
@@ -27,6 +27,9 @@ from met.trace.recorder import record
 from met.trace.recording import Branch, CodeSection, RecordedControl, RecordSection
 from met.trace.slicing import sections_in
 from met.trace.tangents import TangentSection, moved_by, with_tangents
+
+if TYPE_CHECKING:
+    from met import run as engine
 
 
 class PeriodProgram:
@@ -67,6 +70,8 @@ class PeriodProgram:
     @cached_property
     def prepared(self) -> engine.Prepared:
         """The experiment as it is run, without inputs and with records of its own."""
+        from met import run as engine
+
         return engine.prepare(self.experiment)
 
     @cached_property
