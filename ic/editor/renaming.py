@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from ic.driver.compile import Compiled
-from ic.editor.checking import CheckRequest
+from ic.editor.checking import CheckRequest, compiled_with_reply
 from ic.editor.names import NameInText, NamesInTexts
 from ic.editor.structure import DeckText
 from ic.language import BLOCKS
@@ -115,17 +115,8 @@ def _is_deck(name: str) -> bool:
 
 
 def _compiled(request: CheckRequest) -> Compiled:
-    from ic.driver.compile import check
-
     os.chdir(request.folder)
-    return check(
-        request.name,
-        include_dirs=request.include_dirs,
-        defines=request.defines,
-        select="all",
-        text=request.text,
-        unsaved=request.unsaved,
-    )
+    return compiled_with_reply(request)[0]
 
 
 def renamed(asked: RenameRequest) -> Renamed:

@@ -83,13 +83,7 @@ class FlowAbreast(Flow):
             tangents = [(cell, of(ref)) for cell, ref in section.tangents] if moves else []
             for kink in section.kinks if moves else ():
                 self._note(kink.nodes, self._of_each(of(kink.sides[0]) == of(kink.sides[1])) & self._any(of(kink.move)))
-        for cell, value in cells:
-            self.cells[cell] = value
-            self.tangents.pop(cell, None)
-        self.tangents.update({cell: move for cell, move in tangents if np.any(move != 0.0)})
-        if self._recording and moves:
-            self.rows.update({column: of(ref) for column, ref in section.records})
-            self.row_tangents.update({column: of(ref) for column, ref in section.record_tangents})
+        self._store(section, of, cells, tangents)
         self.sections_run.append(number)
         self._runs += 1
 

@@ -133,6 +133,18 @@ class Flow:
                 a, b = kink.sides
                 if of(a) == of(b) and np.any(of(kink.move) != 0.0):
                     self.edges.append(Edge(self._runs, kink.nodes, section.name, self.tick, self._moved(section, kink)))
+        self._store(section, of, cells, tangents)
+        self._runs += 1
+
+    def _store(
+        self,
+        section: TangentSection,
+        of: Callable[[int], Any],
+        cells: Iterable[tuple[str, Any]],
+        tangents: Iterable[tuple[str, Any]],
+    ) -> None:
+        """Take over what a section came to. of: the value of a reference;  cells, tangents: of its stores"""
+        moves = bool(self.tangents)
         for cell, value in cells:
             self.cells[cell] = value
             self.tangents.pop(cell, None)
@@ -140,7 +152,6 @@ class Flow:
         if self._recording and moves:
             self.rows.update({column: of(ref) for column, ref in section.records})
             self.row_tangents.update({column: of(ref) for column, ref in section.record_tangents})
-        self._runs += 1
 
     def _moved(self, section: TangentSection, kink: Kink) -> tuple[str, ...]:
         """The cells that move what a kink compares."""
