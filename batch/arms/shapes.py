@@ -1,4 +1,4 @@
-"""What the links look like: the deck's shapes as simple solids and lines, each fixed to its link's frame.
+"""The looks of the links: the deck's shapes as simple solids and lines, each fixed to its link's frame.
 
 A rod, a box and a cylinder begin at the link frame's origin and extend along one of its axes; a sphere is centred there
 (ic/meaning/mechanics/shapes.py). Where the deck writes a centre of mass and leaves the inertia to the shape, the solid
@@ -67,7 +67,7 @@ class ArmShape:
 
 
 def shapes(arm: ArmNumbers, bodies: Sequence[Link | Payload]) -> dict[str, list[ArmShape]]:
-    """What is drawn of each of these bodies, and of the base where it is no link, by name."""
+    """The solids of each of these bodies, and of the base where it is no link, by name."""
     structure = arm.experiment.structure
     carried: dict[str, list[Joint]] = {}
     for joint in structure.joints:

@@ -1,4 +1,4 @@
-"""What the links look like (`batch.arms.shapes`) as foxglove's primitives, each fixed to its link's frame."""
+"""The looks of the links (`batch.arms.shapes`) as foxglove's primitives, each fixed to its link's frame."""
 
 from __future__ import annotations
 

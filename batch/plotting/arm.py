@@ -124,7 +124,7 @@ def _outputs(
     channels: dict[str, np.ndarray],
     time: np.ndarray,
 ) -> np.ndarray:
-    """What the scene's formulas come to, (row, output)."""
+    """Values of the scene's formulas, (row, output)."""
     values: dict[str, Any] = {v.path: float(group.at(v.name, [position])[0]) for v in group.role("coordinate")}
     values |= {name: channels[name] for name in scene.channels} | {TIME: time}
     for joint in scene.joints:

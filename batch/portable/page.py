@@ -96,7 +96,7 @@ def data_of(experiment: Experiment, archive: ArchiveFile, group: ArchiveGroup) -
 
 
 def _in_deck_units(units: DeckUnits, columns: Sequence[Mapping[str, str]]) -> list[tuple[float, str]]:
-    """Of each column the number that its SI values are divided by, and the unit they are then in."""
+    """The divisor of each column's SI values, and the unit they are then in."""
     out = []
     for each in columns:
         panel = Panel(each["signal"], "", each["unit"], each["signal"], (), ())

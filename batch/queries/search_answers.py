@@ -144,7 +144,7 @@ class SearchAnswer:
         return out + (self._border() if found.serves and search.kind == "tune" else [])
 
     def _by_slopes(self) -> list[str]:
-        """How far a tuning went along exact slopes, and why no further, in lines."""
+        """Lines about a tuning along exact slopes: the steps it took, and why no more."""
         search = self.search
         count, why_not = search.along_slopes, search.without_slopes
         out = [f"  {count:,} of them along exact slopes of the metrics"] if count else []

@@ -117,7 +117,7 @@ def _loop_lines(loop: OpenLoop, answers: Linearized) -> Iterator[str]:
 
 
 def no_limit(loop: OpenLoop) -> str:
-    """What is told of a loop whose gain has no limit above, or none so near that it was looked at."""
+    """The words about a loop whose gain has no limit above, or none so near that it was looked at."""
     return "no limit" if loop.searched is None else f"more than {loop.searched:,.0f} times"
 
 

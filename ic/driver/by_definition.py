@@ -34,7 +34,7 @@ from met.plan import Allowance
 
 @frozen
 class KnownFindings:
-    """What was found of one definition, and the allowances of its experiments."""
+    """Findings about one definition, and the allowances of its experiments."""
 
     found: DefinitionFindings
     allowances: tuple[tuple[Allowance, ...], ...] = ()

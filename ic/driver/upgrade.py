@@ -45,7 +45,7 @@ class Upgrades:
 
 
 def upgrades(paths: Sequence[str]) -> Upgrades:
-    """What `met fmt --upgrade` makes of these files, of which those of the latest edition are not among the texts."""
+    """The texts that `met fmt --upgrade` makes of these files, but of those of the latest edition."""
     found: dict[str, str] = {}
     before: dict[str, Compiled] = {}
     refused: dict[str, Problem] = {}

@@ -109,7 +109,7 @@ def answers(request: CheckRequest, *, pause: float) -> Iterator[CheckReply | Dec
 
 
 def first_replies(request: CheckRequest, clock: Callable[[], float] = time.monotonic) -> Iterator[CheckReply]:
-    """What is told before the audit; of a deck that cannot be read, all that there is. clock: in s."""
+    """Replies before the audit; about a deck that cannot be read, all that there is. clock: in s."""
     from ic.driver.by_definition import DefinitionChecks
     from ic.read import read
     from met.diagnostic import Problem

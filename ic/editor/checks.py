@@ -138,7 +138,7 @@ class DeckChecks:
         return [self.checked[uri] for uri in self._roots() if uri in self.checked]
 
     def request(self, deck: OpenText) -> CheckRequest:
-        """What a check of a deck is asked, with all texts as they are now."""
+        """The request for a check of a deck, with all texts as they are now."""
         folder, name = os.path.split(deck.path) if deck.path is not None else (os.getcwd(), "")
         exists = os.path.isdir(folder)
         return CheckRequest(

@@ -80,7 +80,7 @@ def _duration(seconds: float) -> str:
 
 
 def _verdicts(entry: TextEntry, last: LastRun, range_of: RangeOf) -> Iterator[types.CodeLens]:
-    """What the last run said of each requirement that is written here."""
+    """The last run's verdict on each requirement that is written here."""
     words = {"".join(text.split()): counts for text, counts in last.requirements.items()}
     for inner in entry.entries:
         if inner.kind != "require" or len(inner.words) < 2:

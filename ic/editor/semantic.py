@@ -81,7 +81,7 @@ def meanings(text: DeckText, names: NamesInTexts) -> Iterator[tuple[Token, str, 
 
 
 def _parameter_or_index(text: DeckText, token: Token, loops: list[TextEntry]) -> tuple[str, int] | None:
-    """Whether a word is the parameter of a macro, or the index of a loop around it."""
+    """True where a word is the parameter of a macro, or the index of a loop around it."""
     for macro in text.macros:
         if macro.name.offset < token.offset <= macro.end:
             for each in macro.parameters or ():

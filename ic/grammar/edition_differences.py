@@ -20,7 +20,7 @@ from met.diagnostic import Help, Label, Place, write
 
 class EditionDifferences(Cursor):
     units_alone = False
-    """Whether a unit is declared here, so that no name is that of a value."""
+    """True where a unit is declared here, so that no name is that of a value."""
 
     @cached_property
     def names_of_units(self) -> frozenset[str]:

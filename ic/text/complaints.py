@@ -109,7 +109,7 @@ class Complaints:
         return (bool(self.errors), *sets)
 
     def findings(self) -> DefinitionFindings:
-        """What was found, of a collector that is `apart`."""
+        """The findings of a collector that is `apart`."""
         return DefinitionFindings(
             tuple(each for each in self._found if each != _BEFORE),
             tuple(self._remarks),

@@ -1,4 +1,4 @@
-"""How an arm's accelerations move with its state, in closed form: inverse dynamics differentiated, solved with the
+"""Derivatives of an arm's accelerations by its state, in closed form: inverse dynamics differentiated, solved with the
 factors of the mass matrix.
 
     M dqdd = dtau - (d ID/dq) dq - (d ID/dqd) dqd        ID = M(q) qdd + h(q, qd), at the qdd that was found
@@ -125,7 +125,7 @@ class LinearisedDynamics:
         return left
 
     def _load_torques(self, wrenches: Mapping[str, Wrench] | None) -> list[Real]:
-        """What wrenches on links are at the joints, N m (N)."""
+        """Torques of wrenches on links, at the joints, N m (N)."""
         tree = self.tree
         total = list(loads_on_bodies(tree, wrenches)[0])
         torques: list[Real] = [0.0] * len(total)

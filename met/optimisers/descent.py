@@ -59,7 +59,7 @@ class LocalModel:
         return self.after(np.zeros(self.piece_slopes.shape[1]))
 
     def after(self, move: np.ndarray) -> float:
-        """What the straight functions give after a move, [dimension]."""
+        """The function's value after a move, [dimension]."""
         values = self.pieces + added((self.piece_slopes * move).T)
         if len(self.hinges):
             np.add.at(

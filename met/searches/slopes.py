@@ -61,7 +61,7 @@ def worth_of(search: Search, requirements: Sequence[MetricLimit], found: CaseSlo
 def local_model(
     search: Search, requirements: Sequence[MetricLimit], found: CaseSlopes, candidate: np.ndarray
 ) -> LocalModel | str:
-    """What is to be small at a candidate, over the unit cube; or why there is no such function.
+    """A model of what is to be small near a candidate, over the unit cube; or why there is none.
 
     candidate  values of its parameters, SI;  found: of its cases
     """
@@ -106,5 +106,5 @@ def local_model(
 
 
 def _per_share(low: float, high: float, logarithmic: bool, value: float) -> float:
-    """How a parameter moves with its place in its range, there."""
+    """Slope of a parameter by its place in its range, there."""
     return value * logarithm(high / low) if logarithmic else high - low

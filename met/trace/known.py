@@ -31,7 +31,7 @@ class KnownDerivative:
 
 
 class KnownTangents:
-    """What is known of a section's graph, for directions one after the other."""
+    """Derivatives that a section's recording tells in closed form, for directions one after the other."""
 
     def __init__(self, graph: Nodes, known: Sequence[KnownDerivative]) -> None:
         self._graph, self._known = graph, known

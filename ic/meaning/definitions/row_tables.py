@@ -61,7 +61,7 @@ class RowTable:
         return Diagnostic("D385", message, Label(place), also, tuple(helps), severity="warning")
 
     def cells(self, name: Name) -> tuple[CsvCell, ...]:
-        """What a path means, `bodies.boom.mass`: one cell, or those of a vector. Raises Problem, placed."""
+        """The cells that a path means, `bodies.boom.mass`: one, or those of a vector. Raises Problem, placed."""
         if len(name.path) < 3:
             raise self._no_value(name)
         _, row, *words = name.path

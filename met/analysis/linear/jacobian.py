@@ -173,7 +173,7 @@ def _by_itself(program: PeriodProgram, flow: Flow) -> PeriodMap | Problem:
 
 @frozen
 class _Held:
-    """What is held in a case where a period begins, the joints that are locked among it, and what is then a state."""
+    """Names of states that are held in a case where a period begins, of locked joints among them, and of all others."""
 
     held: tuple[str, ...]
     locked: tuple[str, ...]
@@ -181,7 +181,7 @@ class _Held:
 
 
 def _held(start: Flow, after: Flow) -> _Held:
-    """What is held where a period begins. after: its first ticks. Raises Problem where something breaks away."""
+    """Find what is held where a period begins. after: its first ticks. Raises Problem where something breaks away."""
     locked, rates = start.locked(), held_rates(start)
     held = (*(name for name, mode in after.modes().items() if mode == 0.0), *rates.values(), *locked)
     if going := after.breaking_away():
