@@ -44,6 +44,7 @@ def jacobian(of: LinearisedDynamics, parts: int = 4) -> np.ndarray:
     return np.array([[x for part in of.along(*move) for x in part] for move in moves]).T
 
 
+@pytest.mark.oracle
 def test_accelerations_move_as_pinocchio_says() -> None:
     worst = Worst("d qdd / d(q, qd, tau) against computeABADerivatives, share of the largest entry")
     for arm, tree in forest():
@@ -60,6 +61,7 @@ def test_accelerations_move_as_pinocchio_says() -> None:
     worst.below(CLOSE)
 
 
+@pytest.mark.oracle
 @pytest.mark.parametrize("joints", [40, 60])
 def test_rounding_does_not_grow_along_a_chain(joints: int) -> None:
     """Of rods alike, without rotors: the random trees branch early, and none is so deep."""
