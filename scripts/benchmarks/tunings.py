@@ -1,4 +1,4 @@
-"""Tunings with and without exact slopes: cases, how near they come to the best that is known, and how long they take.
+"""Tunings with and without exact slopes: cases, how near they come to the best that is known, and their CPU time.
 
     python -m scripts.benchmarks.tunings [SEEDS [PROBLEM ...]]
 
@@ -161,10 +161,10 @@ tune t of fine {{
 
 
 def tuned(experiment: Experiment, prepared: engine.Prepared, slopes: TuningSlopes) -> tuple[int, int, float, float]:
-    """Cases, those along slopes, the goal in the worst plant of the best candidate, and seconds."""
+    """Cases, those along slopes, the goal in the worst plant of the best candidate, and seconds of CPU."""
     search = experiment.search
     assert search is not None
-    begun, method = time.perf_counter(), search_method(search, slopes)
+    begun, method = time.process_time(), search_method(search, slopes)
     cases, worths = [], []
     while len(asked := method.ask()):
         program = prepared.of_cases(with_cases(experiment, asked))
@@ -175,7 +175,7 @@ def tuned(experiment: Experiment, prepared: engine.Prepared, slopes: TuningSlope
         method.tell(worth)
         cases.append(asked)
         worths.append(worth)
-    seconds, table = time.perf_counter() - begun, np.concatenate(cases)
+    seconds, table = time.process_time() - begun, np.concatenate(cases)
     _, of, tried = np.unique(table[:, : len(search.parameters)], axis=0, return_inverse=True, return_counts=True)
     worst = np.full(len(tried), -np.inf)
     np.maximum.at(worst, of.ravel(), np.concatenate(worths))
@@ -214,9 +214,13 @@ def compare(name: str, seeds: int) -> None:
     for way in ("off", "on", "long"):
         off = [100.0 * (each[2] / best - 1.0) for each in found[way]]
         cases, seconds = (median(each[n] for each in found[way]) for n in (0, 3))
-        row += [f"{cases:,.0f}", f"{median(off):.2g} %, {max(off):.2g} %", f"{seconds:.1f} s"]
+        row += [f"{cases:,.0f}", f"{_share(median(off))} ({_share(max(off))})", f"{seconds:.1f} s"]
     along = median(each[1] for each in found["on"])
     print(f"| {name} | {row[0]} | " + " | ".join(row[1:]) + f" | {along:.0f} |", flush=True)
+
+
+def _share(percent: float) -> str:
+    return "< 0.001 %" if 0.0 < percent < 0.001 else f"{percent:.2g} %"
 
 
 def main() -> None:
