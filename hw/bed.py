@@ -4,6 +4,9 @@ A bed has a drive motor, which is the motor under test, and a load motor on the 
 the one and the current of the other, which its amplifiers hold, and answers with what its sensors say. Everything is in
 SI, on the motor's side of the gearbox. What is sent and read are whole counts of the bed's scales.
 
+A drive that has a loop of its own is told a torque or a rate in place of the voltage: `About.drive` says which. All
+that is called voltage here, command, count, limit and slew, is then of that quantity and in its unit, N m or rad/s.
+
     bed.connect()                       who is there: name, limits, scales; the outputs are in the safe state
     bed.arm()                           from here on a deadman runs
     while ...: bed.exchange(V, A)       at the wire's rate, at least 500 Hz
@@ -20,6 +23,7 @@ from typing import Self
 
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
+from met.substitution.bed import Drive
 
 
 class BedState(enum.IntEnum):
@@ -92,6 +96,7 @@ class About:
     firmware  first eight bytes of the SHA-256 of what was built, in hexadecimal
     session   another number after each boot
     tick_hz   rate of the bed's own ticks, Hz;  deadman: s without a new command after which it stops
+    drive     what the drive is told (met.substitution.bed.DRIVES); a deck's bed model must be of the same
     """
 
     name: str
@@ -103,6 +108,7 @@ class About:
     deadman: float
     scales: Scales
     limits: Limits
+    drive: Drive = "voltage"
 
 
 @frozen

@@ -21,6 +21,7 @@ from hw.drivers import opened
 from hw.pace import Pace, pace
 from hw.ports import Port
 from hw.writer import recording
+from met import models
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.plan import SEED, Experiment, Formula
@@ -72,6 +73,7 @@ def run(request: CaseRequest) -> loop.LoopEnd:
             port = Port(request.ports[joint], request.baud, request.lock_step, request.transcripts.get(joint))
             beds.append(opened(port, experiment, joint, request.row, of.period))
             abouts.append(_greeted(beds[-1], joint, experiment, request))
+            _check_drive(abouts[-1], experiment, joint)
         lock_step = request.lock_step
         _check_time(abouts, lock_step)
         _check_ticks(abouts, of, lock_step)
@@ -131,6 +133,17 @@ def _greeted(bed: BedDriver, joint: str, experiment: Experiment, request: CaseRe
         seed = int(case_seeds(experiment, [row])[0]) if SEED in cases.noise else cases.seed
         bed.preset(seed=seed, repeat=0 if cases.repeats is None else int(cases.repeats[row]))
     return about
+
+
+def _check_drive(about: About, experiment: Experiment, joint: str) -> None:
+    """Raise Problem E438 where a bed's drive is told another quantity than the deck's bed model has it."""
+    use = next(each for each in experiment.structure.substitutions if each.joint == joint)
+    told = models.find("bed", use.bed, use.place).drive
+    if told != about.drive:
+        message = f"bed `{about.name}` takes a {about.drive}, and `{use.bed}` of joint `{joint}` sends it a {told}"
+        fit = [name for name, each in models.available("bed").items() if each.drive == about.drive]
+        helps = f"bed models that send a {about.drive}: {', '.join(fit) or 'none'}"
+        raise Problem(error("E438", message, help=helps))
 
 
 def _check_time(abouts: Sequence[About], lock_step: bool) -> None:

@@ -21,6 +21,7 @@ from ic.printing.columns import columns, number, quantity
 from met.diagnostic import Diagnostic
 from met.frozen import frozen
 from met.messages.visible import say
+from met.substitution.bed import DRIVES
 
 ASKED = 32
 """The number of times that the sensors are read, to measure how long an answer takes."""
@@ -89,15 +90,16 @@ def probe_and_tell(
 def lines(result: ProbeResult) -> list[str]:
     """The result for people, line by line."""
     about, sample, limits = result.about, result.sample, result.about.limits
+    unit, _ = DRIVES[about.drive]
     out = [f"bed `{about.name}` at {result.port}"]
     sensors = (f"{name.replace('_', ' ')} {quantity(value, unit)}" for name, value, unit in _read(sample))
     rows = [
         ["firmware", f"{about.firmware}, version {about.version} of the protocol, session {about.session}"],
-        ["has", ", ".join(["drive voltage", "load current", "tachometer", *capabilities(about)])],
+        ["has", ", ".join([f"drive {about.drive}", "load current", "tachometer", *capabilities(about)])],
         ["ticks", f"{number(about.tick_hz)} Hz; stops itself after {number(1e3 * about.deadman)} ms without a command"],
         [
             "limits",
-            f"{number(limits.voltage)} V, {number(limits.voltage_slew)} V/s; {number(limits.current)} A, "
+            f"{number(limits.voltage)} {unit}, {number(limits.voltage_slew)} {unit}/s; {number(limits.current)} A, "
             f"{number(limits.current_slew)} A/s, I2t {number(limits.heat)} A^2 s; {number(limits.rate)} rad/s, armed "
             f"below {number(limits.arming_rate)} rad/s",
         ],
@@ -167,7 +169,7 @@ def _trips(bed: BedDriver) -> tuple[float, ...]:
 
 def _scales(about: About) -> list[tuple[float, str]]:
     s, has = about.scales, about.capabilities
-    result = [(s.voltage, "V"), (s.current, "A"), (s.rate, "rad/s")]
+    result = [(s.voltage, DRIVES[about.drive][0]), (s.current, "A"), (s.rate, "rad/s")]
     others = (
         (Capability.ENCODER, s.angle, "rad"),
         (Capability.DRIVE_CURRENT, s.drive_current, "A of the drive"),

@@ -106,6 +106,10 @@ def run(request: MovesRequest) -> MovesResult:
         about = bed.connect()
         process.warnings(bed)
         latch.check(bed, about, request.port)
+        if about.drive != "voltage":
+            message = f"bed `{about.name}` takes a {about.drive}, and the moves that identify a motor are voltages"
+            helps = "set its drive to voltages for the time of `met bed identify`, or take the data sheet's numbers"
+            raise Problem(error("E438", message, help=helps))
         if Capability.SIMULATED in about.capabilities:
             bed.preset(seed=experiment.cases.seed)
         lock_step = Capability.LOCK_STEP in about.capabilities

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import field
-from typing import Any
+from typing import Any, Literal
 
 from met.frozen import frozen
 from met.parameter import Memory, Parameter
@@ -25,6 +25,16 @@ class Wire:
     voltage: Real
     current: Real
 
+
+Drive = Literal["voltage", "torque", "rate"]
+"""The quantity that the drive of a bed is told: where the servo's law ends and the drive's begins."""
+
+DRIVES: Mapping[Drive, tuple[str, str]] = {
+    "voltage": ("V", "all of the servo's law is ours: its voltage is on the drive motor"),
+    "torque": ("N*m", "the drive has a current loop of its own: it is told the torque of the motor"),
+    "rate": ("rad/s", "the drive has a rate loop of its own: it is told the rate of the shaft"),
+}
+"""Unit of each, and what the drive then does itself."""
 
 Draw = Callable[[str], Real]
 """A normal deviate of mean 0 and variance 1 by the name of what is noisy: one a tick, the same however it is run."""
@@ -85,6 +95,7 @@ class BedModel:
     read      (p, held) -> the filtered rate as the computer reads it, rad/s
     taken     (p, wire) -> what the amplifiers make of a command, converters and limits; whether a limit held it back
     presets   by the word `faults`, a parameter of shape text: values of parameters that a deck does not write
+    drive     what its drive is told, one of `DRIVES`
     """
 
     name: str
@@ -96,6 +107,7 @@ class BedModel:
     read: Callable[[Any, Any], Real]
     taken: Callable[[Any, Wire], tuple[Wire, Truth]]
     presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    drive: Drive = "voltage"
 
     @property
     def shown(self) -> tuple[tuple[str, str, str], ...]:

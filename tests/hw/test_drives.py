@@ -1,0 +1,43 @@
+"""What a bed's drive is told: a voltage, a torque or a rate, which the deck's bed model has to send."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import ic
+from hw import case
+from hw.bed import About
+from hw.beds import emulated
+from hw.beds.emulated import EmulatedBed
+from met.diagnostic import Problem
+from tests.hw.device import Shaft
+
+DECK = """\
+#include <two_link.ic>
+run bench like nominal {
+    rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }
+    substitute shoulder { bed = emulated(delay = 1); }
+}
+"""
+
+
+def about() -> About:
+    values = {"i_max": 3.0}
+    return EmulatedBed(Shaft(), emulated.scales(values), emulated.limits(values, 1e-3)).connect()
+
+
+def test_a_drive_that_takes_a_torque_is_not_sent_voltages(tmp_path: Path) -> None:
+    (tmp_path / "deck.ic").write_text(DECK)
+    (experiment,) = ic.compile(tmp_path / "deck.ic", select=["bench"]).experiments
+    case._check_drive(about(), experiment, "shoulder")
+    with pytest.raises(Problem) as refused:
+        case._check_drive(replace(about(), drive="torque"), experiment, "shoulder")
+    (told,) = refused.value.diagnostics
+    assert (told.code, told.message) == (
+        "E438",
+        "bed `emulated` takes a torque, and `emulated` of joint `shoulder` sends it a voltage",
+    )
+    assert told.help == ("bed models that send a torque: none",)
