@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.queries.deck_units import DeckUnits, written_plan
 from batch.queries.groups import groups_named
 from batch.queries.pool import Pool, pools
 from batch.queries.step_errors.figures import figures, together
@@ -116,7 +117,10 @@ def _section(
         beds = stability(pool, own, progress)
     except Problem as problem:
         trouble = trouble or "; ".join(diagnostic.message for diagnostic in problem.diagnostics)
-    drawn = signals(pool, values, before)
+    recorded = any(group.recorded for group in pool.groups)
+    plan = written_plan(file) if recorded else None
+    units = [DeckUnits(file, group, plan) for group in pool.groups] if plan is not None else []
+    drawn = signals(pool, values, before, units)
     errors = together(map(figures, pool.groups))
     return ReportSection(
         name=pool.name,
