@@ -24,7 +24,7 @@ from batch.report.contents.overview import overview
 from batch.report.contents.parameters import parameters, varied
 from batch.report.contents.parts import Fact, Report, ReportSection, SourceListing, Stability
 from batch.report.contents.stability import stability
-from batch.report.contents.tables import replay, structures, worst
+from batch.report.contents.tables import best, replay, structures, worst
 from batch.report.contents.verdicts import metric_rows, verdict
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem
@@ -131,6 +131,7 @@ def _section(
         structures=structures(pool, before),
         evidence=evidence_part(pool, archive, several=bool(only)),
         designs=design_answer(file, pool),
+        best=best(pool, archive, only, before),
         worst=worst(pool, archive, only, before),
         overview=overview(pool, before),
         signals=drawn,

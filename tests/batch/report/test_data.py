@@ -149,6 +149,24 @@ class TestWorstCases:
             assert file.groups[0].values("case").tolist() == [worst.cases[0]]
 
 
+class TestBestCases:
+    def test_are_those_with_most_margin(self, here: Path, engine: None) -> None:
+        one = plans.gains(20)
+        one = replace(one, requirements=tuple(replace(each, limit=7.0) for each in one.requirements))
+        path = archives.made(here / "a.h5", one)
+        section = gathered(path).sections[0]
+        assert section.best is not None and section.best.title == "Best cases"
+        with ArchiveFile(path) as file:
+            settle, volts = (file.groups[0].values(name) for name in ("settle", "volts"))
+        margin = 1.0 - np.maximum(settle, volts) / 7.0
+        assert list(section.best.cases) == np.argsort(-margin, kind="stable")[:5].tolist()
+        assert section.best.left == int((margin > 0).sum()) - 5 and section.best.table.marked == frozenset()
+
+    def test_are_not_told_apart_where_none_is_good_or_few_are_there(self, here: Path, sweep: Path) -> None:
+        assert gathered(sweep).sections[0].best is None
+        assert gathered(archives.made(here / "b.h5", plans.gains(5))).sections[0].best is None
+
+
 class TestThePoints:
     def test_are_all_cases_of_few(self, sweep: Path) -> None:
         found = gathered(sweep).sections[0].overview
