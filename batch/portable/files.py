@@ -9,7 +9,7 @@ from typing import Any
 from batch.archive.read import ArchiveFile
 from batch.campaigns.choosing import experiments_named
 from batch.campaigns.plans import read_plan
-from batch.portable.description import FORMAT, described
+from batch.modules.description import FORMAT, described
 from batch.portable.page import GENERATOR
 from met.backends.wasm.module import compiled
 from met.diagnostic import Problem, error

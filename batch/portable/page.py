@@ -17,7 +17,7 @@ from batch.archive.read import ArchiveFile, ArchiveGroup, reading
 from batch.archive.stored import Unlike
 from batch.arms.scene import arm_scene, lacking, scene_json
 from batch.arms.scripts import arm_scripts, arm_style
-from batch.portable.description import MOST_CASES, described
+from batch.modules.description import MOST_CASES, described
 from batch.queries.deck_units import DeckUnits
 from batch.queries.groups import groups_named
 from batch.queries.signals import Panel, deck_unit, pretty_unit

@@ -26,14 +26,12 @@ class DeckUnits:
     in.
 
     experiment  what was run, as the plan has it; None where the plan cannot be read here: units are SI then
+    plan        that of the archive, where a caller has read it for several groups (`written_plan`)
     """
 
-    def __init__(self, archive: ArchiveFile, group: ArchiveGroup) -> None:
+    def __init__(self, archive: ArchiveFile, group: ArchiveGroup, plan: Plan | None = None) -> None:
         self.group = group
-        try:
-            plan: Plan | None = archive.plan(as_written=True)
-        except Problem:
-            plan = None
+        plan = plan or written_plan(archive)
         found = [] if plan is None else [each for each in plan.experiments if each.name == group.name]
         self.experiment: Experiment | None = found[0] if found else None
         self._votes = _votes(self.experiment, plan) if plan is not None and self.experiment is not None else {}
@@ -62,6 +60,14 @@ class DeckUnits:
                 for signal in (of, of.rpartition(".")[2]):
                     out.setdefault(signal, []).append(str(variable.attributes.get("deck_unit", variable.unit)))
         return out
+
+
+def written_plan(archive: ArchiveFile) -> Plan | None:
+    """The archive's plan, to be looked at; None where it cannot be read here."""
+    try:
+        return archive.plan(as_written=True)
+    except Problem:
+        return None
 
 
 def _votes(experiment: Experiment, plan: Plan) -> dict[str, tuple[str, ...]]:

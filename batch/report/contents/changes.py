@@ -20,6 +20,18 @@ class OtherOrigin:
 
 
 @frozen
+class DeckTextChange:
+    """A file of the decks that differs.
+
+    said  how, in words;  lines: a unified difference of its text, without its heads;  left  lines that are not here
+    """
+
+    said: str
+    lines: tuple[str, ...]
+    left: int = 0
+
+
+@frozen
 class RunChanges:
     """A run, or the cases of one structure of a sweep, in both archives.
 
@@ -46,11 +58,13 @@ class ArchiveChanges:
     """The differences from another archive as a whole.
 
     before   what the other is called, and `now` this one
-    origins  what they were made from and that differs
+    origins  what they were made from and that differs, but for the texts of the decks
+    decks    files of the decks that differ
     alone    runs and sweeps that one of them has alone
     """
 
     before: str
     now: str
     origins: tuple[OtherOrigin, ...]
+    decks: tuple[DeckTextChange, ...]
     alone: tuple[str, ...]

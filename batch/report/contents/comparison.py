@@ -10,10 +10,12 @@ from batch.differences import words
 from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, VERDICTS
 from batch.differences.result import Diff, ExperimentDiff
 from batch.queries.failures import ranges
-from batch.queries.pool import Pool
+from batch.queries.pool import ENDED, Pool
 from batch.report.contents.against import GOOD, ComparedArchive, EarlierCases
-from batch.report.contents.changes import ArchiveChanges, OtherOrigin, RunChanges
+from batch.report.contents.changes import ArchiveChanges, DeckTextChange, OtherOrigin, RunChanges
+from batch.report.contents.moves import metric_moves
 from batch.report.contents.parts import OutcomeCount, RequirementFlow, Verdict
+from met.messages.visible import visible
 
 MOST_LINES = 200
 """Lines of one kind of change that are in a page."""
@@ -22,7 +24,6 @@ KINDS = {
     "versions": "Versions",
     "code": "Code",
     "structure": "Structure",
-    "deck": "Deck",
     "changed": "Parameters and models",
     "follows": "What follows",
     "new": "New parameters",
@@ -34,8 +35,15 @@ def archive_changes(found: Diff) -> ArchiveChanges:
     origins = tuple(
         OtherOrigin(KINDS[kind], lines[:MOST_LINES], max(0, len(lines) - MOST_LINES))
         for kind, lines in words.provenance_lines(found)
+        if kind in KINDS
     )
-    return ArchiveChanges(str(found.a), str(found.b), origins, tuple(words.unmatched_runs(found)))
+    decks = tuple(
+        DeckTextChange(
+            visible(each.said), tuple(map(visible, each.lines[:MOST_LINES])), max(0, len(each.lines) - MOST_LINES)
+        )
+        for each in found.changed.decks
+    )
+    return ArchiveChanges(str(found.a), str(found.b), origins, decks, tuple(words.unmatched_runs(found)))
 
 
 def run_changes(found: Diff, before: EarlierCases | None) -> tuple[RunChanges, ...]:
@@ -94,6 +102,7 @@ def verdict(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases |
         word=found.verdict,
         figure=_figure(both),
         flows=tuple(flow for pool, before in both for flow in _flows(pool, before, named=len(pairs) > 1)),
+        ends=_ends(both),
     )
 
 
@@ -135,5 +144,23 @@ def _flows(pool: Pool, before: EarlierCases, *, named: bool) -> list[Requirement
             met += words.pairs_text(pairs[text])
         said = words.requirement_text(pairs[text])
         gained, lost = (ranges(pool.cases[which].tolist()) for which in (now & ~was, was & ~now))
-        out.append(RequirementFlow(f"{pool.name}: {said}" if named else said, met, gained, lost))
+        better, worse = metric_moves(pool, before, text)
+        out.append(RequirementFlow(f"{pool.name}: {said}" if named else said, met, gained, lost, better, worse))
     return out
+
+
+def _ends(both: Sequence[tuple[Pool, EarlierCases]]) -> RequirementFlow | None:
+    """Which cases reach their end now, and which no longer; None where all do as before."""
+    gained, lost, was, now, of = [], [], 0, 0, 0
+    for pool, before in both:
+        here, there = pool.ended < ENDED.index("failed"), before.ended < ENDED.index("failed")
+        name = f"{pool.name}: " if len(both) > 1 else ""
+        for which, found in ((here & ~there, gained), (there & ~here, lost)):
+            if (which & before.there).any():
+                found.append(f"{name}{ranges(pool.cases[which & before.there].tolist())}")
+        was, now = was + int((there & before.there).sum()), now + int((here & before.there).sum())
+        of += int(before.there.sum())
+    if not gained and not lost:
+        return None
+    met = f"by {was:,}, now by {now:,} of {of:,}" if was != now else f"by {now:,} of {of:,}, other ones"
+    return RequirementFlow("reaches its end", met, "; ".join(gained), "; ".join(lost))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,13 +19,19 @@ class EarlierHistories:
     """Histories of the other archive, in the panels of a page.
 
     found   the page's panels;  points  of a line at most
+    scaled  the page's unit for each signal, as a panel of this archive, by name and SI unit
     clocks  the page's times, to which those of the other archive are added
     """
 
     def __init__(
-        self, before: EarlierCases, found: Sequence[SignalPanel], clocks: list[np.ndarray], points: int
+        self,
+        before: EarlierCases,
+        found: Sequence[SignalPanel],
+        scaled: Mapping[tuple[str, str], Panel],
+        clocks: list[np.ndarray],
+        points: int,
     ) -> None:
-        self.before, self.found, self.clocks, self.points = before, found, clocks, points
+        self.before, self.found, self.scaled, self.clocks, self.points = before, found, scaled, clocks, points
         self._panels: dict[tuple[bool, str], dict[tuple[str, str], Panel]] = {}
 
     def of(self, case: int, number: int, position: int) -> tuple[History | None, History | None]:
@@ -53,8 +60,13 @@ class EarlierHistories:
     def _of(self, other: bool, group: ArchiveGroup) -> dict[tuple[str, str], Panel]:
         key = other, group.name
         if key not in self._panels:
-            self._panels[key] = {(panel.name, panel.unit): panel for panel in panels(group)}
+            known = [self._in_unit(panel) for panel in panels(group)]
+            self._panels[key] = {(panel.name, panel.unit): panel for panel in known}
         return self._panels[key]
+
+    def _in_unit(self, panel: Panel) -> Panel:
+        one = self.scaled.get((panel.name, panel.si))
+        return panel if one is None else replace(panel, unit=one.unit, scale=one.scale, in_si=one.in_si)
 
     def _clock(self, time: np.ndarray) -> int:
         thinned = thin_clock(time, self.points)

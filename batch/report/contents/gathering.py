@@ -9,6 +9,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
+from batch.queries.deck_units import DeckUnits, written_plan
 from batch.queries.groups import groups_named
 from batch.queries.pool import Pool, pools
 from batch.queries.step_errors.figures import figures, together
@@ -23,7 +24,7 @@ from batch.report.contents.overview import overview
 from batch.report.contents.parameters import parameters, varied
 from batch.report.contents.parts import Fact, Report, ReportSection, SourceListing, Stability
 from batch.report.contents.stability import stability
-from batch.report.contents.tables import replay, structures, worst
+from batch.report.contents.tables import best, replay, structures, worst
 from batch.report.contents.verdicts import metric_rows, verdict
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem
@@ -116,7 +117,10 @@ def _section(
         beds = stability(pool, own, progress)
     except Problem as problem:
         trouble = trouble or "; ".join(diagnostic.message for diagnostic in problem.diagnostics)
-    drawn = signals(pool, values, before)
+    recorded = any(group.recorded for group in pool.groups)
+    plan = written_plan(file) if recorded else None
+    units = [DeckUnits(file, group, plan) for group in pool.groups] if plan is not None else []
+    drawn = signals(pool, values, before, units)
     errors = together(map(figures, pool.groups))
     return ReportSection(
         name=pool.name,
@@ -127,6 +131,7 @@ def _section(
         structures=structures(pool, before),
         evidence=evidence_part(pool, archive, several=bool(only)),
         designs=design_answer(file, pool),
+        best=best(pool, archive, only, before),
         worst=worst(pool, archive, only, before),
         overview=overview(pool, before),
         signals=drawn,

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from batch.archive.read import ArchiveGroup
 from batch.queries.arrange import command_curves, joints_of
+from batch.queries.deck_units import DeckUnits
 from batch.queries.pool import Pool
 from batch.queries.signals import Panel, history, panels
 from batch.report.contents.against import EarlierCases
@@ -32,17 +34,23 @@ MOST_PANELS = 32
 """Plots under one another."""
 
 
-def signals(pool: Pool, values: int = MOST_VALUES, before: EarlierCases | None = None) -> Signals | None:
+def signals(
+    pool: Pool, values: int = MOST_VALUES, before: EarlierCases | None = None, units: Sequence[DeckUnits] = ()
+) -> Signals | None:
     """The histories of the worst cases that have some, and of the middle one; None where none has one.
 
-    values  how many numbers there may be
+    values  how many numbers there may be;  units  the deck's for each group of the pool; none: SI
     before  another archive to compare with: the cases that differ most from it come first, each with what it was there
     """
     known = _kept(pool, before)
     if not known:
         return None
     values = values if before is None else values // 3  # what it is, what it was, and the difference
-    groups = [_Group(group, [place for number, place in known if number == n]) for n, group in enumerate(pool.groups)]
+    scaled: dict[tuple[str, str], Panel] = {}
+    groups = []
+    for n, group in enumerate(pool.groups):
+        own = units[n] if units else None
+        groups.append(_Group(group, [place for number, place in known if number == n], own, scaled))
     width = max(max((each.width for each in groups), default=1), 1)
     few = min(len(known), COMPARED)
     points = int(np.clip(values // (width * few), FEWEST_POINTS, MOST_POINTS))
@@ -66,7 +74,7 @@ def signals(pool: Pool, values: int = MOST_VALUES, before: EarlierCases | None =
         middle = known[len(known) // 2]
         wanted = wanted if middle in wanted else [*wanted[:-1], middle]
     numbers = {each: int(pool.groups[each[0]].at("case", [each[1]])[0]) for each in wanted}
-    was = None if before is None else EarlierHistories(before, found, clocks, points)
+    was = None if before is None else EarlierHistories(before, found, scaled, clocks, points)
     histories = tuple(
         History(
             numbers[n, position],
@@ -129,15 +137,25 @@ def no_signals(pool: Pool) -> str:
 
 
 class _Group:
-    """The histories of the cases of one structure, of which those at these positions are wanted."""
+    """The histories of the cases of one structure, of which those at these positions are wanted.
 
-    def __init__(self, group: ArchiveGroup, positions: Sequence[int]) -> None:
+    units   the deck's; None: SI
+    scaled  panels of structures before it, by name and SI unit: the same signal is in one unit on the whole page
+    """
+
+    def __init__(
+        self,
+        group: ArchiveGroup,
+        positions: Sequence[int],
+        units: DeckUnits | None,
+        scaled: dict[tuple[str, str], Panel],
+    ) -> None:
         self.group = group
         self.panels: tuple[Panel, ...] = ()
         self.rows = 0
         if not positions or not group.role("signal"):
             return
-        found = panels(group)
+        found = [self._in_unit(panel, units, scaled) for panel in panels(group)]
         self.rows = int(group.values("time").shape[0])
         commands = command_curves(group, found, positions[:COMPARED], apart=True)
         drawn = {(command.variable, command.column) for command in commands.values()}
@@ -150,6 +168,11 @@ class _Group:
             ]
             for p in self.panels
         }
+
+    @staticmethod
+    def _in_unit(panel: Panel, units: DeckUnits | None, scaled: dict[tuple[str, str], Panel]) -> Panel:
+        one = scaled.setdefault((panel.name, panel.si), panel if units is None else units.panel(panel))
+        return replace(panel, unit=one.unit, scale=one.scale, in_si=one.in_si)
 
     @property
     def width(self) -> int:

@@ -77,14 +77,31 @@ class FailureRow:
 
 
 @frozen
+class MetricMove:
+    """Cases in which a required metric went one way, away from its limit or towards it, by more than is allowed: how
+    many they are, and of the one that went furthest its number and the value before and now, in `unit`."""
+
+    cases: int
+    case: int
+    before: str
+    now: str
+    unit: str
+
+
+@frozen
 class RequirementFlow:
-    """A requirement in two archives: by how many of the cases in both it is met, in words, and which of these it is met
-    in now, or missed now, and was not before."""
+    """A requirement in two archives, or that a case reaches its end: by how many of the cases in both it is met, in
+    words, and which of these it is met in now, or missed now, and was not before.
+
+    better, worse  cases whose metric is further on the good side of the limit, or less far; None where there is none
+    """
 
     text: str
     met: str
     gained: str
     lost: str
+    better: MetricMove | None = None
+    worse: MetricMove | None = None
 
 
 @frozen
@@ -107,6 +124,7 @@ class Verdict:
     parts   how the cases came out; they add up to all of them
     word    of a comparison: "identical", "equivalent", "different" or "incomparable"; of an answer: what it comes to
     figure  of a comparison: cases with nothing against them, before and now, of how many in both
+    ends    of a comparison: cases that reach their end now and did not, and the reverse; None where all do as before
     """
 
     kind: str
@@ -121,6 +139,7 @@ class Verdict:
     word: str = ""
     figure: tuple[int, int, int] | None = None
     flows: tuple[RequirementFlow, ...] = ()
+    ends: RequirementFlow | None = None
 
     @property
     def cases(self) -> int:
@@ -184,8 +203,9 @@ class TextTable:
 
 
 @frozen
-class WorstCaseTable:
-    """The worst cases: a table whose rows are these cases, the command that runs each again, and what is left out."""
+class NotableCases:
+    """The best cases, or the worst: a table whose rows are these cases, the command that runs each again, and how many
+    more there are."""
 
     title: str
     table: TextTable
@@ -497,7 +517,8 @@ class ReportSection:
     evidence: EvidencePart | None
     designs: DesignAnswer | None
     structures: TextTable | None
-    worst: WorstCaseTable | None
+    best: NotableCases | None
+    worst: NotableCases | None
     overview: Overview | None
     signals: Signals | None
     no_signals: str

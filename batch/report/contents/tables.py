@@ -1,28 +1,50 @@
-"""Tables of a report: the worst cases, and the structures of a sweep side by side."""
+"""Tables of a report: the best and the worst cases, and the structures of a sweep side by side."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from batch.archive.searched import is_search
 from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
 from batch.queries.summary import median_text
 from batch.report.contents.against import GOOD, EarlierCases
-from batch.report.contents.parts import TextTable, WorstCaseTable
+from batch.report.contents.parts import NotableCases, TextTable
 from met.distinct import distinct
 from met.outputs import quoted
 
-MOST_CASES = 20
-"""Rows of the table of worst cases."""
+MOST_CASES, MOST_BEST = 20, 5
+"""Rows of the tables of worst and of best cases."""
 
 MISSES = "\N{BALLOT X}"
 
 
-def worst(pool: Pool, archive: str, only: str, before: EarlierCases | None = None) -> WorstCaseTable | None:
+def best(pool: Pool, archive: str, only: str, before: EarlierCases | None = None) -> NotableCases | None:
+    """The cases that meet all that is required and stay furthest from their limits, the best first; None where nothing
+    is required, no case meets it, or all cases are in the other table at a glance. Of a search too: its answer is the
+    best. only, before: as `worst` has them."""
+    if not pool.requirements or pool.count <= MOST_BEST or any(map(is_search, pool.groups)):
+        return None
+    order = pool.worst_first[::-1]
+    places = order[pool.ended[order] == ENDED.index("met")]
+    if not len(places):
+        return None
+    made = _case_table(pool, places[:MOST_BEST], archive, only, before)
+    return replace(made, title="Best cases", left=len(places) - len(made.cases))
+
+
+def worst(pool: Pool, archive: str, only: str, before: EarlierCases | None = None) -> NotableCases | None:
     """The worst cases, failed ones first. only: the run or sweep to be named in commands; "" where there is one.
     before: how they came out in another archive."""
     if pool.count < 2:
         return None
-    places = pool.worst_first[:MOST_CASES]
+    made = _case_table(pool, pool.worst_first[:MOST_CASES], archive, only, before)
+    return replace(made, title=_title(pool, len(made.cases)), left=pool.count - len(made.cases))
+
+
+def _case_table(pool: Pool, places: np.ndarray, archive: str, only: str, before: EarlierCases | None) -> NotableCases:
+    """The cases at these places, a row each, with all their columns."""
     columns = pool.columns
     rows, marked = [], set()
     ids = pool.texts("case_id", places)
@@ -45,8 +67,7 @@ def worst(pool: Pool, archive: str, only: str, before: EarlierCases | None = Non
         marked=frozenset(marked),
     )
     numbers = tuple(int(pool.cases[place]) for place in places)
-    commands = tuple(replay(archive, only, case) for case in numbers)
-    return WorstCaseTable(_title(pool, len(rows)), table, numbers, commands, pool.count - len(rows))
+    return NotableCases("", table, numbers, tuple(replay(archive, only, case) for case in numbers), 0)
 
 
 def replay(archive: str, only: str, case: int | str) -> str:

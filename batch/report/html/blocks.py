@@ -163,32 +163,52 @@ def _comparison(found: Verdict) -> Html:
     words = [(cls, f"{count:,} {word}") for cls, word, count in parts]
     legend = el("ul", [el("li", el("span", cls=f"key {cls}"), text) for cls, text in words], cls="legend")
     bars = bar([(cls, count) for cls, _, count in parts], "; ".join(text for _, text in words))
-    evidence = [join([bars, legend]) if found.cases > 1 else None, _flows(found.flows)]
+    moves = [*found.flows, *([found.ends] if found.ends is not None else [])]
+    apart = [_moves(moves, better=better) for better in (True, False)] if moves else []
+    evidence = [join([bars, legend]) if found.cases > 1 else None, apart, _flows(found.flows)]
     return el("div", answer, el("div", evidence, cls="evidence"), cls="verdict against")
 
 
 def _flows(found: Sequence[RequirementFlow]) -> Html | None:
     if not found:
         return None
-    gained, lost = any(each.gained for each in found), any(each.lost for each in found)
-    heads = [
-        "requirement",
-        "cases in both",
-        *(["met now, and not before"] if gained else []),
-        *(["missed now, and not before"] if lost else []),
-    ]
     rows = [
-        el(
-            "tr",
-            el("th", el("code", breaking(each.text)), scope="row"),
-            el("td", each.met, cls="words"),
-            el("td", each.gained or "–", cls="good words" if each.gained else None) if gained else None,
-            el("td", each.lost or "–", cls="bad words" if each.lost else None) if lost else None,
-        )
+        el("tr", el("th", el("code", breaking(each.text)), scope="row"), el("td", each.met, cls="words"))
         for each in found
     ]
-    head = el("tr", [el("th", head, scope="col") for head in heads])
+    head = el("tr", [el("th", head, scope="col") for head in ("requirement", "cases in both")])
     return scrolling(el("table", el("thead", head), el("tbody", lines(rows))), "Requirements, before and now")
+
+
+def _moves(found: Sequence[RequirementFlow], *, better: bool) -> Html:
+    """What came out better now, or what came out worse: a row for each requirement by which any case did."""
+    rows = []
+    for each in found:
+        crossed, moved = (each.gained, each.better) if better else (each.lost, each.worse)
+        if not crossed and moved is None:
+            continue
+        furthest: Child = "–"
+        if moved is not None:
+            values = f" {moved.before} → {moved.now} {moved.unit}".rstrip()
+            furthest = [case_link(moved.case), values]
+        rows.append(
+            el(
+                "tr",
+                el("th", el("code", breaking(each.text)), scope="row"),
+                el("td", crossed or "–", cls=f"{'good' if better else 'bad'} words" if crossed else None),
+                el("td", f"{moved.cases:,}" if moved is not None else "–", cls="right"),
+                el("td", furthest, cls="words"),
+            )
+        )
+    name = "Improvements" if better else "Regressions"
+    if not rows:
+        return join([el("h4", name), el("p", "None of what is required.", cls="said")])
+    crossed, moved_head = (
+        ("met now, and not before", "more margin in") if better else ("no longer met", "less margin in")
+    )
+    heads = (("requirement", None), (crossed, None), (moved_head, "right"), ("furthest", None))
+    head = el("tr", [el("th", text, scope="col", cls=cls) for text, cls in heads])
+    return join([el("h4", name), scrolling(el("table", el("thead", head), el("tbody", lines(rows))), name)])
 
 
 def _parts(found: Verdict) -> Html:

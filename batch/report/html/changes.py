@@ -18,14 +18,15 @@ from batch.differences.words import (
     signal_columns,
 )
 from batch.queries.pool import page_number
-from batch.report.contents.changes import ArchiveChanges, OtherOrigin, RunChanges
+from batch.report.contents.changes import ArchiveChanges, DeckTextChange, OtherOrigin, RunChanges
 from batch.report.contents.parts import TextTable
 from batch.report.html.blocks import case_link, likeness, scrolling
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
 from batch.report.html.tables import command, table
 
-SHOWN_LINES, SHOWN_WORST = 12, 5
-"""Lines of one kind of change, and cases of those that changed most, that are open; the others are folded away."""
+SHOWN_LINES, SHOWN_WORST, SHOWN_DIFF = 12, 5, 60
+"""Lines of one kind of change, cases of those that changed most, and lines of a deck's file that are open; the others
+are folded away."""
 
 MOST_ENDED = 20
 """Cases that are listed of those that end otherwise alike."""
@@ -34,8 +35,22 @@ MOST_ENDED = 20
 def origins(found: ArchiveChanges) -> Html:
     """The section on what the two archives were made from, and on runs that one of them has alone."""
     rows = [el("div", el("dt", each.about), el("dd", _lines(each))) for each in found.origins]
-    same = el("p", SAME[0].upper() + SAME[1:], ".", cls="said") if not rows else None
-    return join([el("dl", rows, cls="facts made") if rows else None, same, _noted(found.alone)])
+    same = el("p", SAME[0].upper() + SAME[1:], ".", cls="said") if not rows and not found.decks else None
+    decks = [el("h3", "The decks' text"), [_deck(each) for each in found.decks]] if found.decks else None
+    return join([el("dl", rows, cls="facts made") if rows else None, same, _noted(found.alone), decks])
+
+
+MARKS = {"+": "new", "-": "gone", "@": "at"}
+
+
+def _deck(found: DeckTextChange) -> Html:
+    """A file's text before and now: each line that differs with its mark, those about it, and where they stand."""
+    if not found.lines:
+        return el("p", found.said)
+    rows = [el("li", el("code", line), cls=MARKS.get(line[:1])) for line in found.lines]
+    left = el("p", f"and {found.left:,} more lines", cls="under") if found.left else None
+    text = [el("ol", lines(rows), cls="textdiff"), left]
+    return el("details", el("summary", found.said), text, open=len(rows) <= SHOWN_DIFF, cls="deck")
 
 
 def _noted(said: Sequence[str]) -> Html | None:

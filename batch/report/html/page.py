@@ -75,14 +75,15 @@ def _links(number: int, section: ReportSection, report: Report) -> list[tuple[st
         return [(f"s{number}", section.name)]
     found = [
         ("designs", "" if section.designs is None else section.designs.link, section.designs is not None),
-        ("run", "What was run", True),
-        ("overview", "Cases", section.overview is not None),
         ("evidence", "Evidence", section.evidence is not None),
-        ("influence", "Which parameters matter", bool(section.influences)),
+        ("best", "Best cases", section.best is not None),
         ("worst", "Worst cases", section.worst is not None),
+        ("overview", "Cases", section.overview is not None),
         ("signals", "Signals", section.signals is not None),
+        ("influence", "Which parameters matter", bool(section.influences)),
         ("structures", "Structures", section.structures is not None),
         ("stability", "Stability", section.stability is not None),
+        ("run", "What was run", True),
     ]
     return [(f"s{number}-{key}", name) for key, name, there in found if there]
 
@@ -130,15 +131,12 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
         )
     if section.designs is not None:
         out.append(part("designs", section.designs.heading, designs.designs(section.designs)))
-    out.append(
-        part(
-            "run",
-            "What was run",
-            blocks.facts(section.facts),
-            blocks.varied(section.varied, anchors),
-            _notes(section.notes),
-        )
-    )
+    if section.evidence is not None:
+        out.append(part("evidence", "Evidence", tables.evidence(section.evidence)))
+    if section.best is not None:
+        out.append(part("best", section.best.title, tables.cases(section.best), said=ABOUT_BEST))
+    if section.worst is not None:
+        out.append(part("worst", section.worst.title, tables.cases(section.worst)))
     table = blocks.metrics(section)
     if section.overview is not None:
         out.append(
@@ -154,20 +152,16 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
         )
     elif table is not None:
         out.append(part("overview", "Metrics", table))
-    if section.evidence is not None:
-        out.append(part("evidence", "Evidence", tables.evidence(section.evidence)))
-    if section.influences:
-        shown = [tables.influence(each) for each in section.influences]
-        out.append(part("influence", "Which parameters matter", shown, said=ABOUT_INFLUENCE))
-    if section.structures is not None:
-        out.append(part("structures", "Structures side by side", tables.table(section.structures, "Structures")))
-    if section.worst is not None:
-        out.append(part("worst", section.worst.title, tables.worst(section.worst)))
     if section.signals is not None:
         said = [el("p", each, cls="said") for each in section.signals.said]
         out.append(part("signals", "Signals", el("div", cls="signals plot", data_plot="signals"), said))
     else:
         out.append(part("signals", "Signals", said=section.no_signals))
+    if section.influences:
+        shown = [tables.influence(each) for each in section.influences]
+        out.append(part("influence", "Which parameters matter", shown, said=ABOUT_INFLUENCE))
+    if section.structures is not None:
+        out.append(part("structures", "Structures side by side", tables.table(section.structures, "Structures")))
     if section.stability is not None:
         found = section.stability
         out.append(
@@ -181,6 +175,15 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
                 el("p", found.said, cls="said") if found.said else None,
             )
         )
+    out.append(
+        part(
+            "run",
+            "What was run",
+            blocks.facts(section.facts),
+            blocks.varied(section.varied, anchors),
+            _notes(section.notes),
+        )
+    )
     if section.trouble:
         words = f"Parameters and stability are not shown, for the plan could not be read here: {section.trouble}."
         out.append(el("p", words, cls="note"))
@@ -193,6 +196,8 @@ def _notes(notes: Sequence[str]) -> Html | None:
     summary = f"{len(notes)} note{'s' if len(notes) != 1 else ''} of the compiler"
     return el("details", el("summary", summary), [el("p", note) for note in notes], cls="notes")
 
+
+ABOUT_BEST = "Those that meet all that is required and stay furthest from the limit that is nearest to them."
 
 ABOUT_INFLUENCE = (
     "The shares of each metric's variance that a varied parameter explains, alone and with others. A bar goes from the "

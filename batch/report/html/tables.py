@@ -8,11 +8,11 @@ from batch.report.contents.parts import (
     EvidencePart,
     InfluencePart,
     InfluenceRow,
+    NotableCases,
     ParameterRow,
     SourceListing,
     Stability,
     TextTable,
-    WorstCaseTable,
 )
 from batch.report.html.blocks import Anchors, case_link, mark, scrolling, spot_link
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
@@ -50,8 +50,8 @@ def table(found: TextTable, label: str, cells: Sequence[Sequence[Child]] = (), m
     return scrolling(el("table", el("thead", el("tr", heads)), el("tbody", lines(rows))), label)
 
 
-def worst(found: WorstCaseTable) -> Html:
-    """The worst cases with the command that runs each again."""
+def cases(found: NotableCases) -> Html:
+    """The best or the worst cases with the command that runs each again."""
     rows = []
     columns = found.table
     for number, row in enumerate(columns.rows):

@@ -103,6 +103,33 @@ class TestTheVerdict:
             "",
         )
         assert verdict.figure == (0, 1, 58)
+        ends = verdict.ends
+        assert ends is not None and (ends.met, ends.gained, ends.lost) == (
+            "by 58, now by 57 of 58",
+            "",
+            f"#{number(12)}",
+        )
+
+    @pytest.mark.slow
+    def test_has_improvements_and_regressions_apart(self, planted: tuple[Path, Path]) -> None:
+        found = gathered(*planted)
+        settle, volts = found.verdicts[-1].flows
+        assert (settle.better, settle.worse, volts.worse) == (None, None, None)
+        assert volts.better is not None and (volts.better.cases, volts.better.case) == (2, MIXED.index(14))
+        with ArchiveFile(planted[0]) as file:
+            was = float(file.groups[0].values("volts")[14])
+        assert (volts.better.before, volts.better.now) == (f"{was:.3f}", f"{was - 1.4:.3f}")
+        back = gathered(*reversed(planted)).verdicts[-1].flows[1]
+        assert back.better is None and back.worse is not None and back.worse.cases == 2
+        said = words(page(found))
+        better, worse = said.split(" Improvements ")[1].split(" Regressions ")
+        assert f"volts < 5 V #{MIXED.index(14)} 2 #{MIXED.index(14)} {volts.better.before} → " in better
+        assert f"settle < 10 s #{MIXED.index(12)} – – reaches its end #{MIXED.index(12)}" in worse
+
+    @pytest.mark.slow
+    def test_calls_neither_better_nor_worse_what_is_allowed(self, planted: tuple[Path, Path]) -> None:
+        volts = gathered(*planted, "volts=1V").verdicts[-1].flows[1]
+        assert volts.better is not None and volts.better.cases == 1  # by 1.4 V; the other's 0.7 V are allowed
 
     @pytest.mark.slow
     def test_of_an_archive_and_itself_is_identical(self, planted: tuple[Path, Path]) -> None:
@@ -172,6 +199,18 @@ class TestThePage:
         archives.made(here / "b.h5", replace(one, cases=replace(one.cases, seed=8)))
         self.all_told(Path("a.h5"), Path("b.h5"))
         assert gathered(Path("a.h5"), Path("b.h5")).sections[0].changes[0].samples
+
+    def test_shows_the_lines_of_the_decks_that_differ(self, here: Path) -> None:
+        deck = archives.DECK
+        for name, text in (("a.h5", deck), ("b.h5", deck.replace("duration = 4 s;", "duration = 4.04 s;"))):
+            batch.run(archives.compiled(here, "brief", deck=text), output=name)
+        found = gathered(Path("a.h5"), Path("b.h5"))
+        assert found.changes is not None
+        [changed] = found.changes.decks
+        assert changed.said.endswith("bench.ic: 1 line new, 1 gone") and changed.left == 0
+        source = page(found)
+        assert '<li class="gone"><code>-run brief like nominal { duration = 4 s; }</code></li>' in source
+        assert '<li class="new"><code>+run brief like nominal { duration = 4.04 s; }</code></li>' in source
 
     def test_of_many_changes_folds_away_the_later_ones(self, here: Path, engine: None) -> None:
         one = plans.nominal()

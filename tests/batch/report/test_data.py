@@ -15,6 +15,7 @@ from batch.queries.best import Designs
 from batch.queries.grids import column_levels
 from batch.queries.pool import ENDED, CaseColumn, Pool, pools
 from batch.report.contents import histories, overview, stability
+from batch.report.contents.against import ComparedArchive
 from batch.report.contents.designs import design_map
 from batch.report.contents.gathering import gather
 from batch.report.contents.maps import _steps as round_steps
@@ -146,6 +147,24 @@ class TestWorstCases:
         assert cli.main([*shlex.split(worst.commands[0])[1:], "-q", "--no-picture"]) == cli.YES
         with ArchiveFile(f"both.case{worst.cases[0]}.h5") as file:
             assert file.groups[0].values("case").tolist() == [worst.cases[0]]
+
+
+class TestBestCases:
+    def test_are_those_with_most_margin(self, here: Path, engine: None) -> None:
+        one = plans.gains(20)
+        one = replace(one, requirements=tuple(replace(each, limit=7.0) for each in one.requirements))
+        path = archives.made(here / "a.h5", one)
+        section = gathered(path).sections[0]
+        assert section.best is not None and section.best.title == "Best cases"
+        with ArchiveFile(path) as file:
+            settle, volts = (file.groups[0].values(name) for name in ("settle", "volts"))
+        margin = 1.0 - np.maximum(settle, volts) / 7.0
+        assert list(section.best.cases) == np.argsort(-margin, kind="stable")[:5].tolist()
+        assert section.best.left == int((margin > 0).sum()) - 5 and section.best.table.marked == frozenset()
+
+    def test_are_not_told_apart_where_none_is_good_or_few_are_there(self, here: Path, sweep: Path) -> None:
+        assert gathered(sweep).sections[0].best is None
+        assert gathered(archives.made(here / "b.h5", plans.gains(5))).sections[0].best is None
 
 
 class TestThePoints:
@@ -339,6 +358,34 @@ class TestSignals:
             ("elbow", True),
         ]
         assert found.histories[0].values[found.panels.index(qd)][:, 2:] == pytest.approx(0.03)
+
+    def test_are_in_the_deck_s_units(self, tmp_path: Path) -> None:
+        deck = """#include <two_link.ic>
+            run short like nominal {
+                duration = 0.2 s;  record += [servo.command];
+                initial { shoulder.q = 30 deg;  elbow.q = -20 deg;  qd = 3 deg/s; }
+            }
+        """
+        batch.run(archives.compiled(tmp_path, "short", deck=deck), output=tmp_path / "a.h5")
+        found = gathered(tmp_path / "a.h5").sections[0].signals
+        assert found is not None
+        assert [(panel.name, panel.unit) for panel in found.panels][:2] == [("q", "deg"), ("qd", "deg/s")]
+        assert found.histories[0].values[0][0] == pytest.approx([30.0, -20.0])
+        assert found.histories[0].values[1][0] == pytest.approx([3.0, 3.0, *[np.rad2deg(0.03)] * 2])
+
+    def test_of_another_archive_are_in_the_same_units(self, tmp_path: Path) -> None:
+        deck = "#include <two_link.ic>\nrun short like nominal { duration = 0.2 s;  initial { q = %s; } }\n"
+        for name, start in (("a", "0.5 rad"), ("b", "30 deg")):
+            plan = archives.compiled(tmp_path, "short", deck=deck % start)
+            batch.run(plan, output=tmp_path / f"{name}.h5")
+        with ArchiveFile(tmp_path / "b.h5") as file, ArchiveFile(tmp_path / "a.h5") as other:
+            before = ComparedArchive(other, batch.diff(tmp_path / "a.h5", tmp_path / "b.h5"))
+            found = gather(file, against=before).sections[0].signals
+        assert found is not None and found.panels[0].unit == "deg"
+        [mine] = found.histories
+        assert mine.before is not None and mine.change is not None
+        assert mine.before.values[0][0, 0] == pytest.approx(np.rad2deg(0.5))
+        assert mine.change.values[0][0, 0] == pytest.approx(30.0 - np.rad2deg(0.5))
 
 
 class TestStructures:

@@ -163,6 +163,17 @@ def test_it_reads_without_scripts(found: Report) -> None:
         assert said in re.sub(r"\s+", " ", words)
 
 
+def test_answers_come_first(here: Path, engine: None) -> None:
+    one = archives.grid([0.01, 0.02, 0.03, 0.04], [20.0, 21.0, 22.0])
+    one = replace(one, requirements=tuple(replace(each, limit=20.0) for each in one.requirements))
+    source = report(archives.made(here / "a.h5", one)).read_text(encoding="utf-8")
+    parts = ("verdict", "s0-designs", "s0-evidence", "s0-best", "s0-worst", "s0-overview", "s0-signals", "s0-run")
+    places = [source.index(f'<section id="{part}"') for part in parts]
+    assert places == sorted(places)
+    links = re.findall(r'<a href="#([\w-]+)">', source[source.index("<nav") : source.index("</nav>")])
+    assert links == [*parts, "parameters", "provenance"]
+
+
 @pytest.mark.slow
 def test_a_verdict_of_another_kind_stands_beside_the_first(found: Report) -> None:
     other = replace(found.verdicts[0], kind="difference", about="against b.h5", headline="3 cases differ")

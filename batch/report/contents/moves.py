@@ -1,0 +1,60 @@
+"""Which way required metrics went since another archive: away from their limits, which is better, or towards them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from batch.differences.compare import magnitude
+from batch.differences.words import distinct_texts
+from batch.queries.pool import CaseColumn, Pool, page_number
+from batch.report.contents.against import EarlierCases
+from batch.report.contents.parts import MetricMove
+
+
+def metric_moves(pool: Pool, before: EarlierCases, requirement: str) -> tuple[MetricMove | None, MetricMove | None]:
+    """The cases in both in which the metric of a requirement is better now, and those in which it is worse. Less than
+    the comparison allows is neither, and so is a value that is not a number in one of the two."""
+    for column in pool.metrics():
+        sense = next((limit.sense for limit in column.limits if limit.text == requirement), None)
+        was = None if sense is None else before.values(column)
+        if sense is None or was is None:
+            continue
+        moved = _beyond(pool, before, column)
+        lower, higher = (moved & way for way in (column.values < was, column.values > was))
+        found = (lower, higher) if sense == "<" else (higher, lower)
+        return _move(pool, column, was, found[0]), _move(pool, column, was, found[1])
+    return None, None
+
+
+def _beyond(pool: Pool, before: EarlierCases, column: CaseColumn) -> np.ndarray:
+    """[case] whether a metric differs by more than the comparison of its structure allows."""
+    name = column.key.partition(":")[2]
+    now = pool.gathered(name)
+    was = np.where(before.there, before.pool.gathered(name)[before.place], np.nan)
+    out = np.zeros(pool.count, bool)
+    for number, _, experiment in before.pairs:
+        told = next((each for each in experiment.signals if each.metric and each.name == name and not each.why), None)
+        if told is not None:
+            here = (pool.group_of == number) & before.there
+            a, b, allowed = was[here], now[here], told.tolerance
+            with np.errstate(invalid="ignore", over="ignore"):
+                limit = allowed.absolute + allowed.relative * magnitude(a, b)
+                out[here] = (a != b) & ~(np.abs(b - a) <= limit)
+    return out
+
+
+def _move(pool: Pool, column: CaseColumn, was: np.ndarray, moved: np.ndarray) -> MetricMove | None:
+    """The cases that moved, and the one that moved furthest; None where none did."""
+    places = np.flatnonzero(moved)
+    if not len(places):
+        return None
+    with np.errstate(over="ignore"):
+        furthest = int(places[np.abs(column.values[places] - was[places]).argmax()])
+    texts = _texts(float(was[furthest]), float(column.values[furthest]))
+    return MetricMove(len(places), int(pool.cases[furthest]), *texts, column.unit)
+
+
+def _texts(before: float, now: float) -> tuple[str, str]:
+    """The two values as a page shows them, or in more digits where these would be the same."""
+    texts = page_number(before), page_number(now)
+    return texts if texts[0] != texts[1] else distinct_texts(before, now)
