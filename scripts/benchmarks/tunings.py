@@ -214,7 +214,7 @@ def compare(name: str, seeds: int) -> None:
     for way in ("off", "on", "long"):
         off = [100.0 * (each[2] / best - 1.0) for each in found[way]]
         cases, seconds = (median(each[n] for each in found[way]) for n in (0, 3))
-        row += [f"{cases:,.0f}", f"{_share(median(off))} ({_share(max(off))})", f"{seconds:.1f} s"]
+        row += [f"{cases:,.0f}", f"{_share(median(off))} ({_share(max(off))})", f"{seconds:.2g} s"]
     along = median(each[1] for each in found["on"])
     print(f"| {name} | {row[0]} | " + " | ".join(row[1:]) + f" | {along:.0f} |", flush=True)
 
