@@ -25,13 +25,14 @@ class DeckUnits:
     """The deck's unit for each SI unit: of a signal what a requirement of it is in, else what most of its values are
     in.
 
+    archive     the group's, or the plan of what was run
     experiment  what was run, as the plan has it; None where the plan cannot be read here: units are SI then
     """
 
-    def __init__(self, archive: ArchiveFile, group: ArchiveGroup) -> None:
+    def __init__(self, archive: ArchiveFile | Plan, group: ArchiveGroup) -> None:
         self.group = group
         try:
-            plan: Plan | None = archive.plan(as_written=True)
+            plan: Plan | None = archive if isinstance(archive, Plan) else archive.plan(as_written=True)
         except Problem:
             plan = None
         found = [] if plan is None else [each for each in plan.experiments if each.name == group.name]
