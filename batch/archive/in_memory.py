@@ -1,4 +1,5 @@
-"""The group of one experiment as an xarray.Dataset in memory: what `batch.open` gives of an archive of the same cases.
+"""The group of one experiment in memory: as an xarray.Dataset, what `batch.open` gives of an archive of the same cases;
+and as whoever reads archives takes it.
 
 Making twenty variables anew takes xarray a millisecond. So the Dataset is laid out once for each number of cases, and
 filled by a copy of it that has other values.
@@ -6,14 +7,17 @@ filled by a copy of it that has other values.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from functools import lru_cache
+from collections.abc import Collection, Mapping, Sequence
+from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from batch.archive import layout as archive_layout
 from batch.archive.layout import Layout
+from batch.archive.read import ArchiveGroup
+from batch.archive.stored import Stored
 from batch.archive.values import KINDS, values_of_cases, values_of_dimensions
 from met.frozen import frozen
 from met.plan import Experiment, keys
@@ -95,6 +99,75 @@ class DatasetMaker:
         }
         template = xarray.Dataset(laid, coordinates, attributes).set_coords([name for name in named if name in laid])
         return DatasetLayout(layout, template, tuple(laid))
+
+
+class GroupInMemory(ArchiveGroup):
+    """A group of an archive that is in no file: what is one value a case, and no histories.
+
+    values  by the names of the layout's variables along `case`, in the order of the cases
+    """
+
+    def __init__(self, experiment: Experiment, count: int, values: Mapping[str, Any]) -> None:
+        self._layout = archive_layout.layout(experiment, count, 0)
+        self._values = {**values_of_dimensions(experiment), **values}
+        self.path = Path(experiment.name)
+        self.attributes = _as_read({**self._layout.attributes, "cases_in_table": experiment.cases.count})
+        self.verified = self.summary = self.summed = None
+        self.step_errors = ()
+        self.name, self.sweep, self.allowed = experiment.name, str(self.attributes.get("sweep", "")), ()
+
+    @classmethod
+    def of_run(cls, experiment: Experiment, run: Run) -> GroupInMemory:
+        """The group of the cases of a run."""
+        count = len(run.case)
+        values = values_of_cases(experiment, archive_layout.layout(experiment, count, 0), run)
+        return cls(experiment, count, {name: _plain(each, count) for name, each in values.items()})
+
+    @classmethod
+    def of_metrics(
+        cls, experiment: Experiment, rows: np.ndarray, status: np.ndarray, metrics: Mapping[str, np.ndarray]
+    ) -> GroupInMemory:
+        """The group of these rows of the case table, with their status and metrics alone."""
+        names = {each.key: each.name for each in archive_layout.layout(experiment, len(rows), 0).role("metric")}
+        values = {names[name]: each for name, each in metrics.items()}
+        return cls(experiment, len(rows), {"case": experiment.cases.table[rows], "status": status, **values})
+
+    @cached_property
+    def variables(self) -> dict[str, Stored]:
+        return {each.name: _stored(each) for each in self._layout.variables}
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        return tuple(self.values(name).shape)
+
+    def type(self, name: str) -> str:
+        return str(self.values(name).dtype.str)
+
+    def values(self, name: str) -> np.ndarray:
+        return np.asarray(self._values[name])
+
+    def at(self, name: str, positions: Sequence[int] | np.ndarray) -> np.ndarray:
+        return self.values(name)[np.asarray(positions, np.int64)]
+
+    def stretch(self, name: str, first: int, last: int) -> np.ndarray:
+        return self.values(name)[first:last]
+
+    @property
+    def count(self) -> int:
+        return self._layout.sizes["case"]
+
+    @property
+    def recorded(self) -> int:
+        return 0
+
+
+def _stored(variable: archive_layout.Variable) -> Stored:
+    told = _as_read(variable.attributes)
+    return Stored(variable.name, variable.dims, variable.role, variable.unit, (), variable.long_name, told)
+
+
+def _as_read(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes as `ArchiveGroup` has them: arrays as lists."""
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in attributes.items()}
 
 
 def _as_opened(attributes: Mapping[str, Any]) -> dict[str, Any]:

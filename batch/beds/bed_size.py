@@ -136,8 +136,12 @@ def _notes(experiment: Experiment, joint: str, figures: BedFigures, candidates: 
     use, schedule = servo_of(experiment, joint), experiment.structure.schedule
     assert use is not None
     yield "all of it is simulated: no real bed has been driven with this version"
-    if substitution_of(experiment, joint) is not None:
+    on = substitution_of(experiment, joint)
+    scaled = on is not None and on.scaled
+    if on is not None:
         yield "friction, noise and converters of the bed are in the figures as far as the deck's bed has them"
+        if scaled:
+            yield "the bed is scaled: all figures are of its own motors, and arm and rotor as these feel them"
     else:
         yield "friction, noise and converters of a bed are not in the figures: in the deck this joint is on none"
         if use.divisor < schedule.dynamics:
@@ -145,7 +149,8 @@ def _notes(experiment: Experiment, joint: str, figures: BedFigures, candidates: 
             yield f"the servo ticks {times} times a step of the dynamics, and one of them alone is seen"
     yield "a part's rotor is on the shaft with it; a coupling and a brake are not"
     if any(each.role == "drive" for each in candidates):
-        yield "a drive of other constants moves the joint otherwise: write its own into the servo, and ask again"
+        whose = "bed" if scaled else "servo"
+        yield f"a drive of other constants moves the joint otherwise: write its own into the {whose}, and ask again"
     if any(each.part.figure("resistance") for each in candidates):
         yield "voltages of parts are of resistance and back-EMF, without inductance and what heat does to both"
     if figures.at_most:

@@ -10,12 +10,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from batch.beds.chosen_bed import chosen_bed
 from hw.bed import About, Capability, Limits, Scales
 from hw.identify.driving import MovesRequest
 from hw.process import talk
 from ic.printing.columns import columns, quantity
 from met import models
+from met.analysis.shaft_work import scale_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import new_file
@@ -24,6 +27,7 @@ from met.outputs import check_place
 from met.plan import Experiment, Formula, Plan, Substitution
 from met.plan import file as plan_file
 from met.plant import bed_values
+from met.substitution.bed_scale import BedScale
 
 if TYPE_CHECKING:
     from hw.identify.fit import Estimate, FitResult
@@ -65,8 +69,8 @@ class DataSheet:
 
 
 def sheet_of(experiment: Experiment, joint: str, kt_load: float | None) -> DataSheet:
-    """The data sheet of a joint's motor in the first case: the motor as the servo has it, the rest as the bed has
-    it."""
+    """The data sheet of a joint's motor in the first case: the motor as the servo has it, over the scales of the bed
+    where it has some, and the rest as the bed has it."""
     inputs = {each.path: float(each.values[0]) for each in experiment.cases.coordinates}
     outputs = experiment.formulas.replay(inputs)
 
@@ -74,11 +78,11 @@ def sheet_of(experiment: Experiment, joint: str, kt_load: float | None) -> DataS
         value = experiment.parameters[f"{joint}.servo.{name}"].value
         return float(outputs[value.output] if isinstance(value, Formula) else value)  # type: ignore[arg-type]
 
-    bed = bed_values(experiment, joint)
-    values = {name: servo(own) for name, own in OF_SERVO.items()}
+    bed, scale = bed_values(experiment, joint), _scale_of(experiment, joint)
+    values = {name: servo(own) / scale.of(UNITS[name]) for name, own in OF_SERVO.items()}
     values |= {"kt_load": bed["kt_load"] if kt_load is None else kt_load, "f_cut": bed["f_cut"]}
     if f"{joint}.servo.v_max" in experiment.parameters:
-        values["v_max"] = servo("v_max")
+        values["v_max"] = servo("v_max") / scale.voltage
     origin = experiment.parameters[f"{joint}.bed.kt_load"].origin
     return DataSheet(values, kt_load is not None or origin.place is not None)
 
@@ -279,7 +283,10 @@ def included(
     [use] = (each for each in experiment.structure.substitutions if each.joint == joint)
     [servo] = (each for each in experiment.structure.servos if each.joint == joint)
     bed = [*(f"{name} = {head}_{name}" for name in UNITS), *_believed(experiment, use)]
-    motor = (f"{own} = {head}_{name}; " for name, own in OF_SERVO.items())
+    scale = _scale_of(experiment, joint)
+    times = {name: "" if (by := scale.of(UNITS[name])) == 1.0 else f" * {by:.12g}" for name in OF_SERVO}
+    scales = f"torque = {scale.torque:.12g};  rate = {scale.rate:.12g};  voltage = {scale.voltage:.12g};"
+    motor = (f"{own} = {head}_{name}{times[name]}; " for name, own in OF_SERVO.items())
     uses = (
         [
             f"substitute {joint} {{",
@@ -287,6 +294,7 @@ def included(
             *_packed([f"{each}," for each in bed[:-1]] + bed[-1:], 8),
             "    );",
             f"    law = {use.law};",
+            *([f"    scale {{ {scales} }}"] if use.scaled else []),
             "}",
         ],
         [f"servo found like {servo.definition} {{", *_packed(motor, 4), "}"],
@@ -313,12 +321,18 @@ def included(
     return formatted(str(deck), "\n".join(lines) + "\n")
 
 
+def _scale_of(experiment: Experiment, joint: str) -> BedScale:
+    """The scales of a joint's bed in the first case."""
+    found = scale_of(experiment, joint, np.array([0]))
+    return BedScale(*(float(np.ravel(each)[0]) for each in (found.torque, found.rate, found.voltage)))
+
+
 def _believed(experiment: Experiment, use: Substitution) -> list[str]:
     """The other parameters of the bed that the deck writes."""
     said = {
         path.rpartition(".")[2]: each
         for path, each in experiment.parameters.items()
-        if path.startswith(f"{use.joint}.bed.") and each.origin.kind == "deck"
+        if path.startswith(f"{use.joint}.bed.") and ".scale." not in path and each.origin.kind == "deck"
     }
     own = [
         f"{name} = {quantity(each.value, each.unit)}"

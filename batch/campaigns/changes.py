@@ -350,7 +350,7 @@ WHOLE = {
     "metrics": {"model"},
     "guides": {"model"},
     "sensors": {"model"},
-    "substitutions": {"bed", "law"},
+    "substitutions": {"bed", "law", "scaled"},
 }
 """Fields by whose change a thing has other parameters."""
 

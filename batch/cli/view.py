@@ -1,26 +1,62 @@
-"""`met view`: a face of batch.portable."""
+"""`met view`: a face of batch.portable and batch.watching."""
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 
 import click
 
-from met.cli import YES, loudness_options
+from met.cli import YES, check_options, deck_options, loudness_options
+from met.host.sources import names_archive, names_plan
 from met.messages.visible import say
 
 
-@click.command(short_help="Make one HTML page that runs an archive's cases again, under sliders.")
-@click.argument("archive", metavar="ARCHIVE")
+@click.command(short_help="Make a page that runs an archive's cases again under sliders, or watch a deck on one.")
+@click.argument("source", metavar="ARCHIVE|DECK")
 @click.argument("name", metavar="[NAME]", required=False)
-@click.option("-o", "--output", metavar="FILE", help="The page [ARCHIVE.view.html].")
+@click.option("-o", "--output", metavar="FILE", help="Of an archive: the page [ARCHIVE.view.html].")
+@click.option(
+    "--port", type=click.IntRange(1, 65535), metavar="N", help="Of a deck: the port of 127.0.0.1 [a free one]."
+)
+@deck_options
 @loudness_options
-def view(archive: str, name: str | None, output: str | None, quiet: bool, verbose: bool) -> int:
-    """Write an archive's only run or sweep, or NAME, as a page with a slider for each number that is varied.
+def view(
+    source: str,
+    name: str | None,
+    output: str | None,
+    port: int | None,
+    defines: tuple[str, ...],
+    include_dirs: tuple[str, ...],
+    settings: tuple[str, ...],
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Write an archive's only run or sweep, or NAME, as a page with a slider for each number that is varied. Or watch a
+    deck: the page of its run, or NAME, is new each time the deck is saved.
 
-    Whoever opens it moves a slider, and the run is computed there, with the bits of the archive; where the archive
-    has the case, the page compares. It is whole in one file and opens without a network.
+    Whoever opens the page moves a slider, and the run is computed there, with the bits of the archive; where the
+    archive has the case, the page compares. It is whole in one file and opens without a network.
+
+    The page of a deck is served on 127.0.0.1, to who has the address that is printed, until Ctrl-C or until the
+    terminal is closed. A mistake in the deck is shown beside the last run without one.
     """
+    check_options(source, () if name is None else (name,), False, defines, include_dirs, settings)
+    if names_plan(source):
+        raise click.UsageError(f"`{source}` is a plan: `met run {source}` runs it, and `met view` takes the archive")
+    if names_archive(source):
+        if port is not None:
+            raise click.UsageError(f"--port is for decks: the page of the archive `{source}` is a file")
+        return _write(source, name, output, quiet)
+    if output is not None:
+        raise click.UsageError(
+            f"-o is for archives: the page of the deck `{source}` is served; `met run` makes an archive of it"
+        )
+    return _watch(source, name, port or 0, defines, include_dirs, settings, quiet)
+
+
+def _write(archive: str, name: str | None, output: str | None, quiet: bool) -> int:
     from batch.portable import files
     from batch.portable.page import view as page
     from ic.printing.columns import size
@@ -30,4 +66,35 @@ def view(archive: str, name: str | None, output: str | None, quiet: bool, verbos
     files.write_page(page(archive, () if name is None else (name,)), target)
     if not quiet:
         say(f"{target}  ({size(target.stat().st_size)})")
+    return YES
+
+
+def _watch(
+    deck: str,
+    name: str | None,
+    port: int,
+    defines: tuple[str, ...],
+    include_dirs: tuple[str, ...],
+    settings: tuple[str, ...],
+    quiet: bool,
+) -> int:
+    from batch.executors.termination import TERMINATED, Terminated, terminable
+    from batch.watching.answers import WatchedDeck
+    from batch.watching.following import follow
+    from ic.find import find
+
+    def ready(address: str) -> None:
+        say(address)
+        if not quiet:
+            end = "Ctrl-C ends it" if sys.stdin is not None and sys.stdin.isatty() else f"`kill {os.getpid()}` ends it"
+            say(f"The page of {path}, for a browser on this machine. Who has the address can read it. {end}.", err=True)
+
+    path = find(deck, include_dirs)
+    try:
+        with terminable():
+            follow(WatchedDeck(path, include_dirs, defines, settings), name, port=port, ready=ready)
+    except Terminated:
+        return TERMINATED
+    except KeyboardInterrupt:
+        return YES
     return YES

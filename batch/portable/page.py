@@ -28,8 +28,8 @@ from batch.report.html.payload import script_json
 from met.backends.wasm.module import KERNEL_JS, compiled
 from met.diagnostic import Problem, error
 from met.messages.visible import visible
-from met.plan import Experiment
-from met.run import inputs, prepare
+from met.plan import Experiment, Plan
+from met.run import Prepared, inputs, prepare
 from met.version import VERSION
 
 GENERATOR = "MET view"
@@ -57,9 +57,21 @@ def view(archive: str | Path, names: tuple[str, ...] = ()) -> str:
         return page_of(experiment, data_of(experiment, file, group))
 
 
-def data_of(experiment: Experiment, archive: ArchiveFile, group: ArchiveGroup) -> dict[str, Any]:
-    """Data that the script needs: the module, its description, and what the archive has of the first cases."""
-    prepared = prepare(experiment)
+def data_of(
+    experiment: Experiment,
+    archive: ArchiveFile | Plan,
+    group: ArchiveGroup,
+    *,
+    source: str = "archive",
+    prepared: Prepared | None = None,
+) -> dict[str, Any]:
+    """Data that the script needs: the module, its description, and what the archive has of the first cases.
+
+    archive   the group's; of a group that is in none, the plan
+    source    what the page calls whatever its numbers are compared with
+    prepared  the experiment, where it is at hand
+    """
+    prepared = prepared or prepare(experiment)
     module = compiled(prepared.recording)
     told = described(prepared, module)
     positions = group.values("case")[:MOST_CASES]
@@ -78,12 +90,13 @@ def data_of(experiment: Experiment, archive: ArchiveFile, group: ArchiveGroup) -
     return {
         "module": base64.b64encode(module.code).decode("ascii"),
         "description": shown,
+        "source": source,
         "same_code": prepared.code_key == group.attributes.get("code_key"),
         "positions": positions.tolist(),
         "count": group.count,
         "status": group.stretch("status", 0, len(positions)).tolist(),
         "metrics": [
-            _doubles(group.stretch(known[each["name"]], 0, len(positions))) for each in metrics
+            doubles(group.stretch(known[each["name"]], 0, len(positions))) for each in metrics
         ],
         "labels": [visible(each["name"]) for each in told["inputs"]],
         "units": [_unit(each["unit"]) for each in told["inputs"]],
@@ -127,31 +140,48 @@ def _visible(value: Any) -> Any:
     return [_visible(each) for each in value] if isinstance(value, list) else value
 
 
-def _doubles(values: np.ndarray) -> str:
+def doubles(values: np.ndarray) -> str:
     """Numbers as base64 of their bytes."""
     return base64.b64encode(np.ascontiguousarray(values, "<f8").tobytes()).decode("ascii")
 
 
 def page_of(experiment: Experiment, data: dict[str, Any]) -> str:
-    """The whole file. The same data give the same text."""
+    """The whole file of a page about an archive. The same data give the same text."""
+    by = "by the code that the archive was made with" if data["same_code"] else f"{OTHER_CODE} (MET {VERSION})"
+    return page_text(experiment, data, kicker="A page that simulates", by=by)
+
+
+def page_text(
+    experiment: Experiment,
+    data: dict[str, Any],
+    *,
+    kicker: str,
+    by: str,
+    before: Sequence[str] = (),
+    after: Sequence[str] = (),
+    style: str = "",
+) -> str:
+    """The whole file.
+
+    kicker, by     what stands above the name, and by what code its numbers are computed
+    before, after  further scripts: names of the report's, before the page's own; and texts after it
+    style          a further one
+    """
     script = "\n".join(
         [
-            inlined.licensed("uPlot.iife.min.js", "core.js"),
+            inlined.licensed("uPlot.iife.min.js", "core.js", *before),
             arm_scripts(),
             KERNEL_JS.read_text(encoding="utf-8"),
             f"const MET_PAGE = {script_json(data)};",
             (_ASSETS / "view.js").read_text(encoding="utf-8"),
+            *after,
         ]
     )
-    style = f"{inlined.style()}\n{arm_style()}\n{(_ASSETS / 'view.css').read_text(encoding='utf-8')}"
+    style = "\n".join([inlined.style(), arm_style(), (_ASSETS / "view.css").read_text(encoding="utf-8"), style])
     head = page_head(experiment.name, generator=GENERATOR, style=style, script=script, allowed=_CODE)
-    by = "by the code that the archive was made with" if data["same_code"] else f"{OTHER_CODE} (MET {VERSION})"
     when = "Move a slider, and the run is computed again, here," if data["count"] > 1 else "The run is computed here,"
     header = el(
-        "header",
-        el("p", "A page that simulates", cls="kicker"),
-        el("h1", experiment.name),
-        el("p", f"{when} {by}.", cls="lede"),
+        "header", el("p", kicker, cls="kicker"), el("h1", experiment.name), el("p", f"{when} {by}.", cls="lede")
     )
     none = el("p", "This page needs scripts and WebAssembly, which this reader does not run.")
     body = lines([header, el("main", none), Html(f"<script>{script}</script>")])

@@ -25,13 +25,14 @@ class DeckUnits:
     """The deck's unit for each SI unit: of a signal what a requirement of it is in, else what most of its values are
     in.
 
+    archive     the group's, or the plan that was run (`written_plan`, where a caller has several groups); None where
+                that cannot be read
     experiment  what was run, as the plan has it; None where the plan cannot be read here: units are SI then
-    plan        that of the archive, where a caller has read it for several groups (`written_plan`)
     """
 
-    def __init__(self, archive: ArchiveFile, group: ArchiveGroup, plan: Plan | None = None) -> None:
+    def __init__(self, archive: ArchiveFile | Plan | None, group: ArchiveGroup) -> None:
         self.group = group
-        plan = plan or written_plan(archive)
+        plan = written_plan(archive) if isinstance(archive, ArchiveFile) else archive
         found = [] if plan is None else [each for each in plan.experiments if each.name == group.name]
         self.experiment: Experiment | None = found[0] if found else None
         self._votes = _votes(self.experiment, plan) if plan is not None and self.experiment is not None else {}

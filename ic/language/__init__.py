@@ -16,6 +16,7 @@ from ic.language.runs import (
     METRIC,
     RATES,
     RUN,
+    SCALE,
     SEARCH,
     SUBSTITUTE,
     SWEEP,
@@ -28,8 +29,8 @@ from ic.language.top_level import TOP_LEVEL
 BLOCKS = {
     block.name: block
     for block in (
-        ARM, LINK, JOINT, SERVO, RUN, RATES, INITIAL, ENVIRONMENT, PAYLOAD, SUBSTITUTE, METRIC, LINEAR, TOLERANCES,
-        SWEEP,        SEARCH, TUNE,
+        ARM, LINK, JOINT, SERVO, RUN, RATES, INITIAL, ENVIRONMENT, PAYLOAD, SUBSTITUTE, SCALE, METRIC, LINEAR,
+        TOLERANCES, SWEEP, SEARCH, TUNE,
     )
 }  # fmt: skip
 """All blocks, by name, in the order in which a reader meets them."""

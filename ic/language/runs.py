@@ -5,6 +5,7 @@ from __future__ import annotations
 from ic.language.declaration import BlockDeclaration, Entry
 from met.parameter import Parameter
 from met.plan import BALANCED, VELOCITY_PRODUCTS
+from met.substitution import bed_scale
 
 DURATION = Parameter(name="duration", unit="s", above=0.0, doc="length of the run")
 SEED = Parameter(name="seed", at_least=0.0, at_most=2.0**53, doc="seed of the run's noise")
@@ -15,6 +16,9 @@ MARGIN = Parameter(
     name="margin", default=0.05, at_least=0.0, at_most=1.0, doc="share of each limit to stay away from it"
 )
 BASE_KINDS = ("fixed", "prescribed", "free")
+SCALE_OF_INERTIA = Parameter(
+    name="inertia", above=0.0, doc="follows from torque and rate; where it is written, it is held against them"
+)
 BED, LAW = "emulated", "velocity_tracking"
 """The models of a bed and of its law where a deck names none."""
 
@@ -86,6 +90,25 @@ SUBSTITUTE = BlockDeclaration(
               doc="the model of the bed; `met doc beds`"),
         Entry(name="law", written="law = MODEL(...);", default=f"`{LAW}`", varies="choice", path="JOINT.law",
               doc="how the load motor is driven, one for all substituted joints; `met doc laws`"),
+        Entry(name="scale", written="scale { ... }", default="1: the bed's motor is of the joint's size",
+              doc="how many times larger the joint's motor is than the bed's"),
+    ),
+)  # fmt: skip
+
+SCALE = BlockDeclaration(
+    name="scale",
+    written="scale { ... }",
+    within="substitute",
+    head="",
+    doc="How many times larger the joint's motor is than the one on the bed. Pure numbers; time is not scaled.",
+    entries=(
+        *(
+            Entry(name=each.name, written=f"{each.name} = {example};", default="1", varies="number",
+                  path=f"JOINT.bed.scale.{each.name}", parameter=each, doc=each.doc)
+            for each, example in zip(bed_scale.PARAMETERS, (25, 2, 10), strict=True)
+        ),
+        Entry(name="inertia", written="inertia = 12.5;", default="torque/rate", parameter=SCALE_OF_INERTIA,
+              doc=SCALE_OF_INERTIA.doc),
     ),
 )  # fmt: skip
 

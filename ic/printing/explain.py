@@ -24,6 +24,7 @@ from met.parameter import Parameter
 from met.plan import Coordinate, Experiment, Formula, Origin, Quantity
 from met.plan.channel import recordable
 from met.plan.columns import span
+from met.substitution import bed_scale
 
 SAID = {
     "deck": "written here",
@@ -335,6 +336,8 @@ def _declaration(experiment: Experiment, name: str) -> tuple[Parameter | None, s
         elif name.startswith(f"{use.joint}.servo."):
             model, own = models.find("servo", use.model), words[len(use.joint.split(".")) + 1]
     for on_bed in structure.substitutions:
+        if name.startswith(f"{on_bed.joint}.bed.scale."):
+            return next((each for each in bed_scale.PARAMETERS if each.name == words[3]), None), "scale"
         if name.startswith(f"{on_bed.joint}.bed."):
             model, own = models.find("bed", on_bed.bed), words[2]
         elif name.startswith(f"{on_bed.joint}.law."):

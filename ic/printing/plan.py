@@ -17,6 +17,7 @@ from met.plan import BASE, Base, Experiment, Formula, Joint, Plan, Structure
 from met.plan.columns import different, span
 from met.plan.defaults import OF_FREE_BASE
 from met.plan.uses import sensor_parts
+from met.substitution import bed_scale
 
 CHOSEN = 88  # columns, of parameters that stand in one cell
 FIXED_SPACE = "\u00a0"  # no line ends at one
@@ -309,7 +310,7 @@ def _substitutions(experiment: Experiment) -> Iterator[str]:
             for parameter in model.parameters:
                 path, of_servo = f"{use.joint}.{kind}.{parameter.name}", f"{use.joint}.servo.{parameter.of_servo}"
                 found, servos = parameters.get(path), parameters.get(of_servo)
-                if found is None or found.origin.kind == "default":
+                if found is None or found.origin.kind in ("default", "derived"):
                     continue
                 if servos is None or (found.origin.place, values.shown(path)) != (
                     servos.origin.place,
@@ -320,6 +321,10 @@ def _substitutions(experiment: Experiment) -> Iterator[str]:
             first, *more = textwrap.wrap(whole, CHOSEN, break_on_hyphens=False) or [""]
             lines = [(joint, kind, model.name, first), *(("", "", "", line) for line in more)]
             rows += [tuple(cell.replace(FIXED_SPACE, " ") for cell in line) for line in lines]
+        if use.scaled:
+            names = [each.name for each in bed_scale.PARAMETERS]
+            shown = (f"{name} = {values.shown(f'{use.joint}.bed.scale.{name}')}" for name in names)
+            rows.append(("", "scale", "", f"{', '.join(shown)}; the servo's is over it"))
     yield from columns(rows)
 
 

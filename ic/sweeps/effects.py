@@ -22,7 +22,7 @@ from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.experiment import experiment
 from ic.meaning.runs.run import BLOCKS, Resolved, resolve_run
 from ic.sweeps.choices import OF_RUN, OF_SERVO
-from ic.sweeps.reach import first_words, parameters_nearby, paths_ending_in, without_effect
+from ic.sweeps.reach import first_words, no_scale, parameters_nearby, paths_ending_in, without_effect
 from ic.sweeps.settings import SEED as SEED_PATH
 from ic.sweeps.settings import Destination, Settings, applies_to, destination
 from ic.text.complaints import Complaints, known_words
@@ -141,6 +141,7 @@ class Effects:
             known += [*scope.definitions.lets, *OF_RUN, *(f"{joint}.servo" for joint in joints)]
             helps = (
                 scope.definitions.stays_away(path)
+                or no_scale(path)
                 or did_you_mean(path, known)
                 or parameters_nearby(scope, path)
                 or paths_ending_in(scope, path)

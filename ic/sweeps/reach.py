@@ -59,6 +59,7 @@ def check_coordinates(scope: Scope, *, complete: bool) -> None:
                 f"no parameter `{path}` in this run",
                 place,
                 help=scope.definitions.stays_away(path)
+                or no_scale(path)
                 or did_you_mean(path, (*scope.known, *scope.not_sweepable, *scope.definitions.lets))
                 or parameters_nearby(scope, path)
                 or paths_ending_in(scope, path)
@@ -75,6 +76,12 @@ def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
     block = scope.definitions.block(definition) if definition is not None else None
     item = block.get(rest) if block is not None else None
     return [Label(item.place, "written here")] if item is not None else None
+
+
+def no_scale(path: str) -> list[str]:
+    """The remedy for a scale of a bed that has none."""
+    joint, found, _ = path.partition(".bed.scale.")
+    return [f"its bed has no scale: `scale {{ }}` in `substitute {joint}` gives it one"] if found else []
 
 
 def first_words(scope: Scope) -> list[str]:

@@ -4,6 +4,8 @@ Of a joint whose motor is on a bed already, the simulated bed says it, at the ti
 
     w = bed.shaft_rate,  w' = N qdd,  tau_m = tau_m(bed.drive_voltage, w),  tau_l = law.torque
 
+w' and tau_l over their scales, where the bed's motor is of another size than the joint's: all is of the bed's own size.
+
 Of any other joint, the joint itself does, at the instants of the dynamics: the load motor gives what the arm takes,
 
     w = servo.motor_rate,  w' = N qdd,  tau_m = servo.motor_torque,  tau_l = -tau_load/N + (J_b - J_m) w'
@@ -27,6 +29,8 @@ from met.plan import Experiment, Formula, Origin, Quantity, ServoUse, Substituti
 from met.plan.channel import recordable
 from met.run import prepare, run
 from met.servos.motor import Motor
+from met.substitution import bed_scale
+from met.substitution.bed_scale import BedScale
 
 BLOCK_BYTES = 128 << 20
 """Size of the histories that are held at once, where one case's are not larger."""
@@ -44,7 +48,8 @@ class ShaftWork:
     drive         torque of the drive motor, before friction, N m;  voltage: on it, V
     load          torque of the load motor on a shaft of the inertia `shaft`, N m
     arm           inertia of the arm at the shaft, J_eff/N^2, kg m^2
-    rotor         inertia J_m of the joint's rotor, kg m^2, [case];  shaft: inertia J_b of the bed's shaft, [case]
+    rotor         inertia J_m of the joint's rotor, kg m^2, [case];  shaft: inertia J_b of the bed's shaft, [case];
+                  arm and rotor over the scale of inertia, where the bed has one
     kt            torque constant of the drive motor, N m/A, [case];  kt_load: of the load motor, None where no deck
                   says which
     strongest     largest torque of the drive motor, N m, [case]
@@ -152,13 +157,14 @@ def _block(experiment: Experiment, joint: str, found: Any, rows: np.ndarray, *, 
     of = {name: found.signals[f"{joint}.{name}"] for name in (OF_BED if on_bed else OF_JOINT)}
     motor = motor_of(experiment, joint, rows)
     ratio = motor["ratio"][:, None]
+    scale = scale_of(experiment, joint, rows)
     if on_bed:
         bed = motor | {
             name: parameter(experiment, path, rows)
             for name in ("inertia", "kt_load", "kt", "resistance", "tau_max")
             if (path := f"{joint}.bed.{name}") in experiment.parameters
         }
-        rate, voltage, load = of["bed.shaft_rate"], of["bed.drive_voltage"], of["law.torque"]
+        rate, voltage, load = of["bed.shaft_rate"], of["bed.drive_voltage"], of["law.torque"] / scale.torque
         kt, resistance, most = (bed[name][:, None] for name in ("kt", "resistance", "tau_max"))
         drive = np.clip(kt / resistance * (voltage - kt * rate), -most, most)
     else:
@@ -169,12 +175,12 @@ def _block(experiment: Experiment, joint: str, found: Any, rows: np.ndarray, *, 
         case=np.asarray(experiment.cases.table[rows]),
         time=found.time,
         rate=rate,
-        acceleration=ratio * of["qdd"],
+        acceleration=ratio * of["qdd"] / scale.rate,
         drive=drive,
         voltage=voltage,
         load=load,
-        arm=of["J_eff"] / ratio**2,
-        rotor=motor["inertia"],
+        arm=of["J_eff"] / ratio**2 / scale.inertia,
+        rotor=motor["inertia"] / np.broadcast_to(scale.inertia, ratio.shape)[:, 0],
         shaft=bed["inertia"],
         kt=bed["kt"],
         kt_load=bed.get("kt_load"),
@@ -182,6 +188,15 @@ def _block(experiment: Experiment, joint: str, found: Any, rows: np.ndarray, *, 
         failed=found.status != 0,
         limited=found.limited,
     )
+
+
+def scale_of(experiment: Experiment, joint: str, rows: np.ndarray) -> BedScale:
+    """The scales of a joint's bed, each [case, 1]; 1 where it has none."""
+    use = substitution_of(experiment, joint)
+    if use is None or not use.scaled:
+        return BedScale()
+    names = (each.name for each in bed_scale.PARAMETERS)
+    return BedScale(*(parameter(experiment, f"{joint}.bed.scale.{name}", rows)[:, None] for name in names))  # type: ignore[arg-type]
 
 
 def motor_of(experiment: Experiment, joint: str, rows: np.ndarray) -> dict[str, np.ndarray]:

@@ -18,6 +18,7 @@ Parameters are named by paths, the ones a deck uses inside a run:
     <joint>.servo.command.<parameter>      as the command declares
     <joint>.servo.sensor.<of>.<parameter>  as the sensor declares through which the servo's law sees a quantity
     <joint>.bed.<parameter>                as the bed declares that the joint's motor is on
+    <joint>.bed.scale.torque|rate|voltage  of a bed whose motor is of another size than the joint's
     <joint>.law.<parameter>                as the law declares that drives the bed's load
     initial.<joint>.q|qd                   rad, rad/s (m, m/s)
     initial.base.position|velocity.x|y|z   of a free base, world axes, m, m/s; .rpy (rad, fixed x-y-z), .rate (rad/s)
@@ -224,12 +225,15 @@ class Substitution:
     """A joint whose motor is on a bed: the models of bed and law. Its servo stays what it is.
 
     All substituted joints of a structure have one law, and servos that tick together.
+
+    scaled  whether the bed's motor is of another size than the joint's (met.substitution.bed_scale)
     """
 
     joint: str
     bed: str
     law: str
     place: Place | None = keyed("never", default=None)
+    scaled: bool = keyed("where set", default=False)
 
 
 @frozen

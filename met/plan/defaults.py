@@ -10,6 +10,7 @@ from met.parameter import Parameter, under
 from met.plan import COMPONENTS, Course, Experiment, Joint, Origin, Quantity, Structure
 from met.plan.channel import JOINT_LIMITS, channels, joint_unit, watched_unit
 from met.plan.uses import quantities, sensor_parts, servo_parts
+from met.substitution import bed_scale
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 
@@ -21,14 +22,17 @@ OF_FLIGHT = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("rate
 
 
 def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity | None]]:
-    """Paths that the experiment lacks, each with its model's default or the servo's value, None where neither is."""
+    """Paths that the experiment lacks, each with its model's default or the servo's value, None where neither is. A bed
+    that is scaled has none of its servo's."""
     defaults: dict[str, Quantity] = {}
+    scaled = {use.joint for use in experiment.structure.substitutions if use.scaled}
     for path, unit, default, parameter in declared(experiment):
         if path in experiment.parameters:
             continue
         found = None if default is None else Quantity(default, unit, Origin("default", note="not in the plan file"))
-        if found is None and parameter is not None and parameter.of_servo:
-            of_servo = f"{path.partition('.')[0]}.servo.{parameter.of_servo}"
+        joint = path.partition(".")[0]
+        if found is None and parameter is not None and parameter.of_servo and joint not in scaled:
+            of_servo = f"{joint}.servo.{parameter.of_servo}"
             found = experiment.parameters.get(of_servo, defaults.get(of_servo))
         if found is not None:
             defaults[path] = found
@@ -123,6 +127,8 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
             for parameter in model.parameters:
                 if parameter.shape != "text":  # for the compiler alone
                     yield from _numbers(f"{on_bed.joint}.{head}", parameter, joint_unit(parameter.unit, joint))
+        for parameter in bed_scale.PARAMETERS if on_bed.scaled else ():
+            yield from _numbers(f"{on_bed.joint}.bed.scale", parameter, parameter.unit)
     for prefix, parameters in of_environment(structure):
         named = next((f"{prefix}.{parameter.name}" for parameter in parameters if parameter.names == "joint"), None)
         about = experiment.parameters.get(named) if named is not None else None

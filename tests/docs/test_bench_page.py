@@ -17,11 +17,13 @@ from met import cli
 
 FILE = Path(__file__).parents[2] / "docs" / "bench.md"
 PAGE = FILE.read_text(encoding="utf-8")
+SUBSTITUTION = FILE.with_name("substitution.md").read_text(encoding="utf-8")
+"""The page that has the crane's deck."""
 _SHOWN = re.compile(r"^```\n\$ met (.*)\n((?:(?!```).*\n)*)```", re.MULTILINE)
 
 
 def said(command: str, folder: Path) -> str:
-    for name, text in re.findall(r"<!-- (\S+) -->\n```\w+\n(.*?)```", PAGE, re.DOTALL):
+    for name, text in re.findall(r"<!-- (\S+) -->\n```\w+\n(.*?)```", PAGE + SUBSTITUTION, re.DOTALL):
         (folder / name).write_text(text, encoding="utf-8")
     out = io.StringIO()
     with contextlib.chdir(folder), contextlib.redirect_stdout(out):

@@ -17,7 +17,7 @@ from tests.paper.stability_map import limits
 
 PAGE = (Path(__file__).parents[2] / "docs" / "substitution.md").read_text(encoding="utf-8")
 LINEAR = (Path(__file__).parents[2] / "docs" / "linear.md").read_text(encoding="utf-8")
-DECK, MOTORS = re.findall(r"```c\n(.*?)```", PAGE, re.DOTALL)
+DECK, MOTORS, CRANE = re.findall(r"```c\n(.*?)```", PAGE, re.DOTALL)
 RATIO, SLOW = 1570.0, 0.03
 LIGHT_TO_HEAVY = (0.5, 1.5, 5.0, 20.0)
 
@@ -45,6 +45,27 @@ def test_as_many_motors_pass_as_the_page_says(tmp_path: Path) -> None:
     assert f"{(passing == 3).sum()} motors pass and {(passing == 0).sum()} do not" in PAGE
     worst = int(np.argmax(result.metrics["late"]))
     assert f"--case '#{worst}'" in PAGE
+
+
+def test_the_crane_of_the_page_is_off_by_what_it_says(tmp_path: Path) -> None:
+    (tmp_path / "crane.ic").write_text(CRANE, encoding="utf-8")
+    names = ("software", "full", "exact", "lab", "faulty", "larger")
+    rates = {}
+    for name in names:
+        result = engine.run(ic.compile(tmp_path / "crane.ic", select=[name]).experiments[0])
+        assert not result.status.any() and not result.limited.any()
+        rates[name] = result.signals["qd"][0, :, 0]
+
+    def off(name: str, other: str) -> str:
+        return f"{100.0 * np.sqrt(np.mean((rates[name] - rates[other]) ** 2)) / 0.5:.2f} %"
+
+    assert np.abs(rates["exact"] - rates["full"]).max() < 1e-12
+    for name in ("full", "exact"):
+        assert re.search(rf"^\| `{name}`, [^|]* \| {off(name, 'software')} \| \|$", PAGE, re.MULTILINE), name
+    for name in ("lab", "faulty"):
+        two = f"{off(name, 'software')} \\| {off(name, 'larger')}"
+        assert re.search(rf"^\| `{name}`, [^|]* \| {two} \|$", PAGE, re.MULTILINE), name
+    assert f"differs from `software` by {off('larger', 'software')}." in PAGE
 
 
 @pytest.mark.slow

@@ -24,7 +24,7 @@ DECK = """
 #include <two_link.ic>
 run bench like hybrid {{
     rates {{ dynamics = 1 kHz;  servos = 1 kHz;  record = 1 kHz; }}  duration = {duration} s;
-    remove settle;  record = [q, qd, shoulder.bed.shaft_rate, shoulder.bed.load_current];
+    {scale} remove settle;  record = [q, qd, shoulder.bed.shaft_rate, shoulder.bed.load_current];
 }}
 """
 
@@ -57,11 +57,14 @@ def stepped(experiment: Experiment, bed: BedDriver) -> list[tuple[float, float, 
     return rows
 
 
-@pytest.mark.parametrize("duration", [2, pytest.param(20, marks=pytest.mark.slow)])
+SCALED = "shoulder { scale { torque = 4;  rate = 1.5;  voltage = 2; } }"
+
+
+@pytest.mark.parametrize(("duration", "scale"), [(2, ""), pytest.param(20, "", marks=pytest.mark.slow), (2, SCALED)])
 def test_a_run_is_the_same_to_the_bit_inside_the_kernel_in_process_and_over_a_line(
-    tmp_path: Path, duration: int
+    tmp_path: Path, duration: int, scale: str
 ) -> None:
-    (tmp_path / "bench.ic").write_text(DECK.format(duration=duration), encoding="utf-8")
+    (tmp_path / "bench.ic").write_text(DECK.format(duration=duration, scale=scale), encoding="utf-8")
     experiment = ic.compile(tmp_path / "bench.ic", select=["bench"]).experiments[0]
     values = {
         path.removeprefix("shoulder.bed."): quantity.value

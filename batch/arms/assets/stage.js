@@ -270,6 +270,21 @@ MET.stage = (() => {
     new ResizeObserver(redraw).observe(view);
     MET.drawn.push(redraw);
 
+    // Where it is seen from and at which instant; and back there, on a page that takes another's place.
+    const seenFrom = ({ azimuth, elevation, distance, target }) => ({ azimuth, elevation, distance, target });
+    const kept = () => ({ camera: seenFrom(camera), time, playing, rate, frames, ghostly });
+
+    function resume(before) {
+      if (chosen) home();
+      [fresh, moved, rate] = [false, true, before.rate];
+      Object.assign(camera, seenFrom(before.camera));
+      speed.value = rate;
+      if (before.frames !== frames) withFrames.click();
+      if (before.ghostly !== ghostly) withOthers.click();
+      seek(before.time);
+      if (before.playing) run(true);
+    }
+
     // How long a picture of many takes, ms, everything drawn.
     function measure(count = 20) {
       if (renderer) sized(false);
@@ -280,7 +295,7 @@ MET.stage = (() => {
       }
       return (performance.now() - begun) / count;
     }
-    return { take: arm.take, show, haunt, settle, seek, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
+    return { take: arm.take, show, haunt, settle, seek, kept, resume, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
   }
 
   return { make };

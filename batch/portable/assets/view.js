@@ -10,7 +10,8 @@
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const kernel = METKernel.make(bytes(data.module), told.kernel);
   const cases = told.cases.inputs;
-  const archived = data.metrics.map((text) => new Float64Array(bytes(text).buffer));
+  const { source } = data;  // what the numbers are compared with: an archive, or the run of a deck that is watched
+  let archived = data.metrics.map((text) => new Float64Array(bytes(text).buffer));
   const NEAR = 0.01;  // of a slider's way, within which it takes a value of the archive's
   const time = Float64Array.from({ length: told.rows }, (_, n) => (n * told.kernel.record_divisor) / told.kernel.base_hz);
   const main = document.querySelector("main");
@@ -21,6 +22,7 @@
   const MOST_GHOSTS = 100;
   const SLICE = 24;  // ms of work between which the page answers
   const others = [];
+  let turn = 0;  // of computing them
   let values = cases[0].slice();
   let plots = [];
   let lines = [];
@@ -43,13 +45,12 @@
     };
     return { put, shown, input, n, box: node("label", { class: "knob" }, node("code", null, data.labels[n]), slider, shown) };
   }).filter(Boolean);
-  const chosen = node("select", { "aria-label": "Case of the archive", change: () => {
-    values = cases[chosen.value].slice();
-    knobs.forEach((knob) => knob.put());
-    update();
-  } }, node("option", { value: "", disabled: true }, "none of the archive's"), ...cases.map((_, n) => node("option", { value: n }, `#${data.positions[n]}`)));
+  const chosen = node("select", { "aria-label": `Case of the ${source}`, change: () => {
+    place(cases[chosen.value].slice());
+  } }, node("option", { value: "", disabled: true }, `none of the ${source}'s`), ...cases.map((_, n) => node("option", { value: n }, `#${data.positions[n]}`)));
 
   const same = (a, b) => a.every((value, n) => Object.is(value, b[n]));
+  const position = () => cases.findIndex((each) => same(each, values));  // among the cases; -1 between them
 
   function update() {
     const begun = performance.now();
@@ -59,12 +60,12 @@
     const width = told.columns.length;
     lines = told.columns.map((_, c) => Array.from(time, (_t, row) => (row < rows ? found.rows[row * width + c] / data.columnScales[c] : null)));
     draw();
-    const which = cases.findIndex((each) => same(each, values));
+    const which = position();
     chosen.value = which < 0 ? "" : which;
     knobs.forEach(({ shown, input, n }) => { shown.textContent = `${number(values[n] / input.scale)} ${data.units[n]}`; });
     const measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
     tell(which, measured, failed, tick, took);
-    if (stage && rows) stage.show(taken(values, found.rows, rows), which < 0 ? "not in the archive" : `case #${data.positions[which]}`);
+    if (stage && rows) stage.show(taken(values, found.rows, rows), which < 0 ? `not in the ${source}` : `case #${data.positions[which]}`);
     if (stage) stage.haunt(others.filter((each) => each.n !== which));
   }
 
@@ -88,14 +89,17 @@
   function haunt() {
     const count = Math.min(cases.length, MOST_GHOSTS + 1);
     const chosen = Array.from({ length: count }, (_, n) => Math.floor((n * cases.length) / count));
+    const mine = ++turn;
     let done = 0;
+    others.length = 0;
     (function next() {
+      if (mine !== turn) return;
       const begun = performance.now();
       while (done < chosen.length && performance.now() - begun < SLICE) {
         const n = chosen[done++];
         const found = kernel.run([cases[n]], told.ticks);
         const { failed, rows } = ended(found.outputs);
-        const bad = failed || told.requirements.some((each) => !judged(each, numberOf(each.metric, n, found.outputs)));
+        const bad = failed || told.requirements.some((each) => missed(each, n, found.outputs));
         if (rows) others.push({ n, bad, taken: taken(cases[n], found.rows, rows) });
       }
       stage.haunt(others.filter((each) => !same(cases[each.n], values)));
@@ -113,6 +117,12 @@
     return own ? outputs[own.output] : archived[told.metrics.length + told.not_computed.findIndex((metric) => metric.name === name)][n];
   }
 
+  // Whether a case misses a requirement; what is not known of a case that has yet to be run is no miss.
+  function missed(requirement, n, outputs) {
+    const value = numberOf(requirement.metric, n, outputs);
+    return !judged(requirement, value) && !(data.status[n] < 0 && Number.isNaN(value));
+  }
+
   function judged({ comparison, limit }, value) {
     return { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b }[comparison](value, limit);
   }
@@ -127,17 +137,19 @@
   // Whose numbers these are: the archive's, where every metric has the bits that stand there.
   function tell(which, measured, failed, tick, took) {
     const speed = `computed here in ${number(took)} ms, ${kernel.fused ? "with this machine's multiply-add" : "with the module's own multiply-add"}`;
+    const awaited = which >= 0 && data.status[which] < 0;  // of a deck that is watched: `met` has yet to run it
     const wrong = which < 0 || data.status[which] !== 0 ? [] : told.metrics.filter((_, m) => !Object.is(measured[m], archived[m][which]));
-    const bad = wrong.length > 0 || (which >= 0 && failed !== (data.status[which] !== 0));
-    let words = "Not in the archive: ";
-    if (bad) words = `Other numbers than the archive has for case #${data.positions[which]}${wrong.length ? ` (${wrong.map((metric) => metric.name).join(", ")})` : ""}: `;
-    else if (which >= 0 && failed) words = `Case #${data.positions[which]} fails, as in the archive: `;
-    else if (which >= 0) words = measured.length ? `Case #${data.positions[which]}, with the archive's bits in ${measured.length === 1 ? "its metric" : `all ${measured.length} metrics`}: ` : `Case #${data.positions[which]}; it has no metric to compare: `;
+    const bad = wrong.length > 0 || (which >= 0 && !awaited && failed !== (data.status[which] !== 0));
+    let words = `Not in the ${source}: `;
+    if (awaited) words = `Case #${data.positions[which]}, before it is compared: `;
+    else if (bad) words = `Other numbers than the ${source} has for case #${data.positions[which]}${wrong.length ? ` (${wrong.map((metric) => metric.name).join(", ")})` : ""}: `;
+    else if (which >= 0 && failed) words = `Case #${data.positions[which]} fails, as in the ${source}: `;
+    else if (which >= 0) words = measured.length ? `Case #${data.positions[which]}, with the ${source}'s bits in ${measured.length === 1 ? "its metric" : `all ${measured.length} metrics`}: ` : `Case #${data.positions[which]}; it has no metric to compare: `;
     const end = failed ? `; it fails at ${number(tick / told.kernel.base_hz)} s` : "";
     came.classList.toggle("bad", bad);
     came.textContent = `${words}${speed}${end}.`;
     // Metrics of linear answers are not computed here: the archive's cases have them from the archive.
-    const given = [...measured, ...told.not_computed.map((_, n) => (which < 0 ? null : archived[measured.length + n][which]))];
+    const given = [...measured, ...told.not_computed.map((_, n) => (which < 0 || awaited ? null : archived[measured.length + n][which]))];
     answers.replaceChildren(...[...told.metrics, ...told.not_computed].map((metric, m) => {
       const unknown = given[m] === null || Number.isNaN(given[m]);
       const verdicts = told.requirements.filter((each) => each.metric === metric.name).map((each) => {
@@ -146,7 +158,7 @@
         return node("div", { class: met ? "met" : "missed" }, `${each.text}: ${met ? "met" : "missed"}`);
       });
       const value = given[m] === null ? "not computed here" : `${number(given[m] / data.metricScales[m])} ${data.metricUnits[m]}`.trim();
-      const whose = given[m] === null || m < measured.length ? "" : ", from the archive";
+      const whose = given[m] === null || m < measured.length ? "" : `, from the ${source}`;
       return node("tr", null, node("td", null, node("code", null, metric.name)), node("td", null, value + whose), node("td", null, verdicts));
     }));
   }
@@ -200,6 +212,21 @@
   if (stage && cases.length > 1) requestAnimationFrame(() => setTimeout(haunt));
   else document.documentElement.dataset.haunted = "yes";
   MET.shown = stage;
+  // For who puts a page in the place of another, or has numbers later: batch/watching/assets/kept.js.
+  MET.page = { data, inputs: () => told.inputs, values: () => values, position, plots: () => plots, put: place, arrive };
+
+  function place(given) {
+    values = given;
+    knobs.forEach((knob) => knob.put());
+    update();
+  }
+
+  function arrive(found) {
+    Object.assign(data, found);
+    archived = data.metrics.map((text) => new Float64Array(bytes(text).buffer));
+    update();
+    if (stage && told.not_computed.length && cases.length > 1) haunt();
+  }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", make);
   addEventListener("resize", make);
 })();

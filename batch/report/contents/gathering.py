@@ -119,7 +119,7 @@ def _section(
         trouble = trouble or "; ".join(diagnostic.message for diagnostic in problem.diagnostics)
     recorded = any(group.recorded for group in pool.groups)
     plan = written_plan(file) if recorded else None
-    units = [DeckUnits(file, group, plan) for group in pool.groups] if plan is not None else []
+    units = [DeckUnits(plan, group) for group in pool.groups] if plan is not None else []
     drawn = signals(pool, values, before, units)
     errors = together(map(figures, pool.groups))
     return ReportSection(

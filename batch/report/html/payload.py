@@ -35,7 +35,7 @@ def section_data(section: ReportSection, replay: str, changes: ArchiveChanges | 
         "against": None if changes is None else [visible(changes.before), visible(changes.now)],
         "replay": visible(replay),
         "ended": list(ENDED),
-        "overview": None if section.overview is None else _overview(section.overview),
+        "overview": None if section.overview is None else overview_data(section.overview),
         "signals": None if section.signals is None else _signals(section.signals),
         "stability": None if section.stability is None else _stability(section.stability),
     }
@@ -93,7 +93,8 @@ def _column(column: CaseColumn) -> dict[str, Any]:
     }
 
 
-def _overview(overview: Overview) -> dict[str, Any]:
+def overview_data(overview: Overview) -> dict[str, Any]:
+    """The data of a plot of cases as points, and of maps."""
     return {
         "cases": packed(overview.cases),
         "ids": [visible(each) for each in overview.ids],

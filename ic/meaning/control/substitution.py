@@ -1,4 +1,5 @@
-"""Motors on beds: `substitute JOINT { bed = ...; law = ...; }`, the models' parameters, and that joints go together."""
+"""Motors on beds: `substitute JOINT { bed = ...; law = ...; }`, the models' parameters, scales, and that joints go
+together."""
 
 from __future__ import annotations
 
@@ -6,15 +7,25 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression
-from ic.language.runs import BED, LAW
+from ic.language.runs import BED, LAW, SCALE, SCALE_OF_INERTIA
 from ic.meaning.control.schedule import Ticks
 from ic.meaning.control.servos import Use, moving_kind
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters import not_sweepable
-from ic.meaning.parameters.models import check_keys, find_model, refuse_values, use_model, word_of
+from ic.meaning.parameters.models import (
+    body_of,
+    check_keys,
+    find_model,
+    refuse_values,
+    use_model,
+    value_place,
+    word_of,
+)
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
@@ -22,6 +33,8 @@ from met import models
 from met.diagnostic import Label, Place, leave_out
 from met.parameter import Parameter
 from met.plan import EnvironmentUse, Origin, Schedule, Substitution
+from met.substitution import bed_scale
+from met.substitution.bed_scale import BedScale
 
 DEFAULTS: dict[models.Kind, str] = {"bed": BED, "law": LAW}
 USAGE = "write `substitute JOINT { bed = BED(...);  law = LAW(...); }`"
@@ -162,7 +175,12 @@ def _substitution(
         )
         return None
     block = item.body or MergedBlock()
-    check_keys(scope, block, DEFAULTS, Owner(f"`substitute {item.name}`", item.place, ""))
+    check_keys(scope, block, (*DEFAULTS, SCALE.name), Owner(f"`substitute {item.name}`", item.place, ""))
+    scaled, scale = block.get(SCALE.name), None
+    if scaled is not None:
+        scale = _scale(scope, item.name, scaled)
+        if scale is None:
+            return None
     bed, law = (_model(scope, each, block.get(each), item) for each in DEFAULTS)
     for each, model in (("bed", bed), ("law", law)):
         if model is None:
@@ -179,14 +197,16 @@ def _substitution(
         scope.not_sweepable[f"{owner.path}.model"] = not_sweepable.chosen(f"vary `{owner.path}` over models")
         body = (part.body if part is not None else None) or MergedBlock()
         if each == "bed":
-            _use_bed(scope, owner, model, body, use)
+            _use_bed(scope, owner, model, body, use, scale)
+            if scale is not None and scaled is not None:
+                _check_strength(scope, owner, use, scale, scaled)
         else:
             use_model(scope, owner, model.parameters, body)
     if bed is None or law is None:
         return None
     named = block.get("law")
     place = _name_place(named.value) if named is not None and named.value is not None else item.place
-    return Substitution(item.name, bed.name, law.name, item.place), place
+    return Substitution(item.name, bed.name, law.name, item.place, scaled=scale is not None), place
 
 
 def _name_place(value: Expression) -> Place:
@@ -204,8 +224,71 @@ def _model(scope: Scope, kind: models.Kind, item: Item | None, around: Item) -> 
     return model
 
 
-def _use_bed(scope: Scope, owner: Owner, bed: Any, body: MergedBlock, use: Use) -> None:
-    """Every parameter of a bed: what the deck writes, else the word's of its faults, the servo's, the default."""
+def _scale(scope: Scope, joint: str, item: Item) -> BedScale | None:
+    """The scales of a joint's bed; None where one of them is wrong (already reported)."""
+    before = scope.complaints.error_count
+    body, path = body_of(scope, item), f"{joint}.bed.{SCALE.name}"
+    owner = Owner(f"the scale of joint `{joint}`'s bed", item.place, path, homes=item.homes)
+    values = use_model(scope, owner, bed_scale.PARAMETERS, body, (SCALE_OF_INERTIA.name,))
+    written = body.get(SCALE_OF_INERTIA.name)
+    if values is None or scope.complaints.error_count > before:
+        return None
+    if written is not None:
+        inertia = scope.number(owner, SCALE_OF_INERTIA, written, record=False)
+        own = owner.join(SCALE_OF_INERTIA.name)
+        if inertia is not None:
+            scope.checks.require(
+                (inertia, values["torque"], values["rate"]),
+                _not_its_quotient,
+                code="D365",
+                message=f"`inertia` of {owner.label} is not that of its torque and rate",
+                place=value_place(written),
+                path=own,
+                needs=tuple(owner.join(each.name) for each in bed_scale.PARAMETERS),
+                help="leave it out: with one time for both, inertia is torque over rate",
+            )
+    return None if scope.complaints.error_count > before else BedScale(**values)
+
+
+def _not_its_quotient(table: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    follows = table[:, 1] / table[:, 2]
+    bad = ~(np.abs(table[:, 0] - follows) <= 1e-9 * follows)
+    return bad, [f"it is {x[1]:g}/{x[2]:g} = {x[1] / x[2]:g}" for x in table[bad][:1]]
+
+
+def _check_strength(scope: Scope, owner: Owner, use: Use, scale: BedScale, scaled: Item) -> None:
+    """Warn where the bed's motor is at its largest torque before the joint's would be."""
+    path, of = owner.join("tau_max"), f"{use.joint}.servo.tau_max"
+    own, joints = scope.parameters.get(path), scope.parameters.get(of)
+    if own is None or joints is None:
+        return
+    place = own.origin.place if own.origin.kind == "deck" and own.origin.place is not None else scaled.place
+    values: tuple[Any, ...] = (own.value, joints.value, scale.torque)
+
+    def warn(table: np.ndarray) -> None:
+        weak = np.flatnonzero(table[:, 0] * table[:, 2] < (1.0 - 1e-9) * table[:, 1])
+        if not weak.size:
+            return
+        most, wanted, times = table[weak[0]]
+        where = scope.checks.where(int(weak[0]), values)
+        scope.complaints.remark(
+            "D366",
+            f"the bed's motor of joint `{use.joint}` gives {most:g} N*m at most{where}, which stands for "
+            f"{most * times:g} N*m, and the joint's motor gives {wanted:g} N*m",
+            place,
+            help=[
+                "beyond that torque the run is one of a weaker motor; where it stays below, nothing is lost",
+                f"a stronger motor on the bed, or `torque = {wanted / most:g};` in its `scale`, by which inertias grow "
+                "too",
+            ],
+        )
+
+    scope.checks.observe(values, warn, place, needs=(path, of, f"{owner.path}.{SCALE.name}.torque"))
+
+
+def _use_bed(scope: Scope, owner: Owner, bed: Any, body: MergedBlock, use: Use, scale: BedScale | None = None) -> None:
+    """Every parameter of a bed: what the deck writes, else the word's of its faults, the servo's, the default. Of one
+    that is scaled the servo's over their scale, so that its motor is an exact model of the joint's."""
     written = models.written(bed)
     check_keys(scope, body, [p.name for p in written], owner)
     faults, preset = None, {}
@@ -217,8 +300,10 @@ def _use_bed(scope: Scope, owner: Owner, bed: Any, body: MergedBlock, use: Use) 
         item = body.get(wanted.name)
         if wanted.shape == "text":
             continue
-        if item is None and wanted.of_servo and models.parameter(use.servo, wanted.of_servo) is not None:
-            scope.copied(owner, wanted, f"{use.joint}.servo.{wanted.of_servo}")
+        known = wanted.of_servo and models.parameter(use.servo, wanted.of_servo) is not None
+        if item is None and known and (scale is None or wanted.unit in bed_scale.POWERS):
+            over = None if scale is None else scale.of(wanted.unit)
+            scope.copied(owner, wanted, f"{use.joint}.servo.{wanted.of_servo}", over)
         elif item is None and wanted.name in preset:
             _preset(scope, owner, replace(wanted, default=preset[wanted.name]), faults)
         else:

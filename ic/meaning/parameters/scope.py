@@ -332,8 +332,11 @@ class Scope:
         origin = Origin("derived", owner.place, (), note)
         return self._finish(owner, wanted, name, owner.homes, self._plain(value), origin, owner.place, True)
 
-    def copied(self, owner: Owner, wanted: Parameter, of: str) -> Real | None:
-        """A parameter that is another's, of this path, unless a sweep varies it itself; None where the other failed."""
+    def copied(self, owner: Owner, wanted: Parameter, of: str, over: Real | None = None) -> Real | None:
+        """A parameter that is another's, of this path, unless a sweep varies it itself; None where the other failed.
+
+        over  a scale: the parameter is then the other's value over it
+        """
         other = self.parameters.get(of)
         if other is None or isinstance(other.value, str | tuple) or self.checks.failed(of):
             self.checks.fail(owner.join(wanted.name))
@@ -341,6 +344,12 @@ class Scope:
         own = self._coordinate(owner, wanted.name, owner.homes) is not None
         own = own or bool(self._given(owner, wanted.name, owner.homes))
         origin = replace(other.origin, note="" if own else f"that of `{of}`")
+        if over is not None and not own:
+            note = f"that of `{of}` over its scale"
+            return self._finish(
+                owner, wanted, wanted.name, owner.homes, self._plain(other.value / over),
+                Origin("derived", other.origin.place, (), note), other.origin.place or owner.place, True, needs=(of,),
+            )  # fmt: skip
         value = self._finish(
             owner,
             wanted,

@@ -1,5 +1,8 @@
 """Joints whose motors are on a bed: what happens at each tick of their servos (docs/physics.md, motor substitution).
 
+Rates, torques, voltages and inertias here are those of the joint's motor; a bed of another size (`scale`) has its own
+in its memory, its parameters and on its wire (met/substitution/bed_scale.py).
+
 At a servo's tick, in this order: the bed has come to this instant under what its amplifiers held; its filtered rate is
 read, and the observer corrected; joint position and rate of the arm are made the shaft's (at an instant of the
 dynamics: between two the step under way keeps its own); the servo sets the voltage from the filtered rate. At an
@@ -22,8 +25,9 @@ from met.program.control.sensing import READING
 from met.program.system import Actuator, System
 from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.motor import Motor, torque
-from met.substitution import balance, observer
+from met.substitution import balance, bed_scale, observer
 from met.substitution.bed import BedModel, Wire
+from met.substitution.bed_scale import BedScale
 from met.substitution.law import Law, LawInput, LawOutput
 from met.substitution.shaft import lasting
 from met.trace import Real, absolute, clip, sign, where
@@ -45,12 +49,13 @@ _UNKNOWN = (1e4, 1e4, 1e8, 1e-2)
 
 @frozen
 class Mounted:
-    """A substituted joint: its servo, the bed that its motor is on, and the law."""
+    """A substituted joint: its servo, the bed that its motor is on, the law, and whether the bed is scaled."""
 
     actuator: Actuator
     joint: str
     bed: BedModel
     law: Law
+    scaled: bool
 
     @property
     def index(self) -> int:
@@ -71,7 +76,10 @@ class Substituted:
         self.loads = loads
         self.wire = wire
         self.late = late
-        self.mounted = tuple(Mounted(a, system.joints[a.index].name, bed, law) for a, bed, law in system.mounted)
+        scaled = {use.joint for use in system.structure.substitutions if use.scaled}
+        self.mounted = tuple(
+            Mounted(a, system.joints[a.index].name, bed, law, a.use.joint in scaled) for a, bed, law in system.mounted
+        )
         self.dynamics = system.structure.schedule.dynamics
         self.base_hz = system.structure.schedule.base_hz
         self.divisor = self.mounted[0].actuator.use.divisor if self.mounted else 1
@@ -148,7 +156,7 @@ class Substituted:
         for each in self.mounted:
             motor = self.motor(tape, each)
             w = motor.ratio * tape.read(f"{each.joint}.qd")
-            self.begin_bed(tape, each, w)
+            self.begin_bed(tape, each, w / self.scale(tape, each).rate)
             if self.wire:  # what is inside a real one nobody knows
                 for memory in each.bed.memory:
                     tape.write(f"{each.joint}.bed.{memory.name}", math.nan)
@@ -162,7 +170,7 @@ class Substituted:
                     tape.write(cell_names.COVARIANCE(each.joint, i, j), _UNKNOWN[i] if i == j else 0.0)
 
     def begin_bed(self, tape: Tape, each: Mounted, w: Real) -> None:
-        """The emulated bed of a shaft that has turned at w rad/s for long."""
+        """The emulated bed of a shaft, its own, that has turned at w rad/s for long."""
         begun = answer(self._owner(each), each.bed.begin, self._bed_values(tape, each), w)
         returned(self._owner(each), "begin", begun, (memory.name for memory in each.bed.memory))
         for name, value in begun.items():
@@ -216,7 +224,8 @@ class Substituted:
         """The filtered rate, the observer's correction, and the shaft's angle."""
         for each in self.mounted:
             name = each.joint
-            rate = tape.input(f"wire:{name}.rate") if self.wire else self.reading(tape, each)
+            read = tape.input(f"wire:{name}.rate") if self.wire else self.reading(tape, each)
+            rate = read * self.scale(tape, each).rate
             w: Real = rate
             if each.law.observer:
                 gain = tuple(tape.read(cell_names.OBSERVER_GAIN(name, i)) for i in range(4))
@@ -336,7 +345,8 @@ class Substituted:
         """Puts a command on the wire, and gives back what the amplifiers hold from now on: an older one, if delayed."""
         name = each.joint
         p = self._bed_values(tape, each)
-        asked = Wire(self._voltage(tape, each), given.torque / p.kt_load)
+        scale = self.scale(tape, each)
+        asked = Wire(self._voltage(tape, each) / scale.voltage, given.torque / scale.torque / p.kt_load)
         with tape.part(READING):
             asked, limited = answer(self._owner(each), each.bed.taken, p, asked)
         cells.count(tape, limited, LIMITED)
@@ -363,7 +373,8 @@ class Substituted:
         sides = []
         for each, wire in zip(self.mounted, applied, strict=True):
             w_ref = tape.read(cell_names.REFERENCE_RATE(each.joint))
-            sides.append(self._side(tape, each, w_ref, wire.voltage, 0.0))
+            voltage = wire.voltage * self.scale(tape, each).voltage
+            sides.append(self._side(tape, each, w_ref, voltage, 0.0))
             self._observe(tape, each, self._predicted(tape, each, self._observed(tape, each), wire))
         for each, side, one in zip(self.mounted, sides, balance.balanced(sides, Lambda, b_0), strict=True):
             after = side.w + self.period * side.ratio * one.qdd
@@ -383,12 +394,12 @@ class Substituted:
         )
 
     def _law_input(self, tape: Tape, each: Mounted, found: balance.Balanced | None) -> LawInput:
-        motor, p, name = self.motor(tape, each), self._bed_values(tape, each), each.joint
+        motor, inertia, name = self.motor(tape, each), self._shaft_inertia(tape, each), each.joint
         mean = each.law.balance == "full"
-        extra = p.inertia * (self.period / lasting(motor.damping / p.inertia, self.period) - 1.0) if mean else 0.0
+        extra = inertia * (self.period / lasting(motor.damping / inertia, self.period) - 1.0) if mean else 0.0
         return LawInput(
             motor=motor,
-            inertia=p.inertia,
+            inertia=inertia,
             rate=tape.read(cell_names.READ(name)),
             before=tape.read(cell_names.READ_BEFORE(name)),
             w=tape.read(cell_names.SHAFT_RATE(name)),
@@ -401,10 +412,10 @@ class Substituted:
 
     def _predicted(self, tape: Tape, each: Mounted, x: observer.Four, wire: Wire) -> observer.Four:
         """The observer's state a tick on, under what the amplifiers hold."""
-        motor, band = self.motor(tape, each), self._band(tape, each)
-        load = self._bed_values(tape, each).kt_load * wire.current
+        motor, band, scale = self.motor(tape, each), self._band(tape, each), self.scale(tape, each)
+        load = self._bed_values(tape, each).kt_load * wire.current * scale.torque
         w, d = x[0], x[3]
-        drive = torque(motor.kt, motor.resistance, motor.tau_max, wire.voltage, w)
+        drive = torque(motor.kt, motor.resistance, motor.tau_max, wire.voltage * scale.voltage, w)
         rest = clip(drive + d + load - motor.f_v * w, -motor.f_c, motor.f_c)
         dry = where(absolute(w) > band, sign(w) * motor.f_c, rest)
         # Back-EMF is in the model; where the drive is at its limit this takes it out again.
@@ -419,10 +430,22 @@ class Substituted:
         p = self.system.servo_values(each.actuator, tape.read)
         return answer(each.actuator.owner, each.actuator.servo.motor, p)
 
+    def scale(self, tape: Tape, each: Mounted) -> BedScale:
+        """The scales of the joint's bed; 1 where it has none."""
+        if not each.scaled:
+            return BedScale()
+        p = self._values(tape, self._owner(each), f"{each.joint}.bed.scale", bed_scale.PARAMETERS)
+        return BedScale(p.torque, p.rate, p.voltage)
+
+    def _shaft_inertia(self, tape: Tape, each: Mounted) -> Real:
+        """The inertia of the bed's shaft as the joint's motor would feel it, kg m^2."""
+        inertia: Real = self._bed_values(tape, each).inertia
+        return inertia * self.scale(tape, each).inertia
+
     def _model(self, tape: Tape, each: Mounted) -> observer.DiscreteModel:
-        p = self._bed_values(tape, each)
+        inertia, f_cut = self._shaft_inertia(tape, each), self._bed_values(tape, each).f_cut
         damping = self.motor(tape, each).damping
-        return observer.model(inertia=p.inertia, damping=damping, f_cut=p.f_cut, period=self.period)
+        return observer.model(inertia=inertia, damping=damping, f_cut=f_cut, period=self.period)
 
     def _noise(self, tape: Tape, each: Mounted) -> observer.Noise:
         p, T = self._law_values(tape, each), self.period

@@ -99,6 +99,37 @@ def test_the_deck_that_is_written_holds_the_truth_and_can_be_included(
     assert len(records.read(here / "shoulder.identified.records").rows) > 40_000
 
 
+def test_a_scaled_bed_is_identified_as_it_is_and_its_deck_has_both_sizes(
+    identify: Callable[..., tuple[int, str, str]], here: Path
+) -> None:
+    """The bed's motor is near what its scales make of the servo's. Written into the servo it is of the joint's size."""
+    scaled = DECK.replace(
+        "kt = 0.067 N*m/A", "kt = 0.033 N*m/A, tau_max = 0.072 N*m, f_v = 1e-5 N*m*s/rad, kt_load = 0.072 N*m/A"
+    ).replace("        law =", "        scale { torque = 2;  voltage = 2; }\n        law =")
+    Path("deck.ic").write_text(scaled)
+    sheet = sheet_of(wired(), "shoulder", None)
+    assert (sheet.values["kt"], sheet.values["tau_max"], sheet.values["v_max"]) == (0.0305, 0.072, 10.0)
+    assert (sheet.values["inertia"], sheet.values["resistance"]) == (6.38e-5 / 2, 2.05 / 2)
+    status, out, _ = identify("--port", "emulated", "--format", "json")
+    assert status == cli.YES
+    found = json.loads(out)["parameters"]
+    for name, value in {"kt": 0.033, "resistance": 1.8, "f_c": 0.024, "inertia": 7e-5, "tau_max": 0.072}.items():
+        assert found[name]["low"] <= value <= found[name]["high"], name
+    text = (here / "shoulder.identified.ic").read_text()
+    assert "//         scale { torque = 2;  rate = 1;  voltage = 2; }\n" in text
+    use = "".join(line.removeprefix("//").strip() + "\n" for line in text.splitlines() if line.startswith("//     "))
+    block, servo = use.split("servo found")
+    Path("use.ic").write_text(
+        f'#include "deck.ic"\n#include "shoulder.identified.ic"\nservo found {servo}'
+        f"run found_run like wired {{ remove shoulder;  servos {{ shoulder = found; }}\n{block} }}\n"
+    )
+    assert cli.main(["check", "use.ic"]) == cli.YES
+    made = ic.compile("use.ic", select=["found_run"]).experiments[0].parameters
+    for name, of, scale in (("kt", "kt", 2.0), ("resistance", "resistance", 2.0), ("inertia", "j_m", 2.0)):
+        assert made[f"shoulder.bed.{name}"].value == pytest.approx(found[name]["value"], rel=1e-4)
+        assert made[f"shoulder.servo.{of}"].value == pytest.approx(scale * found[name]["value"], rel=1e-4)
+
+
 def test_the_servo_is_the_data_sheet_and_what_is_asked_goes_before_the_deck() -> None:
     sheet = sheet_of(wired(), "shoulder", None)
     assert (sheet.values["kt"], sheet.values["inertia"], sheet.values["v_max"]) == (0.061, 6.38e-5, 20.0)

@@ -150,7 +150,7 @@ class Chromium:
 
     def open(
         self,
-        path: Path,
+        path: Path | str,
         *,
         width: int = 1280,
         height: int = 900,
@@ -158,7 +158,7 @@ class Chromium:
         scale: float = 1.0,
         scripts: bool = True,
     ) -> Page:
-        """A page of this size (CSS pixels), when all of it is there."""
+        """A page of this size (CSS pixels), when all of it is there: of a file, or at an address."""
         target = self.ask("Target.createTarget", url="about:blank")["targetId"]
         session = self.ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         page = Page(self, session, target)
@@ -178,7 +178,7 @@ class Chromium:
         )
         if not scripts:
             page.ask("Emulation.setScriptExecutionDisabled", value=True)
-        page.ask("Page.navigate", url=path.resolve().as_uri())
+        page.ask("Page.navigate", url=path if isinstance(path, str) else path.resolve().as_uri())
         page.until_loaded()
         return page
 

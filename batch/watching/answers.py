@@ -1,0 +1,196 @@
+"""A deck that is watched: compiled, as the page of one of its runs, and its cases run.
+
+The page comes first, for it needs nothing but the module, and computes what it shows. The cases are run behind it by
+the machine's own code, as `met run` runs them; the page compares its numbers with theirs, bit by bit.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from batch.archive.in_memory import GroupInMemory
+from batch.portable.description import MOST_CASES
+from batch.portable.page import data_of, doubles, page_text
+from batch.queries.pool import ENDED, Pool
+from batch.report.contents.overview import overview
+from batch.report.html.payload import overview_data
+from ic.driver.compile import compile_deck
+from ic.language import EXPERIMENTS
+from ic.meaning.definitions.resolve import Definitions
+from ic.read import read
+from ic.text.complaints import Complaints
+from met.analysis.linear import metrics as linear_metrics
+from met.diagnostic import Diagnostic, Problem, error
+from met.frozen import frozen
+from met.messages.render import render
+from met.messages.visible import visible
+from met.outputs import quoted
+from met.plan import Experiment, Plan
+from met.run import DONE, Prepared, Run, results
+
+ASSETS = Path(__file__).with_name("assets")
+
+KICKER = "A deck that is watched"
+BY_CASE = ("points.js", "overview.js", "cells.js", "map.js")
+"""Scripts of the report that draw a sweep's cases as points and maps."""
+
+NOT_YET = -1
+"""Status of a case that has yet to be run."""
+
+FIRST, SHARE, TELLING = 32, 0.2, 1.0
+"""Cases that are run first; seconds that further ones take before it is looked whether they are still wanted; and
+seconds after which it is told what there is so far."""
+
+MOST_LETTERS = 200_000
+"""Letters of messages that are shown."""
+
+
+@frozen
+class WatchedDeck:
+    """A deck as it was asked for on the command line; settings as `--set` and `--vary` have them."""
+
+    path: Path
+    include_dirs: tuple[str, ...] = ()
+    defines: tuple[str, ...] = ()
+    settings: tuple[str, ...] = ()
+
+
+@frozen
+class DeckAnswer:
+    """What came of compiling a deck.
+
+    messages    in the words of `met check`; "" where it has nothing to say
+    experiment  the run or sweep that is shown, of the plan; None where an error stands in its way
+    names       runs and sweeps that can be shown;  groups: of the one that is shown, where it has several structures
+    files       the names of all files that were read
+    """
+
+    messages: str
+    names: tuple[str, ...]
+    files: tuple[str, ...]
+    plan: Plan | None = None
+    experiment: Experiment | None = None
+    groups: tuple[str, ...] = ()
+
+
+def compiled(deck: WatchedDeck, name: str | None = None, group: str | None = None) -> DeckAnswer:
+    """The deck's run or sweep of this name; for None the one that `met run` would take. group: of several structures
+    the one that is shown; for None the first."""
+    try:
+        folders = [Path(each) for each in deck.include_dirs]
+        tree = read(deck.path, folders, deck.defines, despite_errors=True)
+    except Problem as problem:
+        return DeckAnswer(_words(problem.diagnostics, problem.sources), (), tuple(problem.sources))
+    known = Definitions(tree, Complaints())
+    found = [each for kind in EXPERIMENTS for each in known.of_kind(kind).values()]
+    names = tuple(each.name for each in [each for each in found if known.writes(each)] or found)
+    made = compile_deck(
+        tree, select=None if name is None else (name,), defines=deck.defines, settings=deck.settings
+    )  # fmt: skip
+    words, files = _words(made.diagnostics, made.sources), tuple(made.sources)
+    if made.plan is None:
+        return DeckAnswer(words, names, files)
+    experiments = {each.name: each for each in made.plan.experiments}
+    experiment = experiments.get(group or "", made.plan.experiments[0])
+    if experiment.search is not None:
+        return DeckAnswer(_words([_search(deck, experiment)], {}), names, files)
+    return DeckAnswer(words, names, files, made.plan, experiment, tuple(experiments) if len(experiments) > 1 else ())
+
+
+def _search(deck: WatchedDeck, experiment: Experiment) -> Diagnostic:
+    name = experiment.name_in_deck
+    helps = f"`met run {quoted(deck.path)} {quoted(name)} -o a.h5`, then `met view a.h5`"
+    return error("E476", f"`{name}` is a search: which cases it has is known when it has run", help=helps)
+
+
+def _words(diagnostics: Any, sources: Mapping[str, str]) -> str:
+    return visible(render(diagnostics, sources))[:MOST_LETTERS]
+
+
+def page(answer: DeckAnswer, prepared: Prepared) -> str:
+    """The page of the run that is shown, before its cases are run."""
+    experiment, plan = prepared.experiment, answer.plan
+    assert plan is not None
+    rows = shown_rows(experiment)
+    empty = {use.name: np.full(len(rows), np.nan) for use in experiment.metrics}
+    group = GroupInMemory.of_metrics(experiment, rows, np.full(len(rows), NOT_YET, np.int8), empty)
+    data = data_of(experiment, plan, group, source=kind_of(experiment), prepared=prepared)
+    by = "by the code of `met run`"
+    if experiment.cases.count > len(rows):
+        by += f"; of {experiment.cases.count:,} cases these are the first {len(rows):,}"
+    after = (ASSETS / "kept.js").read_text(encoding="utf-8")
+    style = (ASSETS / "kept.css").read_text(encoding="utf-8")
+    return page_text(experiment, data, kicker=KICKER, by=by, before=BY_CASE, after=[after], style=style)
+
+
+def kind_of(experiment: Experiment) -> str:
+    """`run`, or `sweep` where it has several cases."""
+    return "sweep" if experiment.cases.count > 1 else "run"
+
+
+def shown_rows(experiment: Experiment) -> np.ndarray:
+    """Rows of the case table that the page has and that are run."""
+    return np.arange(min(experiment.cases.count, MOST_CASES))
+
+
+def run_cases(
+    prepared: Prepared, stop: Callable[[], bool], progress: Callable[[int], None] = lambda _: None
+) -> Iterator[Run]:
+    """Run the cases that the page has: what there is of them so far, now and then, and in the end; nothing more once
+    they are to stop. Raises Problem, as `met run` does."""
+    linear_metrics.check(prepared)
+    rows = shown_rows(prepared.experiment)
+    prepared.kernel  # noqa: B018 - compiling is not running
+    done, told, count, found = 0, time.monotonic(), FIRST, []
+    while done < len(rows) and not stop():
+        began = time.monotonic()
+        here = rows[done : done + count]
+        found.append(linear_metrics.compute(prepared, here, record=False)[1])
+        done += len(here)
+        took = time.monotonic() - began
+        count = max(1, min(4 * count, round(count * SHARE / max(took, 1e-6))))
+        progress(done)
+        if done == len(rows) or time.monotonic() - told > TELLING:
+            told = time.monotonic()
+            yield results(prepared, rows[:done], None, np.concatenate(found))
+
+
+def numbers(deck: WatchedDeck, experiment: Experiment, run: Run) -> str:
+    """What came of the cases so far, as the page's script takes it: JSON."""
+    count, done = len(shown_rows(experiment)), len(run.case)
+    status = np.full(count, NOT_YET)
+    status[:done] = run.status
+    metrics = []
+    for use in (*experiment.structure.metrics, *experiment.linear_metrics):
+        values = np.full(count, np.nan)
+        values[:done] = run.metrics[use.name]
+        metrics.append(doubles(values))
+    pool = Pool(experiment.name, [GroupInMemory.of_run(experiment, run)])
+    points = overview(pool)
+    command = f"met run {quoted(deck.path)} {quoted(experiment.name_in_deck)} --case '#CASE'"
+    data = {
+        "status": status.tolist(),
+        "metrics": metrics,
+        "done": done,
+        "failed": int((run.status != DONE).sum()),
+        "failures": [[each.count, visible(each.cause), each.row] for each in pool.failures[:5]],
+        "doubtful": sorted({visible(each) for each in run.warning if each})[:5],
+        "verdicts": [
+            [visible(text), *(int((pool.outcomes[:, n] == value).sum()) for value in (1, 0, -1))]
+            for n, text in enumerate(pool.requirements)
+        ],
+        "cases": {
+            "name": visible(experiment.name),
+            "against": None,
+            "replay": visible(command),
+            "ended": list(ENDED),
+            "overview": None if points is None else overview_data(points),
+        },
+    }
+    return json.dumps(data, allow_nan=False)

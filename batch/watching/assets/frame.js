@@ -1,0 +1,120 @@
+// The page around the run of a deck that is watched. It hears what is new, makes the new run ready behind the old one,
+// puts it where that was looked at, and lets it take its place. Texts of a deck come in as text nodes alone.
+"use strict";
+
+(() => {
+  const READY = 400;  // ms, in which a page that nobody sees draws nothing, and is shown as it is
+  const make = (tag, about = {}, ...children) => {
+    const made = Object.assign(document.createElement(tag), about);
+    made.append(...children);
+    return made;
+  };
+  const name = make("code");
+  const doing = make("span", { className: "doing" });
+  doing.setAttribute("role", "status");
+  const runs = make("select", { onchange: () => choose({ run: runs.value }) });
+  const groups = make("select", { onchange: () => choose({ run: state.run, group: groups.value }) });
+  const [ofRun, ofGroup] = [make("label", {}, "Run ", runs), make("label", {}, "Structure ", groups)];
+  const head = make("h2");
+  const words = make("pre", { tabIndex: 0 });
+  const messages = make("aside", { hidden: true }, head, words);
+  const room = make("div", { className: "room" });
+  document.body.append(make("header", { className: "deck-bar" }, name, ofRun, ofGroup, doing), make("main", {}, messages, room));
+
+  let state = { page: 0, numbers: 0 };
+  let [shown, coming] = [null, null];  // {frame, page, numbers}
+  let gone = false;
+
+  async function choose(chosen) {
+    await fetch("choose", { method: "POST", body: new URLSearchParams(chosen) });
+  }
+
+  function options(select, label, all, chosen) {
+    label.hidden = all.length < 2;
+    if ([...select.options].map((each) => each.value).join("\n") !== all.join("\n")) select.replaceChildren(...all.map((each) => make("option", { value: each }, each)));
+    select.value = chosen;
+  }
+
+  const clock = (seconds) => new Date(1000 * seconds).toTimeString().slice(0, 8);
+  const ofDeck = /^\s*\d*\s*\|/;  // a line of a file, or the marks under it, which stay one line
+
+  // What `met check` says; told: what was put there last.
+  let told = "";
+  function say(text) {
+    if (told === text) return;
+    told = text;
+    words.replaceChildren(...text.split("\n").map((line) => (ofDeck.test(line) ? make("span", { className: "of-deck" }, line) : `${line}\n`)));
+  }
+
+  function tell() {
+    document.title = `${state.name} · met view`;
+    name.textContent = state.name;
+    options(runs, ofRun, state.names, state.run);
+    options(groups, ofGroup, state.groups, state.group);
+    const broken = state.broken ? `a mistake since ${clock(state.tried)}` : "";
+    const standing = state.page && !state.broken ? `as saved at ${clock(state.saved)}` : "";
+    doing.textContent = gone ? "met view has ended: nothing is watched any more" : [broken, state.doing || standing].filter(Boolean).join(" · ");
+    doing.classList.toggle("bad", gone || state.broken);
+    messages.hidden = !state.messages;
+    messages.classList.toggle("bad", state.broken);
+    head.textContent = state.broken ? (state.page ? `A mistake: shown is the run as saved at ${clock(state.saved)}` : "A mistake: there is no run to show yet") : "Warnings";
+    say(state.messages);
+  }
+
+  function take(news) {
+    state = news;
+    tell();
+    if (state.page && state.page !== (coming || shown || {}).page) load(state.page);
+    deliver();
+  }
+
+  // The new page, behind the one that is seen.
+  function load(page) {
+    if (coming) coming.frame.remove();
+    const frame = make("iframe", { src: `page/${page}`, title: "The run", className: "coming" });
+    const mine = { frame, page, numbers: 0 };
+    coming = mine;
+    frame.addEventListener("load", () => {
+      if (coming !== mine) return;
+      const { metKept } = frame.contentWindow;
+      if (!metKept) return;  // it was gone before it was fetched: another comes
+      const standing = () => (shown ? JSON.stringify(shown.frame.contentWindow.metKept.take()) : "");
+      const stood = standing();
+      if (shown) metKept.put(JSON.parse(stood));
+      deliver();
+      let done = false;
+      const swap = () => {
+        if (done || coming !== mine) return;
+        done = true;
+        if (shown) {
+          if (standing() !== stood) metKept.put(JSON.parse(standing()));  // it was moved meanwhile
+          if (document.activeElement === shown.frame) frame.contentWindow.focus();
+          shown.frame.remove();
+        }
+        frame.className = "";
+        [shown, coming] = [mine, null];
+        document.documentElement.dataset.shown = page;
+      };
+      frame.contentWindow.requestAnimationFrame(() => frame.contentWindow.requestAnimationFrame(swap));
+      setTimeout(swap, READY);
+    });
+    room.append(frame);
+  }
+
+  // What came of the cases, to the page that they are of.
+  async function deliver() {
+    const to = [shown, coming].find((each) => each && each.page === state.page && each.frame.contentWindow.metKept);
+    const { numbers } = state;
+    if (!to || !numbers || to.numbers === numbers) return;
+    to.numbers = numbers;
+    const answer = await fetch(`numbers/${numbers}`);
+    if (answer.ok && to.frame.isConnected) {
+      to.frame.contentWindow.metKept.arrive(await answer.json());
+      document.documentElement.dataset.numbers = numbers;
+    }
+  }
+
+  const events = new EventSource("events");
+  events.onmessage = (event) => { gone = false; take(JSON.parse(event.data)); };
+  events.onerror = () => { gone = true; if (state.name) tell(); };
+})();

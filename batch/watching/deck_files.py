@@ -1,0 +1,115 @@
+"""The files that a deck is made of, and when one of them has changed.
+
+Editors write in many ways: over the file, or beside it and then by a rename; and some write a file that is as it was.
+So a file has changed when its bytes have, which are looked at only where its size, time or inode is another.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from ic.text.files import LIBRARY
+from ic.text.lexer import COMMAND_LINE
+from met.host.files import read_regular
+
+PAUSE = 0.05
+"""Seconds between two looks."""
+
+SETTLED, LONGEST = 0.02, 0.5
+"""Seconds without a change after which a file counts as written; and the most that are waited for that."""
+
+Stamp = tuple[int, int, int] | None
+"""Time, size and inode of a file; None where there is none."""
+
+
+class DeckFiles:
+    """The files and folders that are watched, as they were when they were last looked at."""
+
+    def __init__(self, deck: Path, include_dirs: Sequence[str] = ()) -> None:
+        self._deck, self._folders = deck, [Path(each) for each in include_dirs]
+        self._stamps: dict[Path, Stamp] = {}
+        self._digests: dict[Path, bytes] = {}
+        self._around: dict[Path, Stamp] = {}
+        self._look(deck)
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The files that are watched, the deck first."""
+        return tuple(self._stamps)
+
+    def begin(self) -> float:
+        """Look at all files, before they are read; gives back when that was, for `found`."""
+        for path in self.paths:
+            self._look(path)
+        self._around = {folder: _stamp(folder) for folder in self._all_folders()}
+        return time.time()
+
+    def found(self, names: Iterable[str], begun: float) -> bool:
+        """Watch the files that a deck was read from since then, by the names that messages give them. True where one
+        that was not known has changed meanwhile, so that what was read of it is not known."""
+        paths = dict.fromkeys([self._deck, *(path_of(name) for name in names if name != COMMAND_LINE)])
+        new = [path for path in paths if path not in self._stamps]
+        for path in [path for path in self._stamps if path not in paths]:
+            del self._stamps[path], self._digests[path]
+        for path in new:
+            self._look(path)
+        self._around |= {folder: _stamp(folder) for folder in self._all_folders() if folder not in self._around}
+        return any((stamp := self._stamps[path]) is not None and stamp[0] > begun * 1e9 for path in new)
+
+    def changed(self, *, around: bool = False) -> bool:
+        """True if a file has other bytes than it had. around: or if in a folder something came, went or was renamed,
+        where a file that is looked for may be one."""
+        others = [path for path in self.paths if _stamp(path) != self._stamps[path]]
+        changed = sum(map(self._look, others)) > 0
+        if around and not changed:
+            now = {folder: _stamp(folder) for folder in self._around}
+            changed, self._around = now != self._around, now
+        return changed
+
+    def wait(self, *, around: bool = False, until: Callable[[], bool] = lambda: False) -> None:
+        """Wait until something has changed and is written, or something else has happened."""
+        while not until():
+            if self.changed(around=around):
+                self._settle()
+                return
+            time.sleep(PAUSE)
+
+    def _settle(self) -> None:
+        """Wait while a file is being written, or has given up its name to one that is yet to take it."""
+        end = time.monotonic() + LONGEST
+        while time.monotonic() < end:
+            before = {path: _stamp(path) for path in self.paths}
+            time.sleep(SETTLED)
+            if None not in before.values() and before == {path: _stamp(path) for path in self.paths}:
+                return
+
+    def _look(self, path: Path) -> bool:
+        """Take a file as it is now. True where its bytes are others."""
+        self._stamps[path] = _stamp(path)
+        try:
+            digest = hashlib.sha256(read_regular(path)).digest()
+        except OSError:
+            digest = b""
+        before = self._digests.get(path)
+        self._digests[path] = digest
+        return before is not None and before != digest
+
+    def _all_folders(self) -> list[Path]:
+        return list(dict.fromkeys([*(path.parent for path in self._stamps), *self._folders]))
+
+
+def path_of(name: str) -> Path:
+    """The file that messages call so: `<servos/rigid_gearbox.ic>` is one of the standard library's."""
+    return LIBRARY / name[1:-1] if name.startswith("<") and name.endswith(">") else Path(name)
+
+
+def _stamp(path: Path) -> Stamp:
+    try:
+        about = os.stat(path)
+    except OSError:
+        return None
+    return about.st_mtime_ns, about.st_size, about.st_ino

@@ -1,0 +1,123 @@
+"""`met view DECK`: wait until a deck is saved, compile it, show its run, run its cases; until the terminal is closed.
+
+The cases are run in a thread of their own, and given up when the deck is saved again. Nothing is written but into the
+cache of compiled objects, so that whoever is killed in the middle leaves nothing.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from batch.watching import answers
+from batch.watching.answers import DeckAnswer, WatchedDeck
+from batch.watching.board import Board
+from batch.watching.deck_files import DeckFiles
+from batch.watching.serving import PageServer
+from met.diagnostic import Problem
+from met.messages.render import render
+from met.messages.visible import visible
+from met.run import Prepared, prepare
+
+PATIENCE_SECONDS = 2.0
+"""For cases that are given up, when all ends: a compiler is not to be left in the middle."""
+
+
+def follow(deck: WatchedDeck, name: str | None, *, port: int, ready: Callable[[str], None]) -> None:
+    """Show the deck's run until an interrupt. Raises Problem E477 where the port cannot be had.
+
+    name   of the run or sweep; None: the one that `met run` would take, or that is chosen on the page
+    ready  told the address of the page, when it can be opened
+    """
+    board = Board(visible(str(deck.path)))
+    server = PageServer(board, port)
+    server.begin()
+    ready(server.address)
+    loop = _Loop(deck, name, board)
+    try:
+        loop.run()
+    finally:
+        loop.give_up(PATIENCE_SECONDS)
+        server.end()
+
+
+class _Loop:
+    """What is shown, and the thread that runs its cases. name, group: what was asked for, or chosen on the page."""
+
+    def __init__(self, deck: WatchedDeck, name: str | None, board: Board) -> None:
+        self._deck, self._name, self._board = deck, name, board
+        self._group: str | None = None
+        self._files = DeckFiles(deck.path, deck.include_dirs)
+        self._page = self._work = ""
+        self._is_broken = False
+        self._cases: threading.Thread | None = None
+        self._stop = threading.Event()
+
+    def run(self) -> None:
+        """Compile, show, wait; for ever."""
+        while True:
+            again = self._once()
+            if not again:
+                self._files.wait(around=self._is_broken, until=self._board.is_chosen)
+            if (chosen := self._board.take_chosen()) is not None:
+                self._name, self._group = chosen
+            self._board.tell(doing="compiling")
+
+    def give_up(self, seconds: float | None = None) -> None:
+        """Run no more cases of what is shown; wait until that is so, for so long at most."""
+        self._stop.set()
+        if self._cases is not None:
+            self._cases.join(seconds)
+
+    def _once(self) -> bool:
+        """Compile what is on the disk, and show it. True where that has changed meanwhile."""
+        begun = self._files.begin()
+        answer = answers.compiled(self._deck, self._name, self._group)
+        if self._files.found(answer.files, begun):
+            return True
+        self._is_broken = answer.experiment is None
+        told = {"names": list(answer.names), "groups": list(answer.groups), "messages": answer.messages}
+        if answer.experiment is None:
+            self._board.tell(**told, broken=True, tried=begun, doing="")
+            return False
+        try:
+            self._show(answer, prepare(answer.experiment), told, begun)
+        except Problem as problem:
+            self._is_broken = True
+            self._board.tell(**told | {"messages": _words(problem)}, broken=True, tried=begun, doing="")
+        return False
+
+    def _show(self, answer: DeckAnswer, prepared: Prepared, told: dict[str, object], begun: float) -> None:
+        """Put up the page, and begin to run its cases; where page and program are as they were, they stay."""
+        experiment = prepared.experiment
+        told |= {
+            "run": experiment.name_in_deck, "group": experiment.name, "broken": False, "saved": begun, "tried": begun,
+        }  # fmt: skip
+        text, work = answers.page(answer, prepared), prepared.work_key
+        if (text, work) == (self._page, self._work):
+            self._board.tell(**told, doing="")
+            return
+        self.give_up(0.0)
+        self._page, self._work, self._stop = text, work, threading.Event()
+        page = self._board.show("page", text, **told, numbers=0, doing="compiling for this machine")
+        self._cases = threading.Thread(target=self._run_cases, args=(prepared, page, self._stop), daemon=True)
+        self._cases.start()
+
+    def _run_cases(self, prepared: Prepared, page: int, stop: threading.Event) -> None:
+        """Run the cases of a page, and tell what comes of them while it is the one that is shown."""
+        experiment, board = prepared.experiment, self._board
+        total = len(answers.shown_rows(experiment))
+
+        def progress(done: int) -> None:
+            board.tell(page, doing=f"{done:,} of {total:,} cases are run")
+
+        try:
+            for run in answers.run_cases(prepared, stop.is_set, progress):
+                board.show("numbers", answers.numbers(self._deck, experiment, run), page)
+            board.tell(page, doing="")
+        except Problem as problem:
+            board.tell(page, messages=_words(problem), doing="the cases were not run")
+
+
+def _words(problem: Problem) -> str:
+    return visible(render(problem.diagnostics, problem.sources))

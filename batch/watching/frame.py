@@ -1,0 +1,47 @@
+"""The page around the run of a deck that is watched: what `met check` says, which run is shown, how far it is.
+
+The run is a page of its own in it. When there is a new one, it is made ready behind the old one, put where that was
+looked at, and then takes its place.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from batch.report.html import inlined
+from batch.report.html.markup import Html, el, lines
+
+_ASSETS = Path(__file__).with_name("assets")
+
+
+def _asset(name: str) -> str:
+    return (_ASSETS / name).read_text(encoding="utf-8").strip()
+
+
+@cache
+def frame() -> tuple[str, str]:
+    """The whole text, the same for each deck, and its content security policy."""
+    script, style = _asset("frame.js"), "\n".join([inlined.style(), _asset("frame.css")])
+    policy = (
+        f"default-src 'none'; script-src {inlined.digest(script)}; style-src {inlined.digest(style)}; img-src data:; "
+        "connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+    head = lines(
+        [
+            el("meta", charset="utf-8"),
+            el("meta", name="viewport", content="width=device-width, initial-scale=1"),
+            el("meta", name="color-scheme", content="light dark"),
+            el("link", rel="icon", href="data:,"),
+            el("title", "met view"),
+            Html(f"<style>{style}</style>"),
+        ]
+    )
+    none = el("noscript", el("p", "This page needs scripts, which this reader does not run."))
+    body = lines([none, Html(f"<script>{script}</script>")])
+    text = f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{head}\n</head>\n<body>\n{body}\n</body>\n</html>\n'
+    return text, policy
+
+
+FRAME_POLICY = "default-src 'none'; frame-ancestors 'none'"
+"""Of answers that are no page."""

@@ -1,0 +1,194 @@
+"""The page of a deck that is watched, over HTTP, on this machine alone and to one who has its address.
+
+Others use the machine too, and their browsers and programs reach every port of it; and any page in one's own browser
+can send requests there. So each request is refused that does not know the token in the address, that names another
+host than this one (a name that somebody has made lead here), or that another page has sent. Nothing of the disk is
+served: what can be asked for is four names.
+"""
+
+from __future__ import annotations
+
+import hmac
+import json
+import secrets
+import threading
+from contextlib import suppress
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from socket import socket
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from batch.watching.board import Board
+from batch.watching.frame import FRAME_POLICY, frame
+from met.diagnostic import Problem, error
+
+HOST = "127.0.0.1"
+TOKEN_BYTES = 24
+
+MOST_OPEN = 64
+"""Connections at a time: a page has two. More are closed at once, so that nobody fills the memory with them."""
+
+IDLE_SECONDS = 10.0
+"""A request that takes longer to come is given up."""
+
+ALIVE_SECONDS = 15.0
+"""Between two signs of life to a page that waits, by which one that has gone is noticed."""
+
+MOST_CHOICE = 10_000
+"""Bytes of a choice."""
+
+SAFE = {
+    "Cache-Control": "no-store",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+INNER_POLICY = "frame-ancestors 'self'"
+"""Besides what the page allows itself."""
+
+
+class PageServer(ThreadingHTTPServer):
+    """Serves what is on the board until it is closed. Raises Problem E477 where the port cannot be had."""
+
+    daemon_threads = True
+    block_on_close = False
+
+    def __init__(self, board: Board, port: int = 0) -> None:
+        self.board, self.token = board, secrets.token_urlsafe(TOKEN_BYTES)
+        self._open = threading.Semaphore(MOST_OPEN)
+        try:
+            super().__init__((HOST, port), _Request)
+        except OSError as reason:
+            helps = "leave `--port` out: a free one is taken"
+            message = f"cannot serve on port {port} of {HOST}: {(reason.strerror or str(reason)).lower()}"
+            raise Problem(error("E477", message, help=helps)) from reason
+        self.hosts = tuple(f"{name}:{self.server_port}" for name in (HOST, "localhost"))
+
+    @property
+    def address(self) -> str:
+        """Of the page, for a browser on this machine."""
+        return f"http://{HOST}:{self.server_port}/{self.token}/"
+
+    def begin(self) -> None:
+        """Serve, in a thread of its own."""
+        threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.5}, daemon=True).start()
+
+    def end(self) -> None:
+        """Serve no more, and let everybody go who waits."""
+        self.board.end()
+        self.shutdown()
+        self.server_close()
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        if self._open.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: socket | Any, client_address: Any) -> None:
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._open.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A connection that broke is nothing to tell."""
+
+
+class _Request(BaseHTTPRequestHandler):
+    """One request: GET of the frame, the page in it, its numbers, events; POST of a choice."""
+
+    server: PageServer
+    server_version, sys_version = "met", ""
+    timeout = IDLE_SECONDS
+
+    def do_GET(self) -> None:
+        what, number = self._asked()
+        if what == "":
+            text, policy = frame()
+            self._send(text.encode(), "text/html; charset=utf-8", policy)
+        elif what == "events":
+            self._events()
+        elif what in ("page", "numbers") and (found := self.server.board.text(what, number)) is not None:
+            kind = "text/html; charset=utf-8" if what == "page" else "application/json"
+            self._send(found, kind, INNER_POLICY if what == "page" else FRAME_POLICY)
+        elif what is not None:
+            self._refuse(HTTPStatus.NOT_FOUND)
+
+    def do_POST(self) -> None:
+        what, _ = self._asked(posted=True)
+        if what is None:
+            return
+        size = self.headers.get("Content-Length", "")
+        if what != "choose" or not size.isascii() or not size.isdigit() or int(size) > MOST_CHOICE:
+            self._refuse(HTTPStatus.NOT_FOUND if what != "choose" else HTTPStatus.BAD_REQUEST)
+            return
+        told = parse_qs(self.rfile.read(int(size)).decode("utf-8", "replace"))
+        run, group = (told.get(name, [None])[0] for name in ("run", "group"))
+        if run is not None and self.server.board.choose(run, group):
+            self._send(b"", "text/plain", FRAME_POLICY)
+        else:
+            self._refuse(HTTPStatus.BAD_REQUEST)
+
+    def _asked(self, posted: bool = False) -> tuple[str | None, int]:
+        """What is asked for, behind the token, and of which number; None where it was refused."""
+        hosts = self.headers.get_all("Host") or []
+        if len(hosts) != 1 or hosts[0] not in self.server.hosts:
+            return self._refuse(HTTPStatus.MISDIRECTED_REQUEST)
+        origin, site = self.headers.get("Origin"), self.headers.get("Sec-Fetch-Site", "none")
+        foreign = origin != f"http://{hosts[0]}" and (posted or origin is not None)
+        if foreign or site not in ("none", "same-origin"):
+            return self._refuse(HTTPStatus.FORBIDDEN)
+        first, _, rest = urlsplit(self.path).path.removeprefix("/").partition("/")
+        known = hmac.compare_digest(first.encode("utf-8", "replace"), self.server.token.encode())
+        what, _, number = rest.partition("/")
+        if not known or not self.path.startswith(f"/{self.server.token}/"):
+            return self._refuse(HTTPStatus.NOT_FOUND)
+        if number and not (number.isascii() and number.isdigit() and len(number) < 10):
+            return self._refuse(HTTPStatus.NOT_FOUND)
+        return what, int(number or 0)
+
+    def _events(self) -> None:
+        """The state each time that it changes, until the page goes or all ends."""
+        self.send_response(HTTPStatus.OK)
+        self._head("text/event-stream", FRAME_POLICY)
+        self.end_headers()
+        number = 0
+        while not self.server.board.ended:
+            number, state = self.server.board.after(number, ALIVE_SECONDS)
+            said = ":\n\n" if state is None else f"data: {json.dumps(state)}\n\n"
+            try:
+                self.wfile.write(said.encode())
+                self.wfile.flush()
+            except OSError:
+                return
+
+    def _send(self, body: bytes, kind: str, policy: str) -> None:
+        self.send_response(HTTPStatus.OK)
+        self._head(kind, policy)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        with suppress(OSError):
+            self.wfile.write(body)
+
+    def _head(self, kind: str, policy: str) -> None:
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Security-Policy", policy)
+        for name, value in SAFE.items():
+            self.send_header(name, value)
+
+    def _refuse(self, status: HTTPStatus) -> tuple[None, int]:
+        """An answer that says nothing of what there is."""
+        self.send_response(status)
+        self.send_header("Content-Length", "0")
+        self.end_headers()
+        return None, 0
+
+    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+        """Requests that cannot be read get the same."""
+        self._refuse(HTTPStatus(code))
+
+    def log_message(self, format: str, *words: Any) -> None:
+        """Nothing is logged: an address holds the token."""
