@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Literal
 
 from hw.bed import Capability, Limits, Scales
+from hw.interlock import Interlock, interlock_c
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host import cache
@@ -90,6 +91,7 @@ class Config:
     drive_current       measured drive current beyond which it is a fault, A; where it is measured
     shaft               None: nobody watches the tachometer
     capabilities        ENCODER ... WATCHDOG as the port has them; LOCK_STEP of a simulated plant; SIMULATED is added
+    interlock           None: there is none; else INTERLOCK is added, and the port has a `board_interlock_port`
     """
 
     name: str
@@ -102,6 +104,7 @@ class Config:
     drive_current: float = 0.0
     shaft: Shaft | None = None
     capabilities: Capability = Capability(0)
+    interlock: Interlock | None = None
 
 
 # Of the numbers of hw/firmware/core/guard.h.
@@ -374,6 +377,9 @@ def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
     if not (1 <= len(config.name) <= 16 and config.name.isascii() and config.name.isprintable()):
         raise ValueError(f"the name {config.name!r} is not 1 to 16 printable characters of ASCII")
     capabilities = config.capabilities | (Capability.SIMULATED if plant else Capability(0))
+    lock = config.interlock
+    if lock is not None:
+        capabilities |= Capability.INTERLOCK
     if Capability.LOCK_STEP in capabilities and not plant and Capability.SIMULATED not in capabilities:
         raise ValueError("lock-step is for simulated plants")
     announced = (
@@ -400,6 +406,7 @@ def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
         "",
         "extern const bed_config board_config;",
         *([] if plant else ["extern const bed_plant board_plant;"]),
+        *([] if lock is None else interlock_c(lock, config.tick_hz, s, counts["arming_rate"], capabilities)),
         "const bed_config board_config = {",
         f"    .capabilities = 0x{int(capabilities):04x}u,",
         f"    .firmware = {{{_bytes(firmware)}}},",
@@ -415,6 +422,7 @@ def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
         *(f"        .{each} = {value}{'u' if each in ('bits', 'lag') else ''}," for each, value in g.items()),
         "    },",
         f"    .plant = {'&board_plant' if Capability.SIMULATED in capabilities else '0'},",
+        *([] if lock is None else ["    .interlock = &board_interlock,"]),
         "};",
     ]
     if plant:
