@@ -48,6 +48,7 @@ class Fault(enum.IntFlag):
     TACHOMETER_REVERSED = 1 << 10
     NOISE = 1 << 11
     WATCHDOG = 1 << 12
+    INTERLOCK = 1 << 14
 
 
 class Capability(enum.IntFlag):
@@ -60,6 +61,26 @@ class Capability(enum.IntFlag):
     WATCHDOG = 1 << 3
     LOCK_STEP = 1 << 4
     SIMULATED = 1 << 5
+    INTERLOCK = 1 << 6
+
+
+class InterlockReason(enum.IntFlag):
+    """The reasons for which a bed's interlock stops it or does not let it arm; the values are bits of the
+    protocol."""
+
+    STOP = 1 << 0
+    READY = 1 << 1
+    READ_BACK = 1 << 2
+    KEY = 1 << 3
+    CONVERTER = 1 << 4
+    DRIVE_HEAT = 1 << 5
+    TEMPERATURE = 1 << 6
+    BUS = 1 << 7
+    ANGLE = 1 << 8
+    ENCODER = 1 << 9
+    LOAD = 1 << 10
+    TICK = 1 << 11
+    MAIN = 1 << 12
 
 
 @frozen
@@ -119,6 +140,7 @@ class BedSample:
     rate     rate of the shaft behind the tachometer's filter, rad/s;  angle: of the shaft, rad
     faults   the faults that are latched
     refused  True where the bed did not do what was asked, as it may not in this state
+    interlock  reasons that are latched, else those that forbid arming now
     """
 
     state: BedState
@@ -130,6 +152,7 @@ class BedSample:
     angle: float | None = None
     drive_current: float | None = None
     acceleration: float | None = None
+    interlock: InterlockReason | None = None
 
 
 LIMIT_NAMES = ("voltage", "current", "rate", "voltage_slew", "current_slew")

@@ -22,11 +22,12 @@ from pathlib import Path
 from typing import Literal
 
 from hw.bed import Capability, Limits, Scales
+from hw.interlock import Interlock, interlock_c
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host import cache
 
-Kind = Literal["host", "library", "arm"]
+Kind = Literal["host", "library", "arm", "pico"]
 
 FIRMWARE = Path(__file__).with_name("firmware")
 """The folder with the C sources."""
@@ -39,25 +40,30 @@ CROSS_COMPILER, EMULATOR = "arm-none-eabi-gcc", "qemu-system-arm"
 LIMIT = 1 << 28
 """Size of the folder of products, bytes, above which those longest unused are removed."""
 
-_PRODUCTS: Mapping[Kind, str] = {"host": "bed-host", "library": "libbed.so", "arm": "bed.elf"}
+_PRODUCTS: Mapping[Kind, str] = {"host": "bed-host", "library": "libbed.so", "arm": "bed.elf", "pico": "bed.elf"}
+
+_BARE = (
+    "-O2",
+    "-mthumb",
+    "-ffreestanding",
+    "-nostdlib",
+    "-static",
+    "-ffunction-sections",
+    "-fdata-sections",
+    "-fno-tree-loop-distribute-patterns",
+    "-Wl,--gc-sections",
+    "-Wl,--fatal-warnings",
+)
 
 _FLAGS: Mapping[Kind, tuple[str, ...]] = {
     "host": ("-O2",),
     "library": ("-O2", "-shared", "-fPIC"),
-    "arm": (
-        "-O2",
-        "-mcpu=cortex-m3",
-        "-mthumb",
-        "-ffreestanding",
-        "-nostdlib",
-        "-static",
-        "-ffunction-sections",
-        "-fdata-sections",
-        "-fno-tree-loop-distribute-patterns",
-        "-Wl,--gc-sections",
-        "-Wl,--fatal-warnings",
-    ),
+    "arm": ("-mcpu=cortex-m3", *_BARE),
+    "pico": ("-mcpu=cortex-m0plus", *_BARE),
 }
+
+_CROSS: Mapping[Kind, str] = {"arm": "arm/lm3s6965.ld", "pico": "pico/rp2040.ld"}
+"""The linker's scripts of kinds that are built for another processor."""
 
 
 @frozen(kw_only=True)
@@ -90,6 +96,7 @@ class Config:
     drive_current       measured drive current beyond which it is a fault, A; where it is measured
     shaft               None: nobody watches the tachometer
     capabilities        ENCODER ... WATCHDOG as the port has them; LOCK_STEP of a simulated plant; SIMULATED is added
+    interlock           None: there is none; else INTERLOCK is added, and the port has a `board_interlock_port`
     """
 
     name: str
@@ -102,6 +109,7 @@ class Config:
     drive_current: float = 0.0
     shaft: Shaft | None = None
     capabilities: Capability = Capability(0)
+    interlock: Interlock | None = None
 
 
 # Of the numbers of hw/firmware/core/guard.h.
@@ -146,25 +154,27 @@ def build(
     *,
     sources: Sequence[Path] = (),
     flags: Sequence[str] = (),
+    texts: Mapping[str, str] | None = None,
 ) -> Path:
-    """The firmware of one bed: a program ("host"), a shared library, or an ELF file for lm3s6965evb ("arm").
+    """The firmware of one bed: a program ("host"), a shared library, or an ELF file for lm3s6965evb ("arm") or a
+    Raspberry Pi Pico ("pico", which hw/pico.py makes an image of).
 
-    plant_c   text of the simulated plant; None only for a library, whose port is in `sources`
-    flags     more words for the compiler
+    plant_c   text of the simulated plant; None for a library, whose port is in `sources`, and for a Pico with motors
+    flags     more words for the compiler;  texts: more sources, by their names
 
     Problem E410, E411: there is no compiler, or it does not build this. ValueError: a config that cannot be counted
     (`Uncountable`), or whose ticks are not the plant's periods.
     """
-    if plant_c is None and kind != "library":
+    if plant_c is None and kind not in ("library", "pico"):
         raise ValueError(f"firmware of kind {kind!r} needs a plant")
     compiler = _compiler(kind)
-    texts = {"config.c": config_c(config, plant=plant_c is not None)}
+    texts = {**(texts or {}), "config.c": config_c(config, plant=plant_c is not None)}
     if plant_c is not None:
         _check_period(config, plant_c)
         texts["plant.c"] = plant_c
     files = _sources(kind, plant=plant_c is not None) + [Path(path) for path in sources]
-    words = [*WARNINGS, *_FLAGS[kind], *(() if kind == "arm" else _fused()), *flags]
-    read = sorted([*FIRMWARE.rglob("*.h"), *(FIRMWARE.rglob("*.ld") if kind == "arm" else ())])
+    words = [*WARNINGS, *_FLAGS[kind], *(() if kind in _CROSS else _fused()), *flags]
+    read = sorted([*FIRMWARE.rglob("*.h"), *([FIRMWARE / _CROSS[kind]] if kind in _CROSS else ())])
     stamp = firmware_hash([*files, *read], texts)
     texts["config.c"] = config_c(config, plant=plant_c is not None, firmware=stamp)
     version = subprocess.run([compiler, "--version"], capture_output=True, text=True).stdout
@@ -374,6 +384,9 @@ def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
     if not (1 <= len(config.name) <= 16 and config.name.isascii() and config.name.isprintable()):
         raise ValueError(f"the name {config.name!r} is not 1 to 16 printable characters of ASCII")
     capabilities = config.capabilities | (Capability.SIMULATED if plant else Capability(0))
+    lock = config.interlock
+    if lock is not None:
+        capabilities |= Capability.INTERLOCK
     if Capability.LOCK_STEP in capabilities and not plant and Capability.SIMULATED not in capabilities:
         raise ValueError("lock-step is for simulated plants")
     announced = (
@@ -400,6 +413,7 @@ def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
         "",
         "extern const bed_config board_config;",
         *([] if plant else ["extern const bed_plant board_plant;"]),
+        *([] if lock is None else interlock_c(lock, config.tick_hz, s, counts["arming_rate"], capabilities)),
         "const bed_config board_config = {",
         f"    .capabilities = 0x{int(capabilities):04x}u,",
         f"    .firmware = {{{_bytes(firmware)}}},",
@@ -415,6 +429,7 @@ def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
         *(f"        .{each} = {value}{'u' if each in ('bits', 'lag') else ''}," for each, value in g.items()),
         "    },",
         f"    .plant = {'&board_plant' if Capability.SIMULATED in capabilities else '0'},",
+        *([] if lock is None else ["    .interlock = &board_interlock,"]),
         "};",
     ]
     if plant:
@@ -427,11 +442,11 @@ def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
 
 
 def _sources(kind: Kind, *, plant: bool) -> list[Path]:
-    folders = ["core"]
-    if plant:
-        folders += ["plant", *(["arm"] if kind == "arm" else [])]
+    folders = ["core", *(["plant"] if plant else []), *([kind] if kind in _CROSS else [])]
     found = [path for folder in folders for path in sorted((FIRMWARE / folder).glob("*.c"))]
-    if plant and kind != "arm":
+    if kind == "pico":
+        found.remove(FIRMWARE / "pico" / ("port.c" if plant else "simulated.c"))
+    if plant and kind not in _CROSS:
         found.append(FIRMWARE / "host" / "port_host.c")
     if kind == "host":
         found.append(FIRMWARE / "host" / "bed_host.c")
@@ -439,7 +454,7 @@ def _sources(kind: Kind, *, plant: bool) -> list[Path]:
 
 
 def _compiler(kind: Kind) -> str:
-    if kind == "arm":
+    if kind in _CROSS:
         if shutil.which(CROSS_COMPILER) is None:
             raise Problem(
                 error(
@@ -470,8 +485,8 @@ def _compile(
 ) -> None:
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
-    include = [f"-I{FIRMWARE / each}" for each in (".", "core", "plant")]
-    ends = [f"-T{FIRMWARE / 'arm' / 'lm3s6965.ld'}", "-lgcc"] if kind == "arm" else []
+    include = [f"-I{FIRMWARE / each}" for each in (".", "core", "plant", *(["pico"] if kind == "pico" else []))]
+    ends = [f"-T{FIRMWARE / _CROSS[kind]}", "-lgcc"] if kind in _CROSS else []
     made = [str(folder / name) for name in sorted(texts)]
     command = [compiler, *words, *include, *map(str, files), *made, "-o", str(folder / _PRODUCTS[kind]), *ends]
     done = subprocess.run(command, capture_output=True, text=True)
@@ -479,7 +494,7 @@ def _compile(
         first = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip()[:200])
         raise Problem(
             error(
-                "E411" if kind == "arm" else "E410",
+                "E411" if kind in _CROSS else "E410",
                 f"`{compiler}` does not build the firmware: {first}",
                 help="a compiler of C11 is needed: gcc 10 or clang 12, or newer",
             )

@@ -22,6 +22,7 @@ from typing import Protocol
 from hw import records
 from hw.bed import BedDriver, BedSample, BedState, Fault
 from hw.pace import MISSED, Pace
+from hw.refusals import interlocked
 from met.frozen import frozen
 
 SPIN = 60e-6
@@ -173,5 +174,6 @@ def _ending(e: int, b: int, sample: BedSample, armed: bool) -> LoopEnd | None:
         return LoopEnd(e, "the bed was reset", b)
     if sample.state == BedState.STOPPED:
         names = ", ".join(fault.name.lower().replace("_", " ") for fault in Fault if fault in sample.faults)  # type: ignore[union-attr]
-        return LoopEnd(e, f"the bed stopped itself: {names or 'it does not say why'}", b, sample.faults)
+        names = "; ".join([names or "it does not say why", *(why for why, _ in interlocked(sample.interlock))])
+        return LoopEnd(e, f"the bed stopped itself: {names}", b, sample.faults)
     return LoopEnd(e, "the bed is not armed any more" if not sample.refused else "the bed refused a command", b)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hw.bed import About, BedDriver, BedSample, BedState, Fault
+from hw.bed import About, BedDriver, BedSample, BedState, Fault, InterlockReason
 from hw.build import Uncountable
 from hw.protocol.frames import Decoder
 from hw.protocol.messages import VERSION
@@ -45,6 +45,29 @@ _FAULTS = {
         "it was reset by its watchdog",
         "its firmware hung or its supply dipped: find out before going on",
     ),
+    Fault.INTERLOCK: ("its interlock stopped it", "`met bed probe` says by which of its inputs"),
+}
+
+_REASONS = {
+    InterlockReason.STOP: ("the emergency stop is pressed, or its wire is off", "find out why, then release it"),
+    InterlockReason.READY: ("an amplifier is not ready", "read what the amplifier shows; is it switched on?"),
+    InterlockReason.READ_BACK: (
+        "the amplifiers are not enabled as they should be",
+        "look at the enable line's relay: a contact that is welded, or a wire that is off",
+    ),
+    InterlockReason.KEY: ("nobody has turned its key since it last stopped", "turn the key off, then on, at the bed"),
+    InterlockReason.CONVERTER: (
+        "its converter does not read its reference as what it is",
+        "look at the converter's supply and reference",
+    ),
+    InterlockReason.DRIVE_HEAT: ("the drive motor was loaded for too long", "let it cool, and load it less"),
+    InterlockReason.TEMPERATURE: ("the drive motor is too warm, or its thermistor is off", "let it cool; see its wire"),
+    InterlockReason.BUS: ("the supply's voltage is too high or too low", "look at the supply and its brake resistor"),
+    InterlockReason.ANGLE: ("the shaft is beyond a limit of its angle", "turn it back by hand, its brake released"),
+    InterlockReason.ENCODER: ("encoder and tachometer do not agree", "look at the wires of both, and their scales"),
+    InterlockReason.LOAD: ("the load's current is not what it is told", "look at its amplifier, wires and sensor"),
+    InterlockReason.TICK: ("its ticks do not come in time", "its clock is wrong, or it hung: change the board"),
+    InterlockReason.MAIN: ("its main program stands still", "its processor hung: switch it off and on"),
 }
 
 
@@ -57,19 +80,28 @@ def remedies(faults: Fault) -> list[str]:
     return [_FAULTS[fault][1] for fault in Fault if fault in faults]
 
 
+def interlocked(reasons: InterlockReason | None) -> list[tuple[str, str]]:
+    """The reasons of an interlock in words, each with its remedy."""
+    return [_REASONS[each] for each in InterlockReason if reasons is not None and each in reasons]
+
+
 def refused(about: About, what: str, sample: BedSample) -> Problem:
     """The error for a bed that did not do what was asked (`arm`, `clear` ...), as its answer says."""
     latched = sample.faults & ~Fault.WATCHDOG
     slow = about.limits.arming_rate
+    locked = interlocked(sample.interlock)
     if not sample.greeted:
         why, helps = "it was reset since it was greeted", ["look at its supply, then begin anew"]
     elif sample.state == BedState.STOPPED and latched and what != "clear":
-        why, helps = f"it stopped itself: {words(latched)}", remedies(latched)
+        why = f"it stopped itself: {'; '.join([words(latched), *(each for each, _ in locked)])}"
+        helps = [*remedies(latched & ~Fault.INTERLOCK), *(each for _, each in locked)]
     elif abs(sample.rate) > slow:
         why = f"its shaft turns at {sample.rate:.3g} rad/s, and {slow:.3g} rad/s is the most for that"
         helps = ["wait until it has come to rest; a shaft that does not is driven by something"]
     elif sample.state == BedState.ARMED:
         why, helps = "it is armed", ["stop it first"]
+    elif locked:
+        why, helps = "; ".join(each for each, _ in locked), [each for _, each in locked]
     elif Fault.HEAT in latched:
         why, helps = "the load motor has not cooled down to half of its I2t", ["wait, or switch its amplifier off"]
     else:

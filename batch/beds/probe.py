@@ -113,6 +113,8 @@ def lines(result: ProbeResult) -> list[str]:
         if fault in sample.faults:
             out.append(f"  fault: {refusals.words(fault)}")
             out += [f"    = help: {each}" for each in refusals.remedies(fault)]
+    for what, remedy in refusals.interlocked(sample.interlock):
+        out += [f"  interlock: {what}", f"    = help: {remedy}"]
     for warning in result.warnings:
         out.append(f"  warning: {warning.message}")
         out += [f"    = help: {each}" for each in warning.help]
@@ -134,6 +136,7 @@ def data(result: ProbeResult) -> dict[str, Any]:
             for fault in Fault
             if fault in sample.faults
         ],
+        "interlock": [{"message": what, "help": [remedy]} for what, remedy in refusals.interlocked(sample.interlock)],
         "warnings": [{"code": each.code, "message": each.message, "help": list(each.help)} for each in result.warnings],
         "line": {
             "bytes": exchanged(about.capabilities),

@@ -236,6 +236,27 @@ def size(source: str, names: tuple[str, ...], **options: Any) -> int:
     return YES if size_and_tell(source, names, **options) else NO
 
 
+@bed.command(short_help="Write the image of a bed's board, to be dragged onto it.")
+@click.argument("bench", metavar="[BENCH.toml]", required=False)
+@click.option("--board", type=click.Choice(["pico"]), required=True, help="The board: a Raspberry Pi Pico.")
+@click.option("-o", "--output", metavar="FILE.uf2", help="The image [the bench's name, in this folder].")
+@click.option("--show", is_flag=True, help="Print the bench's file instead, to change it.")
+@loudness_options
+def firmware(bench: str | None, board: str, output: str | None, show: bool, quiet: bool, verbose: bool) -> int:
+    """Build the firmware of a bed whose numbers are in BENCH.toml, or of the one that the documentation wires, as a
+    UF2 file: hold the board's button while it is plugged in, and drag the file onto the drive that appears. The same
+    bench gives the same bytes.
+
+    Exit status: 0 it is written; 2 the bench is none, or there is no compiler.
+    """
+    from batch.beds.flashing import firmware_and_tell
+
+    if show and output is not None:
+        raise click.UsageError("`--show` writes no file: leave `-o` out")
+    firmware_and_tell(bench, output, show=show, quiet=quiet)
+    return YES
+
+
 @bed.command(short_help="Run a deck whose joints' motors are on beds.")
 @click.argument("source", metavar="DECK|PLAN.json")
 @click.argument("names", nargs=-1, metavar="[NAME]...")

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
 from hw import refusals
-from hw.bed import LIMIT_NAMES, About, BedDriver, BedSample, BedState, Capability, Fault, real_plant
+from hw.bed import LIMIT_NAMES, About, BedDriver, BedSample, BedState, Capability, Fault, InterlockReason, real_plant
 from hw.beds import greeting
 from hw.line import BedLine, TappedLine
 from hw.protocol import messages
@@ -20,7 +20,7 @@ from hw.protocol.messages import HelloAnswer, HostMessage, LimitsAnswer, OtherVe
 from met.diagnostic import Problem, error
 
 _GREETED, _REFUSED = 1 << 2, 1 << 13
-_FAULTS = sum(Fault)
+_FAULTS, _REASONS = sum(Fault), sum(InterlockReason)
 
 _WAITS = (0.05, 0.15, 0.5)
 """s to wait for an answer, each time that a question is asked: first three times the latency of a slow USB adapter,
@@ -58,6 +58,7 @@ class WireBed(BedDriver):
         self._decoder = Decoder()
         self._in_force = LimitsAnswer(0, 0, 0, 0, 0)
         self._sensors: tuple[tuple[str, float], ...] = ()
+        self._has_interlock = False
         self._step = 0
         """Ticks that a bed in lock-step advances by at an exchange; 0 for one with a time of its own."""
         self._angle: tuple[int, int] | None = None
@@ -94,6 +95,7 @@ class WireBed(BedDriver):
             Capability.ACCELEROMETER: ("acceleration", about.scales.acceleration),
         }
         self._sensors = tuple(scales[each] for each in messages.SENSORS if each in about.capabilities)
+        self._has_interlock = Capability.INTERLOCK in about.capabilities
         self._in_force = greeting.in_force(about)
         steps = Capability.LOCK_STEP in about.capabilities and math.isfinite(self.period)
         self._step = greeting.ticks(about, self.period) if steps else 0
@@ -233,7 +235,7 @@ class WireBed(BedDriver):
                 return None
             nonsense += len(data)
             for payload in self._decoder.feed(data):
-                found = messages.bed_answer(payload, len(self._sensors))
+                found = messages.bed_answer(payload, len(self._sensors) + self._has_interlock)
                 if found is None or found[0] != number:
                     continue
                 if isinstance(found[1], kind):
@@ -245,7 +247,7 @@ class WireBed(BedDriver):
     def _sample(self, found: SampleAnswer) -> BedSample:
         status, scale = found.status, self._there().scales.rate
         read = dict[str, float]()
-        for (name, of), counts in zip(self._sensors, found.others, strict=True):
+        for (name, of), counts in zip(self._sensors, found.others, strict=not self._has_interlock):
             read[name] = (self._unwrapped(counts) if name == "angle" else counts) * of
         return BedSample(
             BedState(status & messages.STATE),
@@ -255,6 +257,7 @@ class WireBed(BedDriver):
             found.tick,
             found.rate * scale,
             **read,
+            interlock=InterlockReason(found.others[-1] & _REASONS) if self._has_interlock else None,
         )
 
     def _unwrapped(self, counts: int) -> int:

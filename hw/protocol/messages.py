@@ -174,8 +174,8 @@ class LimitsAnswer:
 
 @frozen
 class SampleAnswer:
-    """SAMPLE: status bits, tick, rate in counts. others: counts of angle, drive current and acceleration, those that
-    the bed has."""
+    """SAMPLE: status bits, tick, rate in counts. others: counts of angle, drive current and acceleration, and the
+    interlock's reasons, those that the bed has."""
 
     kind = 0x84
     status: int
@@ -188,9 +188,12 @@ Answer = HelloAnswer | OtherVersionAnswer | LimitsAnswer | SampleAnswer
 
 _GREETING = struct.Struct("<BHBHI8s16s15d")
 _IN_FORCE = struct.Struct("<BH5i")
-_READINGS = [struct.Struct(f"<BHHIi{n}i") for n in range(4)]
+_LAYOUTS = [struct.Struct(f"<BHHIi{n}i") for n in range(5)]
 
 SENSORS = (Capability.ENCODER, Capability.DRIVE_CURRENT, Capability.ACCELEROMETER)
+"""The capabilities that each add a sensor's number to a SAMPLE, in its order."""
+
+READINGS = (*SENSORS, Capability.INTERLOCK)
 """The capabilities that each add a number to a SAMPLE, in its order."""
 
 
@@ -209,11 +212,11 @@ def host_message(payload: bytes) -> tuple[int, HostMessage] | None:
     return number, message(*message.layout.unpack_from(payload, _HEAD.size))
 
 
-def bed_answer(payload: bytes, sensors: int) -> tuple[int, Answer] | None:
-    """Sequence number and answer of a payload from a bed. sensors: how many of `SENSORS` it has; None: no answer."""
+def bed_answer(payload: bytes, readings: int) -> tuple[int, Answer] | None:
+    """Sequence number and answer of a payload from a bed. readings: how many of `READINGS` it has; None: no answer."""
     kind = payload[0]
     if kind == SampleAnswer.kind:
-        layout = _READINGS[sensors]
+        layout = _LAYOUTS[readings]
         if len(payload) != layout.size:
             return None
         _, number, status, tick, rate, *others = layout.unpack(payload)

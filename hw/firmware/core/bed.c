@@ -22,7 +22,7 @@
 
 /* The outputs. */
 
-static void make_safe(bed *self)
+static void command_nothing(bed *self)
 {
     /* The load first: a load motor that drives is what can run away, and the drive at 0 V brakes. */
     port_set_current(0);
@@ -31,11 +31,23 @@ static void make_safe(bed *self)
     self->current = 0;
 }
 
+static void make_safe(bed *self)
+{
+    command_nothing(self);
+    if (self->config->interlock != NULL) {
+        interlock_rest(&self->interlock, self->config->interlock, self->sensors.rate);
+    }
+}
+
 static void stop_for(bed *self, uint32_t faults)
 {
     make_safe(self);
     self->state = BED_STOPPED;
     self->faults |= faults;
+    if (self->config->interlock != NULL) {
+        interlock_withdraw(&self->interlock);
+        self->live |= self->config->interlock->needs_key ? INTERLOCK_BY_KEY : 0u;
+    }
 }
 
 /* Numbers in bytes, the low one first. */
@@ -108,6 +120,9 @@ static void answer_sample(bed *self, uint16_t number, bool refused)
     }
     if (can(self, BED_HAS_ACCELEROMETER)) {
         at = put_counts(payload, at, self->sensors.acceleration);
+    }
+    if (can(self, BED_HAS_INTERLOCK)) {
+        at = put(payload, at, ((self->faults & BED_FAULT_INTERLOCK) != 0u) ? self->because : self->live, 4u);
     }
     answer(self, TOLD_SAMPLE, number, payload, at);
 }
@@ -221,9 +236,12 @@ static void tighten(bed *self, uint8_t which, int32_t value)
 static bool arm(bed *self, uint32_t session)
 {
     const bool possible = (self->state == BED_DISARMED) && self->greeted && (session == self->session) && slow(self) &&
-                          (self->heat <= self->config->heat.most);
+                          (self->heat <= self->config->heat.most) && (self->live == 0u);
     if (possible) {
         make_safe(self);
+        if (self->config->interlock != NULL) {
+            interlock_arm(&self->interlock, self->config->interlock);
+        }
         self->since = 0u;
         self->from_voltage = 0;
         self->from_current = 0;
@@ -282,10 +300,15 @@ static void disarm(bed *self)
 static bool clear(bed *self)
 {
     const bool hot = ((self->faults & BED_FAULT_HEAT) != 0u) && !cooled(self);
-    const bool possible = (self->state == BED_DISARMED) || ((self->state == BED_STOPPED) && slow(self) && !hot);
+    const interlock_config *config = self->config->interlock;
+    const bool locked = (config != NULL) &&
+                        !interlock_may_clear(&self->interlock, config, self->live, self->because);
+    const bool possible =
+        (self->state == BED_DISARMED) || ((self->state == BED_STOPPED) && slow(self) && !hot && !locked);
     if (possible) {
         make_safe(self);
         self->faults = 0u;
+        self->because = 0u;
         self->state = BED_DISARMED;
     }
     return possible;
@@ -425,8 +448,14 @@ static void end_frame(bed *self)
 
 void bed_boot(bed *self, const bed_config *config, bed_cause cause)
 {
-    make_safe(self);
+    command_nothing(self);
     self->config = config;
+    self->live = 0u;
+    self->because = 0u;
+    if (config->interlock != NULL) {
+        interlock_boot(&self->interlock, config->interlock);
+        self->live = INTERLOCK_BY_TICK; /* until the first one */
+    }
     self->state = BED_DISARMED;
     self->faults = 0u;
     self->greeted = false;
@@ -439,7 +468,8 @@ void bed_boot(bed *self, const bed_config *config, bed_cause cause)
     self->from_current = 0;
     self->from_ticks = 1u;
     self->largest = 0;
-    self->heat = 0;
+    /* What the load was before, nobody knows. A bed with an interlock takes it for as hot as it may be. */
+    self->heat = (config->interlock != NULL) ? config->heat.most : 0;
     guard_tachometer_start(&self->tachometer);
     self->dropped = 0u;
     self->drops = 0u;
@@ -481,16 +511,31 @@ size_t bed_send(bed *self, uint8_t *out, size_t room)
     return count;
 }
 
+/* What the interlock stops the bed for. */
+static uint32_t interlocked(bed *self)
+{
+    const interlock_config *config = self->config->interlock;
+    uint32_t stops = 0u;
+    if (config != NULL) {
+        const bool armed = self->state == BED_ARMED;
+        self->live = interlock_tick(&self->interlock, config, armed, &self->sensors, self->current);
+        stops = armed ? self->live : interlock_latching(self->live);
+        self->because |= stops;
+    }
+    return (stops != 0u) ? BED_FAULT_INTERLOCK : 0u;
+}
+
 void bed_tick(bed *self)
 {
     const bed_config *config = self->config;
     self->tick++;
     port_read(&self->sensors);
+    const uint32_t lock = interlocked(self);
     /* A current that came and went between two readings is heat, too. */
     const bool seen = beyond(self->sensors.load_current, self->largest);
     self->heat = guard_heat(&config->heat, self->heat, seen ? self->sensors.load_current : self->largest);
     if (self->state == BED_ARMED) {
-        uint32_t faults = 0u;
+        uint32_t faults = lock;
         self->since++;
         if (self->since >= config->deadman) {
             faults |= BED_FAULT_DEADMAN;
@@ -518,6 +563,8 @@ void bed_tick(bed *self)
         if (faults != 0u) {
             stop_for(self, faults);
         }
+    } else if (lock != 0u) {
+        stop_for(self, lock);
     } else {
         make_safe(self); /* again, whatever has become of the amplifiers' inputs */
     }

@@ -17,6 +17,7 @@
 
 #include "frame.h"
 #include "guard.h"
+#include "interlock.h"
 #include "port.h"
 
 #define BED_VERSION 1u
@@ -39,6 +40,7 @@ typedef enum { BED_POWER, BED_WATCHDOG } bed_cause;
 #define BED_FAULT_NOISE (1u << 11)
 #define BED_RESET_BY_WATCHDOG (1u << 12)
 #define BED_REFUSED (1u << 13)
+#define BED_FAULT_INTERLOCK (1u << 14)
 
 /* Capabilities. */
 #define BED_HAS_ENCODER (1u << 0)
@@ -47,6 +49,7 @@ typedef enum { BED_POWER, BED_WATCHDOG } bed_cause;
 #define BED_HAS_WATCHDOG (1u << 3)
 #define BED_IN_LOCK_STEP (1u << 4)
 #define BED_IS_SIMULATED (1u << 5)
+#define BED_HAS_INTERLOCK (1u << 6)
 
 /* Of commands, and of what LIMIT can make tighter; counts, slews in counts a tick; none negative. */
 #define BED_LIMITS 5u
@@ -74,6 +77,7 @@ typedef struct {
     guard_heat_config heat;
     guard_tachometer_config tachometer;
     const bed_plant *plant; /* NULL on a board with motors */
+    const interlock_config *interlock; /* NULL: none, and BED_HAS_INTERLOCK is not told */
 } bed_config;
 
 /* Replies that wait for the line: two of the longest frames. */
@@ -99,6 +103,9 @@ typedef struct {
     port_sensors sensors;
     int64_t heat;
     guard_tachometer tachometer;
+    interlock interlock;
+    uint32_t live;    /* the interlock's reasons at the last tick */
+    uint32_t because; /* those that are latched */
     uint64_t dropped; /* the last 64 frames since arming, 1 for one that was dropped; the newest in bit 0 */
     uint32_t drops;   /* how many of these are 1 */
     bool numbered;    /* whether a new frame has been heard since boot */

@@ -9,7 +9,8 @@ extern const bed_config board_config;
 extern const bed_plant board_plant;
 
 typedef struct {
-    int32_t output; /* 'i', 'v'; 'k' for a kick of the watchdog, 'a' for an advance of the plant, 'p' for a preset */
+    int32_t output; /* 'i', 'v'; 'k' for a kick of the watchdog, 'a' for an advance of the plant, 'p' for a preset, 'l'
+                       for the interlock's lines */
     int32_t counts;
 } event;
 
@@ -18,6 +19,11 @@ int fake_measures_load; /* 0: the load's current is what it was told */
 uint32_t fake_session;
 event fake_events[ROOM];
 uint32_t fake_count;
+
+interlock_inputs fake_inputs;
+int fake_reads_back; /* 0: what is read back of the lines is the test's */
+int32_t fake_pace;   /* us that the other clock goes on in a tick */
+int32_t fake_beat;   /* rounds of the main program in a tick */
 
 static bed the_bed;
 
@@ -73,6 +79,26 @@ static bool preset(uint8_t which, uint64_t bits)
 }
 
 const bed_plant board_plant = {advance, preset};
+
+static void read_inputs(interlock_inputs *inputs)
+{
+    fake_inputs.clock += (uint32_t)fake_pace;
+    fake_inputs.beats += (uint32_t)fake_beat;
+    *inputs = fake_inputs;
+    fake_inputs.lost_step = false;
+}
+
+static void set_lines(uint32_t lines)
+{
+    note('l', (int32_t)lines);
+    if (fake_reads_back != 0) {
+        fake_inputs.lines &= ~INTERLOCK_ENABLED;
+        fake_inputs.lines |= ((lines & (INTERLOCK_LOAD_ENABLE | INTERLOCK_DRIVE_ENABLE)) != 0u) ? INTERLOCK_ENABLED : 0u;
+    }
+}
+
+extern const interlock_port board_interlock_port;
+const interlock_port board_interlock_port = {read_inputs, set_lines};
 
 void fake_boot(int by_watchdog)
 {

@@ -3,7 +3,7 @@
 
    The input is read as a script. A byte below 128 opens a frame of up to 12 bytes of payload: with bit 6 the bytes are
    given a CRC and stuffed, so that the fuzzer gets past them, with bit 5 also the next number and, on ARM, the session;
-   else they go in as they are. From 128 on it is a tick, or several, or sets a sensor. */
+   else they go in as they are. From 128 on it is a tick, or several, or sets a sensor or an input. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +17,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static bed the_bed;
 static port_sensors sensors;
-static int32_t held_current, held_voltage;
+static interlock_inputs inputs;
+static int32_t held_current, held_voltage, pace;
+static uint32_t held_lines;
 static uint32_t kicks;
 
 static void require(int holds)
@@ -55,6 +57,21 @@ uint32_t port_session(void)
 {
     return SESSION;
 }
+
+static void read_inputs(interlock_inputs *into)
+{
+    inputs.clock += (uint32_t)pace;
+    inputs.beats++;
+    *into = inputs;
+}
+
+static void set_lines(uint32_t lines)
+{
+    held_lines = lines;
+}
+
+extern const interlock_port board_interlock_port;
+const interlock_port board_interlock_port = {read_inputs, set_lines};
 
 static void advance(void)
 {
@@ -95,7 +112,7 @@ static void check_answers(size_t expected_most)
         require((payload[0] == 0x81u) || (payload[0] == 0x82u) || (payload[0] == 0x84u));
         if (payload[0] == 0x84u) {
             require((payload[3] & 3u) <= 2u);
-            require(((payload[3] & 3u) == 2u) == (((payload[3] & 0xF8u) | (payload[4] & 0x0Fu)) != 0u));
+            require(((payload[3] & 3u) == 2u) == (((payload[3] & 0xF8u) | (payload[4] & 0x4Fu)) != 0u));
         }
     }
     require(frames <= expected_most);
@@ -106,6 +123,9 @@ static void check_outputs(void)
     require((the_bed.state == BED_ARMED) || ((held_current == 0) && (held_voltage == 0)));
     require((the_bed.state == BED_STOPPED) == (the_bed.faults != 0u));
     require((the_bed.state != BED_ARMED) || (the_bed.greeted && (the_bed.since < board_config.deadman)));
+    require((the_bed.state == BED_ARMED) || ((held_lines & INTERLOCK_LOAD_ENABLE) == 0u));
+    require((the_bed.state != BED_ARMED) || (board_config.interlock == NULL) || (held_lines == 7u));
+    require((the_bed.state != BED_ARMED) || (the_bed.live == 0u));
     for (size_t k = 0u; k < BED_LIMITS; k++) {
         require((the_bed.limits[k] >= 0) && (the_bed.limits[k] <= board_config.limits[k]));
     }
@@ -115,7 +135,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
     memset(&sensors, 0, sizeof sensors);
     memset(&the_bed, 0xA5, sizeof the_bed);
+    memset(&inputs, 0, sizeof inputs);
+    inputs.lines = 0x17u; /* all is sound, the key turned off */
     held_current = held_voltage = 1;
+    held_lines = 0u;
+    pace = 1000;
     the_bed.state = BED_DISARMED;
     bed_boot(&the_bed, &board_config, BED_POWER);
     uint16_t number = 0u;
@@ -126,8 +150,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
             for (int k = 0; (k < 4) && (at < size); k++) {
                 value = (int32_t)(((uint32_t)value << 8) | data[at++]);
             }
-            int32_t *const each[] = {&sensors.rate, &sensors.angle, &sensors.drive_current, &sensors.load_current};
-            *each[head & 3u] = value;
+            int32_t *const each[] = {&sensors.rate,         &sensors.angle,      &sensors.drive_current,
+                                     &sensors.load_current, &inputs.temperature, &pace};
+            if ((head & 7u) < 6u) {
+                *each[head & 7u] = value;
+            } else {
+                inputs.lines = (uint32_t)value;
+                inputs.lost_step = (value < 0);
+            }
         } else if (head >= 0x80u) {
             const uint32_t before = kicks;
             for (uint32_t k = 0u; k <= (head & 0x1Fu); k++) {

@@ -106,8 +106,9 @@ def stack(folder: Path, entries: dict[str, int]) -> int:
     """Bytes of the deepest chain of calls from each of these functions, together, with what an interrupt pushes.
 
     From gcc's -fcallgraph-info=su: nodes with their own bytes, edges between them; what is not in them (libgcc) counts
-    as 64. The core calls through a pointer what is in the plant's port alone.
+    as 64. The core calls through a pointer what is in a plant's or an interlock's port alone.
     """
+    called = (":advance", ":preset", ":read_inputs", ":set_lines")
     own: dict[str, int] = {}
     calls: dict[str, set[str]] = {}
     for path in folder.glob("*.ci"):
@@ -121,7 +122,7 @@ def stack(folder: Path, entries: dict[str, int]) -> int:
     def deepest(name: str, above: tuple[str, ...]) -> int:
         assert name not in above, f"recursion: {above}"
         if name == "__indirect_call":
-            return max(deepest(each, above) for each in own if each.endswith((":advance", ":preset")))
+            return max(deepest(each, above) for each in own if each.endswith(called))
         return own.get(name, 64) + max((deepest(each, (*above, name)) for each in calls.get(name, ())), default=0)
 
     return sum(deepest(name, ()) + pushed for name, pushed in entries.items())

@@ -13,13 +13,15 @@ import pytest
 
 from hw.bed import Capability
 from hw.build import FIRMWARE, WARNINGS, config_c
+from hw.interlock import Interlock
 from tests.hw.firmware import wire
 from tests.hw.firmware.device import HERE, LOCK_STEP, PLAIN, SENSORS, SHAFT
+from tests.hw.firmware.test_interlock import LOCK
 
 pytestmark = pytest.mark.slow
 
 SECONDS = int(os.environ.get("MET_FUZZ_SECONDS", "15"))
-"""For each of two beds: half a minute together. An hour: MET_FUZZ_SECONDS=1800, with `-o faulthandler_timeout=0`."""
+"""For each of three beds: 45 s together. An hour: MET_FUZZ_SECONDS=1200, with `-o faulthandler_timeout=0`."""
 
 HANGS_SECONDS = 60
 """After which an input is one that never ends."""
@@ -44,7 +46,14 @@ def seeds() -> list[bytes]:
         ask(wire.HELLO, b"\1") + ask(wire.LIMIT, struct.pack("<Bi", 3, 50)) + ask(wire.ARM, bytes(4)) + drive,
         begun + b"\x03\5\5\0" * 16,
         ask(wire.PRESET, bytes([0]) + struct.pack("<d", 1.0)) + ask(wire.PRESET, bytes([9]) + bytes(8)),
+        turn_key() + begun + drive + b"\x80" + drive + b"\xc6\0\0\0\x1e" + b"\x80" + ask(wire.CLEAR),
+        turn_key() + begun + drive + b"\xc5\0\0\1\0" + b"\x80",
     ]
+
+
+def turn_key() -> bytes:
+    """Of the interlock: off and on, with the lines read back as they are."""
+    return b"\xc6\0\0\0\x13\x80\xc6\0\0\0\x1b\x80"
 
 
 @pytest.fixture(scope="module")
@@ -54,11 +63,20 @@ def clang() -> str:
     return "clang"
 
 
-@pytest.mark.parametrize("capabilities", [SENSORS, SENSORS | LOCK_STEP], ids=["free", "lock-step"])
+@pytest.mark.parametrize(
+    ("capabilities", "lock"),
+    [(SENSORS, None), (SENSORS | LOCK_STEP, None), (SENSORS, LOCK)],
+    ids=["free", "lock-step", "interlock"],
+)
 def test_nothing_that_comes_over_the_line_breaks_a_bed(
-    clang: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], capabilities: Capability
+    clang: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    capabilities: Capability,
+    lock: Interlock | None,
 ) -> None:
-    (tmp_path / "config.c").write_text(config_c(replace(PLAIN, capabilities=capabilities, shaft=SHAFT), plant=False))
+    bed = replace(PLAIN, capabilities=capabilities, shaft=SHAFT, interlock=lock)
+    (tmp_path / "config.c").write_text(config_c(bed, plant=False))
     sources = [*sorted((FIRMWARE / "core").glob("*.c")), HERE / "fuzz_frames.c", tmp_path / "config.c"]
     words = [clang, *WARNINGS, *FUZZED, f"-I{FIRMWARE / 'core'}", *map(str, sources), "-o", str(tmp_path / "fuzz")]
     built = subprocess.run(words, capture_output=True, text=True)

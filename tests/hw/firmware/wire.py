@@ -12,7 +12,7 @@ TOLD_HELLO, TOLD_LIMITS, TOLD_SAMPLE = 0x81, 0x82, 0x84
 DISARMED, ARMED, STOPPED = 0, 1, 2
 GREETED = 1 << 2
 DEADMAN, RANGE, SLEW, RATE, CURRENT, HEAT, DEAD, REVERSED, NOISE = (1 << n for n in range(3, 12))
-WATCHDOG, REFUSED = 1 << 12, 1 << 13
+WATCHDOG, REFUSED, INTERLOCK = 1 << 12, 1 << 13, 1 << 14
 
 
 def stuffed(data: bytes) -> bytes:
@@ -63,7 +63,7 @@ class Sample:
 
     @property
     def faults(self) -> int:
-        return self.status & 0xFF8
+        return self.status & (0xFF8 | INTERLOCK)
 
     @property
     def refused(self) -> bool:

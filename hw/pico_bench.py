@@ -1,0 +1,347 @@
+"""A bench on a Raspberry Pi Pico as its file in TOML has it: the bed's configuration, and the port's numbers.
+
+The file is data: bounded, each figure a number with a unit of its kind, above zero. `hw/firmware/pico/bench.toml` is
+the one that is taken where none is given, and says what each means.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from hw.bed import Capability, Limits, Scales
+from hw.build import Config, Shaft, Uncountable, config_c
+from hw.interlock import Interlock
+from met import units
+from met.diagnostic import Place, Problem, did_you_mean, error
+from met.frozen import frozen
+from met.host.files import read_regular
+from met.unit_parser import parse_unit
+
+SHIPPED = Path(__file__).with_name("firmware") / "pico" / "bench.toml"
+MOST_BYTES = 1 << 16
+
+CLOCK = 125_000_000
+"""Hz of the processor."""
+
+STEPS = 4096
+"""Steps of the converter, and of a command's pulse width."""
+
+RATE_SECONDS = 0.009
+"""Time over which a rate by the encoder alone is taken, s: as late as a filter of 50 Hz."""
+
+WATCHDOG_TICKS = 5
+"""Ticks without one, after which the watchdog resets the chip."""
+
+FLOOR_COUNTS, FLOOR_STEPS = 4.0, 2.0
+"""Counts of the encoder, and steps of the tachometer's zero, by which the two may differ always."""
+
+_TEXT, _FLAG, _WHOLE = "text", "flag", "whole"
+_SCHEMA: Mapping[str, Mapping[str, str]] = {
+    "bed": {"name": _TEXT, "tick": "Hz", "deadman": "s"},
+    "drive": {
+        "voltage_full": "V",
+        "voltage_limit": "V",
+        "voltage_slew": "V/s",
+        "current_range": "A",
+        "current_limit": "A",
+        "current_continuous": "A",
+        "heat": "A^2*s",
+        "kt": "N*m/A",
+        "resistance": "ohm",
+        "tau_max": "N*m",
+    },
+    "load": {
+        "current_full": "A",
+        "current_limit": "A",
+        "current_slew": "A/s",
+        "current_range": "A",
+        "current_continuous": "A",
+        "heat": "A^2*s",
+        "kt": "N*m/A",
+    },
+    "shaft": {
+        "rate_limit": "rad/s",
+        "rate_arming": "rad/s",
+        "inertia": "kg*m^2",
+        "f_c": "N*m",
+        "f_v": "N*m*s/rad",
+        "f_cut": "Hz",
+        "rate_range": "rad/s",
+        "encoder": _WHOLE,
+        "angle_least": "rad",
+        "angle_most": "rad",
+    },
+    "converter": {
+        "rate_zero": _WHOLE,
+        "drive_zero": _WHOLE,
+        "load_zero": _WHOLE,
+        "rate_reversed": _FLAG,
+        "drive_reversed": _FLAG,
+        "load_reversed": _FLAG,
+    },
+    "interlock": {
+        "key": _FLAG,
+        "settle": "s",
+        "hold": "s",
+        "thermistor": "ohm",
+        "thermistor_beta": _WHOLE,
+        "thermistor_pull_up": "ohm",
+        "warmest": _WHOLE,
+        "bus_full": "V",
+        "bus_least": "V",
+        "bus_most": "V",
+        "load_off": "A",
+        "load_time": "s",
+    },
+}
+_TOGETHER = (
+    ("shaft", "angle_least", "angle_most"),
+    ("interlock", "thermistor", "thermistor_beta", "thermistor_pull_up", "warmest"),
+    ("interlock", "bus_full", "bus_least", "bus_most"),
+)
+_OPTIONAL = {("shaft", "rate_range"), *((table, key) for table, *keys in _TOGETHER for key in keys)}
+_QUANTITY = re.compile(r"\s*(-?[\d.]+(?:[eE][+-]?\d+)?)\s*(\S.*?)\s*")
+
+
+@frozen
+class PicoBench:
+    """A bench on a Pico. wiring: the fields of `pico_wiring` (hw/firmware/pico/pico.h), by name."""
+
+    config: Config
+    wiring: Mapping[str, int]
+
+
+def pico_bench(path: str | os.PathLike[str] | None = None) -> PicoBench:
+    """The bench of a file, or that which is shipped. Raises Problem E447, OSError."""
+    file = _File(SHIPPED if path is None else path)
+    figures = file.figures()
+    try:
+        found = _bench(figures)
+        config_c(found.config, plant=False)
+    except Uncountable as reason:
+        raise file.wrong(f"the bench cannot be counted: {reason}", "take numbers that a bed may have") from None
+    except ValueError as reason:
+        raise file.wrong(str(reason), "take numbers that a bed may have") from None
+    return found
+
+
+def wiring_c(wiring: Mapping[str, int]) -> str:
+    """The text of wiring.c."""
+    unsigned = ("reload", "watchdog", "rate_ticks")
+    fields = (f"    .{name} = {value}{'u' if name in unsigned else ''}," for name, value in wiring.items())
+    head = ("/* A Pico's numbers beside config.c. */", '#include "pico.h"', "", "const pico_wiring board_wiring = {")
+    return "\n".join([*head, *fields, "};", ""])
+
+
+def lock_step_wiring(tick_hz: float) -> dict[str, int]:
+    """The wiring of a Pico whose plant is simulated: nothing is connected to it."""
+    return {"reload": round(CLOCK / tick_hz) - 1, "watchdog": 0}
+
+
+def _bench(of: Mapping[str, Any]) -> PicoBench:
+    tick_hz: float = of["bed.tick"]
+    if not 200.0 <= tick_hz <= 4000.0:
+        raise ValueError(f"a tick of {tick_hz:g} Hz is not 200 Hz to 4 kHz")
+    for full, limit in (("drive.voltage_full", "drive.voltage_limit"), ("load.current_full", "load.current_limit")):
+        if of[limit] > of[full] * (STEPS - 1) / STEPS:
+            raise ValueError(f"`{limit}` is more than the amplifier holds at 4095 of 4096 steps, `{full}`")
+    encoder = 2.0 * math.pi / of["shaft.encoder"]
+    tachometer = of.get("shaft.rate_range")
+    ticks = 0 if tachometer else min(32, max(1, round(RATE_SECONDS * tick_hz)))
+    rate = 2.0 * tachometer / STEPS if tachometer else encoder * tick_hz / ticks
+    load_step, load_count = 2.0 * of["load.current_range"] / STEPS, of["load.current_full"] / STEPS
+    scales = Scales(
+        voltage=of["drive.voltage_full"] / STEPS,
+        current=load_count,
+        rate=rate,
+        angle=encoder,
+        drive_current=2.0 * of["drive.current_range"] / STEPS,
+        acceleration=1.0,
+    )
+    limits = Limits(
+        voltage=of["drive.voltage_limit"],
+        current=of["load.current_limit"],
+        rate=of["shaft.rate_limit"],
+        arming_rate=of["shaft.rate_arming"],
+        voltage_slew=of["drive.voltage_slew"],
+        current_slew=of["load.current_slew"],
+        heat=of["load.heat"],
+    )
+    if tachometer and of["shaft.rate_limit"] > 0.95 * tachometer:
+        raise ValueError("`shaft.rate_limit` is beyond 95 % of `shaft.rate_range`, so that no reading could pass it")
+    shaft = Shaft(
+        **{name: of[f"drive.{name}"] for name in ("kt", "resistance", "tau_max")},
+        kt_load=of["load.kt"],
+        **{name: of[f"shaft.{name}"] for name in ("inertia", "f_c", "f_v", "f_cut")},
+    )
+    angle = (of["shaft.angle_least"], of["shaft.angle_most"]) if "shaft.angle_most" in of else None
+    if angle is not None and angle[0] >= angle[1]:
+        raise ValueError("`shaft.angle_least` is not below `shaft.angle_most`")
+    span = 0.064
+    lock = Interlock(
+        key=of["interlock.key"],
+        settle=of["interlock.settle"],
+        hold=of["interlock.hold"],
+        drive_heat=of["drive.heat"],
+        drive_continuous=of["drive.current_continuous"],
+        warmest=_warmest(of),
+        bus=_bus(of),
+        angle=angle,
+        f_cut=of["shaft.f_cut"] if tachometer else None,
+        angle_floor=FLOOR_COUNTS * encoder + FLOOR_STEPS * rate * span,
+        load_off=of["interlock.load_off"],
+        load_time=of["interlock.load_time"],
+    )
+    config = Config(
+        name=of["bed.name"],
+        tick_hz=tick_hz,
+        deadman=of["bed.deadman"],
+        scales=scales,
+        limits=limits,
+        continuous_current=of["load.current_continuous"],
+        drive_current=of["drive.current_limit"],
+        shaft=shaft,
+        capabilities=Capability.ENCODER | Capability.DRIVE_CURRENT | Capability.WATCHDOG,
+        interlock=lock,
+    )
+    ratio = Fraction(load_step / load_count).limit_denominator(1000)
+    wiring = {
+        **lock_step_wiring(tick_hz),
+        "watchdog": round(WATCHDOG_TICKS * 1e6 / tick_hz),
+        "rate_ticks": ticks,
+        "rate_zero": of["converter.rate_zero"],
+        "rate_sign": -1 if of["converter.rate_reversed"] else 1,
+        "drive_zero": of["converter.drive_zero"],
+        "drive_sign": -1 if of["converter.drive_reversed"] else 1,
+        "load_zero": of["converter.load_zero"],
+        "load_counts": ratio.numerator * (-1 if of["converter.load_reversed"] else 1),
+        "load_steps": ratio.denominator,
+        "reference": STEPS // 2,
+        "reference_off": 40,
+        "has_temperature": int("interlock.thermistor" in of),
+        "has_bus": int("interlock.bus_full" in of),
+    }
+    return PicoBench(config, wiring)
+
+
+HIGHEST = 4079
+"""Step of the converter above which a wire is off (hw/firmware/pico/port.c)."""
+
+
+def _warmest(of: Mapping[str, Any]) -> int:
+    """Steps, counted down from `HIGHEST`, of the thermistor at its warmest: R = R25 exp(B (1/T - 1/298.15 K))."""
+    if "interlock.thermistor" not in of:
+        return STEPS
+    kelvin = of["interlock.warmest"] + 273.15
+    hot = of["interlock.thermistor"] * math.exp(of["interlock.thermistor_beta"] * (1.0 / kelvin - 1.0 / 298.15))
+    steps = math.ceil((STEPS - 1) * hot / (hot + of["interlock.thermistor_pull_up"]))
+    if not 32 <= steps <= HIGHEST - 32:
+        warmest = of["interlock.warmest"]
+        raise ValueError(f"at {warmest} degC the thermistor reads {steps} of 4095: take another resistor")
+    return HIGHEST - steps
+
+
+def _bus(of: Mapping[str, Any]) -> tuple[int, int]:
+    if "interlock.bus_full" not in of:
+        return 0, STEPS
+    least, most = (of[f"interlock.bus_{each}"] / of["interlock.bus_full"] * (STEPS - 1) for each in ("least", "most"))
+    if not 0.0 <= least < most <= STEPS - 1:
+        raise ValueError("`bus_least` is not below `bus_most`, or that not below `bus_full`")
+    return math.ceil(least), math.floor(most)
+
+
+class _File:
+    """A bench's file, and the places in it."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.name = os.fspath(path)
+        try:
+            self.text = read_regular(path, MOST_BYTES).decode()
+            self.tables = tomllib.loads(self.text)
+        except UnicodeDecodeError as reason:
+            raise Problem(error("E447", f"{self.name} is no text in UTF-8", help="a bench is TOML")) from reason
+        except (tomllib.TOMLDecodeError, RecursionError) as reason:
+            line = re.search(r"at line (\d+), column (\d+)", str(reason))
+            message = re.sub(r" \(at .*\)$", "", str(reason))
+            at = None if line is None else Place(self.name, int(line[1]), int(line[2]), 1)
+            wrong = error("E447", f"{self.name} is no TOML: {message}", at, help=_BEGIN)
+            raise Problem(wrong, {self.name: self.text}) from reason
+
+    def figures(self) -> dict[str, Any]:
+        """All figures in SI, by `table.key`."""
+        for table, keys in self.tables.items():
+            if table not in _SCHEMA or not isinstance(keys, dict):
+                helps = [*did_you_mean(table, _SCHEMA), f"a bench has {', '.join(f'[{each}]' for each in _SCHEMA)}"]
+                raise self.wrong(f"a bench has no `{table}`", *helps, key=table)
+            for key in keys:
+                if key not in _SCHEMA[table]:
+                    helps = [*did_you_mean(key, _SCHEMA[table]), f"it has {', '.join(_SCHEMA[table])}"]
+                    raise self.wrong(f"[{table}] has no `{key}`", *helps, table=table, key=key)
+        found = {}
+        for table, schema in _SCHEMA.items():
+            given = self.tables.get(table, {})
+            for key, kind in schema.items():
+                if key in given:
+                    found[f"{table}.{key}"] = self._figure(table, key, kind, given[key])
+                elif (table, key) not in _OPTIONAL:
+                    raise self.wrong(f"[{table}] has no `{key}`", _BEGIN, table=table)
+        for table, *keys in _TOGETHER:
+            there = [key for key in keys if f"{table}.{key}" in found]
+            if there and len(there) < len(keys):
+                missing = next(key for key in keys if key not in there)
+                message = f"[{table}] has `{there[0]}` and no `{missing}`"
+                raise self.wrong(message, f"give {', '.join(keys)}, or none of them", table=table, key=there[0])
+        return found
+
+    def _figure(self, table: str, key: str, kind: str, value: Any) -> Any:
+        good = {
+            _TEXT: lambda: isinstance(value, str) and value.isascii() and value.isprintable() and 1 <= len(value) <= 16,
+            _FLAG: lambda: isinstance(value, bool),
+            _WHOLE: lambda: isinstance(value, int) and not isinstance(value, bool) and 0 < value < 10**6,
+        }
+        shown = {_TEXT: '"my bench"', _FLAG: "true", _WHOLE: "2000"}
+        if kind in good:
+            if not good[kind]():
+                what = {_TEXT: "text of 1 to 16 letters", _FLAG: "true or false", _WHOLE: "whole number above zero"}
+                message = f"`{key}` is no {what[kind]}: {value!r}"
+                raise self.wrong(message, f"write `{key} = {shown[kind]}`", table=table, key=key)
+            return value
+        match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
+        try:
+            if match is None:
+                raise ValueError
+            of = parse_unit(match[2])
+            si: float = of.to_si(float(match[1]), match[1])
+            signed = key.startswith("angle")
+            if not units.same(of.dimension, parse_unit(kind).dimension) or not -math.inf < si < math.inf:
+                raise ValueError
+            if si <= 0.0 and not signed:
+                raise ValueError
+        except ValueError:
+            above = "" if key.startswith("angle") else " above zero"
+            message = f"`{key}` is no quantity{above} in {kind}: {value!r}"
+            raise self.wrong(message, f'write `{key} = "1.5 {kind}"`', table=table, key=key) from None
+        return si
+
+    def wrong(self, message: str, *helps: str, table: str = "", key: str = "") -> Problem:
+        """The error about a table's line, or that of a key of it."""
+        lines, at = self.text.split("\n"), 0
+        if table:
+            at = next((k for k, line in enumerate(lines) if re.match(rf"\s*\[\s*{table}\s*\]", line)), 0)
+        if key:
+            named = re.compile(rf"\s*\[*\s*{re.escape(key)}\b")
+            at = next((k for k in range(at, len(lines)) if named.match(lines[k])), at)
+        text = lines[at]
+        column = len(text) - len(text.lstrip()) + 1
+        place = Place(self.name, at + 1, column, max(1, len(text.rstrip()) - column + 1))
+        return Problem(error("E447", message, place, help=helps), {self.name: self.text})
+
+
+_BEGIN = "`met bed firmware --board pico --show` prints one to begin with"

@@ -1,0 +1,113 @@
+"""A Raspberry Pi Pico in its emulator, on a clock that passes when it is told to (emulator.mjs says what is around it).
+
+The emulator is rp2040js, which `scripts/rp2040js` fetches by its hash.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hw.beds.wire import WireBed
+from hw.line import BedLine
+
+HERE = Path(__file__).parent
+EMULATOR = Path(__file__).parents[4] / "build" / "rp2040js-1.4.1"
+STACK_TOP = 0x20002000
+LOAD_ENABLE, DRIVE_ENABLE, BRAKE_RELEASE, PULSE, LED = (1 << pin for pin in (8, 9, 10, 11, 25))
+
+
+def skip_without_tools() -> None:
+    """Skip the test where a tool is missing, and say which and how it comes here."""
+    packages = {"arm-none-eabi-gcc": "gcc-arm-none-eabi", "node": "nodejs"}
+    missing = [name for name in packages if shutil.which(name) is None]
+    if missing:
+        words = " ".join(packages[name] for name in missing)
+        pytest.skip(f"no {' and no '.join(missing)}; on Debian or Ubuntu: apt-get install {words}")
+    if not (EMULATOR / "package.json").exists():
+        pytest.skip("no rp2040js, the Pico's emulator: scripts/rp2040js fetches it, 0.1 MB from registry.npmjs.org")
+
+
+class Emulator:
+    """A Pico of this flash, switched on. motor: its pins are wired to a bench that turns, else to nothing."""
+
+    def __init__(self, flash: bytes, **bench: Any) -> None:
+        command = ["node", str(HERE / "emulator.mjs"), str(EMULATOR)]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.flash, self.out = flash, b""
+        self.told: dict[str, Any] = {}
+        self.ask("boot", flash=flash.hex(), by_watchdog=False, stack=STACK_TOP, bench=bench)
+
+    def ask(self, do: str, **words: Any) -> dict[str, Any]:
+        """An answer of emulator.mjs."""
+        process = self._process
+        assert process.stdin is not None and process.stdout is not None
+        process.stdin.write(json.dumps({"do": do, **words}) + "\n")
+        process.stdin.flush()
+        answer = process.stdout.readline()
+        assert answer, f"the emulator has ended: {process.wait()}"
+        self.told = json.loads(answer)
+        self.out += bytes.fromhex(self.told["out"])
+        return self.told
+
+    def bench(self, **changes: Any) -> None:
+        self.ask("set", bench=changes)
+
+    def sleep(self, seconds: float) -> dict[str, Any]:
+        return self.ask("sleep", us=seconds * 1e6)
+
+    def close(self) -> None:
+        self._process.kill()
+        self._process.wait()
+        for each in (self._process.stdin, self._process.stdout):
+            assert each is not None
+            each.close()
+
+    def __enter__(self) -> Emulator:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class EmulatedLine:
+    """The line to an emulated Pico; time is the emulator's."""
+
+    def __init__(self, emulator: Emulator) -> None:
+        self._emulator = emulator
+
+    def now(self) -> float:
+        return float(self._emulator.told["now"]) * 1e-6
+
+    def send(self, frame: bytes) -> None:
+        self._emulator.ask("bytes", data=frame.hex())
+
+    def receive(self, until: float) -> bytes:
+        emulator = self._emulator
+        if not emulator.out and until > self.now():
+            emulator.ask("run", us=(until - self.now()) * 1e6)
+        found, emulator.out = emulator.out, b""
+        return found
+
+    def sleep(self, seconds: float) -> None:
+        self._emulator.sleep(seconds)
+
+    def close(self) -> None:
+        pass
+
+
+class PicoBed(WireBed):
+    """The host's side of a bed on an emulated Pico."""
+
+    def __init__(self, emulator: Emulator, period: float) -> None:
+        super().__init__("a Pico in its emulator", period, int.from_bytes(os.urandom(2), "little"))
+        self.emulator = emulator
+
+    def open(self) -> BedLine:
+        return EmulatedLine(self.emulator)
