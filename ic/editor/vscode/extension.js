@@ -134,6 +134,8 @@ class Met {
     this.diagnostics = vscode.languages.createDiagnosticCollection('met');
     this.starts = 0;
     this.ready = Promise.resolve();
+    this.coloursChanged = new vscode.EventEmitter();
+    this.lensesChanged = new vscode.EventEmitter();
   }
 
   start() {
@@ -144,6 +146,8 @@ class Met {
       ended: (reason) => this.died(reason),
       'textDocument/publishDiagnostics': (given) =>
         this.diagnostics.set(toUri(given.uri), given.diagnostics.map(toDiagnostic)),
+      'workspace/semanticTokens/refresh': () => this.coloursChanged.fire(),
+      'workspace/codeLens/refresh': () => this.lensesChanged.fire(),
       'window/logMessage': (given) => this.log.appendLine(given.message),
       'window/showMessage': (given) => vscode.window.showWarningMessage(given.message),
     };
@@ -155,7 +159,12 @@ class Met {
         publishDiagnostics: { relatedInformation: true, versionSupport: true },
         rename: { prepareSupport: true },
       },
-      workspace: { workspaceFolders: true, didChangeWatchedFiles: { dynamicRegistration: false } },
+      workspace: {
+        workspaceFolders: true,
+        didChangeWatchedFiles: { dynamicRegistration: false },
+        semanticTokens: { refreshSupport: true },
+        codeLens: { refreshSupport: true },
+      },
     };
     const connection = this.connection;
     this.ready = connection
@@ -267,6 +276,7 @@ class Met {
         locations(await this.wish('references', document, { ...at(place), context: { includeDeclaration } }, token)),
     });
     add('CodeLens', {
+      onDidChangeCodeLenses: this.lensesChanged.event,
       provideCodeLenses: async (document, token) =>
         ((await this.wish('codeLens', document, {}, token)) || []).map(
           (each) => new vscode.CodeLens(toRange(each.range), each.command),
@@ -313,6 +323,7 @@ class Met {
   colour(legend) {
     this.legend = new vscode.SemanticTokensLegend(legend.tokenTypes, legend.tokenModifiers);
     const provider = {
+      onDidChangeSemanticTokens: this.coloursChanged.event,
       provideDocumentSemanticTokens: async (document, token) => {
         const found = await this.wish('semanticTokens/full', document, {}, token);
         return found && new vscode.SemanticTokens(new Uint32Array(found.data));

@@ -29,6 +29,7 @@ const vscode = {
   Uri: { parse: (address) => uri(address.replace('file://', '')) },
   MarkdownString: Kept, SemanticTokens: Kept, SemanticTokensLegend: Kept, FoldingRange: Kept, Hover: Kept,
   CompletionItem: Kept, DocumentSymbol: Kept, CodeAction: Kept, CodeLens: Kept, DiagnosticRelatedInformation: Kept, Diagnostic: Kept,
+  EventEmitter: class { constructor() { this.event = listen; } fire() { shown.refreshed = (shown.refreshed || 0) + 1; } },
   CodeActionKind: { QuickFix: 'quickfix' },
   Range: class { constructor(...at) { Object.assign(this, { start: { line: at[0], character: at[1] }, end: at.slice(2) }); } },
   Location: class { constructor(where, range) { Object.assign(this, { uri: where, range }); } },
