@@ -2,14 +2,15 @@
 
 What edition 1 warns of (D392) gets the brackets that mean the same in both, and the file its line `deck 2;`. That is a
 guess until it is proved: every deck has the same tree before and after, and all its runs and sweeps have the same plans
-and keys. A file that is no deck by itself is proved by those that include it. What cannot be proved stays as it is.
+and keys. A file that is no deck by itself is proved by those that include it. What cannot be proved stays as it is, and
+so does a file that a deck beside it, which nobody named, would take for something else.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -31,6 +32,13 @@ from met.plan.keys import case_ids, inputs, structure_key
 
 CODE = "D392"
 """The warning of what the next edition reads otherwise; the first change of its help means the same in both."""
+
+DECK = ".ic"
+
+MOST_BESIDE = 1_000
+"""Decks beside those to be upgraded that are looked into."""
+
+_INCLUDED = re.compile(r'^[ \t]*(?:#[ \t]*include|use)\b[ \t]*["<]([^">\n]+)[">]', re.MULTILINE)
 
 MOST_ROWS = 10_000
 """Rows of a case table that are compared at either end; all of it follows from the tree, which is compared whole."""
@@ -71,6 +79,13 @@ def upgrades(paths: Sequence[str]) -> Upgrades:
             proved |= files
         else:
             wrong.update(dict.fromkeys(files, difference))
+    for path in _decks_beside(proved - wrong.keys(), {os.path.realpath(each) for each in found}):
+        compiled = _compiled(path)
+        files = {os.path.realpath(name) for name in compiled.sources} & proved - wrong.keys()
+        parts = ", ".join(sorted(os.path.relpath(each) for each in files))
+        difference = _difference(path, compiled, new, parts) if compiled.plan is not None and files else None
+        if difference is not None:
+            wrong.update(dict.fromkeys(files, difference))
     texts: dict[str, str] = {}
     for path in found:
         real = os.path.realpath(path)
@@ -85,6 +100,35 @@ def upgrades(paths: Sequence[str]) -> Upgrades:
 
 def _compiled(path: str, unsaved: Unsaved = NOTHING_UNSAVED) -> Compiled:
     return check(path, include_dirs=(), defines=(), select="all", unsaved=unsaved)
+
+
+def _decks_beside(reals: Iterable[str], named: Collection[str]) -> Iterator[str]:
+    """The decks that include files by name, also through others, and are not among those that are named.
+
+    Looked for in the files' folders and in those around and inside of these.
+    """
+    folders = {os.path.dirname(each) for each in reals}
+    around = sorted({*folders, *map(os.path.dirname, folders), *(each for f in folders for each in _folders_in(f))})
+    texts: dict[str, str] = {}
+    for path in (os.path.join(folder, name) for folder in around for name in sorted(os.listdir(folder))):
+        if path.endswith(DECK) and len(texts) < MOST_BESIDE:
+            try:
+                texts[os.path.relpath(path)] = Files().text(FoundFile(path, path))
+            except Problem:
+                continue
+    wanted = {os.path.basename(each) for each in reals}
+    includes = {path: {os.path.basename(each) for each in _INCLUDED.findall(text)} for path, text in texts.items()}
+    waiting = dict.fromkeys(path for path in texts if os.path.realpath(path) not in named)
+    while found := [path for path in waiting if includes[path] & wanted]:
+        for path in found:
+            del waiting[path]
+            wanted.add(os.path.basename(path))
+            yield path
+
+
+def _folders_in(folder: str) -> Iterator[str]:
+    with os.scandir(folder) as entries:
+        yield from (each.path for each in entries if each.is_dir() and not each.name.startswith("."))
 
 
 # The text
@@ -140,23 +184,25 @@ def _depends_on_its_decks(text: str) -> bool:
     )
 
 
-def _difference(path: str, before: Compiled, new: Mapping[str, str]) -> Problem | None:
-    """Why a deck with these texts is not what it was; None where it is."""
+def _difference(path: str, before: Compiled, new: Mapping[str, str], parts: str = "") -> Problem | None:
+    """Why a deck with these texts is not what it was; None where it is. parts: the files it is about, if not all."""
     after = _compiled(path, new)
     if after.plan is None:
         found = next(each for each in after.diagnostics if each.severity == "error")
-        return Problem(_left(path, f"{found.code}, {found.message}", found), after.sources)
+        return Problem(_left(path, f"{found.code}, {found.message}", found, parts=parts), after.sources)
     assert before.plan is not None
     olds, news = before.plan.experiments, after.plan.experiments
     for old, made in zip(olds, news, strict=False):
         if _meaning(old) != _meaning(made):
-            return Problem(_left(path, f"`{old.name}` would not have the same plan"))
+            return Problem(_left(path, f"`{old.name}` would not have the same plan", parts=parts))
     same = len(olds) == len(news) and placeless(read(path).entries) == placeless(read(path, unsaved=new).entries)
-    return None if same else Problem(_left(path, "it would not have the same entries"))
+    return None if same else Problem(_left(path, "it would not have the same entries", parts=parts))
 
 
-def _left(path: str, why: str, found: Diagnostic | None = None) -> Diagnostic:
-    message = f"`{path}` stays in its edition: {why}"
+def _left(path: str, why: str, found: Diagnostic | None = None, *, parts: str = "") -> Diagnostic:
+    message = f"`{parts or path}` stays in its edition: " + (f"in `{path}`, which includes it, " * bool(parts)) + why
+    if found is None and parts:
+        return error("E346", message, help=f"`met check {path}` may warn of what the editions read otherwise (D392)")
     if found is None:
         help = "does it count lines, by `__LINE__`? The file has one more; else please report it together with the deck"
         return error("E346", message, help=help)

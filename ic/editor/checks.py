@@ -68,20 +68,28 @@ class CheckedDeck:
     used: frozenset[str]
     reply: CheckReply
 
+    def texts_beside(self) -> dict[str, str]:
+        """The texts of all its files but its own."""
+        return {name: text for name, text in self.reply.sources.items() if name != self.name}
+
 
 class DeckChecks:
-    """The open texts, what is known of each, and the one check that runs."""
+    """The open texts, what is known of each, and the one check that runs.
+
+    refresh  called where what an editor draws in a text may change though the text does not: colours, lenses
+    """
 
     def __init__(
         self,
         process: CheckerProcess,
         tell: Callable[[Iterable[CheckedDeck]], None],
         log: Callable[[str], None],
+        refresh: Callable[[], None],
         *,
         include_dirs: Iterable[str] = (),
         defines: Iterable[str] = (),
     ) -> None:
-        self._process, self._tell, self._log = process, tell, log
+        self._process, self._tell, self._log, self._refresh = process, tell, log, refresh
         self.include_dirs, self.defines = tuple(include_dirs), tuple(defines)
         self.texts: dict[str, OpenText] = {}
         self.checked: dict[str, CheckedDeck] = {}
@@ -246,7 +254,9 @@ class DeckChecks:
             )
             self._failed.add(deck.uri)
         if isinstance(answer, DeckIndex):
-            self.indexes[deck.uri] = answer
+            before, self.indexes[deck.uri] = self.indexes.get(deck.uri), answer
+            if before is None or before.cases != answer.cases:
+                self._refresh()
         if not isinstance(answer, CheckReply):
             return
         if answer.known is not None:
@@ -256,5 +266,8 @@ class DeckChecks:
         files = frozenset(os.path.realpath(path) for path in paths if path is not None)
         used = frozenset(name for text in answer.sources.values() for name in used_files(text))
         name = request.name if request.text is None else next(iter(answer.sources), "")
-        self.checked[deck.uri] = CheckedDeck(deck, request.folder, name, texts, files, used, answer)
+        checked = CheckedDeck(deck, request.folder, name, texts, files, used, answer)
+        last, self.checked[deck.uri] = self.checked.get(deck.uri), checked
         self._tell(self.decks())
+        if last is None or last.texts_beside() != checked.texts_beside():
+            self._refresh()

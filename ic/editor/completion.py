@@ -10,7 +10,7 @@ from lsprotocol import types
 from ic.editor.index import DeckIndex
 from ic.editor.names import REMOVED, NamesInTexts
 from ic.editor.structure import NAMING, UNIT, DeckText, TextEntry, indices_around, through_loops
-from ic.editor.used import DEFINED, texts_under
+from ic.editor.used import DEFINED
 from ic.find import library_files
 from ic.language import BLOCKS, DEFINITIONS, EXPERIMENTS, OF_A_RUN, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
@@ -19,6 +19,8 @@ from ic.meaning.definitions.row_tables import ALL as ALL_ROWS
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, USAGE
 from ic.meaning.mechanics.shapes import SHAPES
 from ic.meaning.runs.linear import EQUILIBRIUM
+from ic.meaning.runs.requirements import PERCENTILE
+from ic.meaning.runs.step_errors import STEP_ERROR
 from ic.printing.models import summary
 from ic.text.edition import EDITION_WORD, EDITIONS
 from ic.text.lexer import NAME, NUMBERS, STRING, Token
@@ -27,11 +29,21 @@ from met import models
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan.channel import COMMAND_UNIT
+from met.plan.linear_uses import FIGURES
 from met.unit_parser import parse_unit
 from met.units import UNITS
 
-_PATHS = ("vary", "require", "record", "exclude", "of", "against", "choose", "maximise", "minimise", "signal")
+_PATHS = ("record", "of", "against", "choose", "signal")
 
+_VARIED = ("vary", "with", "exclude")
+"""Words that paths of parameters follow, and no signals: these have no value before a case has run."""
+
+_NOT_VARIED = ("seed", "record")
+"""Keys of a run with a path, that no sweep varies."""
+
+GOALS = ("minimise", "maximise")
+
+COMPARISONS = ("<", "<=", ">", ">=")
 
 _SIGNALS_ALONE = ("record", "open")
 """Keys whose values are signals and no parameters."""
@@ -59,7 +71,8 @@ def offers(text: DeckText, offset: int, names: NamesInTexts, index: DeckIndex, f
     words, around = _before(text, offset, names)
     macro = names.macros.at(text, offset)
     indices = indices_around(text.entries if macro is None else names.macros.body(macro), offset)
-    may_stand = [each for each in _of_entry(words, around, names, index, offset) if _has_indices(each.word, indices)]
+    seen = names.seen_from(text) if "." not in (word.text for word in words[-1:]) else names
+    may_stand = [each for each in _of_entry(words, around, seen, index, offset) if _has_indices(each.word, indices)]
     found = {offer.word: offer for offer in reversed(may_stand)}
     return list(reversed(found.values()))
 
@@ -132,7 +145,8 @@ def _of_entry(
         if words[-2].kind not in NUMBERS:
             return
     if last.text == "like":
-        yield from (offer for offer in _named(names, texts[0]) if offer.word not in texts)
+        roof = ("roof",) if texts[0] in DEFINED else ()
+        yield from (offer for offer in _named(names, texts[0], *roof) if offer.word not in texts)
         return
     if last.text == "of" and texts[0] in OF_A_RUN:
         yield from _named(names, "run")
@@ -254,10 +268,9 @@ def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> 
             part, _, more = path[found_head.end() :].partition(".")
             about.setdefault(part, "" if more else "in the table")
     yield from (Offer(part, types.CompletionItemKind.Field, said) for part, said in about.items())
-    text = next((each for each in names.texts if each.source.name == words[0].source.name), None)
-    files = texts_under(text, head[:-1], names.texts) if text is not None else set()
+    files = names.used.under(words[0].source.name, head[:-1].split("."))
     for name, defined in names.by_name.items() if files else ():
-        kinds = [each.kind for each in defined if each.kind in DEFINED and each.file in files]
+        kinds = [each.kind for each in defined if each.kind in (*DEFINED, "roof") and each.file in files]
         yield from (Offer(name, types.CompletionItemKind.Reference, kind) for kind in kinds[:1])
     for found in names.by_name.get(head[:-1], ()):
         if not signals_alone and found.kind == "servo" and found.entry is not None:
@@ -283,13 +296,14 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
     if where == "linear" and texts == ["at", "="]:
         yield Offer(EQUILIBRIUM, types.CompletionItemKind.Function, "the equilibrium near positions of the joints")
     if where == "servos":
-        yield from _named(names, "servo")
+        yield from _named(names, "servo", "roof")
         return
     kinds = {"parent": "link", "child": "link", "arm": "arm"}
     if key in kinds and where in ("joint", "run"):
         if kinds[key] == "link":
             yield Offer("base", types.CompletionItemKind.Constant, "what the arm stands on")
         yield from _named(names, kinds[key], around=around)
+        yield from _named(names, "roof") if kinds[key] in DEFINED else ()
         return
     model_kinds: dict[str, models.Kind] = {
         "model": "servo", "command": "command", "integrator": "integrator", "metric": "metric", "bed": "bed",
@@ -309,7 +323,13 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
         for name, model in models.available("command").items():
             yield Offer(name, types.CompletionItemKind.Class, summary(model))
         yield from _named(names, "guide")
-    if key in _PATHS or key in _SIGNALS_ALONE or "vary" in texts:
+    if key in GOALS or key == "require":
+        yield from _of_goal(texts, around, names, index)
+        return
+    if key in _VARIED:
+        yield from _of_varied(texts, names, index)
+        return
+    if key in _PATHS or key in _SIGNALS_ALONE:
         values = () if key in _SIGNALS_ALONE else index.values
         heads = dict.fromkeys(each.path.partition(".")[0] for each in values)
         heads |= dict.fromkeys(path.partition(".")[0] for path in index.signals)
@@ -324,9 +344,49 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
             model = models.available(each).get(texts[opened - 1])
             if model is not None and texts[-1] in ("(", ",", ";"):
                 yield from (_of_parameter(parameter) for parameter in models.written(model))
-    yield from _named(names, "let", "macro")
+    yield from _of_expression(names)
+
+
+def _of_expression(names: NamesInTexts) -> Iterator[Offer]:
+    """The words that any value may have in it."""
+    yield from _named(names, "let", "macro", "roof")
     yield from (Offer(each, types.CompletionItemKind.Function, ", ".join(USAGE[each])) for each in FUNCTIONS)
     yield from (Offer(each, types.CompletionItemKind.Constant) for each in CONSTANTS)
+
+
+def _of_goal(texts: list[str], around: TextEntry | None, names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
+    """The words behind `require`, `minimise` and `maximise`: metrics, then a limit; in a call, what it is about."""
+    if texts.count("(") > texts.count(")"):
+        heads = dict.fromkeys(path.partition(".")[0] for path in index.signals)
+        yield from _named(names, "metric", "linear", "joint", around=around)
+        yield from (Offer(each, types.CompletionItemKind.Field, "of a path") for each in heads)
+        yield from _of_expression(names)
+    elif any(each in COMPARISONS for each in texts):
+        yield from _named(names, "servo")
+        yield from _of_expression(names)
+    else:
+        yield from _named(names, "metric", "macro", around=around)
+        if texts[0] == "require":
+            over_time = [name for name, model in models.available("metric").items() if model.condition]
+            for each in (*over_time, *FIGURES, STEP_ERROR, PERCENTILE):
+                yield Offer(each, types.CompletionItemKind.Function, "of what is required")
+
+
+def _of_varied(texts: list[str], names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
+    """The words behind `vary`, `with` and `exclude when`: a path of a parameter, then its values."""
+    if "=" not in texts:
+        heads = dict.fromkeys(each.path.partition(".")[0] for each in index.values)
+        for each in heads:
+            if texts[0] != "vary" or each not in _NOT_VARIED:
+                yield Offer(each, types.CompletionItemKind.Field, "of a path")
+        if texts == ["vary"]:
+            yield Offer("macro", types.CompletionItemKind.Keyword, "a macro of the deck: `vary macro NAME = [...];`")
+        yield from _named(names, "joint", "servo", "let", "macro", "roof")
+        if texts[0] != "exclude":
+            return
+    else:
+        yield from _named(names, "arm" if texts[-4:-1] == ["arm", "=", "["] else "servo")
+    yield from _of_expression(names)
 
 
 def _sweeps_of(run: str, names: NamesInTexts) -> Iterator[Offer]:

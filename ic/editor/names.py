@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from copy import copy
 from functools import lru_cache
 from types import MappingProxyType
 
 from ic.editor.expansions import MacrosInTexts
 from ic.editor.structure import LETS, UNIT, DeckText, TextEntry, flattened, innermost_around
-from ic.editor.used import DEFINED, texts_under, uses_in
+from ic.editor.used import DEFINED, UsedDecks, uses_in
+from ic.grammar.uses import USE
 from ic.language import OF_A_RUN
 from ic.text.lexer import NAME, NUMBERS, Token
 from met.frozen import frozen
@@ -38,6 +40,9 @@ _VALUES = ("let", "macro", "guide", "joint", "metric", "signal", "require", "swe
 REMOVED = ("metric", "require", "guide", "sensor", "payload", "signal", "linear")
 """The kinds of names that `remove` takes away."""
 
+
+OUTERMOST = (*DEFINED, "roof", "run", "sweep", "search", "tune", "macro", UNIT)
+"""The kinds of names that are of a deck itself, and not of an arm or a run."""
 
 NOTHING_MADE: Mapping[tuple[str, str], Sequence[str]] = MappingProxyType({})
 
@@ -80,11 +85,13 @@ class NamesInTexts:
     def __init__(self, texts: Iterable[DeckText], made: Mapping[tuple[str, str], Sequence[str]] = NOTHING_MADE) -> None:
         self._made = made
         self.texts = tuple(texts)
+        self.used = UsedDecks(self.texts)
         self.macros = MacrosInTexts(self.texts)
         self.by_name: dict[str, list[NameInText]] = {}
         for text in self.texts:
             for each in self._defined(text):
                 self.by_name.setdefault(each.token.text, []).append(each)
+        self._all: Mapping[str, list[NameInText]] = self.by_name
         self._with_braces = {name: found for name, found in self.by_name.items() if "{" in name}
 
     def of_kind(self, *kinds: str) -> list[str]:
@@ -135,6 +142,7 @@ class NamesInTexts:
         under = self._under_roof(token, entry)
         if under is not None:
             return under
+        found = self._seen(found, token)
         for kind in _wanted(token, entry):
             of_kind = [each for each in found if each.kind == kind]
             if of_kind:
@@ -144,29 +152,47 @@ class NamesInTexts:
                 )
         return found if entry is None else []
 
+    def _seen(self, found: list[NameInText], token: Token) -> list[NameInText]:
+        """Those that a word's text knows without a roof."""
+        if not self.used or not found:
+            return found
+        seen = self.used.seen_from(token.source.name)
+        return [each for each in found if each.file in seen or each.kind not in OUTERMOST]
+
+    def seen_from(self, text: DeckText) -> NamesInTexts:
+        """The names that a text knows without a roof, and those of arms and runs."""
+        if not self.used:
+            return self
+        made, seen = copy(self), self.used.seen_from(text.source.name)
+        made.by_name = {}
+        for name, found in self.by_name.items():
+            kept = [each for each in found if each.file in seen or each.kind not in OUTERMOST]
+            made.by_name |= {name: kept} if kept else {}
+        return made
+
     def _under_roof(self, token: Token, entry: TextEntry | None) -> list[NameInText] | None:
-        """The definitions that a word behind a roof means, `d1` of `panda.d1`, and the roof that one before means; None
-        where there is no roof."""
-        text = next((each for each in self.texts if each.source.name == token.source.name), None)
-        roofs = {use.roof.text: use for use in uses_in(text)} if text is not None else {}
-        words = entry.words if entry is not None and roofs else []
+        """The definitions that a word behind roofs means, `d1` of `cell.panda.d1`, and the roof that one before means;
+        None where there is no roof."""
+        words = entry.words if entry is not None and entry.kind != USE and self.used else []
         at = next((i for i, word in enumerate(words) if word.offset == token.offset), None)
-        if text is None or at is None:
+        if at is None:
             return None
-        before, behind = [word.text for word in words[max(0, at - 3) : at]], words[at + 1 : at + 2]
-        if before[-1:] == ["."] and before[-2] in roofs and before[-3:-2] != ["."]:
-            files = texts_under(text, before[-2], self.texts)
-            return [each for each in self.by_name.get(token.text, ()) if each.kind in DEFINED and each.file in files]
-        if token.text in roofs and before[-1:] != ["."] and behind and behind[0].text == ".":
-            return [NameInText("roof", roofs[token.text].roof, None)]
-        return None
+        roofs: list[str] = []
+        begin = at
+        while begin >= 2 and words[begin - 1].text == "." and words[begin - 2].kind == NAME:
+            begin -= 2
+            roofs.insert(0, words[begin].text)
+        files = self.used.under(token.source.name, roofs)
+        is_before_dot = at + 1 < len(words) and words[at + 1].text == "."
+        roof = self.used.roofs(files).get(token.text) if is_before_dot else None
+        if roof is not None:
+            return [NameInText("roof", roof.roof, None)]
+        if not roofs or not files:
+            return None
+        return [each for each in self._all.get(token.text, ()) if each.kind in DEFINED and each.file in files]
 
     def _of_owner(self, found: list[NameInText], entry: TextEntry | None) -> list[NameInText]:
-        """Those of the arm or the run that an entry is about, where some are; of a deck's own, where decks that are
-        used have such names too, those of the file."""
-        here = [each for each in found if entry is not None and each.file == entry.words[0].source.name]
-        if here and len(here) < len(found) and all(each.kind in DEFINED for each in found):
-            return here
+        """Those of the arm or the run that an entry is about, where some are."""
         if len(found) < 2 or entry is None:
             return found
         for owner in self.owners(entry):
@@ -185,12 +211,21 @@ class NamesInTexts:
             entry = waiting.pop(0)
             if entry.named is not None:
                 owners.append(entry.named.text)
-            of = entry.word_behind("of") if entry.kind in OF_A_RUN else ""
-            arms = [inner.texts[2] for inner in entry.entries if inner.texts[:2] == ["arm", "="] and inner.texts[2:]]
-            for kind, name in ((entry.kind, entry.word_behind("like")), ("run", of), *(("arm", arm) for arm in arms)):
-                bases = [each for each in self.by_name.get(name, ()) if each.kind == kind]
-                waiting += [each.entry for each in bases if each.entry is not None]
+            bases = [*self._named_behind("like", entry, entry.kind)]
+            bases += self._named_behind("of", entry, "run") if entry.kind in OF_A_RUN else ()
+            for inner in entry.entries:
+                bases += self._named_behind("=", inner, "arm") if inner.texts[:2] == ["arm", "="] else ()
+            waiting += [each.entry for each in bases if each.entry is not None]
         return owners
+
+    def _named_behind(self, word: str, entry: TextEntry, kind: str) -> list[NameInText]:
+        """The definitions of a kind that an entry names behind a word, with roofs before the name or without."""
+        token = entry.name_behind(word)
+        if token is None:
+            return []
+        under = self._under_roof(token, entry)
+        found = under if under is not None else self._seen(self._all.get(token.text, []), token)
+        return [each for each in found if each.kind == kind]
 
     def _made_by_loops(self, name: str) -> list[NameInText]:
         """The definitions whose names with braces may be this one: `seg_{i}` of `seg_7` and of `seg_{i-1}`."""
@@ -218,13 +253,10 @@ class NamesInTexts:
             for inner in entry.entries:
                 if inner.kind == "model" and len(inner.words) > 2:
                     return inner.words[2].text
-            base = entry.word_behind("like")
-            if "=" in entry.texts:
-                base = entry.word_behind("=")
-                if entry.block != "servo":
-                    return base
-            kind = entry.block
-            found = [each for each in self.by_name.get(base, ()) if each.kind == kind and each.entry]
+            behind = "=" if "=" in entry.texts else "like"
+            if behind == "=" and entry.block != "servo":
+                return entry.word_behind("=")
+            found = [each for each in self._named_behind(behind, entry, entry.block) if each.entry is not None]
             if not found or found[0].entry is entry:
                 return ""
             assert found[0].entry is not None
@@ -233,6 +265,7 @@ class NamesInTexts:
 
     def _defined(self, text: DeckText) -> Iterator[NameInText]:
         yield from _named(text.all_entries(), made=False)
+        yield from (NameInText("roof", use.roof, None) for use in uses_in(text))
         parameters = {each.text for macro in text.macros for each in macro.parameters or ()}
         for macro in text.macros:
             yield NameInText("macro", macro.name, None)

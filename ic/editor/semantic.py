@@ -14,6 +14,7 @@ from lsprotocol import types
 from ic.editor.completion import parameters_of
 from ic.editor.names import NamesInTexts
 from ic.editor.structure import LOOP, DeckText, TextEntry, flattened
+from ic.editor.used import uses_in
 from ic.language import BLOCKS, TOP_LEVEL
 from ic.language.bodies import JOINT_KINDS
 from ic.meaning.expressions.evaluate import FUNCTIONS
@@ -66,8 +67,10 @@ def meanings(text: DeckText, names: NamesInTexts) -> Iterator[tuple[Token, str, 
     entries.sort(key=lambda entry: entry.words[0].offset)
     begins = [entry.words[0].offset for entry in entries]
     loops = [entry for entry in entries if entry.kind == LOOP and entry.opened is not None and len(entry.words) > 1]
-    in_lines = (token for directive in text.directives for token in directive.tokens[2:])
-    every = sorted((*text.tokens, *in_lines), key=lambda token: token.offset)
+    in_lines = (token for line in text.directives if line.name != "include" for token in line.tokens[2:])
+    files = [(use.first.offset, use.last.offset) for use in uses_in(text)]
+    deck = (each for each in text.tokens if not any(first < each.offset < last for first, last in files))
+    every = sorted((*deck, *in_lines), key=lambda token: token.offset)
     before: Token | None = None
     for n, token in enumerate(every):
         if token.kind == NAME:

@@ -48,11 +48,13 @@ class DeckServer(LanguageServer):
             self.process,
             self.publish,
             self.log,
+            self.refresh,
             include_dirs=[os.path.abspath(each) for each in include_dirs],
             defines=defines,
         )
         self._last_runs = last_runs
         self.related = True
+        self._refreshes_colours = self._refreshes_lenses = False
         self.fixes: dict[str, list[QuickFix]] = {}
         self._published: dict[str, types.PublishDiagnosticsParams] = {}
         self._worker: asyncio.Task[None] | None = None
@@ -61,6 +63,9 @@ class DeckServer(LanguageServer):
         """Take the editor's options, and start to check."""
         shown = parameters.capabilities.text_document and parameters.capabilities.text_document.publish_diagnostics
         self.related = bool(shown and shown.related_information)
+        drawn = parameters.capabilities.workspace
+        self._refreshes_colours = bool(drawn and drawn.semantic_tokens and drawn.semantic_tokens.refresh_support)
+        self._refreshes_lenses = bool(drawn and drawn.code_lens and drawn.code_lens.refresh_support)
         self._take_options(parameters.initialization_options)
         self.process.start()
         self._worker = asyncio.create_task(self.checks.work())
@@ -86,6 +91,13 @@ class DeckServer(LanguageServer):
     def log(self, text: str) -> None:
         """Write an error into the editor's log."""
         self.window_log_message(types.LogMessageParams(types.MessageType.Error, f"met lsp: {text}"))
+
+    def refresh(self) -> None:
+        """Have the editor ask again for colours and lenses, where it does so: other files of a deck have changed."""
+        if self._refreshes_colours:
+            self.workspace_semantic_tokens_refresh(None)
+        if self._refreshes_lenses:
+            self.workspace_code_lens_refresh(None)
 
     def end(self) -> None:
         """End the process that checks."""

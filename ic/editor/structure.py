@@ -92,6 +92,14 @@ class TextEntry:
         texts = self.texts
         return texts[texts.index(word) + 1] if word in texts[:-1] else ""
 
+    def name_behind(self, word: str) -> Token | None:
+        """The token of the name behind a word, `drive` of `like panda.drive`; None where there is none."""
+        words = self.words[len(self.words) - len(self.texts) :]
+        at = self.texts.index(word) + 1 if word in self.texts[:-1] else len(words)
+        while at + 2 < len(words) and words[at + 1].text == "." and words[at + 2].kind == NAME:
+            at += 2
+        return words[at] if at < len(words) else None
+
 
 @dataclass
 class TextDirective:

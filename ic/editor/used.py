@@ -1,10 +1,10 @@
-"""Decks that a text uses: which of a deck's texts a roof's definitions stand in."""
+"""Decks that a text uses: which of a deck's texts a name is of, with roofs before it and without."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from ic.editor.structure import DeckText
 from ic.grammar.uses import AS, USE
@@ -48,15 +48,59 @@ def used_files(text: str) -> set[str]:
     return {os.path.basename(quoted or angled) for quoted, angled in _USE.findall(text)}
 
 
-def texts_under(text: DeckText, roof: str, texts: Iterable[DeckText]) -> set[str]:
-    """The names of the texts that a roof of a text stands for: the deck that it uses, and what that includes."""
-    known = {each.source.name: each for each in texts}
-    waiting = [use.file for use in uses_in(text) if use.roof.text == roof]
-    found: set[str] = set()
-    while waiting:
-        file = waiting.pop().removeprefix("./")
-        for name, each in known.items():
-            if name not in found and re.fullmatch(rf"<?(?:.*/)?{re.escape(file)}>?", name):
-                found.add(name)
-                waiting += [one or other for one, other in _INCLUDE.findall(each.source.text)]
-    return found
+class UsedDecks:
+    """Which texts a name may be of: those that includes connect, and behind roofs those that these stand for.
+
+    A text that no other one is seen to include or use, for a macro names its file, counts as a part of the first.
+    """
+
+    def __init__(self, texts: Sequence[DeckText]) -> None:
+        self._uses = {each.source.name: list(uses_in(each)) for each in texts}
+        self._beside: dict[str, set[str]] = {name: set() for name in self._uses}  # includes, or is included by
+        reached: set[str] = set()
+        for each in texts if any(self._uses.values()) else ():
+            here = each.source.name
+            for quoted, angled in _INCLUDE.findall(each.source.text):
+                for found in self._called(quoted or angled) - {here}:
+                    self._beside[here].add(found)
+                    self._beside[found].add(here)
+                    reached.add(found)
+            reached.update(*(self._called(use.file) for use in self._uses[here]))
+        for name in list(self._uses)[1:]:
+            if name not in reached:
+                self._beside[name].add(texts[0].source.name)
+                self._beside[texts[0].source.name].add(name)
+
+    def __bool__(self) -> bool:
+        """True where a text uses a deck."""
+        return any(self._uses.values())
+
+    def _called(self, file: str) -> set[str]:
+        """The texts that a file's name may mean."""
+        pattern = re.compile(rf"<?(?:.*/)?{re.escape(file.removeprefix('./'))}>?")
+        return {name for name in self._uses if pattern.fullmatch(name)}
+
+    def seen_from(self, name: str) -> set[str]:
+        """The texts whose definitions a text knows without a roof, its own among them."""
+        return self._connected({name}) if self else set(self._uses)
+
+    def _connected(self, names: Iterable[str]) -> set[str]:
+        found: set[str] = set()
+        waiting = set(names)
+        while waiting:
+            name = waiting.pop()
+            found.add(name)
+            waiting |= self._beside.get(name, set()) - found
+        return found
+
+    def roofs(self, names: Iterable[str]) -> dict[str, UseInText]:
+        """The roofs that some texts have."""
+        return {use.roof.text: use for name in names for use in self._uses.get(name, ())}
+
+    def under(self, name: str, words: Sequence[str]) -> set[str]:
+        """The texts that roofs in a text stand for, `cell`, `panda` of `cell.panda.d1`; none where one is no roof."""
+        found = self.seen_from(name)
+        for word in words:
+            use = self.roofs(found).get(word)
+            found = self._connected(self._called(use.file)) if use is not None else set()
+        return found

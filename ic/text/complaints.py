@@ -30,6 +30,10 @@ MOST_TURNS_SHOWN = 4
 """Turns of a loop that are named beside a mistake of the first."""
 
 
+MOST_ROOFS_SHOWN = 4
+"""Uses of a file that are named beside a mistake in it."""
+
+
 UNKNOWN_WORDS = ("D044", "D045", "D082", "D108", "D136", "D157")
 """Codes of messages about unknown words of the language, which no deck defines."""
 
@@ -140,8 +144,9 @@ class Complaints:
 
     @property
     def all(self) -> tuple[Diagnostic, ...]:
-        """All findings; of a mistake that several turns of a loop make, the first, which names the others."""
-        return tuple(map(self._with_turns, self._found))
+        """All findings; of a mistake that several turns of a loop make, or roofs of a file have, the first, which names
+        the others."""
+        return tuple(once_for_all_roofs(map(self._with_turns, self._found)))
 
     @property
     def errors(self) -> tuple[Diagnostic, ...]:
@@ -400,6 +405,30 @@ def _mistake(diagnostic: Diagnostic) -> object:
     assert diagnostic.at is not None
     place = diagnostic.at.place
     return diagnostic.code, diagnostic.severity, place.file, place.line, place.column, place.macros
+
+
+def once_for_all_roofs(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+    """The diagnostics with each mistake of a file that is used under several roofs once, at the first of them."""
+    first: dict[object, Diagnostic] = {}
+    others: dict[object, dict[Place, None]] = {}
+    kept: list[tuple[Diagnostic, object]] = []
+    for each in found:
+        place = each.at.place if each.at is not None else None
+        key = (_mistake(each), place.turns) if place is not None and place.used else None
+        known = first.setdefault(key, each)
+        came_by = known.at.place.included if known.at is not None else ()
+        roofs = [place.included[n] for n in place.used if place.included[n] not in came_by] if place and key else []
+        if roofs:
+            others.setdefault(key, {})[Place(*roofs[-1], 1)] = None
+        else:
+            kept.append((each, key if known is each else None))
+    for each, key in kept:
+        uses = list(others.get(key, ())) if key is not None else []
+        labels = [Label(use, "likewise where it is used here") for use in uses[:MOST_ROOFS_SHOWN]]
+        if len(uses) > MOST_ROOFS_SHOWN:
+            more = f", and in {len(uses) - MOST_ROOFS_SHOWN:,} more"
+            labels[-1] = replace(labels[-1], text=labels[-1].text + more)
+        yield replace(each, also=(*each.also, *labels)) if labels else each
 
 
 def _spot(place: Place) -> tuple[str, int, int]:

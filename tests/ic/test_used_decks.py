@@ -265,6 +265,25 @@ def test_what_cannot_be_is_told(text: str, code: str, message: str, tmp_path: Pa
     assert all(each.at is not None for each in told)
 
 
+def test_a_mistake_of_a_file_under_several_roofs_is_told_once(tmp_path: Path) -> None:
+    part = PART.replace("length = reach", "lenght = reach").replace(
+        "servo fast like drive { kp", "servo fast like drive { kpp"
+    )
+    uses = [f'use "part.ic" as roof_{n};\n' for n in range(6)]
+    found = compiled(tmp_path, "".join(uses) + HOLD.replace("part.", "roof_0."), part=part)
+    once = compiled(tmp_path, uses[0] + HOLD.replace("part.", "roof_0."), part=part)
+    assert len(found.diagnostics) == len(once.diagnostics) == 2
+    for one, other in zip(found.diagnostics, once.diagnostics, strict=True):
+        assert one.at is not None and other.at is not None and one.message == other.message
+        said = [(Path(each.place.file).name, each.place.line, each.text) for each in one.also[len(other.also) :]]
+        assert said == [
+            ("deck.ic", 2, "likewise where it is used here"),
+            ("deck.ic", 3, "likewise where it is used here"),
+            ("deck.ic", 4, "likewise where it is used here"),
+            ("deck.ic", 5, "likewise where it is used here, and in 1 more"),
+        ]
+
+
 def test_a_mistake_in_a_used_deck_is_placed_there_with_the_line_that_uses_it(tmp_path: Path) -> None:
     found = compiled(tmp_path, f"\n{USE}{HOLD}", part=PART.replace("like drive { kp", "like driv { kp"))
     assert messages(found).startswith("""\

@@ -94,6 +94,7 @@ const toUri = (text) => vscode.Uri.parse(text, true);
 const toLocation = (l) => new vscode.Location(toUri(l.uri), toRange(l.range));
 const toEdit = (e) => new vscode.TextEdit(toRange(e.range), e.newText);
 const named = (document) => ({ uri: document.uri.toString() });
+const folderOf = (folders) => (folders.length ? folders[0].uri.fsPath : undefined);
 
 function toDiagnostic(given) {
   const made = new vscode.Diagnostic(toRange(given.range), given.message, (given.severity || 1) - 1);
@@ -134,6 +135,8 @@ class Met {
     this.diagnostics = vscode.languages.createDiagnosticCollection('met');
     this.starts = 0;
     this.ready = Promise.resolve();
+    this.coloursChanged = new vscode.EventEmitter();
+    this.lensesChanged = new vscode.EventEmitter();
   }
 
   start() {
@@ -144,18 +147,24 @@ class Met {
       ended: (reason) => this.died(reason),
       'textDocument/publishDiagnostics': (given) =>
         this.diagnostics.set(toUri(given.uri), given.diagnostics.map(toDiagnostic)),
+      'workspace/semanticTokens/refresh': () => this.coloursChanged.fire(),
+      'workspace/codeLens/refresh': () => this.lensesChanged.fire(),
       'window/logMessage': (given) => this.log.appendLine(given.message),
       'window/showMessage': (given) => vscode.window.showWarningMessage(given.message),
     };
-    const cwd = folders.length ? folders[0].uri.fsPath : undefined;
-    this.connection = new Connection(settings.get('command') || 'met', ['lsp', '--stdio'], cwd, handlers);
+    this.connection = new Connection(settings.get('command') || 'met', ['lsp', '--stdio'], folderOf(folders), handlers);
     const capabilities = {
       general: { positionEncodings: ['utf-16'] },
       textDocument: {
         publishDiagnostics: { relatedInformation: true, versionSupport: true },
         rename: { prepareSupport: true },
       },
-      workspace: { workspaceFolders: true, didChangeWatchedFiles: { dynamicRegistration: false } },
+      workspace: {
+        workspaceFolders: true,
+        didChangeWatchedFiles: { dynamicRegistration: false },
+        semanticTokens: { refreshSupport: true },
+        codeLens: { refreshSupport: true },
+      },
     };
     const connection = this.connection;
     this.ready = connection
@@ -225,6 +234,8 @@ class Met {
   watch() {
     const { workspace } = vscode;
     const files = workspace.createFileSystemWatcher('**/*.{ic,csv,urdf}');
+    const archives = workspace.createFileSystemWatcher('**/*.run.json'); // written when a run has ended
+    const ended = () => this.lensesChanged.fire();
     const changed = (type) => (uri) =>
       this.connection.tell('workspace/didChangeWatchedFiles', { changes: [{ uri: uri.toString(), type }] });
     this.context.subscriptions.push(
@@ -239,6 +250,7 @@ class Met {
           contentChanges: [{ text: document.getText() }],
         })),
       files, files.onDidCreate(changed(1)), files.onDidChange(changed(2)), files.onDidDelete(changed(3)),
+      archives, archives.onDidCreate(ended), archives.onDidChange(ended), archives.onDidDelete(ended),
     );
   }
 
@@ -267,6 +279,7 @@ class Met {
         locations(await this.wish('references', document, { ...at(place), context: { includeDeclaration } }, token)),
     });
     add('CodeLens', {
+      onDidChangeCodeLenses: this.lensesChanged.event,
       provideCodeLenses: async (document, token) =>
         ((await this.wish('codeLens', document, {}, token)) || []).map(
           (each) => new vscode.CodeLens(toRange(each.range), each.command),
@@ -313,6 +326,7 @@ class Met {
   colour(legend) {
     this.legend = new vscode.SemanticTokensLegend(legend.tokenTypes, legend.tokenModifiers);
     const provider = {
+      onDidChangeSemanticTokens: this.coloursChanged.event,
       provideDocumentSemanticTokens: async (document, token) => {
         const found = await this.wish('semanticTokens/full', document, {}, token);
         return found && new vscode.SemanticTokens(new Uint32Array(found.data));
@@ -323,10 +337,16 @@ class Met {
     );
   }
 
-  /** Run words of `met` in a terminal, where their output and Ctrl-C belong. */
-  terminal(shellArgs) {
-    const shellPath = vscode.workspace.getConfiguration('met').get('command') || 'met';
-    vscode.window.createTerminal({ name: `met ${shellArgs[0]}`, shellPath, shellArgs }).show();
+  /** Run words of `met` as a task: in a terminal, whose output stays when they have ended. */
+  terminal(words) {
+    const folders = vscode.workspace.workspaceFolders || [];
+    const command = vscode.workspace.getConfiguration('met').get('command') || 'met';
+    const task = new vscode.Task(
+      { type: 'process' }, folders.length ? vscode.TaskScope.Workspace : vscode.TaskScope.Global,
+      words.join(' '), 'met', new vscode.ProcessExecution(command, words, { cwd: folderOf(folders) }), [],
+    );
+    task.presentationOptions = { reveal: vscode.TaskRevealKind.Always, focus: true };
+    vscode.tasks.executeTask(task);
   }
 
   run() {

@@ -151,6 +151,32 @@ def test_a_file_without_a_run_is_proved_by_the_deck_that_includes_it_and_never_b
     assert meaning("deck.ic") == kept
 
 
+OTHERWISE = """\
+error[E346]: `part.ic` stays in its edition: in `../deck.ic`, which includes it, `r` would not have the same plan
+ = help: `met check ../deck.ic` may warn of what the editions read otherwise (D392)
+
+1 error
+"""
+
+
+def test_a_file_with_a_run_is_proved_within_decks_that_include_it_too(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    servo = "servo s { model = passive;  friction = 20 N*ft; }\n"
+    part = servo + RUN.replace("reach", "1 m").replace("arm = a;", "arm = a;  servos { j = s; }")
+    (folder / "parts").mkdir()
+    Path("parts/part.ic").write_text(part)
+    Path("parts/more.ic").write_text('#include "part.ic"\n')
+    Path("deck.ic").write_text('let ft = 0.5 m;\n#include "parts/more.ic"\n')
+    fmt(capsys, "deck.ic", "parts")
+    kept = Path("parts/part.ic").read_text()
+    monkeypatch.chdir("parts")
+    assert fmt(capsys, "--upgrade", "part.ic") == (2, "", OTHERWISE)  # by itself it has feet
+    assert Path("part.ic").read_text() == kept
+    Path("../deck.ic").write_text('let foot = 0.5 m;\n#include "parts/more.ic"\n')
+    assert fmt(capsys, "--upgrade", "part.ic") == (0, "part.ic: upgraded\n", "")
+
+
 def test_a_file_that_cannot_be_read_is_to_be_mended_first(capsys: pytest.CaptureFixture[str]) -> None:
     Path("a.ic").write_text("let x = 3 kg\n")
     assert fmt(capsys, "--upgrade", "a.ic") == (2, "", BROKEN)

@@ -84,10 +84,10 @@ def test_names_that_a_loop_makes_are_offered_and_those_with_braces_in_the_loop_a
         assert found <= set(offered) and not {"j_{i}", "axis", "at", "duration"} & set(offered), before
     in_loop = CHAIN.replace("child = seg_{i};", "child = |;")
     assert {"seg_{i}", "seg_0", "seg_1", "seg_2"} <= set(words(editor, deck, in_loop))
-    in_run = "    for i in 1 .. 2 { metric top_{i} = peak { of = j_{i}.q; }  require | }\n    record "
+    in_run = "    for i in 1 .. 2 { metric top_{i} = peak { of = j_{i}.q; }  require never(| }\n    record "
     offered = words(editor, deck, CHAIN.replace("    record ", in_run))
     assert {"top_{i}", "j_{i}", "j_2"} <= set(offered), "and not what a block of a run may begin with"
-    offered = words(editor, deck, CHAIN.replace("    record ", "    require |\n    record "))
+    offered = words(editor, deck, CHAIN.replace("    record ", "    require never(|\n    record "))
     assert "j_2" in offered and not any("{" in each for each in offered)
 
 

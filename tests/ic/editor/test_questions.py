@@ -141,6 +141,33 @@ def test_words_of_a_deck_itself_are_offered_and_shown_as_the_language_declares_t
 TABLE = "link, mass [kg], com.x [m], com.y [m], com.z [m]\nboom, 2, 0.1, 0, 0\nstick_left, 1, 0.2, 0, 0\n"
 
 
+def test_only_what_may_be_varied_set_or_required_is_offered_there(editor: Editor, deck: Path) -> None:
+    heads = {"links", "initial", "environment", "shoulder", "elbow", "gearbox", "reach", "arm"}
+    signals = {"q", "tau", "energy", "momentum"}
+    with_metric = ARM + "run last like nominal { metric settle = settling_time { of = elbow.qd;  target = slow; } }\n"
+    editor.change(deck, with_metric)
+    assert editor.of(deck) == []
+
+    def offered(written: str) -> set[str]:
+        return set(words(editor, deck, with_metric + written))
+
+    varied = offered("sweep a of last { vary |")
+    assert heads | {"macro"} <= varied and not varied & {*signals, "seed", "record", "settle", "sqrt", "pi"}
+    assert offered("search a of last { vary |") == varied
+    given = offered("run more like last { with |")
+    assert heads | {"seed"} <= given and not given & {*signals, "settle", "macro", "sqrt"}
+    excluded = offered("sweep a of last { exclude when |")
+    assert heads | {"abs", "pi"} <= excluded and not excluded & {*signals, "settle"}
+    values = offered("sweep a of last { vary gearbox.kp = |")
+    assert {"linspace", "slow", "gearbox"} <= values and not values & {*signals, "links", "seed"}
+    assert offered("search a of last { minimise |") == {"settle", "ROD"}
+    required = offered("run more like last { require |")
+    assert {"settle", "always", "step_error", "phase_margin"} <= required and not required & {*heads, *signals, "slow"}
+    limit = offered("run more like last { require settle < |")
+    assert {"slow", "abs", "gearbox"} <= limit and not limit & {*signals, "settle", "links"}
+    assert {*signals, "settle", "elbow", "slow"} <= offered("run more like last { require always(|")
+
+
 def test_rows_and_columns_stand_behind_the_name_of_a_table(editor: Editor, tmp_path: Path) -> None:
     (tmp_path / "bodies.csv").write_text(TABLE)
     deck = tmp_path / "own.ic"

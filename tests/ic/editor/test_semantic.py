@@ -56,6 +56,13 @@ def test_a_word_has_its_kind(mark: str, kind: str, bits: int) -> None:
     assert found[word, at] == (kind, bits)
 
 
+def test_a_files_name_is_no_word_of_the_deck() -> None:
+    text = '#include <servos/rigid_gearbox.ic>\n#include "two.ic"\nuse <two.ic> as two;\nlet rigid_gearbox = 2 m;\n'
+    found = of(text)
+    assert {offset for _, offset in found if offset < text.index("as two")} == {text.index("use")}
+    assert ("two", text.index("two;")) in found
+
+
 def test_an_index_of_a_loop_is_a_parameter_of_it() -> None:
     found = of(CHAIN)
     assert found["i", CHAIN.index("i in 0")] == ("parameter", DEFINES)

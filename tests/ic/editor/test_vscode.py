@@ -115,4 +115,5 @@ def test_the_client_shows_what_the_server_says(tmp_path: Path) -> None:
     assert shown["coloured"] > 50 and shown["coloured"] % 5 == 0
     assert shown["named"] == "motor" and shown["renamed"] == 2 and shown["wrong"] == "`kg` is a unit"
     assert shown["lenses"] == ["1 case", "run"]
+    assert shown["refreshed"] >= 2, "colours and lenses are asked for again once the deck's files are known"
     assert shown["terminals"] == [[str(met), "run", str(deck), "more"], [str(met), "run", str(deck)]]

@@ -29,6 +29,7 @@ const vscode = {
   Uri: { parse: (address) => uri(address.replace('file://', '')) },
   MarkdownString: Kept, SemanticTokens: Kept, SemanticTokensLegend: Kept, FoldingRange: Kept, Hover: Kept,
   CompletionItem: Kept, DocumentSymbol: Kept, CodeAction: Kept, CodeLens: Kept, DiagnosticRelatedInformation: Kept, Diagnostic: Kept,
+  EventEmitter: class { constructor() { this.event = listen; } fire() { shown.refreshed = (shown.refreshed || 0) + 1; } },
   CodeActionKind: { QuickFix: 'quickfix' },
   Range: class { constructor(...at) { Object.assign(this, { start: { line: at[0], character: at[1] }, end: at.slice(2) }); } },
   Location: class { constructor(where, range) { Object.assign(this, { uri: where, range }); } },
@@ -44,12 +45,15 @@ const vscode = {
     ...Object.fromEntries(['Open', 'Close', 'Save'].map((each) => [`onDid${each}TextDocument`, listen])),
     onDidChangeTextDocument: (changed) => { changes.tell = changed; return subscription; },
   },
+  Task: class { constructor(...given) { this.execution = given[4]; } },
+  ProcessExecution: class { constructor(...given) { this.given = given; } },
+  TaskScope: {}, TaskRevealKind: {},
+  tasks: { executeTask: ({ execution }) => shown.terminals.push([execution.given[0], ...execution.given[1]]) },
   window: {
     activeTextEditor: { document },
     createOutputChannel: () => ({ append() {}, appendLine: (line) => shown.messages.push(line), ...subscription }),
     showWarningMessage: (line) => shown.messages.push(line),
     showErrorMessage: (line) => shown.messages.push(line),
-    createTerminal: (options) => ({ show: () => shown.terminals.push([options.shellPath, ...options.shellArgs]) }),
   },
 };
 vscode.languages.createDiagnosticCollection = () => ({
