@@ -5,6 +5,7 @@
 MET.arm = (() => {
   const POSE = 12;  // numbers of a body: the rows of its rotation, its origin
   const SHAPE = 9;  // of a shape: middle, axis, size
+  const SOLID = 16;  // of a solid: place, three axes, size
   const { joint: JOINT, cube: CUBE, rail: RAIL, foot: FOOT } = MET.look;
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -58,24 +59,57 @@ MET.arm = (() => {
     const vector = (numbers, at) => [numbers[at], numbers[at + 1], numbers[at + 2]];
     const rows = (numbers, body) => [0, 3, 6].map((at) => vector(numbers, POSE * body + at));
     const origin = (numbers, body) => vector(numbers, POSE * body + 9);
-    const turn = (R, v) => [dot(R[0], v), dot(R[1], v), dot(R[2], v)];
+    const [upX, upY, upZ] = scene.up[2] === 1 ? [[1, 0, 0], [0, 1, 0], [0, 0, 1]] : turned;
+
+    // Puts a direction of a body, or with `from` a point, into the world, z up, at a place of `out`.
+    function put(numbers, body, x, y, z, out, at, from) {
+      const b = POSE * body;
+      const wx = numbers[b] * x + numbers[b + 1] * y + numbers[b + 2] * z + (from ? numbers[b + 9] : 0);
+      const wy = numbers[b + 3] * x + numbers[b + 4] * y + numbers[b + 5] * z + (from ? numbers[b + 10] : 0);
+      const wz = numbers[b + 6] * x + numbers[b + 7] * y + numbers[b + 8] * z + (from ? numbers[b + 11] : 0);
+      out[at] = upX[0] * wx + upX[1] * wy + upX[2] * wz;
+      out[at + 1] = upY[0] * wx + upY[1] * wy + upY[2] * wz;
+      out[at + 2] = upZ[0] * wx + upZ[1] * wy + upZ[2] * wz;
+    }
+
+    const meshes = scene.shapes.map(([, kind]) => (kind === "box" ? "block" : kind === "cylinder" ? "can" : "pill"));
+
+    // The numbers of a shape's solid into `out`: its place, its three axes, its size; as `solids` has them.
+    function write(numbers, n, out, to) {
+      const [body, kind, role] = scene.shapes[n];
+      const first = POSE * count + SHAPE * n;
+      const [ax, ay, az] = [numbers[first + 3], numbers[first + 4], numbers[first + 5]];
+      const half = kind === "line" ? 0.5 : 0;
+      put(numbers, body, numbers[first] + half * ax, numbers[first + 1] + half * ay, numbers[first + 2] + half * az, out, to, true);
+      if (kind === "box") [0, 1, 2].forEach((k) => put(numbers, body, +(k === 0), +(k === 1), +(k === 2), out, to + 3 + 3 * k, false));
+      else {  // three axes of which the last is along the shape's, as `along`
+        const far = Math.hypot(ax, ay, az) || 1;
+        const [zx, zy, zz] = [ax / far, ay / far, az / far];
+        const steep = Math.abs(zz) >= 0.9;
+        let [xx, xy, xz] = steep ? [0, -zz, zy] : [-zy, zx, 0];
+        const wide = Math.hypot(xx, xy, xz) || 1;
+        [xx, xy, xz] = [xx / wide, xy / wide, xz / wide];
+        put(numbers, body, xx, xy, xz, out, to + 3, false);
+        put(numbers, body, zy * xz - zz * xy, zz * xx - zx * xz, zx * xy - zy * xx, out, to + 6, false);
+        put(numbers, body, zx, zy, zz, out, to + 9, false);
+      }
+      const [sx, sy, sz] = [numbers[first + 6], numbers[first + 7], numbers[first + 8]];
+      let [x, y, z, length] = [limb, limb, limb, 0];
+      if (kind === "line") length = Math.hypot(ax, ay, az);
+      else if (kind === "rod") length = sz;
+      else if (kind === "sphere") [x, y, z] = [sx, sy, sz];
+      else if (kind === "box") [x, y, z] = role === "joint" ? [CUBE * limb, CUBE * limb, CUBE * limb] : [sx, sy, sz];
+      else [x, y, z, length] = role === "joint" ? [JOINT[0] * limb, JOINT[0] * limb, JOINT[0] * limb, JOINT[1] * limb] : [sx, sx, sx, sz];
+      if (role === "rail") [x, y, z] = [RAIL * limb, RAIL * limb, RAIL * limb];
+      [out[to + 12], out[to + 13], out[to + 14], out[to + 15]] = [x, y, z, length];
+    }
 
     // The solids: {mesh, role, joint, at, axes (of the mesh, in the world), size}.
+    const own = new Float64Array(SOLID);
     function solids(numbers) {
-      const out = scene.shapes.map(([body, kind, role, joint], n) => {
-        const first = POSE * count + SHAPE * n;
-        const R = rows(numbers, body);
-        const [axis, sizes] = [vector(numbers, first + 3), vector(numbers, first + 6)];
-        let middle = vector(numbers, first);
-        let [mesh, stretch] = ["pill", [limb, limb, limb, 0]];
-        let own = along(axis);
-        if (kind === "line") [middle, stretch[3]] = [plus(middle, axis, 0.5), size(axis)];
-        else if (kind === "rod") stretch[3] = sizes[2];
-        else if (kind === "sphere") stretch = [...sizes, 0];
-        else if (kind === "box") [mesh, own, stretch] = ["block", [[1, 0, 0], [0, 1, 0], [0, 0, 1]], role === "joint" ? [CUBE * limb, CUBE * limb, CUBE * limb, 0] : [...sizes, 0]];
-        else [mesh, stretch] = ["can", role === "joint" ? [JOINT[0] * limb, JOINT[0] * limb, JOINT[0] * limb, JOINT[1] * limb] : [sizes[0], sizes[0], sizes[0], sizes[2]]];
-        if (role === "rail") stretch = [RAIL * limb, RAIL * limb, RAIL * limb, stretch[3]];
-        return { mesh, role, joint, at: up(plus(origin(numbers, body), turn(R, middle))), axes: own.map((each) => up(turn(R, each))), size: stretch };
+      const out = scene.shapes.map(([, , role, joint], n) => {
+        write(numbers, n, own, 0);
+        return { mesh: meshes[n], role, joint, at: vector(own, 0), axes: [3, 6, 9].map((at) => vector(own, at)), size: [...vector(own, 12), own[15]] };
       });
       if (!scene.moves) out.push({ mesh: "can", role: "base", joint: -1, at: [0, 0, FOOT[1] * limb / 2], axes: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], size: [FOOT[0] * limb, FOOT[0] * limb, 0.4 * limb, FOOT[1] * limb] });
       return out;
@@ -88,7 +122,7 @@ MET.arm = (() => {
       return { mesh: "can", role: "xyz"[which], joint: -1, at: plus(up(origin(numbers, body)), axis, far / 2), axes: along(axis), size: [0.2 * limb, 0.2 * limb, 0.2 * limb, far] };
     }));
 
-    return { take, solids, frames, scene, limb, reach: scene.reach };
+    return { take, solids, write, meshes, frames, scene, limb, reach: scene.reach };
   }
 
   // Ends and radius of a solid as if it were a pill, by which it is fitted into a picture.
@@ -97,5 +131,5 @@ MET.arm = (() => {
     return { ends: [plus(at, axes[2], -half), plus(at, axes[2], half)], radius: mesh === "block" ? Math.hypot(x, y) / 2 : x };
   }
 
-  return { make, ends, dot, cross, plus, unit, along, length: size };
+  return { make, ends, dot, cross, plus, unit, along, length: size, SOLID };
 })();

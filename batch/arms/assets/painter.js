@@ -8,7 +8,7 @@ MET.painter = (() => {
   const BEHIND = 1e6;  // m: ghosts are drawn before what is solid
 
   function draw(picture, width, height) {
-    const { camera, solids, ghosts, trace, floor, step, reach, colours } = picture;
+    const { camera, solids, arm, ghosts, trace, floor, step, reach, colours } = picture;
     const axes = camera.axes();
     const half = height / 2;
     const seen = (p) => {
@@ -69,7 +69,7 @@ MET.painter = (() => {
         return node("path", { d: d([a, [b[0] + 0.01, b[1]]], false), stroke: css(colours.shade), "stroke-linecap": "round", "stroke-width": (2 * radius * scale((a[2] + b[2]) / 2)).toFixed(1) });
       })));
     }
-    ghosts.forEach((each, n) => each.forEach((one) => solid(one, colours.ghost(n), Math.min(1, 1.5 * colours.ghost(n)[3]))));
+    ghosts.forEach((numbers, n) => arm.solids(numbers).forEach((one) => solid(one, colours.ghost(n), Math.min(1, 1.5 * colours.ghost(n)[3]))));
     if (trace.length > 1) path(1e9, { d: d(trace.map(seen), false), stroke: css(colours.trace), "stroke-width": 1.6 });  // under the arm
     solids.forEach((each) => solid(each, colours.solid(each), 1));
     items.sort((a, b) => b[0] - a[0]);

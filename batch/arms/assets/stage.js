@@ -8,6 +8,7 @@ MET.stage = (() => {
   const BAR = 44;  // px of the view's upper edge where words and buttons stand
   const FAR = 1e4;  // reaches, farther than which nothing is fitted
   const [REST, SLOW] = [120, 45];  // ms after which a picture that stands is drawn fine; of a picture, more than which is slow
+  const PAUSE = 100;  // ms between which plots follow an arm that plays, where a processor draws
   const TRACED = 240;  // points of the tip's path
   const FILM = 6;  // pictures on paper
   const rgb = (hex, alpha = 1) => [...[1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255), alpha];
@@ -29,7 +30,7 @@ MET.stage = (() => {
     const step = stepOf(arm.reach);
     let [chosen, others, floor, time, playing, rate, end] = [null, [], null, 0, false, 1, 0];
     let [frames, ghostly, fresh, asked, touched, moved, before] = [false, true, true, false, false, false, 0];
-    let [path, still, rest, pace, coarse] = [[], true, 0, 0, 1];
+    let [path, still, rest, pace, coarse, inks, saidAt] = [[], true, 0, 0, 1, null, 0];
     const fingers = new Map();  // and mice: places where the view is held, by pointer
 
     const canvas = node("canvas");
@@ -62,9 +63,10 @@ MET.stage = (() => {
       renderer = null;  // a driver that cannot; SVG can
     }
     canvas.hidden = !renderer;
+    if (renderer && renderer.software) view.classList.add("plain");
     canvas.addEventListener("webglcontextlost", () => { renderer = null; canvas.hidden = true; redraw(); });
 
-    function colours() {
+    function inksOf() {
       const mine = palette();
       const [link, base, payload] = BODY[MET.dark() ? "dark" : "light"];
       const by = { link: rgb(link), base: rgb(base), rail: rgb(base), payload: rgb(payload), joint: rgb(base) };
@@ -84,7 +86,7 @@ MET.stage = (() => {
       const numbers = chosen.at(at);
       const solids = [...arm.solids(numbers), ...(frames ? arm.frames(numbers) : [])];
       const shown = all && ghostly ? others : [];
-      return { camera, solids, ghosts: shown.map((each) => arm.solids(each.at(at))), trace: path, floor, step, reach: arm.reach, limb: arm.limb, colours: colours(), fine, shadow: !scene.moves };
+      return { camera, solids, arm, ghosts: shown.map((each) => each.at(at)), trace: path, floor, step, reach: arm.reach, limb: arm.limb, colours: (inks ||= inksOf()), fine, shadow: !scene.moves };
     }
 
     // Everything that a case comes to, as pills. What has run away is left out, and a payload that is more than a reach from
@@ -145,7 +147,10 @@ MET.stage = (() => {
 
     function seek(to, quietly = false) {
       time = Math.min(Math.max(to, 0), end);
-      if (!quietly) seen(time);
+      if (!quietly && (!playing || time >= end || performance.now() - saidAt >= (renderer && !renderer.software ? 0 : PAUSE))) {
+        saidAt = performance.now();
+        seen(time);
+      }
       redraw();
     }
 
@@ -246,6 +251,7 @@ MET.stage = (() => {
     // Cases that are ghosts: {taken, bad}.
     function haunt(list) {
       others = list.map(({ taken, bad }) => ({ at: taken.at, bad }));
+      inks = null;
       withOthers.hidden = !list.length;
       withOthers.textContent = list.length === 1 ? "1 other case" : `${list.length} other cases`;
       redraw();
@@ -268,7 +274,7 @@ MET.stage = (() => {
       Object.assign(camera, { distance, target, aspect });
     });
     new ResizeObserver(redraw).observe(view);
-    MET.drawn.push(redraw);
+    MET.drawn.push(() => { inks = null; redraw(); });
 
     // Where it is seen from and at which instant; and back there, on a page that takes another's place.
     const seenFrom = ({ azimuth, elevation, distance, target }) => ({ azimuth, elevation, distance, target });

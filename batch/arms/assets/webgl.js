@@ -1,22 +1,36 @@
-// Draws a picture of an arm by WebGL 2: meshes of unit size, stretched and turned instance by instance; a floor with a grid
-// and shadows on it. `make` gives null where there is no WebGL.
-//   picture  {camera, solids, ghosts: [solids], trace: [points], floor (its height, or null), step (of the grid, m), colours,
+// Draws a picture of an arm by WebGL 2: meshes of unit size, stretched and turned by what a texture lists of each solid; a
+// floor with a grid and shadows on it. `make` gives null where there is no WebGL.
+//   picture  {camera, solids, arm, ghosts: of each the arm's numbers, trace: [points], floor (its height, or null), step (of the grid, m), colours,
 //            fine: it stands, and may take longer; shadow: whether the arm casts one}
+// All solids of a mesh are one call, a copy of the mesh each: where a processor draws, each instance of an instanced call
+// costs as much as a call, some 40 us, by which a hundred ghosts take ten times as long.
 "use strict";
 
 MET.webgl = (() => {
-  const { plus, unit, along, length } = MET.arm;
-  const NUMBERS = 20;  // of an instance
+  const { plus, unit, along, length, SOLID: TINT } = MET.arm;
+  const [NUMBERS, ROW] = [20, 128];  // of a solid, in five dots of a texture; solids in its row
   const [FEW, THIN] = [16, 0.4];  // ghosts; of more, limbs are thinner by this and have few faces
   const SUN = unit([-0.28, -0.18, 1]);  // where shadows come from
 
-  const SOLID = [`#version 300 es
+  // What stands in the texture of a vertex's solid: its place, axes, size and colour.
+  const LISTED = `
     layout(location=0) in vec4 shape; layout(location=1) in vec3 bent;
-    layout(location=2) in vec3 at; layout(location=3) in vec3 x; layout(location=4) in vec3 y; layout(location=5) in vec3 z;
-    layout(location=6) in vec4 size; layout(location=7) in vec4 tint;
+    uniform highp sampler2D listed; uniform ivec2 run;  // the first solid of this call, vertices of its mesh
+    vec3 at, x, y, z; vec4 size, tint;
+    void look() {
+      int n = run.x + gl_VertexID / run.y;
+      ivec2 dot_ = ivec2(5 * (n % ${ROW}), n / ${ROW});
+      vec4 a = texelFetch(listed, dot_, 0), b = texelFetch(listed, dot_ + ivec2(1, 0), 0), c = texelFetch(listed, dot_ + ivec2(2, 0), 0);
+      at = a.xyz; x = vec3(a.w, b.xy); y = vec3(b.zw, c.x); z = c.yzw;
+      size = texelFetch(listed, dot_ + ivec2(3, 0), 0); tint = texelFetch(listed, dot_ + ivec2(4, 0), 0);
+    }`;
+
+  const SOLID = [`#version 300 es
+    ${LISTED}
     uniform mat4 view; uniform vec4 shadow; uniform float height;
     out vec3 normal; out vec3 place; out vec4 colour;
     void main() {
+      look();
       vec3 own = shape.xyz * size.xyz + vec3(0.0, 0.0, shape.w * size.w);
       place = at + own.x * x + own.y * y + own.z * z;
       normal = bent.x * x + bent.y * y + bent.z * z;
@@ -41,12 +55,11 @@ MET.webgl = (() => {
   // Ghosts and paths, of which there are many: one varying, little light. What has no normals is a ribbon that faces the
   // eye: shape is its place across and along, and which end it is of.
   const GHOST = [`#version 300 es
-    layout(location=0) in vec4 shape; layout(location=1) in vec3 bent;
-    layout(location=2) in vec3 at; layout(location=3) in vec3 x; layout(location=4) in vec3 y; layout(location=5) in vec3 z;
-    layout(location=6) in vec4 size; layout(location=7) in vec4 tint;
+    ${LISTED}
     uniform mat4 view; uniform vec3 back; uniform vec3 right;
     out vec4 colour;
     void main() {
+      look();
       vec3 own = shape.xyz * size.xyz + vec3(0.0, 0.0, shape.w * size.w);
       vec3 place = own.x * x + own.y * y + own.z * z;
       float light = 0.9 + 0.2 * (bent.x * x.z + bent.y * y.z + bent.z * z.z);
@@ -127,6 +140,9 @@ MET.webgl = (() => {
     return lathe([...half.slice().reverse(), ...half.map(([r, z, end, out, upward]) => [r, -z, -end, out, -upward])], sides);
   }
 
+  // The same of few faces, with sharp edges.
+  const drum = (sides) => lathe([[0, 0, -0.5, 0, -1], [1, 0, -0.5, 0, -1], [1, 0, -0.5, 1, 0], [1, 0, 0.5, 1, 0], [1, 0, 0.5, 0, 1], [0, 0, 0.5, 0, 1]], sides);
+
   function block() {
     const vertices = [];
     const faces = [];
@@ -176,48 +192,94 @@ MET.webgl = (() => {
     }
 
     const [solid, ghost, floor] = [program(SOLID), program(GHOST), program(FLOOR)];
-    const instances = gl.createBuffer();
     let lately = {};  // the path that was drawn last
 
-    function mesh({ vertices, faces }) {
-      const array = gl.createVertexArray();
-      gl.bindVertexArray(array);
-      gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
-      gl.bufferData(gl.ARRAY_BUFFER, Float32Array.from(vertices), gl.STATIC_DRAW);
-      [[0, 4, 0], [1, 3, 16]].forEach(([place, count, at]) => {
+    // A mesh, and room for copies of it, which are made as they are needed.
+    const mesh = ({ vertices, faces }) => ({ vertices, faces, each: vertices.length / 7, array: gl.createVertexArray(), room: 0 });
+    function copies(of, count) {
+      gl.bindVertexArray(of.array);
+      if (of.room >= count) return;
+      of.room = Math.max(count, 2 * of.room);
+      const [corners, faces] = [new Float32Array(of.room * of.vertices.length), new Uint32Array(of.room * of.faces.length)];
+      for (let n = 0; n < of.room; n++) {
+        corners.set(of.vertices, n * of.vertices.length);
+        faces.set(of.faces.map((corner) => corner + n * of.each), n * of.faces.length);
+      }
+      gl.bindBuffer(gl.ARRAY_BUFFER, of.corners ||= gl.createBuffer());
+      gl.bufferData(gl.ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+      [[0, 4, 0], [1, 3, 16]].forEach(([place, numbers, at]) => {
         gl.enableVertexAttribArray(place);
-        gl.vertexAttribPointer(place, count, gl.FLOAT, false, 28, at);
+        gl.vertexAttribPointer(place, numbers, gl.FLOAT, false, 28, at);
       });
-      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, Uint16Array.from(faces), gl.STATIC_DRAW);
-      return { array, count: faces.length };
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, of.ways ||= gl.createBuffer());
+      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, faces, gl.STATIC_DRAW);
     }
     const fine = { pill: mesh(pill(28, 8)), can: mesh(can(36)), block: mesh(block()) };
-    const quick = { pill: mesh(pill(14, 3)), can: mesh(can(18)), block: fine.block };  // while a processor draws it moving
-    const coarse = { pill: mesh(pill(10, 2)), can: mesh(can(10)), block: fine.block };
-    const sparse = { ...coarse, pill: mesh(ribbon(2)) };
+    const quick = { pill: mesh(pill(10, 2)), can: mesh(drum(16)), block: fine.block };  // while a processor draws it moving
+    const coarse = { pill: mesh(pill(8, 1)), can: mesh(drum(8)), block: fine.block };
+    const [sparse, flat] = [2, 1].map((steps) => ({ ...coarse, pill: mesh(ribbon(steps)) }));
     const kept = software ? { frame: gl.createFramebuffer(), dots: gl.createRenderbuffer(), of: "" } : null;
 
-    // Instances by mesh, their numbers one after another.
-    function packed(groups) {
-      const out = {};
-      for (const { solids, colour } of groups)
-        for (const each of solids) (out[each.mesh] ||= []).push(...each.at, ...each.axes[0], ...each.axes[1], ...each.axes[2], ...each.size, ...colour(each));
-      return Object.entries(out).map(([name, numbers]) => [name, Float32Array.from(numbers)]);
+    // Solids as a texture has them, those of a mesh one after another.
+    const list = () => ({ texture: gl.createTexture(), numbers: new Float32Array(0), rows: 0, runs: [] });
+    const [own, way, crowd] = [list(), list(), list()];
+    function room(into, count) {
+      const rows = Math.max(1, Math.ceil(count / ROW));
+      if (into.numbers.length < rows * ROW * NUMBERS) into.numbers = new Float32Array(rows * ROW * NUMBERS);
+      return rows;
+    }
+    function upload(into, rows) {
+      gl.bindTexture(gl.TEXTURE_2D, into.texture);
+      if (into.rows < rows) {
+        into.rows = rows;
+        gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, 5 * ROW, rows, 0, gl.RGBA, gl.FLOAT, into.numbers);
+        [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER].forEach((which) => gl.texParameteri(gl.TEXTURE_2D, which, gl.NEAREST));
+      } else gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 5 * ROW, rows, gl.RGBA, gl.FLOAT, into.numbers);
+    }
+    const laid = (counts) => {
+      let first = 0;
+      return counts.map(([name, count]) => ({ name, count, first: (first += count) - count }));
+    };
+
+    function fill(into, solids, colour) {
+      const by = {};
+      solids.forEach((each) => (by[each.mesh] ||= []).push(each));
+      const rows = room(into, solids.length);
+      Object.values(by).flat().forEach((each, n) => {
+        const at = n * NUMBERS;
+        into.numbers.set(each.at, at);
+        each.axes.forEach((axis, k) => into.numbers.set(axis, at + 3 + 3 * k));
+        into.numbers.set(each.size, at + 12);
+        into.numbers.set(colour(each), at + TINT);
+      });
+      into.runs = laid(Object.entries(by).map(([name, several]) => [name, several.length]));
+      upload(into, rows);
     }
 
-    function put(meshes, packs) {
-      packs.forEach(([name, numbers]) => {
-        gl.bindVertexArray(meshes[name].array);
-        gl.bindBuffer(gl.ARRAY_BUFFER, instances);
-        gl.bufferData(gl.ARRAY_BUFFER, numbers, gl.STREAM_DRAW);
-        [3, 3, 3, 3, 4, 4].reduce((at, count, n) => {
-          gl.enableVertexAttribArray(2 + n);
-          gl.vertexAttribPointer(2 + n, count, gl.FLOAT, false, 4 * NUMBERS, at);
-          gl.vertexAttribDivisor(2 + n, 1);
-          return at + 4 * count;
-        }, 0);
-        gl.drawElementsInstanced(gl.TRIANGLES, meshes[name].count, gl.UNSIGNED_SHORT, 0, numbers.length / NUMBERS);
+    // Ghosts, whose numbers go straight into the list: no joints of theirs are shown; of many, what is long is thinner.
+    function fillCrowd({ arm, ghosts, colours }, thinner) {
+      const by = {};
+      arm.meshes.forEach((mesh, n) => { if (arm.scene.shapes[n][2] !== "joint" || mesh === "pill") (by[mesh] ||= []).push(n); });
+      const all = Object.entries(by).flatMap(([mesh, shapes]) => shapes.map((n) => [n, mesh === "pill" ? thinner : 1]));
+      const rows = room(crowd, all.length * ghosts.length);
+      let at = 0;
+      all.forEach(([n, slim]) => ghosts.forEach((numbers, g) => {
+        arm.write(numbers, n, crowd.numbers, at);
+        for (let k = 12; k < 15; k++) crowd.numbers[at + k] *= slim;
+        crowd.numbers.set(colours.ghost(g), at + TINT);
+        at += NUMBERS;
+      }));
+      crowd.runs = laid(Object.entries(by).map(([mesh, shapes]) => [mesh, shapes.length * ghosts.length]));
+      upload(crowd, rows);
+    }
+
+    function put(meshes, { texture, runs }, { uniforms }) {
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      runs.forEach(({ name, first, count }) => {
+        const of = meshes[name];
+        copies(of, count);
+        gl.uniform2i(uniforms.run, first, of.each);
+        gl.drawElements(gl.TRIANGLES, count * of.faces.length, gl.UNSIGNED_INT, 0);
       });
     }
 
@@ -230,8 +292,8 @@ MET.webgl = (() => {
       gl.uniform1f(floor.uniforms.step_, step);
       gl.uniform4f(floor.uniforms.line, ...colours.grid);
       gl.uniform4f(floor.uniforms.ground, ...colours.ground);
-      gl.bindVertexArray(fine.block.array);
-      gl.drawElements(gl.TRIANGLES, 6, gl.UNSIGNED_SHORT, 2 * 30);  // its upper side
+      copies(fine.block, 1);
+      gl.drawElements(gl.TRIANGLES, 6, gl.UNSIGNED_INT, 4 * 30);  // its upper side
     }
 
     // The floor as it was, unless it is seen from elsewhere: it has the most dots of all, and a processor is slow at them.
@@ -272,7 +334,7 @@ MET.webgl = (() => {
       gl.uniformMatrix4fv(solid.uniforms.view, false, view);
       gl.uniform3f(solid.uniforms.eye, ...eye);
       gl.uniform3f(solid.uniforms.key, ...unit(plus(plus(back.map((x) => 0.75 * x), right, -0.5), up, 0.8)));
-      const own = packed([{ solids, colour: colours.solid }]);
+      fill(own, solids, colours.solid);
       if (picture.shadow && height !== null && eye[2] > height) {
         gl.enable(gl.STENCIL_TEST);
         gl.stencilFunc(gl.EQUAL, 0, 1);
@@ -280,26 +342,29 @@ MET.webgl = (() => {
         gl.uniform4f(solid.uniforms.shadow, ...SUN, 1);
         gl.uniform4f(solid.uniforms.shade, ...colours.shade);
         gl.uniform1f(solid.uniforms.height, height);
-        put(detail === fine ? quick : coarse, own);
+        put(detail === fine ? quick : coarse, own, solid);
         gl.disable(gl.STENCIL_TEST);
       }
       gl.uniform4f(solid.uniforms.shadow, 0, 0, 0, 0);
       gl.enable(gl.DEPTH_TEST);
       gl.enable(gl.CULL_FACE);
-      put(detail, own);
+      put(detail, own, solid);
       gl.useProgram(ghost.made);
       gl.uniformMatrix4fv(ghost.uniforms.view, false, view);
       gl.uniform3f(ghost.uniforms.back, ...back);
       gl.uniform3f(ghost.uniforms.right, ...right);
-      if (lately.trace !== trace || lately.of !== String(colours.trace))
-        lately = { trace, of: String(colours.trace), packs: packed([{ solids: threads(trace, 0.1 * limb), colour: () => colours.trace }]) };
-      put(sparse, lately.packs);
+      if (lately.trace !== trace || lately.of !== String(colours.trace)) {
+        lately = { trace, of: String(colours.trace) };
+        fill(way, threads(trace, 0.1 * limb), () => colours.trace);
+      }
+      put(picture.fine ? sparse : flat, way, ghost);
       if (ghosts.length) {
         gl.depthMask(false);
         gl.enable(gl.POLYGON_OFFSET_FILL);  // behind what is solid, where they coincide
         gl.polygonOffset(2, 400);
         const many = ghosts.length > FEW;
-        put(many ? sparse : picture.fine ? quick : coarse, packed(ghosts.map((each, n) => ({ solids: (many ? thin : plain)(each), colour: () => colours.ghost(n) }))));
+        fillCrowd(picture, many ? THIN : 1);
+        put(many ? (picture.fine ? sparse : flat) : picture.fine ? quick : coarse, crowd, ghost);
         gl.disable(gl.POLYGON_OFFSET_FILL);
         gl.depthMask(true);
       }
@@ -308,10 +373,6 @@ MET.webgl = (() => {
 
     return { software, draw, finish: () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)) };
   }
-
-  // What is shown of a ghost: no joints; of many, what is long is thinner.
-  const plain = (solids) => solids.filter(({ role, mesh }) => role !== "base" && (role !== "joint" || mesh === "pill"));
-  const thin = (solids) => plain(solids).map((each) => (each.mesh === "pill" ? { ...each, size: each.size.map((x, n) => (n < 3 ? THIN * x : x)) } : each));
 
   // A path as thin pills.
   const threads = (points, radius) => points.slice(1).map((p, n) => {

@@ -148,6 +148,13 @@ class Chromium:
             page.told(said["method"], said.get("params", {}))
         return said
 
+    def cpu_seconds(self) -> dict[str, float]:
+        """The processor's time that its processes have taken, by kind: `browser`, `renderer`, `GPU`."""
+        out: dict[str, float] = {}
+        for each in self.ask("SystemInfo.getProcessInfo")["processInfo"]:
+            out[each["type"]] = out.get(each["type"], 0.0) + each["cpuTime"]
+        return out
+
     def open(
         self,
         path: Path | str,
