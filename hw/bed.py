@@ -36,7 +36,8 @@ class BedState(enum.IntEnum):
 
 
 class Fault(enum.IntFlag):
-    """The reasons for which a bed stops itself; the values are the bits of the protocol's status."""
+    """The reasons for which a bed stops itself; the values are the bits of the protocol's status, and from 1 << 16 on
+    those that only a bed of another kind has."""
 
     DEADMAN = 1 << 3
     RANGE = 1 << 4
@@ -49,11 +50,14 @@ class Fault(enum.IntFlag):
     NOISE = 1 << 11
     WATCHDOG = 1 << 12
     INTERLOCK = 1 << 14
+    DRIVE = 1 << 16
+    SUPPLY = 1 << 17
+    DISAGREEMENT = 1 << 18
 
 
 class Capability(enum.IntFlag):
     """The properties of a bed beyond drive voltage, load current and tachometer; the values are bits of the
-    protocol."""
+    protocol, and from 1 << 16 on those that only a bed of another kind has."""
 
     ENCODER = 1 << 0
     DRIVE_CURRENT = 1 << 1
@@ -81,6 +85,8 @@ class InterlockReason(enum.IntFlag):
     LOAD = 1 << 10
     TICK = 1 << 11
     MAIN = 1 << 12
+    COASTS = 1 << 16
+    """Its safe state is outputs that are off: the shaft is not braked."""
 
 
 @frozen
@@ -166,11 +172,13 @@ class BedDriver(ABC):
     patience  s to wait for the answer to an exchange; whoever drives the bed sets it
     has_line  False where answers come at once, from this process, so that there is no line to measure
     warnings  what may make exchanges late, known once it is connected
+    remarks   rows for whoever asks what the bed is, a word and a line each, known once it is connected
     """
 
     patience: float = 0.01
     has_line: bool = True
     warnings: tuple[Diagnostic, ...] = ()
+    remarks: tuple[tuple[str, str], ...] = ()
 
     @abstractmethod
     def connect(self) -> About:

@@ -212,7 +212,8 @@ class Conformance:
     def test_the_shaft_is_braked_when_it_is_stopped(self, bed: BedDriver) -> None:
         about = self.driven(bed)
         fast = self.drive(bed, 0.2, voltage=self.share * about.limits.voltage)
-        assert bed.rest(0.5).rate < 0.2 * fast.rate
+        left = 1.0 if Capability.COASTS in about.capabilities else 0.2
+        assert bed.rest(0.5).rate < left * fast.rate
 
     def test_leaving_a_with_block_stops_it(self, bed: BedDriver) -> None:
         with pytest.raises(KeyError), bed:

@@ -45,6 +45,15 @@ _FAULTS = {
         "it was reset by its watchdog",
         "its firmware hung or its supply dipped: find out before going on",
     ),
+    Fault.DRIVE: ("a drive stopped itself", "its maker's tool says why: a current, a temperature, its encoder"),
+    Fault.SUPPLY: (
+        "the supply's voltage was above its limit",
+        "what a motor gives back has to go somewhere: a brake resistor, or capacitors that take it",
+    ),
+    Fault.DISAGREEMENT: (
+        "the two drives do not agree about the shaft",
+        "look whether the coupling slips, and whether one of them counts the other way round: `reversed`",
+    ),
     Fault.INTERLOCK: ("its interlock stopped it", "`met bed probe` says by which of its inputs"),
 }
 

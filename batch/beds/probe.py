@@ -38,6 +38,7 @@ class ProbeResult:
 
     trips   s from question to answer, for each of the `ASKED` questions that had one; empty where there is no line
     needed  s that the bytes of an exchange take; 0 where the line has no baud rate
+    remarks  what the driver says of the bed besides, a word and a line each; its line, too, where it says that
     """
 
     port: str
@@ -47,6 +48,7 @@ class ProbeResult:
     baud: int
     needed: float
     trips: tuple[float, ...]
+    remarks: tuple[tuple[str, str], ...] = ()
 
     @property
     def fastest(self) -> float:
@@ -65,7 +67,7 @@ def probe(chosen: ChosenBed, baud: int) -> ProbeResult:
         about = bed.connect()
         sample = bed.read()
         trips = _trips(bed) if bed.has_line else ()
-        return ProbeResult(chosen.port, about, sample, bed.warnings, baud, bed.line_time(about), trips)
+        return ProbeResult(chosen.port, about, sample, bed.warnings, baud, bed.line_time(about), trips, bed.remarks)
 
 
 def probe_and_tell(
@@ -106,6 +108,7 @@ def lines(result: ProbeResult) -> list[str]:
         ["a count", ", ".join(quantity(value, unit) for value, unit in _scales(about))],
         ["sensors", ", ".join(sensors)],
         ["state", sample.state.name.lower()],
+        *(list(row) for row in result.remarks),
         *_line(result),
     ]
     out += columns(rows)
@@ -137,6 +140,7 @@ def data(result: ProbeResult) -> dict[str, Any]:
             if fault in sample.faults
         ],
         "interlock": [{"message": what, "help": [remedy]} for what, remedy in refusals.interlocked(sample.interlock)],
+        "remarks": dict(result.remarks),
         "warnings": [{"code": each.code, "message": each.message, "help": list(each.help)} for each in result.warnings],
         "line": {
             "bytes": exchanged(about.capabilities),
@@ -154,6 +158,7 @@ def capabilities(about: About) -> list[str]:
         Capability.WATCHDOG: "a watchdog of its own",
         Capability.LOCK_STEP: "no time of its own",
         Capability.SIMULATED: "no motor: it is simulated",
+        Capability.COASTS: "a shaft that coasts when it is stopped",
     }
     return [
         words.get(each, str(each.name).lower().replace("_", " ")) for each in Capability if each in about.capabilities
@@ -190,7 +195,7 @@ def _line(result: ProbeResult) -> list[Sequence[str]]:
     if not result.trips and not result.needed:
         return [["line", "none: the bed is in this process"]]
     said = []
-    if result.needed:
+    if result.needed and not result.remarks:
         bytes_ = exchanged(result.about.capabilities)
         said.append(f"{result.baud} baud: {bytes_} bytes an exchange take {1e3 * result.needed:.3g} ms")
     if result.trips:

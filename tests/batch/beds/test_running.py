@@ -131,7 +131,7 @@ error[E418]: port `emulated`: of which joint?
             ("both", "--port", "elbow=emulated"),
             """\
 error[E418]: no port for the bed of joint `shoulder`
- = help: `--port JOINT=PORT`: a serial line, `emulated`, `firmware`, `qemu`, or a transcript
+ = help: `--port JOINT=PORT`: a serial line, `emulated`, `firmware`, `qemu`, `can:BENCH.toml`, or a transcript
 """,
         ),
         (

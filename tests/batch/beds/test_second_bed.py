@@ -126,7 +126,7 @@ def test_help_and_messages_name_the_second_driver(met_bed: Callable[..., tuple[i
     assert status == cli.YES
     assert "  flywheel:INERTIA  A flywheel on both motors, in this process, in lock-step.\n" in said
     assert drivers.ports_in_words() == (
-        "a serial line, `emulated`, `firmware`, `qemu`, `flywheel:INERTIA`, or a transcript"
+        "a serial line, `emulated`, `firmware`, `qemu`, `can:BENCH.toml`, `flywheel:INERTIA`, or a transcript"
     )
     status, _, complained = met_bed("probe", "--port", "flywheel:none")
     assert status == cli.BAD_INPUT

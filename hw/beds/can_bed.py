@@ -1,0 +1,460 @@
+"""A bed of two drives on a CAN bus, `can:BENCH.toml`: one turns the motor under test, the other loads it.
+
+A drive has a current loop of its own. It is told a torque, or a voltage where its dialect has that; what a bed's driver
+is told, the voltage of one motor and the current of the other, becomes that here:
+
+    load   torque = kt_load * current
+    drive  the voltage itself; or the torque that an armature of kt and resistance takes from that voltage at the rate
+           that was read last, kt/R (V - kt w), at most torque_max
+
+Limits of voltage, current, their slews, rate and heat are watched here, besides those of the drives; what no host can
+do, to stop a shaft whose host is dead, the drives' own watchdogs do, and are made to prove it each time before arming.
+Both drives tell of one shaft: an answer counts only where they agree.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+from hw import refusals
+from hw.bed import About, BedDriver, BedSample, BedState, Capability, Fault, Limits, Scales, real_plant
+from hw.beds import greeting
+from hw.beds.emulated import FINE, FINE_ANGLE
+from hw.drives import DIALECTS
+from hw.drives.arming import begin_driving, forget, prove_watchdogs, switch_off
+from hw.drives.bench_file import TwoDrives, two_drives
+from hw.drives.bus import PythonCanLine
+from hw.drives.drive import ASKS, Drive, DriveReading, DriveState, Talk
+from hw.drives.frames import FAST, NOMINAL, CanFrame, CanLine, on_bus
+from hw.drives.side import Side, agree
+from hw.ports import Opening, PortKind
+from hw.protocol import messages
+from met.diagnostic import Problem, did_you_mean, error
+from met.substitution import butterworth
+
+LONGEST_SHARE = 0.8
+"""Largest share of a period that the frames of an exchange may take on the bus."""
+
+STALE = 0.05
+"""Longest time since a drive has said its state, s; an answer that is more than that behind does not count."""
+
+OWED, GRACE = 0.01, 3e-4
+"""Time after a question without an answer for which that may come yet, s; and how much longer it is listened then, so
+that it is not taken for the answer to a later question: frames have no numbers."""
+
+DISAGREED = 5
+"""Answers in a row in which the drives disagree, after which the bed stops."""
+
+
+class CanBed(BedDriver):
+    """A bed of two drives.
+
+    bench, drives  what the file says, and the host's sides of its drive and load
+    open_line      opens the bus;  period: s from one exchange to the next, infinite where none are made
+    proved         s after which each drive had stopped by itself when it was last armed; None where it said so only
+                   when it was asked
+    returned       J that the drives gave back to the supply since the bed was armed, as far as they say so
+    """
+
+    def __init__(
+        self, bench: TwoDrives, drives: tuple[Drive, Drive], open_line: Callable[[], CanLine], *, period: float
+    ) -> None:
+        self._bench, self._drives, self._open, self.period = bench, drives, open_line, period
+        self._line: CanLine | None = None
+        self._about: About | None = None
+        self._state, self._faults, self._why = BedState.DISARMED, Fault(0), ""
+        self.proved: tuple[float | None, ...] = ()
+        self.returned, self._heat, self.confirmed = 0.0, 0.0, True
+
+    # Who is there
+
+    def connect(self) -> About:
+        self.close()
+        self._line = self._open()
+        try:
+            self._about = self._greet(self._line)
+        except BaseException:
+            self.close()
+            raise
+        return self._about
+
+    def _greet(self, line: CanLine) -> About:
+        self._talk = talk = Talk(line, self._drives)
+        bench = self._bench
+        facts = [drive.greet(talk) for drive in self._drives]
+        says = {"velocity": False, "difference": True}
+        sides = [
+            Side(drive, each, says.get(bench.rate, each.difference))
+            for drive, each in zip(self._drives, facts, strict=True)
+        ]
+        self._sides = (sides[0], sides[1])
+        drive, load = self._sides
+        figures = drive.drive.entry.figures
+        self._kt, self._resistance, self._kt_load = figures["kt"], figures["resistance"], load.drive.entry.figures["kt"]
+        self._most = min(figures["torque_max"], drive.facts.torque_max)
+        current = min(load.drive.entry.figures["current_max"], load.facts.torque_max / self._kt_load)
+        self._rated = load.drive.entry.figures["current_rated"]
+        self._acceleration = (self._most + self._kt_load * current) / bench.shaft["inertia"]
+        self._supply_max = min([bench.supply["voltage_max"], *(each.supply_max for each in facts if each.supply_max)])
+        by_voltage = drive.drive.entry.quantity == "voltage"
+        volts = drive.facts.voltage_count if by_voltage else drive.facts.torque_count * self._resistance / self._kt
+        scales = Scales(volts or FINE, load.facts.torque_count / self._kt_load or FINE, FINE, FINE_ANGLE, FINE, FINE)
+        hz = min(each.control_hz for each in facts)
+        rate = min(bench.shaft["rate_max"], *(each.rate_max for each in facts))
+        voltage = figures["voltage_max"]
+        slews = 2.0 * voltage * hz, 2.0 * current * hz
+        limits = Limits(voltage, current, rate, bench.shaft["arming_rate"], *slews, load.drive.entry.figures["heat"])
+        capabilities = Capability.ENCODER
+        if not all(each.braking for each in facts):
+            capabilities |= Capability.COASTS
+        said = "\n".join(
+            f"{d.dialect} {d.node} {f.hardware} {f.firmware}" for d, f in zip(self._drives, facts, strict=True)
+        )
+        firmware = hashlib.sha256(said.encode()).hexdigest()[:16]
+        about = About(bench.name, 1, firmware, 0, capabilities, hz, max(f.watchdog for f in facts), scales, limits)
+        if not greeting.DEADMAN[0] <= about.deadman <= greeting.DEADMAN[1] or min(f.watchdog for f in facts) < 0.002:
+            helps = "`watchdog` of the bench file: 10 to 20 ms"
+            raise Problem(error("E404", f"bed `{about.name}` would stop {1e3 * about.deadman:g} ms late", help=helps))
+        self._check_share()
+        self._in_force = self._own = greeting.in_force(about)
+        self._epoch = line.now()
+        self._hold(0, 0, self._epoch)
+        self._warmed, self._disagreed, self._owed_until = self._epoch, 0, self._epoch
+        self._ask_both(about, agreed=False)
+        for side in self._sides:
+            side.begin()
+        self._filtered = (self._sides[0].rate, 0.0)
+        self.remarks = self._remarks()
+        self._state = BedState.STOPPED if self._faults else BedState.DISARMED
+        for each in self._drives:
+            if each.state == DriveState.FAILED and not self._faults:
+                self._latch(Fault.DEADMAN if each.starved else Fault.DRIVE, f"{each.words}: {each.errors}")
+        return about
+
+    def _check_share(self) -> None:
+        """Raise Problem E405 where the frames of an exchange do not fit into a period."""
+        share = self._on_bus() / self.period
+        if share > LONGEST_SHARE:
+            message = (
+                f"the frames of an exchange take {share:.0%} of its period of {self.period * 1e3:.4g} ms on the bus"
+            )
+            message += f", and {LONGEST_SHARE:.0%} is the most"
+            raise Problem(error("E405", message, help="a lower rate of the servo, or a faster bus"))
+
+    def _on_bus(self) -> float:
+        """Longest time that the frames of an exchange take on the bus, s."""
+        bus = self._bench.bus
+        speeds = float(bus.get("bitrate", NOMINAL)), float(bus.get("data_bitrate", FAST))
+        frames = [each for d in self._drives for each in (*d.told(0.0), *d.asked(), *d.answers())]
+        return sum(on_bus(frame, *speeds) for frame in frames)
+
+    def line_time(self, about: About) -> float:
+        return self._on_bus()
+
+    def _remarks(self) -> tuple[tuple[str, str], ...]:
+        bus, cut = self._bench.bus, self._bench.shaft["filter"]
+        frames = sum(len(each.told(0.0)) + len(each.asked()) + len(each.answers()) for each in self._drives)
+        most = f"{frames} frames an exchange, {1e3 * self._on_bus():.3g} ms on the bus at most"
+        filter = f"{cut:g} Hz here, the deck's f_cut" if cut else "none here: the deck's f_cut is the drive's"
+        sides = ((side.drive.entry.role, side.words) for side in self._sides)
+        return (*sides, ("bus", f"{bus['interface']} {bus['channel']}: {most}"), ("filter", filter))
+
+    # What a bed does
+
+    def limit(self, limits: Mapping[str, float]) -> None:
+        about = self._there()
+        tighter = greeting.tighter(about, limits)
+        if self._state != BedState.DISARMED:
+            raise self._refused("take tighter limits")
+        self._in_force = replace(
+            self._in_force, **{name: min(most, getattr(self._own, name)) for name, most in tighter.items()}
+        )
+
+    def arm(self) -> BedSample:
+        about = self._there()
+        self._ask_both(about)
+        self._follow()
+        if self._state != BedState.DISARMED or not self._slow():
+            raise self._refused("arm")
+        self._disagreed, self.returned = 0, 0.0
+        self.proved = prove_watchdogs(self._talk, about.deadman)
+        begin_driving(self._talk)
+        self._state, self.confirmed = BedState.ARMED, False
+        self._hold(0, 0, self._talk.line.now())
+        return self._sample()
+
+    def exchange(self, voltage: float, current: float) -> BedSample | None:
+        about, force, scales = self._there(), self._in_force, self._about_scales()
+        volts = greeting.commanded(voltage, scales.voltage, force.voltage)
+        amperes = greeting.commanded(current, scales.current, force.current)
+        if volts is None or amperes is None:
+            self.stop()
+            if volts is None:
+                raise refusals.no_command(about, "a voltage", voltage, "V", force.voltage * scales.voltage)
+            raise refusals.no_command(about, "a current", current, "A", force.current * scales.current)
+        talk = self._talk
+        now = talk.line.now()
+        armed = self._state == BedState.ARMED
+        talk.drain()
+        if armed:
+            ticks = max(1, round((now - self._told_at) * about.tick_hz))
+            self._warm(now)
+            if now - self._told_at > about.deadman:
+                self._stopped(Fault.DEADMAN, "the host was silent")
+            elif (
+                abs(volts - self._volts) > ticks * force.voltage_slew
+                or abs(amperes - self._amperes) > ticks * force.current_slew
+            ):
+                self._stopped(Fault.SLEW, "")
+        frames: list[CanFrame] = []
+        if self._state == BedState.ARMED:
+            self._hold(volts, amperes, now)
+            drive, load = self._drives
+            frames += load.told(self._kt_load * amperes * scales.current)
+            frames += drive.told(self._told(volts * scales.voltage))
+        if not self._answers(frames, now):
+            return None
+        if self._state == BedState.ARMED:
+            self._watch()
+        return self._sample(refused=not armed)
+
+    def read(self) -> BedSample:
+        about = self._there()
+        self._silence(about)
+        self._ask_both(about)
+        self._follow()
+        self._silence(about)
+        return self._sample()
+
+    def look(self) -> BedSample | None:
+        about = self._there()
+        self._silence(about)
+        self._talk.drain()
+        return self._sample() if self._answers([], self._talk.line.now()) else None
+
+    def clear(self) -> BedSample:
+        about = self._there()
+        self._ask_both(about)
+        self._follow()
+        hot = Fault.HEAT in self._faults and self._heat > about.limits.heat / 2.0
+        if self._state == BedState.ARMED or (self._state == BedState.STOPPED and (hot or not self._slow())):
+            raise self._refused("clear")
+        if self._state == BedState.STOPPED and not forget(self._talk):
+            raise self._refused("clear")
+        self._state, self._faults, self._why = BedState.DISARMED, Fault(0), ""
+        return self._sample()
+
+    def rest(self, time: float) -> BedSample:
+        self._there()
+        self.stop()
+        self._talk.line.sleep(time)
+        self._warm(self._talk.line.now())
+        return self.read()
+
+    def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> BedSample:
+        self._there()
+        raise real_plant()
+
+    def stop(self) -> bool:
+        if self._line is None or self._about is None:
+            return self.confirmed
+        if self._state == BedState.ARMED:
+            self._state = BedState.DISARMED
+        for _ in range(2):
+            try:
+                self._hold(0, 0, self._told_at)
+                self.confirmed = switch_off(self._talk)
+                break
+            except Problem:
+                self.confirmed = False  # the bus is dead: the drives' watchdogs stop them
+        return self.confirmed
+
+    def close(self) -> None:
+        self.stop()
+        line, self._line, self._about = self._line, None, None
+        if line is not None:
+            line.close()
+
+    # Answers
+
+    def _answers(self, commands: Sequence[CanFrame], since: float) -> bool:
+        """Send commands, ask both drives, and follow what they answer. Returns False where an answer does not come in
+        time, or they do not agree."""
+        talk = self._talk
+        for drive in self._drives:
+            drive.reading = None
+        asks = [each for d in self._drives if not (commands and d.answers_commands) for each in d.asked()]
+        talk.send([*commands, *asks])
+
+        answered = talk.pump(since + self.patience, partial(self._answered, since))
+        if answered and since < self._owed_until:
+            talk.pump(
+                min(since + self.patience, talk.line.now() + GRACE)
+            )  # the later one of two is to the last question
+        if not answered:
+            self._owed_until = since + OWED
+            return False
+        stale = talk.line.now() - min(drive.stated for drive in self._drives) > STALE
+        if stale or not self._agree():
+            self._disagreed += 1
+            if self._disagreed < DISAGREED or self._state != BedState.ARMED:
+                return False
+            self._stopped(Fault.DISAGREEMENT, "")
+            return True
+        self._disagreed = 0
+        self._follow()
+        return True
+
+    def _agree(self) -> bool:
+        period = self.period if math.isfinite(self.period) else 1e-3
+        return agree(self._sides, self._readings(), self._acceleration, period)
+
+    def _readings(self) -> tuple[DriveReading, DriveReading]:
+        one, other = (drive.reading for drive in self._drives)
+        assert one is not None and other is not None
+        return one, other
+
+    def _ask_both(self, about: About, agreed: bool = True) -> None:
+        """Ask both drives again and again until both have answered, and agree. Raises Problem E402 where one does not
+        answer, E406 where they do not agree."""
+        talk = self._talk
+        asks = [frame for drive in self._drives for frame in drive.asked()]
+        for _ in range(ASKS):
+            since = talk.line.now()
+            if not talk.ask(asks, partial(self._answered, since)):
+                late = next(d for d in self._drives if d.reading is None or d.reading.time <= since)
+                raise refusals.silent(about.name, f"of {late.words} what its angle is")
+            if not agreed or self._agree():
+                return
+        what = Fault.DISAGREEMENT
+        raise Problem(error("E406", f"bed `{about.name}`: {refusals.words(what)}", help=refusals.remedies(what)))
+
+    def _answered(self, since: float) -> bool:
+        """Whether both drives have answered since a time, s."""
+        return all(drive.reading is not None and drive.reading.time >= since for drive in self._drives)
+
+    def _follow(self) -> None:
+        """Keep what both drives answered last: angle, rate, and the rate behind the filter."""
+        side = self._sides[0]
+        before, time = side.rate, side.time
+        for each, reading in zip(self._sides, self._readings(), strict=True):
+            each.follow(reading)
+        cut, passed = self._bench.shaft["filter"], side.time - time
+        if cut and passed > 0.0:
+            filter = butterworth.over(cut, passed)
+            y, slope = butterworth.along_line(filter, self._filtered, before, side.rate)
+            self._filtered = float(y), float(slope)
+        elif not cut:
+            self._filtered = side.rate, 0.0
+
+    def _watch(self) -> None:
+        """Stop where a drive has stopped, the supply's voltage is too high, or the shaft is too fast."""
+        for drive in self._drives:
+            if drive.state != DriveState.DRIVING:
+                words = f"{drive.words}: {drive.errors or 'it drives no more'}"
+                self._stopped(Fault.DEADMAN if drive.starved else Fault.DRIVE, words)
+                return
+            if drive.supply is not None and drive.supply > self._supply_max:
+                self._stopped(Fault.SUPPLY, f"{drive.supply:.3g} V")
+                return
+        if abs(self._rate()) > self._in_force.rate:
+            self._stopped(Fault.RATE, "")
+
+    def _silence(self, about: About) -> None:
+        """Stop where no command has come for the deadman's time: reading must not keep the drives alive."""
+        if self._state == BedState.ARMED and self._talk.line.now() - self._told_at > about.deadman:
+            self._stopped(Fault.DEADMAN, "the host was silent")
+
+    # The state
+
+    def _there(self) -> About:
+        if self._about is None:
+            raise refusals.not_connected(str(self._bench.bus["channel"]))
+        return self._about
+
+    def _about_scales(self) -> Scales:
+        return self._there().scales
+
+    def _told(self, voltage: float) -> float:
+        """What the drive under test is told for a voltage: that, or the torque of an armature."""
+        if self._drives[0].entry.quantity == "voltage":
+            return voltage
+        torque = self._kt / self._resistance * (voltage - self._kt * self._sides[0].rate)
+        return min(max(torque, -self._most), self._most)
+
+    def _hold(self, volts: int, amperes: int, at: float) -> None:
+        self._volts, self._amperes, self._told_at = volts, amperes, at
+
+    def _warm(self, now: float) -> None:
+        """Let the load's heat, A^2 s, follow what it held until now, and stop where it is too much; sum up the energy
+        that the drives gave back."""
+        about = self._there()
+        passed, self._warmed = now - self._warmed, now
+        held = self._amperes * about.scales.current
+        self._heat = max(0.0, self._heat + (held * held - self._rated * self._rated) * passed)
+        self.returned += sum(max(0.0, -(drive.power or 0.0)) for drive in self._drives) * passed
+        if self._heat > about.limits.heat and self._state == BedState.ARMED:
+            self._stopped(Fault.HEAT, "")
+
+    def _latch(self, fault: Fault, why: str) -> None:
+        self._state, self._faults = BedState.STOPPED, self._faults | fault
+        self._why = self._why or why
+
+    def _stopped(self, fault: Fault, why: str) -> None:
+        self._latch(fault, why)
+        self._hold(0, 0, self._told_at)
+        self.confirmed = switch_off(self._talk, halt=True)
+
+    def _rate(self) -> int:
+        """The shaft's rate in counts, behind the filter; the largest where it has none."""
+        counts = self._filtered[0] / FINE
+        return round(counts) if abs(counts) < messages.MOST else messages.MOST
+
+    def _slow(self) -> bool:
+        return abs(self._rate()) <= greeting.counts(self._there().limits.arming_rate, FINE)
+
+    def _refused(self, what: str) -> Problem:
+        problem = refusals.refused(self._there(), what, self._sample(refused=True))
+        if not self._why:
+            return problem
+        only = problem.diagnostics[0]
+        return Problem(replace(only, help=(self._why, *only.help)))
+
+    def _sample(self, *, refused: bool = False) -> BedSample:
+        about, side = self._there(), self._sides[0]
+        angle = round(side.angle / FINE_ANGLE) * FINE_ANGLE
+        tick = max(0, int((side.time - self._epoch) * about.tick_hz))
+        return BedSample(self._state, True, self._faults, refused, tick, self._rate() * FINE, angle)
+
+
+def _opened_port(opening: Opening) -> CanBed:
+    if opening.port.transcript is not None:
+        helps = "records are kept of every exchange; `candump` keeps what goes over a bus"
+        raise Problem(error("E409", "no transcript is kept of a CAN bus", help=helps))
+    path = opening.port.address
+    try:
+        bench = two_drives(path)
+    except OSError as reason:
+        why = (reason.strerror or str(reason)).lower()
+        raise Problem(error("E446", f"{path} cannot be read: {why}", help="`can:` takes a bench's file")) from None
+    drives = []
+    for entry in (bench.drive, bench.load):
+        dialect = DIALECTS.get(entry.dialect)
+        if dialect is None:
+            known = (*did_you_mean(entry.dialect, DIALECTS), f"dialects: {', '.join(DIALECTS)}")
+            raise Problem(error("E446", f"{path}: no dialect `{entry.dialect}`", help=known))
+        drives.append(dialect(entry))
+    return CanBed(bench, (drives[0], drives[1]), lambda: PythonCanLine(bench.bus), period=opening.period)
+
+
+PORT = PortKind(
+    scheme="can",
+    address="BENCH.toml",
+    doc="Two drives on a CAN bus: ODrive, moteus, Damiao ...; the file says which.",
+    open=_opened_port,
+    lock_step=lambda name, requested: requested,
+)

@@ -1,0 +1,12 @@
+"""The host's side of drives on a CAN bus, one dialect a file.
+
+To add one: write its file with a `Drive` (hw/drives/drive.py), add that to `DIALECTS`, and write the drive's side of it
+in hw/players, which the tests of every dialect are derived from.
+"""
+
+from collections.abc import Mapping
+
+from hw.drives.drive import Drive
+from hw.drives.odrive import OdriveDrive
+
+DIALECTS: Mapping[str, type[Drive]] = {each.dialect: each for each in (OdriveDrive,)}

@@ -1,0 +1,220 @@
+"""The file of a bench of two drives on a CAN bus, in TOML: which bus, which two nodes, and what the shaft bears.
+
+A file is data of others: bounded, each key known, each figure a number with a unit of its kind.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import field
+from pathlib import Path
+from typing import Any
+
+from met import units
+from met.diagnostic import Place, Problem, did_you_mean, error
+from met.frozen import frozen
+from met.host.files import read_regular
+from met.unit_parser import parse_unit
+
+MOST_BYTES = 1 << 16
+
+FIGURES: Mapping[str, Mapping[str, tuple[str, float | None]]] = {
+    "shaft": {
+        "inertia": ("kg*m^2", None),
+        "rate_max": ("rad/s", None),
+        "arming_rate": ("rad/s", 5.0),
+        "filter": ("Hz", 0.0),
+    },
+    "supply": {"voltage_max": ("V", None)},
+    "drive": {
+        "kt": ("N*m/A", None),
+        "resistance": ("ohm", None),
+        "voltage_max": ("V", None),
+        "torque_max": ("N*m", None),
+        "watchdog": ("s", 0.020),
+    },
+    "load": {
+        "kt": ("N*m/A", None),
+        "current_max": ("A", None),
+        "current_rated": ("A", None),
+        "heat": ("A^2*s", None),
+        "watchdog": ("s", 0.020),
+    },
+}
+"""The quantities of each table: their SI unit, and what they are where the file does not say; None: it has to."""
+
+QUANTITIES = ("voltage", "torque")
+"""The quantities by which the drive under test may be told what the servo's law came to."""
+
+RATES = ("velocity", "difference")
+"""The sources of the shaft's rate: the drive's own estimate, or its angle's difference from one sample to the next."""
+
+_WORDS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "shaft": {"rate": RATES},
+    "supply": {},
+    "drive": {"dialect": (), "quantity": QUANTITIES, "endpoints": ()},
+    "load": {"dialect": (), "endpoints": ()},
+}
+_TABLES = ("bus", *FIGURES)
+_QUANTITY = re.compile(r"\s*([\d.]+(?:[eE][+-]?\d+)?)\s*(\S.*?)\s*")
+
+
+@frozen
+class DriveEntry:
+    """One drive of a bench file.
+
+    role      `drive`, the one under test, or `load`
+    sense     1, or -1 where the drive counts the other way round: two motors that face each other
+    quantity  of `QUANTITIES`, by which it is commanded
+    figures   those of `FIGURES`, SI
+    endpoints  path of the file that says where an ODrive's properties are; "" where none is given
+    """
+
+    role: str
+    dialect: str
+    node: int
+    sense: int
+    quantity: str
+    figures: Mapping[str, float]
+    endpoints: str = ""
+
+
+@frozen
+class TwoDrives:
+    """A bench of two drives on a bus. bus: what `can.Bus` is called with;  shaft, supply: of `FIGURES`, SI;  rate: of
+    `RATES`; "" where the dialect decides"""
+
+    name: str
+    bus: Mapping[str, Any]
+    shaft: Mapping[str, float]
+    supply: Mapping[str, float]
+    drive: DriveEntry
+    load: DriveEntry
+    rate: str = ""
+    file: str = field(default="", compare=False)
+
+
+def two_drives(path: str | os.PathLike[str]) -> TwoDrives:
+    """The bench that a file describes. Raises Problem E446, OSError."""
+    return _BenchFile(path).bench()
+
+
+class _BenchFile:
+    """One bench file, and the places in it."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.name = os.fspath(path)
+        data = read_regular(path, MOST_BYTES)
+        try:
+            self.text = data.decode()
+        except UnicodeDecodeError:
+            raise Problem(error("E446", f"{self.name} is no text in UTF-8", help="a bench file is TOML")) from None
+        try:
+            self.tables = tomllib.loads(self.text)
+        except (tomllib.TOMLDecodeError, RecursionError) as reason:
+            line = re.search(r"at line (\d+), column (\d+)", str(reason))
+            message = re.sub(r" \(at .*\)$", "", str(reason))
+            at = None if line is None else Place(self.name, int(line[1]), int(line[2]), 1)
+            wrong = error("E446", f"{self.name} is no TOML: {message}", at, help="docs/drives.md shows a bench file")
+            raise Problem(wrong, {self.name: self.text}) from None
+
+    def bench(self) -> TwoDrives:
+        for key, value in self.tables.items():
+            if key not in ("name", *_TABLES):
+                helps = (*did_you_mean(key, ("name", *_TABLES)), f"a bench has name, {', '.join(_TABLES)}")
+                raise self.wrong(f"a bench has no `{key}`", helps, key=key)
+            if key in _TABLES and not isinstance(value, dict):
+                raise self.wrong(f"`{key}` is no table", f"write `[{key}]` above what belongs to it", key=key)
+        name = self.tables.get("name", Path(self.name).stem)
+        if not isinstance(name, str) or not name.isprintable() or not 0 < len(name) <= 16 or not name.isascii():
+            raise self.wrong("`name` is no name of 1 to 16 letters", '`name = "mine"`', key="name")
+        for table in _TABLES:
+            if table not in self.tables:
+                raise self.wrong(f"it has no table `[{table}]`", "docs/drives.md shows a whole bench file")
+        drive, load = self._drive("drive"), self._drive("load")
+        if (drive.dialect, drive.node) == (load.dialect, load.node):
+            raise self.wrong(
+                f"drive and load are both node {load.node}", "each has a number of its own", "load", "node"
+            )
+        shaft, supply = self._figures("shaft"), self._figures("supply")
+        rate = self._word("shaft", "rate", "")
+        return TwoDrives(name, self._bus(), shaft, supply, drive, load, rate, self.name)
+
+    def _bus(self) -> dict[str, Any]:
+        found = self.tables["bus"]
+        for key in ("interface", "channel"):
+            if key not in found:
+                raise self.wrong(
+                    f"`[bus]` has no `{key}`", 'such as `interface = "socketcan"`, `channel = "can0"`', "bus"
+                )
+        for key, value in found.items():
+            if not isinstance(value, str | int | float | bool):
+                raise self.wrong(f"`{key}` is no word and no number", "python-can's documentation has them", "bus", key)
+        return dict(found)
+
+    def _drive(self, role: str) -> DriveEntry:
+        table = self.tables[role]
+        node, reversed_ = table.get("node"), table.get("reversed", False)
+        if not isinstance(node, int) or isinstance(node, bool) or not 0 <= node <= 127:
+            raise self.wrong(f"`node` of `[{role}]` is no number of a node", "`node = 1`: 0 to 127", role, "node")
+        if not isinstance(reversed_, bool):
+            raise self.wrong(
+                f"`reversed` of `[{role}]` is neither true nor false", "`reversed = true`", role, "reversed"
+            )
+        dialect = self._word(role, "dialect", None)
+        quantity = self._word(role, "quantity", "torque") if role == "drive" else "torque"
+        endpoints = self._word(role, "endpoints", "")
+        if endpoints:
+            endpoints = os.path.join(os.path.dirname(self.name), endpoints)
+        figures = self._figures(role, ("node", "reversed"))
+        return DriveEntry(role, dialect, node, -1 if reversed_ else 1, quantity, figures, endpoints)
+
+    def _figures(self, table: str, others: tuple[str, ...] = ()) -> dict[str, float]:
+        known = (*FIGURES[table], *_WORDS[table], *others)
+        for key in self.tables[table]:
+            if key not in known:
+                helps = (*did_you_mean(key, known), f"`[{table}]` has {', '.join(known)}")
+                raise self.wrong(f"`[{table}]` has no `{key}`", helps, table, key)
+        return {key: self._figure(table, key, unit, default) for key, (unit, default) in FIGURES[table].items()}
+
+    def _figure(self, table: str, key: str, unit: str, default: float | None) -> float:
+        """A quantity above zero, SI."""
+        value = self.tables[table].get(key)
+        if value is None and default is not None:
+            return default
+        match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
+        try:
+            if match is None:
+                raise ValueError
+            of = parse_unit(match[2])
+            found = float(of.to_si(float(match[1]), match[1]))
+            if not units.same(of.dimension, parse_unit(unit).dimension) or not 0.0 < found < float("inf"):
+                raise ValueError
+        except (ValueError, OverflowError):
+            message = f"`{key}` of `[{table}]` is no quantity above zero in {unit}"
+            raise self.wrong(message, f'write `{key} = "1.5 {unit}"`', table, key) from None
+        return found
+
+    def _word(self, table: str, key: str, default: str | None) -> str:
+        found, known = self.tables[table].get(key, default), _WORDS[table][key]
+        if not isinstance(found, str) or not found.isprintable() or (known and found and found not in known):
+            helps = f"one of: {', '.join(known)}" if known else f'`{key} = "..."`'
+            raise self.wrong(f"`{key}` of `[{table}]` is missing, or is none that there is", helps, table, key)
+        return found
+
+    def wrong(self, message: str, help: str | tuple[str, ...], table: str = "", key: str = "") -> Problem:
+        """The error about a table's line, or that of a key of it."""
+        lines, at = self.text.split("\n"), 0
+        head = re.compile(rf"\s*\[\s*{re.escape(table)}\s*\]") if table else None
+        if head is not None:
+            at = next((line for line, text in enumerate(lines) if head.match(text)), 0)
+        if key:
+            named = re.compile(rf"\s*\[*\s*{re.escape(key)}\b")
+            at = next((line for line in range(at, len(lines)) if named.match(lines[line])), at)
+        text = lines[at]
+        column = len(text) - len(text.lstrip()) + 1
+        place = Place(self.name, at + 1, column, max(1, len(text.rstrip()) - column + 1))
+        return Problem(error("E446", message, place, help=help), {self.name: self.text})

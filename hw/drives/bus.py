@@ -1,0 +1,93 @@
+"""A CAN bus by python-can, whatever interface it has: socketcan, slcan, PCAN ..., or the virtual ones of the library.
+
+python-can is MET's extra `can`, and is imported when a bus is opened.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from hw.drives.frames import CanFrame
+from met.diagnostic import Problem, error
+
+
+class PythonCanLine:
+    """A bus of python-can, open as soon as it is made. Making it raises Problem E400 or E449, its methods raise E401.
+
+    settings  what `can.Bus` is called with: interface, channel, bitrate ...
+    """
+
+    def __init__(self, settings: Mapping[str, Any]) -> None:
+        self._name = f"{settings.get('interface')}:{settings.get('channel')}"
+        try:
+            import can
+        except ModuleNotFoundError:
+            install = "`pip install python-can`; with `scripts/met`, `.venv/bin/pip install python-can`"
+            wrong = error("E449", "a bench on a CAN bus needs python-can, which is not here", help=install)
+            raise Problem(wrong) from None
+        self._failures = (can.CanError, OSError)
+        self._message = can.Message
+        try:
+            self._bus: Any = can.Bus(**settings)
+        except (*self._failures, ValueError, TypeError, NotImplementedError, ImportError) as reason:
+            helps = ("is the interface up? `ip link set can0 up type can bitrate 1000000`", "`interface` and `channel`")
+            message = f"CAN bus {self._name} cannot be opened: {' '.join(str(reason).split()) or type(reason).__name__}"
+            raise Problem(error("E400", message, help=helps)) from None
+        self._offset = time.perf_counter() - time.time()  # interfaces stamp frames by the time of day
+
+    def now(self) -> float:
+        return time.perf_counter()
+
+    def send(self, frame: CanFrame) -> None:
+        message = self._message(
+            arbitration_id=frame.id,
+            data=frame.data,
+            is_extended_id=frame.extended,
+            is_remote_frame=frame.remote,
+            is_fd=frame.fd,
+            bitrate_switch=frame.fd,
+        )
+        try:
+            self._bus.send(message, timeout=0.01)
+        except self._failures as reason:
+            raise self._lost(reason) from None
+
+    def receive(self, until: float) -> CanFrame | None:
+        while True:
+            try:
+                message = self._bus.recv(max(0.0, until - time.perf_counter()))
+            except self._failures as reason:
+                raise self._lost(reason) from None
+            if message is None:
+                return None
+            if message.is_error_frame:
+                continue
+            now = time.perf_counter()
+            stamp = message.timestamp + self._offset
+            came = stamp if now - 1.0 < stamp < now else now  # an interface with a clock of its own tells nothing here
+            return CanFrame(
+                message.arbitration_id,
+                bytes(message.data),
+                message.is_extended_id,
+                message.is_remote_frame,
+                message.is_fd,
+                came,
+            )
+
+    def sleep(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+    def close(self) -> None:
+        with contextlib.suppress(*self._failures):
+            self._bus.shutdown()
+
+    def _lost(self, reason: Exception) -> Problem:
+        helps = (
+            "the drives stop themselves when they hear nothing for the time of their watchdog",
+            "look at the cable, its two terminators and the interface, then start again",
+        )
+        message = f"CAN bus {self._name} was lost: {' '.join(str(reason).split()) or type(reason).__name__}"
+        return Problem(error("E401", message, help=helps))

@@ -1,0 +1,209 @@
+"""The host's side of one drive on a CAN bus, as far as all dialects have it in common; each is a file of this folder.
+
+A drive of a bench is told a torque (N m) or a voltage (V), and says its angle (rad) and rate (rad/s), all of them in
+the sense of the bench's shaft. It disarms itself where it hears nothing for the time of its watchdog.
+
+    drive.greet(talk)        who is there: dialect, firmware, limits; it is idle afterwards
+    drive.armed()            frames that arm it with nothing commanded, to be sent until its state says so
+    drive.told(value)        frames of a command
+    drive.asked()            frames that ask for its angle, rate and state
+    drive.take(frame)        what it answers, or says by itself
+"""
+
+from __future__ import annotations
+
+import enum
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+
+from hw.drives.bench_file import DriveEntry
+from hw.drives.frames import CanFrame, CanLine
+from met.diagnostic import Problem, error
+from met.frozen import frozen
+
+GREETED = 2.0
+"""Longest time to wait for each answer of a greeting, all asks together, s."""
+
+ASKS = 5
+"""How often a question of a greeting is asked: a bus loses frames only where something is wrong with it."""
+
+
+class DriveState(enum.Enum):
+    """The state of a drive: idle, its outputs off; driving, so that it takes commands; or stopped by an error."""
+
+    IDLE = "idle"
+    DRIVING = "driving"
+    FAILED = "failed"
+
+
+@frozen
+class DriveReading:
+    """An answer of a drive. time: when its frame came, s of the line's clock;  angle rad, rate rad/s, of the shaft"""
+
+    time: float
+    angle: float
+    rate: float
+
+
+@frozen
+class DriveFacts:
+    """A drive's description of itself, the end of its greeting.
+
+    firmware, hardware  in words
+    watchdog        s without a command after which it stops by itself
+    torque_max      N m, the most that it gives;  rate_max: rad/s
+    control_hz      rate of its own control, Hz
+    torque_count, voltage_count, angle_count, rate_count  N m, V, rad, rad/s of the smallest step that the dialect can
+                    tell; 0 where it has none (floats)
+    angle_range     rad after which its angle begins anew; 0 where it does not
+    difference      True where its angle's difference says more of the rate than its own estimate
+    braking         True where it shorts its windings when it stops; False where the shaft coasts
+    supply_max      V beyond which it stops by itself; 0 where it does not say
+    """
+
+    firmware: str
+    hardware: str
+    watchdog: float
+    torque_max: float
+    rate_max: float
+    control_hz: float
+    torque_count: float = 0.0
+    voltage_count: float = 0.0
+    angle_count: float = 0.0
+    rate_count: float = 0.0
+    angle_range: float = 0.0
+    difference: bool = False
+    braking: bool = False
+    supply_max: float = 0.0
+
+
+class Drive(ABC):
+    """The host's side of one drive.
+
+    reading   the last answer; None before the first
+    state     as it said last;  stated: when, s of the line's clock
+    starved   True where the error that it failed by is that of its watchdog, and no other
+    supply    V of its supply, as it said last; None where it never did
+    power     W that it takes from its supply, below 0 where it gives back; None where it never said so
+    """
+
+    dialect: str
+    answers_commands = False
+    """True where its answer to a command has its angle, rate and state, so that it need not be asked."""
+
+    def __init__(self, entry: DriveEntry) -> None:
+        self.entry, self.node, self.sense = entry, entry.node, entry.sense
+        self.reading: DriveReading | None = None
+        self.state, self.stated = DriveState.IDLE, 0.0
+        self.errors = ""
+        self.starved = False
+        self.supply: float | None = None
+        self.power: float | None = None
+
+    @abstractmethod
+    def greet(self, talk: Talk) -> DriveFacts:
+        """Find the drive, leave it idle, and read what it is. Raises Problem E402 to E404."""
+
+    @abstractmethod
+    def armed(self) -> Sequence[CanFrame]:
+        """Frames that let it drive, with nothing commanded."""
+
+    @abstractmethod
+    def told(self, value: float) -> Sequence[CanFrame]:
+        """Frames of a command, of the quantity that its entry says: N m or V."""
+
+    @abstractmethod
+    def asked(self) -> Sequence[CanFrame]:
+        """Frames that ask for angle, rate and state."""
+
+    @abstractmethod
+    def idle(self) -> Sequence[CanFrame]:
+        """Frames that switch its output off."""
+
+    @abstractmethod
+    def halted(self) -> Sequence[CanFrame]:
+        """Frames that switch its output off so that it does not drive again until its errors are cleared, where the
+        dialect has such; else those of `idle`."""
+
+    @abstractmethod
+    def cleared(self) -> Sequence[CanFrame]:
+        """Frames that let it forget its errors."""
+
+    @abstractmethod
+    def take(self, frame: CanFrame) -> bool:
+        """Take a frame that came, where it is this drive's and sound. Returns True where it was."""
+
+    @abstractmethod
+    def answers(self) -> Sequence[CanFrame]:
+        """Frames as long as those with which it answers an exchange, to reckon how long they take on the bus."""
+
+    def own(self, value: float) -> float:
+        """A quantity of the shaft in the drive's own sense, or the other way round."""
+        return self.sense * value
+
+    @property
+    def words(self) -> str:
+        """The drive in words, for messages."""
+        return f"{self.entry.role} (node {self.node})"
+
+    def wrong(self, what: str, helps: str | Sequence[str]) -> Problem:
+        """The error for a drive that cannot be driven as it is."""
+        return Problem(error("E404", f"{self.words} cannot be driven: {what}", help=helps))
+
+    def other(self, what: str, helps: str | Sequence[str]) -> Problem:
+        """The error for a drive of another dialect or firmware."""
+        return Problem(error("E403", f"{self.words} is no {self.dialect} of a kind that MET knows: {what}", help=helps))
+
+
+class Talk:
+    """A line with the drives on it: what comes is given to them all."""
+
+    def __init__(self, line: CanLine, drives: Sequence[Drive]) -> None:
+        self.line, self.drives = line, drives
+        self.strange: dict[int, int] = {}
+        """Frames that no drive has taken, by identifier: what is said where a drive does not answer."""
+
+    def send(self, frames: Iterable[CanFrame]) -> None:
+        for frame in frames:
+            self.line.send(frame)
+
+    def pump(self, until: float, done: Callable[[], bool] = lambda: False) -> bool:
+        """Take what comes until a time of the line's clock, s, or until `done`. Returns whether it is."""
+        while not done():
+            frame = self.line.receive(until)
+            if frame is None:
+                return done()
+            if not any(drive.take(frame) for drive in self.drives) and len(self.strange) < 64:
+                self.strange[frame.id] = self.strange.get(frame.id, 0) + 1
+        return True
+
+    def drain(self) -> None:
+        """Take what has come, without waiting."""
+        self.pump(-1.0)
+
+    def ask(self, frames: Sequence[CanFrame], done: Callable[[], bool]) -> bool:
+        """Send frames until `done`, `ASKS` times in `GREETED` s. Returns whether it is."""
+        for _ in range(ASKS):
+            self.send(frames)
+            if self.pump(self.line.now() + GREETED / ASKS, done):
+                return True
+        return False
+
+    def silent(self, drive: Drive, what: str) -> Problem:
+        """The error for a drive that does not answer a question of its greeting."""
+        message = f"no {drive.dialect} answers {what} as {drive.words} on the bus"
+        if not self.strange:
+            helps = ["is it switched on, on this bus, at its bitrate? is the bus terminated at both ends?"]
+        else:
+            heard = ", ".join(f"0x{id_:X} ({n})" for id_, n in sorted(self.strange.items())[:8])
+            helps = [f"what came has the identifiers {heard}", *self._guessed()]
+        return Problem(error("E402", message, help=[*helps, f"`node` of `[{drive.entry.role}]`, and its `dialect`"]))
+
+    def _guessed(self) -> list[str]:
+        """The dialect that frames nobody took look like, in words."""
+        if any(0x700 < each <= 0x77F for each in self.strange):
+            return ["identifiers from 0x701 on are heartbeats of CANopen: `cia402`?"]
+        if any(each & 0x1F == 1 and each < 0x800 for each in self.strange):
+            nodes = sorted({each >> 5 for each in self.strange if each & 0x1F == 1})
+            return [f"0x{(nodes[0] << 5) + 1:X} looks like the heartbeat of an ODrive, node {nodes[0]}"]
+        return []

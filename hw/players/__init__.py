@@ -1,0 +1,13 @@
+"""The drives' side of every dialect of hw/drives, over a simulated shaft: a bench without motors, to rehearse on.
+
+A player is written from the dialect's documentation, as the host's side of it is, and shares no code with that. Both
+may be wrong alike: what a maker's firmware does is known once one was there.
+"""
+
+from collections.abc import Callable, Mapping
+
+from hw.players.odrive import PlayedOdrive
+from hw.players.player import PlayedDrive
+
+PLAYED: Mapping[str, Callable[[int, int], PlayedDrive]] = {"odrive": PlayedOdrive}
+"""Makes a played drive of a dialect: (node, sense)."""

@@ -1,0 +1,156 @@
+"""An ODrive's axis, as firmware 0.6 has it on a CAN bus.
+
+Every frame to it feeds its watchdog, as in the sources of 0.5: what MET relies on is the worse of both.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+from typing import Any
+
+from hw.drives.frames import CanFrame
+from hw.players.player import PlayedDrive
+from hw.players.shaft import OFF, Output
+
+PROPERTIES = (
+    ("vbus_voltage", "float"),
+    ("config.dc_bus_overvoltage_trip_level", "float"),
+    ("axis0.config.enable_watchdog", "bool"),
+    ("axis0.config.watchdog_timeout", "float"),
+    ("axis0.config.motor.torque_constant", "float"),
+    ("axis0.config.motor.current_soft_max", "float"),
+    ("axis0.controller.config.vel_limit", "float"),
+    ("axis0.config.can.heartbeat_msg_rate_ms", "uint32"),
+    ("axis0.config.can.encoder_msg_rate_ms", "uint32"),
+    ("axis0.config.can.bus_voltage_msg_rate_ms", "uint32"),
+)
+FIRST = 201
+FORMATS = {"float": "<f", "bool": "<?", "uint32": "<I"}
+
+
+def endpoints(firmware: str = "0.6.10", hardware: str = "4.4.58") -> dict[str, Any]:
+    """The maker's file of properties, as far as there are any here."""
+    found = {path: {"id": FIRST + n, "type": kind} for n, (path, kind) in enumerate(PROPERTIES)}
+    return {"fw_version": firmware, "hw_version": hardware, "endpoints": found}
+
+
+class PlayedOdrive(PlayedDrive):
+    """An ODrive's axis.
+
+    kt N m/A; current_max A; rate_max rad/s
+    watches    False for one whose watchdog does nothing
+    version    protocol, hardware (three numbers), firmware (three), unreleased; None: it does not answer
+    """
+
+    def __init__(
+        self,
+        node: int,
+        sense: int = 1,
+        *,
+        kt: float = 0.06,
+        current_max: float = 10.0,
+        rate_max: float = 400.0,
+        supply: float = 24.0,
+        supply_max: float = 56.0,
+    ) -> None:
+        super().__init__(node, sense)
+        self.watches = True
+        self.version: tuple[int, ...] | None = (2, 4, 4, 58, 0, 6, 10, 0)
+        values = (supply, supply_max, False, 0.1, kt, current_max, rate_max / (2.0 * math.pi), 100, 10, 0)
+        self.values = dict(zip((path for path, _ in PROPERTIES), values, strict=True))
+        self.refuses: set[str] = set()
+        """Properties that cannot be set."""
+        self.state, self.errors, self.torque, self.fed = 1, 0, 0.0, 0.0
+        self._sent = {1: 0.0, 9: 0.0, 0x17: 0.0}
+
+    def reboot(self) -> None:
+        """As after its supply came back."""
+        self.state, self.errors, self.torque = 1, 0, 0.0
+
+    @property
+    def bridge(self) -> Output:
+        return Output("torque", self.torque) if self.state == 8 else OFF
+
+    def _frame(self, command: int, data: bytes) -> CanFrame:
+        return CanFrame(self.node << 5 | command, data)
+
+    def receive(self, frame: CanFrame, now: float) -> Sequence[CanFrame]:
+        if frame.extended or frame.fd or frame.id >> 5 != self.node:
+            return ()
+        self.fed = now
+        command, data = frame.id & 0x1F, frame.data
+        if frame.remote:
+            return self._asked(command)
+        if command == 0x02:
+            self._failed(1 << 25)
+        elif command == 0x04 and len(data) >= 4:
+            return self._property(data)
+        elif command == 0x07 and len(data) >= 4:
+            wanted = struct.unpack_from("<I", data)[0]
+            if wanted == 8 and not self.errors:
+                self.state = 8
+            elif wanted == 1:
+                self.state, self.torque = 1, 0.0
+        elif command == 0x0E and len(data) >= 4:
+            most = (
+                self.values["axis0.config.motor.torque_constant"] * self.values["axis0.config.motor.current_soft_max"]
+            )
+            told = struct.unpack_from("<f", data)[0]
+            self.torque = min(max(told, -most), most) if math.isfinite(told) else 0.0
+        elif command == 0x18:
+            self.errors = 0
+        return ()
+
+    def _asked(self, command: int) -> Sequence[CanFrame]:
+        if command == 0x00 and self.version is not None:
+            return (self._frame(command, bytes(self.version)),)
+        data = self._said(command)
+        return () if data is None else (self._frame(command, data),)
+
+    def _said(self, command: int) -> bytes | None:
+        if command == 0x01:
+            return struct.pack("<IBBBB", self.errors, self.state, 0, 0, 0)
+        if command == 0x09:
+            return struct.pack("<ff", self.angle / (2.0 * math.pi), self.rate / (2.0 * math.pi))
+        if command == 0x17:
+            return struct.pack(
+                "<ff", self.values["vbus_voltage"], self.bridge.value * self.rate / self.values["vbus_voltage"]
+            )
+        return None
+
+    def _property(self, data: bytes) -> Sequence[CanFrame]:
+        write, number = struct.unpack_from("<BH", data)
+        if not FIRST <= number < FIRST + len(PROPERTIES):
+            return ()
+        path, kind = PROPERTIES[number - FIRST]
+        layout = FORMATS[kind]
+        if write == 1 and len(data) >= 4 + struct.calcsize(layout) and path not in self.refuses:
+            self.values[path] = struct.unpack_from(layout, data, 4)[0]
+        if write:
+            return ()
+        return (self._frame(0x05, struct.pack("<xHx", number) + struct.pack(layout, self.values[path])),)
+
+    def tick(self, now: float) -> Sequence[CanFrame]:
+        timeout = self.values["axis0.config.watchdog_timeout"]
+        if (
+            self.state == 8
+            and self.watches
+            and self.values["axis0.config.enable_watchdog"]
+            and now - self.fed > timeout
+        ):
+            self._failed(1 << 24)
+        if self.state == 8 and self.values["vbus_voltage"] > self.values["config.dc_bus_overvoltage_trip_level"]:
+            self._failed(1 << 8)
+        out = []
+        for command, rate in ((0x01, "heartbeat_msg"), (0x09, "encoder_msg"), (0x17, "bus_voltage_msg")):
+            period = 1e-3 * self.values[f"axis0.config.can.{rate}_rate_ms"]
+            data = self._said(command)
+            if period and data is not None and now - self._sent[command] >= period - 1e-9:
+                self._sent[command] = now
+                out.append(self._frame(command, data))
+        return out
+
+    def _failed(self, error: int) -> None:
+        self.errors, self.state, self.torque = self.errors | error, 1, 0.0

@@ -1,0 +1,163 @@
+"""Two played drives on a shaft, in a time that whoever plays them gives, and three ways to give it.
+
+PlayedLine    in this process and in no time at all: the bus is simulated with them, bit times and all
+play(...)     in real time, on a bus of python-can: `virtual` within a process, `udp_multicast` or vcan between two
+python -m hw.players BENCH.toml    the same as a program
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Sequence
+
+from hw.drives.frames import CanFrame, CanLine, on_bus
+from hw.players.shaft import OFF, Output, PlayedShaft
+
+TURNAROUND = 5e-5
+"""Time in which a played drive answers, s."""
+
+
+class PlayedDrive(ABC):
+    """A drive's side of a dialect. node: its number;  sense: -1 where it counts the other way round than the shaft"""
+
+    def __init__(self, node: int, sense: int = 1) -> None:
+        self.node, self.sense = node, sense
+        self.angle = self.rate = 0.0
+
+    @abstractmethod
+    def receive(self, frame: CanFrame, now: float) -> Sequence[CanFrame]:
+        """Frames with which it answers a frame that has come at a time, s."""
+
+    @abstractmethod
+    def tick(self, now: float) -> Sequence[CanFrame]:
+        """Watch the time, s. Returns the frames that it sends by itself."""
+
+    @property
+    @abstractmethod
+    def bridge(self) -> Output:
+        """What its bridge does, in its own sense."""
+
+    @property
+    def output(self) -> Output:
+        """What its bridge does, in the shaft's sense."""
+        out = self.bridge
+        return Output(out.kind, self.sense * out.value) if out.value else out
+
+    def see(self, angle: float, rate: float) -> None:
+        """Read its encoder: angle rad and rate rad/s of the shaft."""
+        self.angle, self.rate = self.sense * angle, self.sense * rate
+
+
+class PlayedBench:
+    """Two played drives on a shaft. slip: rad by which the load's encoder is ahead: a coupling that has slipped"""
+
+    def __init__(self, shaft: PlayedShaft, drive: PlayedDrive, load: PlayedDrive) -> None:
+        self.shaft, self.drive, self.load = shaft, drive, load
+        self.drives = (drive, load)
+        self.slip = 0.0
+        self.ticked = 0.0
+        """Time of the last tick, s."""
+
+    def tick(self) -> list[CanFrame]:
+        """Advance by a tick of the shaft. Returns what the drives send by themselves."""
+        shaft = self.shaft
+        shaft.step(self.drive.output, self.load.output)
+        self.ticked += shaft.period
+        self.drive.see(shaft.angle, shaft.rate)
+        self.load.see(shaft.angle + self.slip, shaft.rate)
+        return [frame for drive in self.drives for frame in drive.tick(self.ticked)]
+
+    def receive(self, frame: CanFrame, now: float) -> list[CanFrame]:
+        """Frames with which the drives answer a frame that has come."""
+        return [answer for drive in self.drives for answer in drive.receive(frame, now)]
+
+    @property
+    def off(self) -> bool:
+        """Whether no drive drives."""
+        return all(drive.output == OFF or drive.output.kind == "short" for drive in self.drives)
+
+
+Spoil = Callable[[CanFrame, bool], list[tuple[float, CanFrame]]]
+"""(frame, whether it comes from a drive) -> what arrives in its place: seconds later, and the frame."""
+
+
+def unspoiled(frame: CanFrame, from_drive: bool) -> list[tuple[float, CanFrame]]:
+    return [(0.0, frame)]
+
+
+class PlayedLine:
+    """A bus with two played drives on it, as a line with a clock of its own: time goes on where the host waits for it.
+
+    spoil  what becomes of each frame on its way
+    """
+
+    def __init__(self, bench: PlayedBench, spoil: Spoil = unspoiled) -> None:
+        self.bench, self.spoil = bench, spoil
+        self._now = self._free = bench.ticked
+        self._order = itertools.count()
+        self._events: list[tuple[float, int, bool, CanFrame]] = []
+        self.closed = False
+
+    def now(self) -> float:
+        return self._now
+
+    def send(self, frame: CanFrame) -> None:
+        self._put(frame, False, self._now)
+
+    def receive(self, until: float) -> CanFrame | None:
+        until = max(until, self._now)
+        while True:
+            due = self.bench.ticked + self.bench.shaft.period
+            if self._events and self._events[0][0] <= min(due, until):
+                time, _, from_drive, frame = heapq.heappop(self._events)
+                self._now = max(self._now, time)
+                if from_drive:
+                    return CanFrame(frame.id, frame.data, frame.extended, frame.remote, frame.fd, time)
+                for answer in self.bench.receive(frame, time):
+                    self._put(answer, True, time + TURNAROUND)
+            elif due <= until:
+                for frame in self.bench.tick():
+                    self._put(frame, True, due)
+            else:
+                self._now = until
+                return None
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass; what comes meanwhile stays on the line."""
+        end, kept = self._now + seconds, []
+        while (frame := self.receive(end)) is not None:
+            kept.append(frame)
+        for frame in kept:
+            heapq.heappush(self._events, (frame.time, next(self._order), True, frame))
+
+    def close(self) -> None:
+        self.closed = True
+
+    def _put(self, frame: CanFrame, from_drive: bool, now: float) -> None:
+        for later, each in self.spoil(frame, from_drive):
+            start = max(self._free, now)
+            self._free = start + on_bus(each)
+            heapq.heappush(self._events, (self._free + later, next(self._order), from_drive, each))
+
+
+def play(line: CanLine, bench: PlayedBench, stopped: Callable[[], bool]) -> None:
+    """Play drives on a line in its own time until `stopped`. What was sent and comes back is dropped: `udp_multicast`
+    hands it to its sender too, and no node of a bus hears itself."""
+    begun = line.now() - bench.ticked
+    own: deque[tuple[int, bool, bytes]] = deque(maxlen=32)
+
+    def send(frames: Sequence[CanFrame]) -> None:
+        for each in frames:
+            own.append((each.id, each.remote, each.data))
+            line.send(each)
+
+    while not stopped():
+        frame = line.receive(begun + bench.ticked + bench.shaft.period)
+        now = line.now() - begun
+        while bench.ticked + bench.shaft.period <= now:
+            send(bench.tick())
+        if frame is not None and (frame.id, frame.remote, frame.data) not in own:
+            send(bench.receive(frame, now))

@@ -1,0 +1,41 @@
+"""The page on drives has a bench file that is one, and its figures are those of the code."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from hw.drives import DIALECTS
+from hw.drives.bench_file import FIGURES, two_drives
+from hw.drives.side import APART, SKEW
+from hw.players import PLAYED
+
+PAGE = (Path(__file__).parents[2] / "docs" / "drives.md").read_text()
+
+
+def test_its_bench_file_is_one_and_names_every_figure(tmp_path: Path) -> None:
+    (text,) = re.findall(r"<!-- bench\.toml -->\n```toml\n(.*?)```", PAGE, re.S)
+    path = tmp_path / "bench.toml"
+    path.write_text(text)
+    bench = two_drives(path)
+    assert bench.name == "bench-1" and bench.load.sense == -1
+    for table, figures in FIGURES.items():
+        for key in figures:
+            assert re.search(rf"^{key}\s*=", text, re.M), (table, key)
+
+
+def test_it_has_every_dialect_and_each_is_played() -> None:
+    assert set(DIALECTS) == set(PLAYED)
+    assert all(f"`{dialect}`" in PAGE for dialect in DIALECTS)
+
+
+def test_it_says_what_two_answers_may_differ_by() -> None:
+    assert f"within {1e3 * APART:g} ms" in PAGE and f"{1e3 * SKEW:g} ms" in PAGE
+    accelerated = (0.4 + 3.0 * 0.06) / 1.3e-4
+    assert accelerated * (SKEW + 135e-6) == pytest.approx(1.5, rel=0.01) and "1.5 rad/s" in PAGE
+
+
+def test_its_first_lines_say_what_was_never_run() -> None:
+    assert "nothing on this page was run on real hardware" in "\n".join(PAGE.splitlines()[:6]).replace("\n", " ")

@@ -1,0 +1,104 @@
+"""Benches of two played drives, and their files, for the tests of this folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from hw import conformance
+from hw.bed import BedDriver
+from hw.beds.can_bed import CanBed
+from hw.drives import DIALECTS
+from hw.drives.bench_file import TwoDrives, two_drives
+from hw.drives.frames import CanLine
+from hw.players.odrive import PlayedOdrive, endpoints
+from hw.players.player import PlayedBench, PlayedDrive, PlayedLine
+from hw.players.shaft import InertiaShaft
+
+KT, RESISTANCE, INERTIA = 0.06, 1.5, 1.3e-4
+
+TEXT = """\
+name = "paper"
+
+[bus]
+interface = "{interface}"
+channel   = "{channel}"
+
+[shaft]
+inertia  = "1.3e-4 kg*m^2"
+rate_max = "380 rad/s"
+
+[supply]
+voltage_max = "40 V"
+
+[drive]
+dialect     = "{dialect}"
+node        = 1
+kt          = "0.06 N*m/A"
+resistance  = "1.5 ohm"
+voltage_max = "20 V"
+torque_max  = "0.4 N*m"
+{more}
+[load]
+dialect       = "{dialect}"
+node          = 2
+reversed      = true
+kt            = "0.06 N*m/A"
+current_max   = "3 A"
+current_rated = "2 A"
+heat          = "9 A^2*s"
+{more}"""
+
+MORE = {"odrive": 'endpoints = "flat_endpoints.json"\n'}
+PLAYED: dict[str, Callable[..., PlayedDrive]] = {"odrive": PlayedOdrive}
+
+
+def bench_file(folder: Path, dialect: str = "odrive", interface: str = "virtual", channel: str = "bench") -> Path:
+    """A bench file of two drives of a dialect, with what it names beside it."""
+    (folder / "flat_endpoints.json").write_text(json.dumps(endpoints()))
+    path = folder / "bench.toml"
+    path.write_text(TEXT.format(dialect=dialect, interface=interface, channel=channel, more=MORE.get(dialect, "")))
+    return path
+
+
+def played_bench(dialect: str = "odrive", **of_drive: float) -> PlayedBench:
+    """Two played drives of a dialect on a shaft, the load's counting the other way round."""
+    shaft = InertiaShaft(inertia=INERTIA, kt=KT, resistance=RESISTANCE, f_c=1e-3, f_v=1e-4)
+    make = PLAYED[dialect]
+    return PlayedBench(shaft, make(1, **of_drive), make(2, -1, **of_drive))
+
+
+def host_on(bench: TwoDrives, open_line: Callable[[], CanLine], period: float = 1e-3) -> CanBed:
+    """The host's side of a bench, on lines that `open_line` gives."""
+    drive, load = (DIALECTS[entry.dialect](entry) for entry in (bench.drive, bench.load))
+    return CanBed(bench, (drive, load), open_line, period=period)
+
+
+def host_of(bench: TwoDrives, line: PlayedLine, period: float = 1e-3) -> CanBed:
+    """The host's side of a bench, on a line."""
+    return host_on(bench, lambda: line, period)
+
+
+class PlayedConformance(conformance.FreeRunning):
+    """What every bed must pass, of two played drives of a dialect, in the time of a simulated bus."""
+
+    dialect = "odrive"
+
+    def opened(self, folder: Path) -> BedDriver:
+        self.played = played_bench(self.dialect)
+        self.line = PlayedLine(self.played)
+        return host_of(two_drives(bench_file(folder, self.dialect)), self.line)
+
+    def wait(self, bed: BedDriver, seconds: float) -> None:
+        self.line.sleep(seconds)
+
+    def outputs(self, bed: BedDriver) -> tuple[float, float]:
+        """Voltage and current for which the drives' torques are, to the nearest count."""
+        assert isinstance(bed, CanBed)
+        drive, load = (each.output for each in self.played.drives)
+        if self.played.off or bed._about is None:
+            return 0.0, 0.0
+        scales = bed._about.scales
+        volts = drive.value if drive.kind == "voltage" else RESISTANCE * drive.value / KT
+        return round(volts / scales.voltage) * scales.voltage, round(load.value / KT / scales.current) * scales.current

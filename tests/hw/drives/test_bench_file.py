@@ -1,0 +1,72 @@
+"""A bench file says what is there, and each mistake in one has its line and its remedy."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from hw.drives.bench_file import two_drives
+from met.diagnostic import Problem
+from tests.hw.conftest import said
+from tests.hw.drives.played import bench_file
+
+
+def test_its_figures_are_si_and_what_it_does_not_say_has_a_default(tmp_path: Path) -> None:
+    path = bench_file(tmp_path)
+    path.write_text(path.read_text().replace('rate_max = "380 rad/s"', 'rate_max = "600 rpm"'))
+    bench = two_drives(path)
+    assert bench.name == "paper" and bench.bus == {"interface": "virtual", "channel": "bench"}
+    assert bench.shaft == {
+        "inertia": 1.3e-4,
+        "rate_max": pytest.approx(20.0 * math.pi, rel=1e-15),
+        "arming_rate": 5.0,
+        "filter": 0.0,
+    }
+    assert (bench.drive.role, bench.drive.node, bench.drive.sense, bench.drive.quantity) == ("drive", 1, 1, "torque")
+    assert (bench.load.sense, bench.load.figures["watchdog"]) == (-1, 0.020)
+    assert bench.drive.endpoints == str(tmp_path / "flat_endpoints.json")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "message", "help"),
+    [
+        ('"1.3e-4 kg*m^2"', '"1.3 N*m"', 8, "`inertia` of `[shaft]` is no quantity above zero in kg*m^2", "write"),
+        ('"1.3e-4 kg*m^2"', "1.3e-4", 8, "`inertia` of `[shaft]` is no quantity above zero in kg*m^2", "write"),
+        ('"3 A"', '"0 A"', 28, "`current_max` of `[load]` is no quantity above zero in A", "write"),
+        ("node          = 2", "node = true", 25, "`node` of `[load]` is no number of a node", "`node = 1`: 0 to 127"),
+        ("node          = 2", "node = 1", 25, "drive and load are both node 1", "each has a number of its own"),
+        ("= true", "= 1", 26, "`reversed` of `[load]` is neither true nor false", "`reversed = true`"),
+        ("torque_max ", "torque_most", 20, "`[drive]` has no `torque_most`", "did you mean `torque_max`?"),
+        ("[supply]", "[suply]", 11, "a bench has no `suply`", "did you mean `supply`?"),
+        ('name = "paper"', 'name = ""', 1, "`name` is no name of 1 to 16 letters", '`name = "mine"`'),
+        ("channel  ", "chanel", 3, "`[bus]` has no `channel`", "such as"),
+        ('"bench"', "[1]", 5, "`channel` is no word and no number", "python-can's documentation has them"),
+        ("[supply]", "[[supply]]", 11, "`supply` is no table", "write `[supply]` above what belongs to it"),
+        ("reversed      = true", 'reversed = "', 26, "is no TOML", "docs/drives.md shows a bench file"),
+    ],
+)
+def test_a_mistake_has_its_place_and_its_remedy(
+    tmp_path: Path, old: str, new: str, line: int, message: str, help: str
+) -> None:
+    path = bench_file(tmp_path)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(Problem) as caught:
+        two_drives(path)
+    words = said(caught.value)
+    assert words.startswith("error[E446]: ") and message in words and f"  = help: {help}" in words, words
+    assert f"--> {path}:{line}:" in words, words
+
+
+def test_a_file_that_is_large_or_no_file_is_not_read(tmp_path: Path) -> None:
+    with pytest.raises(OSError):
+        two_drives(tmp_path)
+    (tmp_path / "large.toml").write_text("#" * (1 << 17))
+    with pytest.raises(OSError):
+        two_drives(tmp_path / "large.toml")
+    (tmp_path / "bytes.toml").write_bytes(b"\xff")
+    with pytest.raises(Problem, match=r"E446: .*bytes.toml is no text in UTF-8"):
+        two_drives(tmp_path / "bytes.toml")

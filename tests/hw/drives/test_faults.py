@@ -1,0 +1,66 @@
+"""Whatever befalls the frames of a bus, no answer is taken that is wrong, and no drive is left driving."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hw.bed import Fault
+from hw.drives.bench_file import two_drives
+from hw.players.player import PlayedLine
+from tests.hw.drives.played import bench_file, host_of, played_bench
+from tests.hw.drives.spoiling import FAULTS, Spoiler, Tally, campaign
+
+DIALECTS = ("odrive",)
+
+
+def through(folder: Path, dialect: str, kind: str, exchanges: int) -> tuple[Tally, Spoiler]:
+    """What comes of so many exchanges under a fault; the bed is off afterwards."""
+    played, spoiler = played_bench(dialect), Spoiler(kind, 1)
+    line = PlayedLine(played, spoiler)
+    with host_of(two_drives(bench_file(folder, dialect)), line) as bed:
+        tally = campaign(bed, line, played, spoiler, exchanges)
+    assert played.off
+    return tally, spoiler
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("kind", FAULTS)
+def test_no_wrong_answer_is_taken(tmp_path: Path, dialect: str, kind: str) -> None:
+    tally, spoiler = through(tmp_path, dialect, kind, 400)
+    assert spoiler.befell >= 2 and tally.answered >= 100
+    assert tally.wrong == 0, tally
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("kind", FAULTS)
+def test_no_wrong_answer_of_ten_thousand_is_taken(tmp_path: Path, dialect: str, kind: str) -> None:
+    tally, spoiler = through(tmp_path, dialect, kind, 10_000)
+    assert spoiler.befell >= 30 and tally.answered >= 1000
+    assert tally.wrong == 0, tally
+
+
+def test_a_drive_that_has_rebooted_stops_the_bed(tmp_path: Path) -> None:
+    tally, spoiler = through(tmp_path, "odrive", "reboot", 1000)
+    assert tally.stops >= spoiler.befell - 1 > 0 and tally.faults == Fault.DRIVE
+
+
+def table(folder: Path, exchanges: int = 10_000) -> None:
+    """Print what comes of each fault: `python -m tests.hw.drives.test_faults`."""
+    for dialect in DIALECTS:
+        for kind in FAULTS:
+            tally, spoiler = through(folder, dialect, kind, exchanges)
+            print(
+                f"{dialect:8} {kind:13} befell {spoiler.befell:6,} answered {tally.answered:6,} wrong {tally.wrong} "
+                f"worst {tally.worst:.3f} rad/s stops {tally.stops} {tally.faults!r}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as name:
+        table(Path(name))

@@ -1,0 +1,140 @@
+"""Played drives on buses of python-can, in real time: in this process, and in one of their own.
+
+`python -m tests.hw.drives.test_real_time 60` prints what 60 s of exchanges at 1 kHz came to.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from hw.bed import BedState
+from hw.beds.can_bed import CanBed
+from hw.drives.bench_file import two_drives
+from hw.drives.bus import PythonCanLine
+from hw.players.player import play
+from hw.realtime import put_first
+from tests.hw.drives.played import bench_file, host_on, played_bench
+
+pytestmark = pytest.mark.alone
+
+DIALECTS = ("odrive",)
+GROUP = "239.74.163.2"
+"""Multicast group, of this machine alone, in whose place a bus is."""
+
+
+@contextmanager
+def on_virtual_bus(folder: Path, dialect: str) -> Iterator[CanBed]:
+    """The host's side of a bench that is played by a thread of this process, on python-can's virtual bus."""
+    bench = two_drives(bench_file(folder, dialect))
+    played, ended = played_bench(dialect), threading.Event()
+    theirs = PythonCanLine(bench.bus)
+    thread = threading.Thread(target=play, args=(theirs, played, ended.is_set), daemon=True)
+    thread.start()
+    try:
+        with host_on(bench, lambda: PythonCanLine(bench.bus)) as bed:
+            yield bed
+    finally:
+        ended.set()
+        thread.join()
+        theirs.close()
+    assert played.off
+
+
+def exchanged(bed: CanBed, seconds: float) -> tuple[int, list[float], list[float]]:
+    """Drive a bed at 1 kHz. Returns how many exchanges had no answer, and of all: how late they began, and how long
+    they took, s. Where it stops itself, as it does where the machine is busy, it is armed anew."""
+    bed.connect()
+    bed.patience = 0.002
+    bed.arm()
+    missed, late, took = 0, [], []
+    begun = time.perf_counter()
+    for n in range(1, round(seconds * 1e3)):
+        due = begun + n * 1e-3
+        if (left := due - time.perf_counter()) > 0.0:
+            time.sleep(left)
+        now = time.perf_counter()
+        sample = bed.exchange(3.0, 0.2)
+        late.append(now - due)
+        took.append(time.perf_counter() - now)
+        if sample is None:
+            missed += 1
+        elif sample.state != BedState.ARMED:
+            while abs(bed.rest(0.5).rate) > 4.0:
+                pass
+            bed.clear()
+            bed.arm()
+            begun = time.perf_counter() - n * 1e-3
+    return missed, late, took
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_a_bus_within_a_process_carries_exchanges(tmp_path: Path, dialect: str) -> None:
+    with on_virtual_bus(tmp_path, dialect) as bed:
+        missed, late, _ = exchanged(bed, 1.0)
+    assert len(late) == 999 and missed < 500
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_a_host_that_is_killed_leaves_the_drives_off_within_their_watchdog(tmp_path: Path, dialect: str) -> None:
+    # where the machine was busy the bed may have stopped by itself just before
+    after = next(each for each in (stopped_after(tmp_path, dialect) for _ in range(5)) if each > 0.0)
+    assert after < 0.020 + 0.005 + 0.05, after  # a tick of the player's, and a busy machine's delay
+
+
+def stopped_after(folder: Path, dialect: str) -> float:
+    """The time from the death of a host to the last of the drives being off, both processes of their own, s."""
+    path = bench_file(folder, dialect, "udp_multicast", GROUP)
+    player = subprocess.Popen([sys.executable, "-m", "hw.players", str(path)], stdout=subprocess.PIPE, text=True)
+    put_first(player.pid)
+    assert player.stdout is not None
+    host = None
+    try:
+        assert player.stdout.readline() == "ready\n"
+        host = subprocess.Popen(
+            [sys.executable, "-m", "tests.hw.drives.driving", str(path)], stdout=subprocess.PIPE, text=True
+        )
+        assert host.stdout is not None
+        assert "ARMED" in host.stdout.readline()
+        host.kill()
+        killed = time.clock_gettime(time.CLOCK_MONOTONIC)
+        host.wait()
+        time.sleep(0.5)
+    finally:
+        for each in (host, player):
+            if each is not None:
+                each.terminate()
+                each.wait()
+    return float(player.stdout.read().split()[-1]) - killed
+
+
+def _figures(seconds: float) -> None:
+    with contextlib.suppress(OSError):  # threads too
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    for dialect in DIALECTS:
+        with tempfile.TemporaryDirectory() as name:
+            with on_virtual_bus(Path(name), dialect) as bed:
+                missed, late, took = exchanged(bed, seconds)
+            print(
+                f"{dialect}: {len(late):,} exchanges at 1 kHz, {missed} without an answer; late median "
+                f"{1e6 * statistics.median(late):.0f} us, p99 {1e6 * statistics.quantiles(late, n=100)[98]:.0f} us; "
+                f"took median {1e6 * statistics.median(took):.0f} us, "
+                f"p99 {1e6 * statistics.quantiles(took, n=100)[98]:.0f} us"
+            )
+            afters = [1e3 * stopped_after(Path(name), dialect) for _ in range(5)]
+            print(f"{dialect}: off {', '.join(f'{each:.1f}' for each in afters)} ms after the host was killed")
+
+
+if __name__ == "__main__":
+    _figures(float(sys.argv[1]))
