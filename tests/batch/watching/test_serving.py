@@ -65,8 +65,8 @@ def test_who_does_not_know_the_token_is_told_nothing(server: PageServer) -> None
 @pytest.mark.parametrize(
     "what",
     ["../../etc/passwd", "page/../../../etc/passwd", "%2e%2e/%2e%2e/etc/passwd", "page/1/../..", "page/-1",
-     "page/99", "page/1e0", "page/٣", "page/" + "9" * 5000, "deck.ic", "assets/frame.js", "page//etc/passwd", "numbers/2",
-     "choose"],
+     "page/99", "page/1e0", "page/٣", "page/" + "9" * 5000, "deck.ic", "assets/frame.js", "page//etc/passwd",
+     "numbers/2", "choose"],
 )  # fmt: skip
 def test_nothing_of_the_disk_can_be_asked_for(server: PageServer, what: str) -> None:
     path = f"/{server.token}/{what}".encode().decode("latin-1")
@@ -93,7 +93,8 @@ def test_two_names_are_refused(server: PageServer) -> None:
 
 
 @pytest.mark.parametrize(
-    "origin", ["http://evil.example", "null", "https://127.0.0.1:{port}", "http://localhost:{port}", "http://127.0.0.1:1"]
+    "origin",
+    ["http://evil.example", "null", "https://127.0.0.1:{port}", "http://localhost:{port}", "http://127.0.0.1:1"],
 )
 def test_what_another_page_sends_is_refused(server: PageServer, origin: str) -> None:
     named = origin.format(port=server.server_port)
