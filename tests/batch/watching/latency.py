@@ -1,8 +1,11 @@
-"""How long it takes from a saved deck to the new picture in a browser: `python -m tests.batch.watching.latency [EDITS]`.
+"""How long it takes from a saved deck to the new picture in a browser.
 
-A number of the deck is another one at each edit, so that the program is, too, and is compiled anew. The picture is there
-when the new run has taken the old one's place, two frames after it was drawn; cases and maps come behind it. Wall time;
-and processor time of `met view`, of all its threads, and of the browser with all its processes.
+    python -m tests.batch.watching.latency [EDITS]
+
+A number of the deck is another one at each edit, so that the program is another, too, and is compiled anew. The picture
+is there when the new run has taken the old one's place, two frames after it was drawn; cases and maps come behind it.
+Wall time; and processor time until the picture, of `met view` with all its threads, and of the browser with all its
+processes, one of which draws what a graphics processor would.
 """
 
 from __future__ import annotations
@@ -36,20 +39,18 @@ NEXT_SECONDS = 0.3
 """Between an edit of which all has come, and the next."""
 
 
-def processor_seconds(name: str) -> float:
-    """Of a process, and of those that it has begun: user and system time."""
-    total, ticks = 0.0, os.sysconf("SC_CLK_TCK")
-    waiting = [name]
-    while waiting:
-        pid = waiting.pop()
-        try:
-            fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-            children = [Path(each, "children").read_text().split() for each in Path(f"/proc/{pid}/task").iterdir()]
-        except OSError:
-            continue
-        total += sum(map(int, fields[11:15])) / ticks
-        waiting += [child for each in children for child in each]
-    return total
+def processor_seconds(pid: int, besides: int = 0) -> float:
+    """Of a process, and of those that it has begun and that run: user and system time. besides: one that is left out,
+    with its own."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        children = [Path(each, "children").read_text().split() for each in Path(f"/proc/{pid}/task").iterdir()]
+    except OSError:
+        return 0.0
+    own = sum(map(int, fields[11:13])) / os.sysconf("SC_CLK_TCK")
+    return own + sum(
+        processor_seconds(int(child), besides) for each in children for child in each if int(child) != besides
+    )
 
 
 def measure(text: str, first: float, edits: int) -> dict[str, list[float]]:
@@ -60,24 +61,24 @@ def measure(text: str, first: float, edits: int) -> dict[str, list[float]]:
         deck.write_text(text % first)
         with viewing(deck, "-q") as view:
             page = chromium.open(view.address)
+            watching, own = view.process.pid, os.getpid()
             for edit in range(edits + 1):
-                own = os.getpid()
+                began = time.time()
+                before = processor_seconds(watching), processor_seconds(own, watching) - time.process_time()
                 if edit:
-                    before = processor_seconds(str(view.process.pid)), processor_seconds(str(own)) - time.process_time()
                     beside = deck.with_name(".new")
-                    beside.write_text(text % round(first * (1 + (edit + time.time() % 1) / 1000), 9))
-                    os.replace(beside, deck)
+                    beside.write_text(text % round(first * (1 + (edit + began % 1) / 1000), 9))
                     began = time.time()
+                    os.replace(beside, deck)
                 shown = page.run(
                     f"new Promise(done => {{ const look = () => document.documentElement.dataset.shown == {edit + 1}"
                     " ? done(Date.now()) : setTimeout(look, 4); look(); })"
                 )
+                after = processor_seconds(watching), processor_seconds(own, watching) - time.process_time()
                 if edit:
-                    after = processor_seconds(str(view.process.pid)), processor_seconds(str(own)) - time.process_time()
-                    view_cpu = after[0] - before[0]
                     found["picture"].append(shown / 1000 - began)
-                    found["cpu"].append(view_cpu)
-                    found["browser cpu"].append(after[1] - before[1] - view_cpu)
+                    found["cpu"].append(after[0] - before[0])
+                    found["browser cpu"].append(after[1] - before[1])
                 view.whole(page=edit + 1)
                 if edit:
                     found["all"].append(time.time() - began)
