@@ -87,12 +87,12 @@ def _watch(
         say(address)
         if not quiet:
             end = "Ctrl-C ends it" if sys.stdin is not None and sys.stdin.isatty() else f"`kill {os.getpid()}` ends it"
-            say(f"The page of {path}, for a browser on this machine. Who has the address can read it. {end}.", err=True)
+            say(f"The page of {deck}, for a browser on this machine. Who has the address can read it. {end}.", err=True)
 
     path = find(deck, include_dirs)
     try:
         with terminable():
-            follow(WatchedDeck(path, include_dirs, defines, settings), name, port=port, ready=ready)
+            follow(WatchedDeck(deck, path, include_dirs, defines, settings), name, port=port, ready=ready)
     except Terminated:
         return TERMINATED
     except KeyboardInterrupt:

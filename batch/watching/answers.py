@@ -53,9 +53,11 @@ MOST_LETTERS = 200_000
 
 @frozen
 class WatchedDeck:
-    """A deck as it was asked for on the command line; settings as `--set` and `--vary` have them."""
+    """A deck as it was asked for on the command line: its name, its file, and options; settings as `--set` and `--vary`
+    have them."""
 
-    path: Path
+    name: str
+    file: Path
     include_dirs: tuple[str, ...] = ()
     defines: tuple[str, ...] = ()
     settings: tuple[str, ...] = ()
@@ -84,7 +86,7 @@ def compiled(deck: WatchedDeck, name: str | None = None, group: str | None = Non
     the one that is shown; for None the first."""
     try:
         folders = [Path(each) for each in deck.include_dirs]
-        tree = read(deck.path, folders, deck.defines, despite_errors=True)
+        tree = read(deck.name, folders, deck.defines, despite_errors=True)
     except Problem as problem:
         return DeckAnswer(_words(problem.diagnostics, problem.sources), (), tuple(problem.sources))
     known = Definitions(tree, Complaints())
@@ -105,7 +107,7 @@ def compiled(deck: WatchedDeck, name: str | None = None, group: str | None = Non
 
 def _search(deck: WatchedDeck, experiment: Experiment) -> Diagnostic:
     name = experiment.name_in_deck
-    helps = f"`met run {quoted(deck.path)} {quoted(name)} -o a.h5`, then `met view a.h5`"
+    helps = f"`met run {quoted(deck.name)} {quoted(name)} -o a.h5`, then `met view a.h5`"
     return error("E476", f"`{name}` is a search: which cases it has is known when it has run", help=helps)
 
 
@@ -161,7 +163,7 @@ def run_cases(
             yield results(prepared, rows[:done], None, np.concatenate(found))
 
 
-def numbers(deck: WatchedDeck, experiment: Experiment, run: Run) -> str:
+def numbers(experiment: Experiment, run: Run) -> str:
     """What came of the cases so far, as the page's script takes it: JSON."""
     count, done = len(shown_rows(experiment)), len(run.case)
     status = np.full(count, NOT_YET)
@@ -173,7 +175,6 @@ def numbers(deck: WatchedDeck, experiment: Experiment, run: Run) -> str:
         metrics.append(doubles(values))
     pool = Pool(experiment.name, [GroupInMemory.of_run(experiment, run)])
     points = overview(pool)
-    command = f"met run {quoted(deck.path)} {quoted(experiment.name_in_deck)} --case '#CASE'"
     data = {
         "status": status.tolist(),
         "metrics": metrics,
@@ -188,7 +189,7 @@ def numbers(deck: WatchedDeck, experiment: Experiment, run: Run) -> str:
         "cases": {
             "name": visible(experiment.name),
             "against": None,
-            "replay": visible(command),
+            "replay": "",
             "ended": list(ENDED),
             "overview": None if points is None else overview_data(points),
         },

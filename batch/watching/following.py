@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from typing import Any
 
 from batch.watching import answers
 from batch.watching.answers import DeckAnswer, WatchedDeck
@@ -19,6 +20,9 @@ from met.messages.render import render
 from met.messages.visible import visible
 from met.run import Prepared, prepare
 
+HEAD_START_SECONDS = 0.1
+"""Of the page, before its cases are run: it is fetched meanwhile."""
+
 PATIENCE_SECONDS = 2.0
 """For cases that are given up, when all ends: a compiler is not to be left in the middle."""
 
@@ -29,7 +33,7 @@ def follow(deck: WatchedDeck, name: str | None, *, port: int, ready: Callable[[s
     name   of the run or sweep; None: the one that `met run` would take, or that is chosen on the page
     ready  told the address of the page, when it can be opened
     """
-    board = Board(visible(str(deck.path)))
+    board = Board(visible(deck.name))
     server = PageServer(board, port)
     server.begin()
     ready(server.address)
@@ -47,7 +51,7 @@ class _Loop:
     def __init__(self, deck: WatchedDeck, name: str | None, board: Board) -> None:
         self._deck, self._name, self._board = deck, name, board
         self._group: str | None = None
-        self._files = DeckFiles(deck.path, deck.include_dirs)
+        self._files = DeckFiles(deck.file, deck.include_dirs)
         self._page = self._work = ""
         self._is_broken = False
         self._cases: threading.Thread | None = None
@@ -76,7 +80,7 @@ class _Loop:
         if self._files.found(answer.files, begun):
             return True
         self._is_broken = answer.experiment is None
-        told = {"names": list(answer.names), "groups": list(answer.groups), "messages": answer.messages}
+        told: dict[str, Any] = {"names": list(answer.names), "groups": list(answer.groups), "messages": answer.messages}
         if answer.experiment is None:
             self._board.tell(**told, broken=True, tried=begun, doing="")
             return False
@@ -87,7 +91,7 @@ class _Loop:
             self._board.tell(**told | {"messages": _words(problem)}, broken=True, tried=begun, doing="")
         return False
 
-    def _show(self, answer: DeckAnswer, prepared: Prepared, told: dict[str, object], begun: float) -> None:
+    def _show(self, answer: DeckAnswer, prepared: Prepared, told: dict[str, Any], begun: float) -> None:
         """Put up the page, and begin to run its cases; where page and program are as they were, they stay."""
         experiment = prepared.experiment
         told |= {
@@ -111,9 +115,11 @@ class _Loop:
         def progress(done: int) -> None:
             board.tell(page, doing=f"{done:,} of {total:,} cases are run")
 
+        if stop.wait(HEAD_START_SECONDS):
+            return
         try:
             for run in answers.run_cases(prepared, stop.is_set, progress):
-                board.show("numbers", answers.numbers(self._deck, experiment, run), page)
+                board.show("numbers", answers.numbers(experiment, run), page)
             board.tell(page, doing="")
         except Problem as problem:
             board.tell(page, messages=_words(problem), doing="the cases were not run")

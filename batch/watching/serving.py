@@ -11,11 +11,13 @@ from __future__ import annotations
 import hmac
 import json
 import secrets
+import sys
 import threading
 from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socket import socket
+from socketserver import TCPServer
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -93,8 +95,15 @@ class PageServer(ThreadingHTTPServer):
         finally:
             self._open.release()
 
+    def server_bind(self) -> None:
+        """As of any server: that of HTTP asks a network what this machine is called."""
+        TCPServer.server_bind(self)
+        self.server_name, self.server_port = HOST, int(self.server_address[1])
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A connection that broke is nothing to tell."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class _Request(BaseHTTPRequestHandler):

@@ -21,8 +21,10 @@ globalThis.metKept = (() => {
 
   function put(before) {
     const at = page.data.positions.indexOf(before.case);
-    if (before.case !== null && at >= 0) page.put(page.data.description.cases.inputs[at].slice());
-    else if (before.case === null) page.put(page.values().map((value, n) => before.values[names()[n]] ?? value));
+    let values = page.values();
+    if (before.case !== null && at >= 0) values = page.data.description.cases.inputs[at].slice();
+    else if (before.case === null) values = values.map((value, n) => before.values[names()[n]] ?? value);
+    if (values.some((value, n) => !Object.is(value, page.values()[n]))) page.put(values);
     if (stage && before.stage) stage.resume(before.stage);
     zoomTo(before.zoom);
     scrollTo(...before.scroll);

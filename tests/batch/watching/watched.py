@@ -21,7 +21,7 @@ DECK = """\
 #include <two_link.ic>
 #include "length.ic"
 run brief like nominal {
-    duration = LENGTH;
+    duration = length;
     remove settle;
     require volts < 3.55 V;
 }
@@ -30,7 +30,7 @@ default sweep tuned of brief {
     vary links.upper.mass = [45000, 90000] g;
 }
 """
-LENGTH = "#define LENGTH 2 s\n"
+LENGTH = "let length = 2 s;\n"
 
 
 def write_deck(folder: Path, text: str = DECK) -> Path:

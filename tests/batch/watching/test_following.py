@@ -1,0 +1,287 @@
+"""`met view DECK`: a save is a new page, a mistake stands beside the last good one, and in the end nothing is left."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import pty
+import re
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ic
+from met import cli
+from met.messages.render import render
+from met.run import prepare, run
+from tests.batch.watching.watched import DECK, View, replace, started, viewing, write_deck
+
+WATCHED = ("-q",)
+
+
+def page_data(view: View) -> dict[str, object]:
+    """What the script of the page that is shown is given."""
+    text = view.ask(f"page/{view.state['page']}").body.decode()
+    found = re.search(r"^const MET_PAGE = (.*);$", text, re.MULTILINE)
+    assert found is not None
+    data: dict[str, object] = json.loads(found[1])
+    return data
+
+
+def doubles(text: object) -> list[float]:
+    """Numbers of which the page has the bytes."""
+    found: list[float] = np.frombuffer(base64.b64decode(str(text)), "<f8").tolist()
+    return found
+
+
+def test_each_save_is_a_new_page_with_the_cases_that_met_run_has(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path)
+    with viewing(deck, *WATCHED) as view:
+        state = view.whole(page=1)
+        assert (state["run"], state["names"], state["broken"]) == ("tuned", ["brief", "tuned"], False)
+        replace(deck, "0.01,", "0.015,")
+        view.whole(page=2)
+        of_deck = view.numbers()
+        replace(tmp_path / "length.ic", "2 s", "3 s")  # a file that it includes
+        view.whole(page=3)
+        assert page_data(view)["source"] == "sweep"
+        of_file = view.numbers()
+        for found, length in ((of_deck, "2 s"), (of_file, "3 s")):
+            (tmp_path / "length.ic").write_text(f"let length = {length};\n")
+            (experiment,) = ic.compile(deck).experiments
+            expected = run(prepare(experiment), record=False)
+            assert doubles(found["metrics"][0]) == expected.metrics["volts"].tolist()
+            assert (found["status"], found["done"]) == ([0] * 6, 6)
+            missed = int((~expected.met["volts < 3.55 V"]).sum())
+            assert found["verdicts"] == [["volts < 3.55 V", 6 - missed, missed, 0]]
+            points = found["cases"]["overview"]
+            assert points["total"] == 6 and len(points["maps"]) == 1
+        assert doubles(of_deck["metrics"][0]) != doubles(of_file["metrics"][0])
+
+
+def test_a_mistake_is_told_as_met_check_tells_it_beside_the_page_until_it_is_mended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    deck = write_deck(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    with viewing("deck.ic", *WATCHED, cwd=tmp_path) as view:
+        view.whole(page=1)
+        replace(deck, "gearbox.kp = [0.005", "gearbox.kq = [0.005")
+        state = view.until(broken=True, doing="")
+        found = ic.check("deck.ic", select=None)
+        assert state["messages"] == render(found.diagnostics, found.sources) and "deck.ic:9:10" in state["messages"]
+        assert (state["page"], state["run"]) == (1, "tuned") and state["tried"] > state["saved"]
+        replace(deck, "gearbox.kq = [0.005", "gearbox.kp = [0.006")
+        state = view.whole(page=2)
+        assert (state["broken"], state["messages"]) == (False, "")
+
+
+def test_what_changes_no_number_changes_no_page(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path)
+    with viewing(deck, *WATCHED) as view:
+        saved = view.whole(page=1)["saved"]
+        replace(deck, "    require", "    // no more volts than that\n    require")
+        while view.until(doing="")["saved"] == saved:
+            view.hear()
+        assert (view.state["page"], view.state["numbers"]) == (1, 1)
+
+
+def test_a_file_that_was_missing_is_noticed_when_it_comes(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path)
+    (tmp_path / "length.ic").rename(tmp_path / "away")
+    with viewing(deck, *WATCHED) as view:
+        state = view.until(broken=True, doing="")
+        assert "error[D005]" in state["messages"] and state["page"] == 0
+        (tmp_path / "away").rename(tmp_path / "length.ic")
+        view.whole(page=1)
+
+
+SEVERAL = DECK.replace("default ", "") + "sweep ways of brief { vary integrator = [modified_euler, rk4]; }\n"
+
+
+def test_of_several_runs_one_is_chosen_on_the_page_or_named(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path, SEVERAL)
+    with viewing(deck, *WATCHED) as view:
+        state = view.until(broken=True, doing="")
+        assert "error[D162]" in state["messages"] and state["names"] == ["brief", "tuned", "ways"]
+        own = f"http://127.0.0.1:{view.port}"
+        assert view.ask("choose", method="POST", body="run=brief", Origin=own).status == 200
+        assert view.whole(page=1)["run"] == "brief"
+        assert view.ask("choose", method="POST", body="run=ways", Origin=own).status == 200
+        state = view.whole(page=2)
+        assert state["groups"] == ["ways.modified_euler", "ways.rk4"] and state["group"] == "ways.modified_euler"
+        assert view.ask("choose", method="POST", body="run=ways&group=ways.rk4", Origin=own).status == 200
+        assert view.whole(page=3)["group"] == "ways.rk4"
+        replace(deck, "3.55", "3.5")
+        assert view.whole(page=4)["group"] == "ways.rk4"  # it stays chosen
+    with viewing(deck, "tuned", *WATCHED) as view:
+        assert view.whole(page=1)["run"] == "tuned"
+    with viewing(deck, "tund", *WATCHED) as view:
+        state = view.until(broken=True, doing="")
+        assert state["messages"].startswith("error[D164]: no run or sweep `tund` in this deck\n = help: did you mean")
+
+
+def test_what_is_set_on_the_command_line_counts_each_time(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path)
+    with viewing(deck, "brief", "--vary", "gearbox.kp=[0.01, 0.02] V*s/rad", "-D", "SPARE", *WATCHED) as view:
+        view.whole(page=1)
+        replace(deck, "3.55", "3.5")
+        view.whole(page=2)
+        assert len(view.numbers()["status"]) == 2
+
+
+def test_of_many_cases_the_first_are_shown_and_run(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path, DECK.replace("[0.005, 0.01, 0.02] V", "linspace(0.005, 0.02, 600) V"))
+    with viewing(deck, *WATCHED) as view:
+        view.whole(page=1)
+        found = view.numbers()
+        assert (found["done"], len(found["status"]), set(found["status"])) == (1000, 1000, {0})
+        assert "of 1,200 cases these are the first 1,000" in view.ask("page/1").body.decode()
+
+
+FAILING = """\
+arm rail {
+    link cart { mass = 1 kg; shape = box(size = [0.1, 0.1, 0.1] m); }
+    joint slide prismatic { parent = base; child = cart; axis = x; }
+}
+run it {
+    arm = rail;  initial { slide.qd = 1 m/s; }
+    environment { drag = joint_damping { sliding = 50 N*s/m; } }
+    rates { dynamics = 100 Hz; record = 100 Hz; }  duration = 3200 ms;
+    record = [qd];  metric late = final { of = slide.qd; }  require late < 1 m/s;
+}
+default sweep damped of it { vary environment.drag.sliding = [50, 220] N*s/m; }
+"""
+
+
+def test_cases_that_fail_are_told_with_their_cause(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path, FAILING)
+    with viewing(deck, *WATCHED) as view:
+        view.whole(page=1)
+        found = view.numbers()
+        assert (found["failed"], found["status"]) == (1, [0, 1])
+        [[count, cause, first]] = found["failures"]
+        assert (count, first) == (1, 1) and "slide" in cause
+        assert found["verdicts"] == [["late < 1 m/s", 1, 0, 1]]
+
+
+SEARCH = DECK + "search hardest of brief { gearbox.kp = between(0.005, 0.02) V*s/rad; maximise volts; at_most = 20; }\n"
+
+
+def test_of_a_search_it_is_said_that_its_cases_are_not_known_yet(tmp_path: Path) -> None:
+    write_deck(tmp_path, SEARCH)
+    with viewing("deck.ic", "hardest", *WATCHED, cwd=tmp_path) as view:
+        state = view.until(broken=True, doing="")
+        assert state["messages"] == (
+            "error[E476]: `hardest` is a search: which cases it has is known when it has run\n"
+            " = help: `met run deck.ic hardest -o a.h5`, then `met view a.h5`\n"
+            "\n1 error\n"
+        )
+
+
+def test_a_deck_that_has_no_run_says_so_on_the_page(tmp_path: Path) -> None:
+    (tmp_path / "deck.ic").write_text("let a = 1 m;\n")
+    with viewing(tmp_path / "deck.ic", *WATCHED) as view:
+        state = view.until(broken=True, doing="")
+        assert state["messages"].startswith("error[D161]: this deck has no run\n") and state["page"] == 0
+
+
+# Several at once, and the end
+
+
+def test_two_views_of_one_deck_and_two_pages_of_one_view_follow_it(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path)
+    with viewing(deck, *WATCHED) as one, viewing(deck, "brief", *WATCHED) as other:
+        again = View(one.process, one.address)
+        views = (one, other, again)
+        for view in views:
+            view.whole(page=1)
+        assert len({one.port, other.port}) == 2 and one.path != other.path
+        replace(deck, "3.55", "3.5")
+        for view in views:
+            view.whole(page=2)
+        assert [view.state["run"] for view in views] == ["tuned", "brief", "tuned"]
+
+
+@pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 0), (signal.SIGTERM, 143), (signal.SIGHUP, -1)])
+def test_it_ends_when_it_is_told_to_without_a_word(tmp_path: Path, sent: signal.Signals, status: int) -> None:
+    deck = write_deck(tmp_path)
+    with viewing(deck, *WATCHED) as view:
+        view.until(page=1)  # its cases are about to be run
+        view.process.send_signal(sent)
+        out, err = view.process.communicate(timeout=60)
+        assert (out, err, view.process.returncode) == ("", "", status)
+
+
+def test_it_ends_with_its_terminal(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path)
+    terminal, own = pty.openpty()
+    command = [sys.executable, "-m", "met.cli", "view", str(deck)]
+    script = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execv(sys.argv[1], sys.argv[1:])"
+    with subprocess.Popen(
+        [sys.executable, "-c", script, *command], stdin=own, stdout=own, stderr=own, start_new_session=True
+    ) as process:
+        os.close(own)
+        said = b""
+        while b"Ctrl-C ends it" not in said:
+            said += os.read(terminal, 1000)
+        assert said.startswith(b"http://127.0.0.1:")
+        os.close(terminal)
+        assert process.wait(60) == -signal.SIGHUP
+
+
+def test_killed_in_the_middle_it_leaves_nothing_and_its_port_is_free(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path, DECK.replace("[0.005, 0.01, 0.02] V", "linspace(0.005, 0.02, 500) V"))
+    work = tmp_path / "tmp"
+    work.mkdir()
+    before = sorted(tmp_path.rglob("*"))
+    with viewing(deck, *WATCHED, cwd=tmp_path, env={"TMPDIR": str(work)}) as view:
+        view.until(page=1)
+        view.process.kill()
+        view.process.wait(60)
+        assert sorted(tmp_path.rglob("*")) == before
+        port = view.port
+    with viewing(deck, "--port", str(port), *WATCHED) as view:
+        assert view.port == port
+
+
+# Mistakes of usage
+
+
+def test_a_port_that_is_taken_is_a_mistake_that_is_told(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path)
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with started(deck, "--port", str(port)) as process:
+            out, err = process.communicate(timeout=60)
+    assert (out, process.returncode) == ("", 2)
+    assert err == (
+        f"error[E477]: cannot serve on port {port} of 127.0.0.1: address already in use\n"
+        " = help: leave `--port` out: a free one is taken\n"
+        "\n1 error\n"
+    )
+
+
+def test_what_is_no_deck_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_deck(tmp_path)
+    for words, said in (
+        (["dek.ic"], "error[D173]: no deck `dek.ic`\n = help: did you mean `deck.ic`?\n"),
+        (["plan.json"], "`plan.json` is a plan: `met run plan.json` runs it, and `met view` takes the archive\n"),
+        (["deck.ic", "-o", "a.html"], "-o is for archives: the page of the deck `deck.ic` is served; "),
+        (["a.h5", "--port", "8001"], "--port is for decks: the page of the archive `a.h5` is a file\n"),
+        (["a.h5", "--set", "a=1"], "--set is for decks: `a.h5` is an archive, of what was run\n"),
+        (["deck.ic", "--port", "0"], "Invalid value for '--port': 0 is not in the range 1<=x<=65535.\n"),
+    ):
+        assert cli.main(["view", *words]) == 2
+        assert said in capsys.readouterr().err
