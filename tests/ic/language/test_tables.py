@@ -15,5 +15,7 @@ def test_the_tables_of_the_page_are_up_to_date() -> None:
 
 def test_each_large_block_has_its_table() -> None:
     marked = re.findall(r"<!-- table of (\w+) -->\n\|", PAGE.read_text(encoding="utf-8"))
-    assert sorted(marked) == ["joint", "link", "payload", "run", "scale", "search", "servo", "substitute", "sweep", "tune"]
+    assert sorted(marked) == sorted(
+        ["joint", "link", "payload", "run", "scale", "search", "servo", "substitute", "sweep", "tune"]
+    )
     assert set(marked) <= set(BLOCKS)
