@@ -37,15 +37,12 @@ def at_least(value: Real, least: Real) -> Real:
     return where(value > least, value, least)
 
 
-def command(drive: Drive, motor: Motor, voltage: Real, w: Real, found: Balanced | None, mean: float) -> Real:
-    """What the drive is told: the servo's voltage, or the mean torque at it.
+def mean_torque(motor: Motor, begins: Real, found: Balanced | None, mean: float) -> Real:
+    """Mean torque of the joint's own motor over the coming tick, N m, within its limit.
 
-    w      rate of the shaft as the command begins to act, rad/s
-    found  the joint's motion in the coming tick, None where no balance says it;  mean: half of the tick, s
+    begins  its torque as the tick begins, N m
+    found   the joint's motion in the tick, None where no balance says it;  mean: half of the tick, s
     """
-    if drive == "voltage":
-        return voltage
-    begins = motors.torque(motor.kt, motor.resistance, motor.tau_max, voltage, w)
     if found is None:
         return begins
     gained = motor.ratio * found.qdd * mean

@@ -351,25 +351,30 @@ class Substituted:
         motor = self.motor(tape, each)
         return torque(motor.kt, motor.resistance, motor.tau_max, self._voltage(tape, each), w)
 
-    def _command(self, tape: Tape, each: Mounted, w: Real, found: balance.Balanced | None) -> Real:
-        """What the bed's drive is told at this tick, of the joint's size."""
+    def _command(self, tape: Tape, each: Mounted, w: Real, found: balance.Balanced | None) -> Real | None:
+        """The torque that the bed's drive is told at this tick, of the joint's size; None where it is told the servo's
+        voltage."""
+        if each.bed.drive == "voltage":
+            return None
         mean = 0.5 * self.period if each.law.balance == "full" else 0.0
-        return drive.command(each.bed.drive, self.motor(tape, each), self._voltage(tape, each), w, found, mean)
+        return drive.mean_torque(self.motor(tape, each), self._own_torque(tape, each, w), found, mean)
 
     def _on_bed(
-        self, tape: Tape, each: Mounted, told: Real, w: Real, found: balance.Balanced | None
+        self, tape: Tape, each: Mounted, told: Real | None, w: Real, found: balance.Balanced | None
     ) -> balance.Balanced | None:
         """The joint's motion, with the torque that the bed's motor has in the coming tick in place of its own."""
-        if found is None or each.bed.drive == "voltage":
+        if found is None or told is None:
             return found
         net = found.net - self._own_torque(tape, each, w) + told
         return balance.Balanced(found.qdd, found.friction, found.s, net)
 
-    def _send(self, tape: Tape, each: Mounted, told: Real, given: LawOutput) -> Wire:
-        """Puts a command on the wire, and gives back what the amplifiers hold from now on: an older one, if delayed."""
+    def _send(self, tape: Tape, each: Mounted, torque: Real | None, given: LawOutput) -> Wire:
+        """Puts a command on the wire, and gives back what the amplifiers hold from now on: an older one, if delayed.
+        torque: what the drive is told; None: the servo's voltage."""
         name, tells = each.joint, each.bed.drive
         p = self._bed_values(tape, each)
         scale = self.scale(tape, each)
+        told = self._voltage(tape, each) if torque is None else torque
         asked = Wire(told / scale.of(DRIVES[tells][0]), given.torque / scale.torque / p.kt_load)
         with tape.part(READING):
             asked, limited = answer(self._owner(each), each.bed.taken, p, asked)
