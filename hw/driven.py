@@ -40,9 +40,8 @@ class CaseKernel:
         self.last = schedule.ticks // self.divisor
         """The servos' last tick."""
         self._rates = [self.block.inputs[program.inputs.index(f"wire:{joint}.rate")] for joint in self.joints]
-        names = ("voltage", "current")
-        self._outputs = [
-            [self.block.outputs[program.outputs.index(f"wire:{joint}.{name}")] for name in names]
+        self._outputs = [  # what the drive is told, and the load's current
+            [self.block.outputs[at] for at, name in enumerate(program.outputs) if name.startswith(f"wire:{joint}.")]
             for joint in self.joints
         ]
 

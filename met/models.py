@@ -159,7 +159,7 @@ def available(kind: Kind) -> dict[str, Any]:
 def _check_names(kind: Kind, model: Any, found_at: str) -> None:
     """Raise Problem where names of a model's numbers are the same, or the engine's: each is recorded under its name."""
     if kind in ("bed", "law"):
-        taken = [name for name, *_ in _of_engine(kind)]
+        taken = [name for name, *_ in _of_engine(kind, model)]
     else:
         taken = ["command"]
     shown = [part.name for group in HELD for part in getattr(model, group, ())]
@@ -171,12 +171,12 @@ def _check_names(kind: Kind, model: Any, found_at: str) -> None:
             raise Problem(error("E215", message, help="each memory, state, signal and parameter has its own name"))
 
 
-def _of_engine(kind: Kind) -> tuple[tuple[str, str, str], ...]:
+def _of_engine(kind: Kind, model: Any) -> tuple[tuple[str, str, str], ...]:
     """Name, unit and meaning of what the engine holds of a bed, or of a law, besides its memory."""
     if kind == "bed":
-        from met.substitution.bed import OF_BED
+        from met.substitution.bed import of_bed
 
-        return OF_BED
+        return of_bed(model.drive)
     from met.substitution.law import OF_LAW, OF_OBSERVER
 
     return OF_LAW + OF_OBSERVER

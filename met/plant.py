@@ -35,8 +35,8 @@ def servo_period(experiment: Experiment) -> float:
 def plant_program(experiment: Experiment, joint: str, *, case: int = 0, period: float | None = None) -> Program:
     """The program of a joint's emulated bed.
 
-    inputs   V and A that the amplifiers hold; what `start` alone reads: rate of the shaft, rad/s; seed and repeat of
-             the noise
+    inputs   V and A that the amplifiers hold (N m or rad/s for V where the drive is told that); what `start` alone
+             reads: rate of the shaft, rad/s; seed and repeat of the noise
     outputs  the filtered rate as the computer reads it, rad/s; rate (rad/s) and angle (rad) of the shaft itself, 0
              where the bed's model knows no `shaft_angle`
 
@@ -178,7 +178,7 @@ class _Phases:
         self.beds.begin_bed(tape, self.each, tape.input("rate"))
 
     def hold(self, tape: Tape) -> None:
-        tape.write(f"{self.each.joint}.bed.drive_voltage", tape.input("voltage"))
+        tape.write(f"{self.each.joint}.bed.drive_{self.each.bed.drive}", tape.input("voltage"))
         tape.write(f"{self.each.joint}.bed.load_current", tape.input("current"))
 
     def bed(self, tape: Tape) -> None:

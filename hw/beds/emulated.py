@@ -16,13 +16,17 @@ from hw.bed import About, BedDriver, BedSample, BedState, Capability, Fault, Lim
 from hw.beds import greeting
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
+from met import models
 from met.diagnostic import Problem, error
 from met.plant import Plant
-from met.substitution.bed import SIMULATION_PARAMETERS
+from met.substitution.bed import SIMULATION_PARAMETERS, Drive
 
 FINE = 2.0**-20
 """V, A or rad/s of a count where the bed's converter has no resolution. Commands reach 2047 of the unit, and a
 product with the count is exact."""
+
+WIDE = 2.0
+"""Limit of the torque that a bed may be told, in units of the largest that its drive gives."""
 
 FINE_ANGLE = 2.0**-16
 """rad of a count of the encoder."""
@@ -51,10 +55,10 @@ class SteppedPlant(Protocol):
     def shaft_angle(self) -> float: ...
 
 
-def scales(values: Mapping[str, float]) -> Scales:
+def scales(values: Mapping[str, float], drive: Drive = "voltage") -> Scales:
     """The counts of a bed with these parameters (met.substitution.bed): a count is a step of its converters."""
     volts, amperes, rate = (
-        values.get(name, 0.0) or FINE for name in ("converter_voltage", "converter_current", "converter_in")
+        values.get(name, 0.0) or FINE for name in (f"converter_{drive}", "converter_current", "converter_in")
     )
     return Scales(volts, amperes, rate, FINE_ANGLE, FINE, FINE)
 
@@ -73,15 +77,23 @@ class EmulatedBed(BedDriver):
 
     plant             at rest when the driver is made
     bears             A that the load motor bears for ever; its limit unless given
+    drive             what its drive is told
     voltage, current  what the amplifiers hold: V, A
     """
 
     has_line = False
 
     def __init__(
-        self, plant: SteppedPlant, scales: Scales, limits: Limits, *, name: str = "emulated", bears: float | None = None
+        self,
+        plant: SteppedPlant,
+        scales: Scales,
+        limits: Limits,
+        *,
+        name: str = "emulated",
+        bears: float | None = None,
+        drive: Drive = "voltage",
     ) -> None:
-        self._plant, self._name, self._scales, self._limits = plant, name, scales, limits
+        self._plant, self._name, self._scales, self._limits, self._drive = plant, name, scales, limits, drive
         self._bears = limits.current if bears is None else bears
         self._about: About | None = None
         self._rate = self._counted(plant.start(0.0, 0.0, 0.0))
@@ -101,6 +113,7 @@ class EmulatedBed(BedDriver):
             DEADMAN,
             self._scales,
             self._limits,
+            self._drive,
         )
         self.stop()
         self._about, self._in_force = about, greeting.in_force(about)
@@ -230,8 +243,12 @@ def _opened_port(opening: Opening) -> EmulatedBed:
         helps = "`--port firmware` has one; with `--lock-step` it gives the same bits"
         raise Problem(error("E409", "an emulated bed has no line whose transcript could be kept", help=helps))
     values = opening.bed_values()
-    plant = Plant(opening.simulated(), opening.joint, case=opening.row, period=opening.period)
-    return EmulatedBed(plant, scales(values), limits(values, opening.period))
+    experiment = opening.simulated()
+    plant = Plant(experiment, opening.joint, case=opening.row, period=opening.period)
+    use = next(each for each in experiment.structure.substitutions if each.joint == opening.joint)
+    drive = models.find("bed", use.bed, use.place).drive
+    most = {} if drive == "voltage" else {"voltage": WIDE * values["tau_max"]}
+    return EmulatedBed(plant, scales(values, drive), limits(values, opening.period, **most), drive=drive)
 
 
 PORT = PortKind(

@@ -38,7 +38,7 @@ def declarations(tokens: Sequence[Token]) -> dict[str, int]:
         if token.text == "{":
             depth += 1
         elif token.text == "}":
-            depth -= 1
+            depth = max(depth - 1, 0)  # a bracket that closes none is reported, and no more
         elif token.text == UNIT and depth == 0 and is_declaration(tokens, at) and token.source.edition > 1:
             found.setdefault(tokens[at + 1].text, at + 1)
     return found

@@ -4,7 +4,8 @@ Of a joint whose motor is on a bed already, the simulated bed says it, at the ti
 
     w = bed.shaft_rate,  w' = N qdd,  tau_m = tau_m(bed.drive_voltage, w),  tau_l = law.torque
 
-w' and tau_l over their scales, where the bed's motor is of another size than the joint's: all is of the bed's own size.
+Where the drive is told a torque, tau_m is that, and the voltage the one that gives it. w' and tau_l are over their
+scales, where the bed's motor is of another size than the joint's: all is of the bed's own size.
 
 Of any other joint, the joint itself does, at the instants of the dynamics: the load motor gives what the arm takes,
 
@@ -30,13 +31,17 @@ from met.plan.channel import recordable
 from met.run import prepare, run
 from met.servos.motor import Motor
 from met.substitution import bed_scale
+from met.substitution.bed import Drive
 from met.substitution.bed_scale import BedScale
 
 BLOCK_BYTES = 128 << 20
 """Size of the histories that are held at once, where one case's are not larger."""
 
 OF_JOINT = ("qdd", "servo.motor_rate", "servo.motor_torque", "servo.voltage", "tau_load", "J_eff")
-OF_BED = ("qdd", "bed.shaft_rate", "bed.drive_voltage", "law.torque", "J_eff")
+ELECTRICAL = {"kt": "N*m/A", "resistance": "ohm"}
+"""What a bed's motor has by its servo's motor and the scale, where its model does not declare it."""
+
+OF_BED = ("qdd", "bed.shaft_rate", "law.torque", "J_eff")
 
 
 @frozen
@@ -129,15 +134,14 @@ def shaft_work(
 
     rows  of the case table, rising; all of them by default.  progress: called with the number of cases done so far
     """
-    on_bed = substitution_of(experiment, joint) is not None
-    prepared = prepare(_recording(experiment, joint, OF_BED if on_bed else OF_JOINT))
+    prepared = prepare(_recording(experiment, joint, _names(experiment, joint)))
     each = max(1, prepared.experiment.structure.history_bytes)
     size = max(1, BLOCK_BYTES // each)
     wanted = np.arange(experiment.cases.count) if rows is None else rows
     for first in range(0, len(wanted), size):
         block = wanted[first : first + size]
         told = None if progress is None else lambda done, before=first: progress(before + done)
-        yield _block(experiment, joint, run(prepared, block, progress=told), block, on_bed=on_bed)
+        yield _block(experiment, joint, run(prepared, block, progress=told), block)
 
 
 def _recording(experiment: Experiment, joint: str, names: Sequence[str]) -> Experiment:
@@ -153,20 +157,39 @@ def _recording(experiment: Experiment, joint: str, names: Sequence[str]) -> Expe
     return replace(experiment, structure=replace(structure, record=record, schedule=schedule))
 
 
-def _block(experiment: Experiment, joint: str, found: Any, rows: np.ndarray, *, on_bed: bool) -> ShaftWork:
-    of = {name: found.signals[f"{joint}.{name}"] for name in (OF_BED if on_bed else OF_JOINT)}
+def drive_of(use: Substitution) -> Drive:
+    """What the drive of a joint's bed is told."""
+    told: Drive = models.find("bed", use.bed, use.place).drive
+    return told
+
+
+def _names(experiment: Experiment, joint: str) -> tuple[str, ...]:
+    """The channels of a joint that its motors' work is made of."""
+    use = substitution_of(experiment, joint)
+    return OF_JOINT if use is None else (*OF_BED, f"bed.drive_{drive_of(use)}")
+
+
+def _block(experiment: Experiment, joint: str, found: Any, rows: np.ndarray) -> ShaftWork:
+    of = {name: found.signals[f"{joint}.{name}"] for name in _names(experiment, joint)}
+    use = substitution_of(experiment, joint)
     motor = motor_of(experiment, joint, rows)
     ratio = motor["ratio"][:, None]
     scale = scale_of(experiment, joint, rows)
-    if on_bed:
-        bed = motor | {
+    if use is not None:
+        bed = motor | {name: motor[name] / np.ravel(scale.of(unit)) for name, unit in ELECTRICAL.items()}
+        bed |= {
             name: parameter(experiment, path, rows)
             for name in ("inertia", "kt_load", "kt", "resistance", "tau_max")
             if (path := f"{joint}.bed.{name}") in experiment.parameters
         }
-        rate, voltage, load = of["bed.shaft_rate"], of["bed.drive_voltage"], of["law.torque"] / scale.torque
+        rate, load = of["bed.shaft_rate"], of["law.torque"] / scale.torque
         kt, resistance, most = (bed[name][:, None] for name in ("kt", "resistance", "tau_max"))
-        drive = np.clip(kt / resistance * (voltage - kt * rate), -most, most)
+        if drive_of(use) == "voltage":
+            voltage = of["bed.drive_voltage"]
+            drive = np.clip(kt / resistance * (voltage - kt * rate), -most, most)
+        else:
+            drive = np.clip(of["bed.drive_torque"], -most, most)
+            voltage = resistance / kt * drive + kt * rate
     else:
         bed = motor
         rate, voltage, drive = of["servo.motor_rate"], of["servo.voltage"], of["servo.motor_torque"]

@@ -10,6 +10,7 @@ from met.substitution import (
     measured_acceleration,
     torque_balance,
     torque_balance_observer,
+    torque_drive,
     velocity_tracking,
 )
 from met.substitution.bed import BedModel
@@ -22,4 +23,4 @@ LAWS: tuple[Law, ...] = (
     bare.LAW,
     measured_acceleration.LAW,
 )
-BEDS: tuple[BedModel, ...] = (emulated.BED,)
+BEDS: tuple[BedModel, ...] = (emulated.BED, torque_drive.BED)

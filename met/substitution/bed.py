@@ -20,10 +20,15 @@ from met.trace import Real, Truth
 
 @frozen
 class Wire:
-    """The values that the amplifiers hold: voltage of the drive motor, V; current of the load motor, A."""
+    """The values that the amplifiers hold: what the drive is told (`DRIVES`); current of the load motor, A."""
 
-    voltage: Real
+    drive: Real
     current: Real
+
+    @property
+    def voltage(self) -> Real:
+        """Voltage of the drive motor, V, on a bed whose drive is told one."""
+        return self.drive
 
 
 Drive = Literal["voltage", "torque", "rate"]
@@ -35,6 +40,9 @@ DRIVES: Mapping[Drive, tuple[str, str]] = {
     "rate": ("rad/s", "the drive has a rate loop of its own: it is told the rate of the shaft"),
 }
 """Unit of each, and what the drive then does itself."""
+
+SENT: tuple[Drive, ...] = ("voltage", "torque")
+"""What laws send. They know the motor's torque by it, so a drive that is told a rate has none that they know of."""
 
 Draw = Callable[[str], Real]
 """A normal deviate of mean 0 and variance 1 by the name of what is noisy: one a tick, the same however it is run."""
@@ -77,11 +85,10 @@ MEMORY = (Memory(name="shaft_rate", unit="rad/s", doc="rate of the shaft itself"
 reads; without it the encoder stays at 0."""
 
 
-OF_BED = (
-    ("drive_voltage", "V", "voltage that is on the drive motor"),
-    ("load_current", "A", "current that is in the load motor"),
-)
-"""Name, unit and meaning of what the engine holds of every bed, besides the memory of its model."""
+def of_bed(drive: Drive) -> tuple[tuple[str, str, str], ...]:
+    """Name, unit and meaning of what the engine holds of a bed, besides the memory of its model."""
+    meaning = "voltage that is on the drive motor" if drive == "voltage" else f"{drive} that the drive is told"
+    return (f"drive_{drive}", DRIVES[drive][0], meaning), ("load_current", "A", "current that is in the load motor")
 
 
 @frozen(kw_only=True)
@@ -112,11 +119,17 @@ class BedModel:
     @property
     def shown(self) -> tuple[tuple[str, str, str], ...]:
         """Name, unit and meaning of all that can be recorded of a bed of this model, its own memory first."""
-        return (*((memory.name, memory.unit, memory.doc) for memory in self.memory), *OF_BED)
+        return (*((memory.name, memory.unit, memory.doc) for memory in self.memory), *of_bed(self.drive))
 
 
 def check(model: BedModel) -> tuple[str, str] | None:
     """The first fault of a declaration: words that go on after the model's name, and the remedy. None: it is sound."""
+    if model.drive not in SENT:
+        told = f"tells its drive a {model.drive}, and laws send a voltage or a torque"
+        return (
+            told,
+            "with a rate loop of the drive's the motor's torque would have to be read back: run it in torque mode",
+        )
     for needed in PARAMETERS:
         found = [parameter for parameter in model.parameters if parameter.name == needed.name]
         if not found:

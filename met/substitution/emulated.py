@@ -2,63 +2,31 @@
 
     J w' = tau_m(V, w) + Kt_load i - F_v w - s F_c + unevenness,   s as friction sticks
 
-The drive motor stands behind a voltage amplifier, the load motor behind a current amplifier. The tachometer's signal
-goes through a Butterworth filter of order 2 and a converter. Between its substeps the bed is exact while the shaft
-slides on and no limit is reached; a shaft that turns back stops first, within a substep.
-
-Faults, in the order of the shaft's turn: the load torque is uneven (`unevenness` of it, `lobes` a turn), the motors are
-out of line (`once` and `twice` a turn), the tachometer is noisy (`tachometer`, rms, a new value each tick), converters
-have a resolution (0: none).
+The drive motor stands behind a voltage amplifier, the load motor behind a current amplifier; the rest is in
+emulated_shaft.py. Faults: the load torque is uneven (`unevenness` of it, `lobes` a turn), the motors are out of line
+(`once` and `twice` a turn), the tachometer is noisy (`tachometer`, rms, a new value each tick), converters have a
+resolution (0: none).
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
-from met.parameter import Memory, Parameter
+from met.parameter import Parameter
 from met.sensors.digital import converted
-from met.servos.motor import TABLE_1, damping, torque
-from met.substitution import butterworth, shaft
+from met.servos.motor import damping, torque
+from met.substitution import emulated_shaft
 from met.substitution.bed import BedModel, Draw, Wire
-from met.trace import Real, Truth, absolute, clip, sin
-
-SUBSTEP = 250e-6
-"""Longest substep, s. Against one of 50 us a run moves by 0.005 % of its rate, all faults on."""
-
-# where misalignment is worst, rad: any two angles do
-_ONCE_AT, _TWICE_AT = 0.3, 1.1
-
-
-def begin(p: Any, w: Real) -> Mapping[str, Real]:
-    return {"shaft_rate": w, "shaft_angle": 0.0, "filtered": w, "filtered_slope": 0.0}
+from met.trace import Real, Truth, absolute, clip
 
 
 def advance(p: Any, held: Any, wire: Wire, time: float, draw: Draw) -> Mapping[str, Real]:
-    count = math.ceil(time / SUBSTEP - 1e-9)
-    h = time / count
+    def driving(w: Real) -> Real:
+        return torque(p.kt, p.resistance, p.tau_max, wire.voltage, w)
+
     decay = damping(p.kt, p.resistance, p.f_v) / p.inertia
-    of = butterworth.over(p.f_cut, h)
-    load = p.kt_load * wire.current
-    noise = p.tachometer * draw("tachometer")
-    w, angle, x = held.shaft_rate, held.shaft_angle, (held.filtered, held.filtered_slope)
-    for _ in range(count):
-        uneven = (
-            p.unevenness * absolute(load) * sin(p.lobes * angle)
-            + p.once * sin(angle + _ONCE_AT)
-            + p.twice * sin(2.0 * angle + _TWICE_AT)
-        )
-        smooth = torque(p.kt, p.resistance, p.tau_max, wire.voltage, w) + load - p.f_v * w + uneven
-        after = shaft.slid(w, smooth, p.f_c, inertia=p.inertia, decay=decay, time=h)
-        x = butterworth.along_line(of, x, w + noise, after + noise)
-        angle = angle + 0.5 * h * (w + after)
-        w = after
-    return {"shaft_rate": w, "shaft_angle": angle, "filtered": x[0], "filtered_slope": x[1]}
-
-
-def read(p: Any, held: Any) -> Real:
-    return converted(held.filtered, p.converter_in)
+    return emulated_shaft.turned(p, held, wire.current, time, draw, driving, decay)
 
 
 def taken(p: Any, wire: Wire) -> tuple[Wire, Truth]:
@@ -67,74 +35,23 @@ def taken(p: Any, wire: Wire) -> tuple[Wire, Truth]:
     return held, absolute(current) > p.i_max
 
 
-ASSUMED = "assumed: of the size that such motors have"
-
 BED = BedModel(
     name="emulated",
     doc=__doc__,
     parameters=(
         Parameter(name="kt", unit="N*m/A", above=0.0, of_servo="kt", doc="torque constant of the drive motor there is"),
         Parameter(name="resistance", unit="ohm", above=0.0, of_servo="resistance", doc="its armature resistance"),
-        Parameter(name="tau_max", unit="N*m", above=0.0, of_servo="tau_max", doc="its largest torque"),
-        Parameter(name="f_c", unit="N*m", at_least=0.0, of_servo="f_c", doc="Coulomb friction of the shaft"),
-        Parameter(name="f_v", unit="N*m*s/rad", at_least=0.0, of_servo="f_v", doc="viscous friction of the shaft"),
-        Parameter(name="inertia", unit="kg*m^2", above=0.0, of_servo="j_m", doc="inertia of the shaft, both rotors"),
-        Parameter(
-            name="kt_load",
-            unit="N*m/A",
-            default=0.072,
-            above=0.0,
-            source=TABLE_1,
-            doc="torque constant of the load motor",
-        ),
-        Parameter(name="i_max", unit="A", default=3.0, above=0.0, source=ASSUMED, doc="limit of the load's amplifier"),
-        Parameter(
-            name="f_cut", unit="Hz", default=50.0, above=0.0, source=TABLE_1, doc="cut-off of the tachometer's filter"
-        ),
-        Parameter(
-            name="delay",
-            default=0.0,
-            at_least=0.0,
-            at_most=3.0,
-            whole=True,
-            doc="whole ticks from reading the rate to acting on it; 1 for most hardware",
-        ),
-        Parameter(
-            name="faults",
-            shape="text",
-            default="none",
-            doc="`none` or `typical`: what the faults are that are not written one by one",
-        ),
-        Parameter(name="unevenness", at_least=0.0, default=0.0, doc="share of the load torque that comes and goes"),
-        Parameter(name="lobes", above=0.0, default=7.0, source=ASSUMED, doc="how often a turn it does"),
-        Parameter(name="once", unit="N*m", at_least=0.0, default=0.0, doc="misalignment, once a turn"),
-        Parameter(name="twice", unit="N*m", at_least=0.0, default=0.0, doc="misalignment, twice a turn"),
-        Parameter(name="tachometer", unit="rad/s", at_least=0.0, default=0.0, doc="noise of the tachometer, rms"),
-        Parameter(name="converter_in", unit="rad/s", at_least=0.0, default=0.0, doc="resolution of the rate's reading"),
+        emulated_shaft.TAU_MAX,
+        *emulated_shaft.SHAFT,
+        *emulated_shaft.REST,
         Parameter(name="converter_voltage", unit="V", at_least=0.0, default=0.0, doc="resolution of the voltage"),
-        Parameter(name="converter_current", unit="A", at_least=0.0, default=0.0, doc="resolution of the current"),
+        emulated_shaft.CURRENT,
     ),
-    memory=(
-        Memory(name="shaft_rate", unit="rad/s", doc="rate of the shaft"),
-        Memory(name="shaft_angle", unit="rad", doc="angle of the shaft"),
-        Memory(name="filtered", unit="rad/s", doc="rate behind the filter"),
-        Memory(name="filtered_slope", unit="rad/s^2", doc="its slope"),
-    ),
-    begin=begin,
+    memory=emulated_shaft.MEMORY,
+    begin=emulated_shaft.begin,
     advance=advance,
-    read=read,
+    read=emulated_shaft.read,
     taken=taken,
-    presets={
-        "none": {},
-        # 12-bit converters over +-400 rad/s, +-20 V and +-3 A
-        "typical": {
-            "unevenness": 0.02,
-            "once": 0.002,
-            "twice": 0.001,
-            "tachometer": 0.1,
-            "converter_in": 800.0 / 4096.0,
-            "converter_voltage": 40.0 / 4096.0,
-            "converter_current": 6.0 / 4096.0,
-        },
-    },
+    # a 12-bit converter over +-20 V
+    presets={"none": {}, "typical": {**emulated_shaft.TYPICAL, "converter_voltage": 40.0 / 4096.0}},
 )

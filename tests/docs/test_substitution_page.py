@@ -68,6 +68,45 @@ def test_the_crane_of_the_page_is_off_by_what_it_says(tmp_path: Path) -> None:
     assert f"differs from `software` by {off('larger', 'software')}." in PAGE
 
 
+DRIVES = re.findall(r"^\| `(\w+)` \| (\S+) % \| (\S+) % \|$", PAGE, re.MULTILINE)
+
+
+def off_on_beds(folder: Path, beds: dict[str, str]) -> list[str]:
+    """Errors of the shoulder of two_link.ic on these beds, by law, against its run in software: `0.14`."""
+    runs = "".join(
+        f"run on_{n} like own {{ substitute shoulder {{ bed = {bed};  law = {law}; }} }}\n"
+        for n, (bed, law) in enumerate(beds.items())
+    )
+    (folder / "drives.ic").write_text(
+        "#include <two_link.ic>\nrun own like nominal { rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }"
+        f"  duration = 5 s;  remove settle;  record = [qd]; }}\n{runs}",
+        encoding="utf-8",
+    )
+    rates = [
+        engine.run(ic.compile(folder / "drives.ic", select=[name]).experiments[0]).signals["qd"][0, :, 0]
+        for name in ("own", *(f"on_{n}" for n in range(len(beds))))
+    ]
+    return [f"{100.0 * np.sqrt(np.mean((each - rates[0]) ** 2)) / SLOW:#.2g}" for each in rates[1:]]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", DRIVES, ids=[row[0] for row in DRIVES])
+def test_a_drive_told_a_torque_is_off_by_what_the_page_says(row: tuple[str, str, str], tmp_path: Path) -> None:
+    beds = {"emulated(delay = 1)": row[0], "torque_drive(delay = 1)": row[0]}
+    assert off_on_beds(tmp_path, beds) == [*row[1:]]
+
+
+@pytest.mark.slow
+def test_so_is_one_that_is_slow_or_gives_too_much_or_has_faults(tmp_path: Path) -> None:
+    beds = [
+        "torque_drive(delay = 1, bandwidth = 300 Hz)", "torque_drive(delay = 1, gain = 1.07)",
+        "torque_drive(delay = 1, faults = typical, bandwidth = 1 kHz)", "emulated(delay = 1, faults = typical)",
+    ]  # fmt: skip
+    slow, much, typical, voltage = off_on_beds(tmp_path, dict.fromkeys(beds, "velocity_tracking"))
+    assert f"by {slow} % with a current loop of 300 Hz, by {much} % with a drive" in PAGE
+    assert f"and by {typical} % with typical faults and one of 1 kHz (`emulated`: {voltage} %)" in PAGE
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", ["100 Hz", "200 Hz", "1 kHz", "2 kHz"])
 def test_the_limits_of_the_page_are_those_that_are_predicted(rate: str) -> None:

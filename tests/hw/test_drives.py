@@ -13,6 +13,8 @@ from hw.bed import About
 from hw.beds import emulated
 from hw.beds.emulated import EmulatedBed
 from met.diagnostic import Problem
+from met.substitution import BEDS
+from met.substitution.bed import check
 from tests.hw.device import Shaft
 
 DECK = """\
@@ -40,4 +42,18 @@ def test_a_drive_that_takes_a_torque_is_not_sent_voltages(tmp_path: Path) -> Non
         "E438",
         "bed `emulated` takes a torque, and `emulated` of joint `shoulder` sends it a voltage",
     )
-    assert told.help == ("bed models that send a torque: none",)
+    assert told.help == ("bed models that send a torque: torque_drive",)
+
+
+def test_a_drive_that_takes_a_torque_is_sent_torques(tmp_path: Path) -> None:
+    (tmp_path / "deck.ic").write_text(DECK.replace("emulated(", "torque_drive("))
+    (experiment,) = ic.compile(tmp_path / "deck.ic", select=["bench"]).experiments
+    case._check_drive(replace(about(), drive="torque"), experiment, "shoulder")
+    with pytest.raises(Problem, match="takes a voltage, and `torque_drive` of joint `shoulder` sends it a torque"):
+        case._check_drive(about(), experiment, "shoulder")
+
+
+def test_a_bed_model_that_tells_its_drive_a_rate_is_refused() -> None:
+    wrong = check(replace(BEDS[0], drive="rate"))
+    assert wrong is not None
+    assert wrong[0] == "tells its drive a rate, and laws send a voltage or a torque"

@@ -27,7 +27,7 @@ from met.program.unheld import Unheld, holding_torques, unheld
 CLOSE = 1e-11
 """Change of a number over a period, as a share of it and at most this itself, that is none."""
 
-HOLD = (".bed.drive_voltage", ".bed.load_current", ":queue.")
+HOLD = (".bed.drive_", ".bed.load_current", ":queue.")
 """Cells of a bed in which what a law asks for waits and acts, after the joint's name."""
 
 MOST_STEPS = 8

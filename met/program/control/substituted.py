@@ -25,8 +25,8 @@ from met.program.control.sensing import READING
 from met.program.system import Actuator, System
 from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.motor import Motor, torque
-from met.substitution import balance, bed_scale, observer
-from met.substitution.bed import BedModel, Wire
+from met.substitution import balance, bed_scale, drive, observer
+from met.substitution.bed import DRIVES, BedModel, Wire
 from met.substitution.bed_scale import BedScale
 from met.substitution.law import Law, LawInput, LawOutput
 from met.substitution.shaft import lasting
@@ -104,7 +104,7 @@ class Substituted:
             {
                 f"wire:{each.joint}.{name}": cell_names.SENT(each.joint, name)
                 for each in self.mounted
-                for name in ("voltage", "current")
+                for name in (each.bed.drive, "current")
             }
             if self.wire
             else {}
@@ -204,7 +204,8 @@ class Substituted:
     def advance_bed(self, tape: Tape, each: Mounted, period: float, *, seed: Real, repeat: Real, tick: Real) -> None:
         """One emulated bed, by period s under what its amplifiers hold; its noise is that of the number `tick`."""
         p = self._bed_values(tape, each)
-        wire = Wire(tape.read(f"{each.joint}.bed.drive_voltage"), tape.read(f"{each.joint}.bed.load_current"))
+        held = (f"drive_{each.bed.drive}", "load_current")
+        wire = Wire(*(tape.read(f"{each.joint}.bed.{name}") for name in held))
 
         def draw(name: str) -> Real:
             return normal(Stream(seed, repeat, f"{each.joint}.bed.{name}"), tick)
@@ -276,12 +277,16 @@ class Substituted:
         found: Sequence[balance.Balanced | None] = [None] * len(self.mounted)
         if self.law.balance != "none":
             sides = [
-                self._side(tape, each, w, self._voltage(tape, each), self._band(tape, each))
+                self._side(tape, each, w, self._own_torque(tape, each, w), self._band(tape, each))
                 for each, w in zip(self.mounted, ahead, strict=True)
             ]
             solve = balance.bare if self.law.balance == "bare" else balance.balanced
             found = solve(sides, Lambda, b_0)
-        inputs = [self._law_input(tape, each, one) for each, one in zip(self.mounted, found, strict=True)]
+        commands = [self._command(tape, *each) for each in zip(self.mounted, ahead, found, strict=True)]
+        inputs = [
+            self._law_input(tape, each, self._on_bed(tape, each, told, w, one))
+            for each, told, w, one in zip(self.mounted, commands, ahead, found, strict=True)
+        ]
         p = [self._law_values(tape, each) for each in self.mounted]
         held = [
             NamedValues(
@@ -292,11 +297,11 @@ class Substituted:
         owner = f"law `{self.law.name}`"
         given = answer(owner, self.law.give, p, held, inputs, lambda qdd: balance.loads(Lambda, b_0, qdd))
         applied = []
-        for each, (one, memory) in zip(self.mounted, given, strict=True):
+        for each, told, (one, memory) in zip(self.mounted, commands, given, strict=True):
             returned(owner, "give", memory, (m.name for m in each.law.memory))
             for name, value in memory.items():
                 tape.write(f"{each.joint}.law.{name}", value)
-            applied.append(self._send(tape, each, one))
+            applied.append(self._send(tape, each, told, one))
             tape.write(cell_names.GIVEN(each.joint), one.qdd)
             tape.write(f"{each.joint}.law.torque", one.torque)
         if self.law.observer:
@@ -333,38 +338,62 @@ class Substituted:
 
     def _queued(self, tape: Tape, each: Mounted, ago: Real) -> Wire:
         """The pair that was asked for this many ticks ago, from 1 to `QUEUE`."""
-        voltage: Real = 0.0
+        told: Real = 0.0
         current: Real = 0.0
         for i in range(QUEUE):
             due = ago == float(i + 1)
-            voltage = where(due, tape.read(cell_names.QUEUED(each.joint, i, "voltage")), voltage)
+            told = where(due, tape.read(cell_names.QUEUED(each.joint, i, each.bed.drive)), told)
             current = where(due, tape.read(cell_names.QUEUED(each.joint, i, "current")), current)
-        return Wire(voltage, current)
+        return Wire(told, current)
 
-    def _send(self, tape: Tape, each: Mounted, given: LawOutput) -> Wire:
-        """Puts a command on the wire, and gives back what the amplifiers hold from now on: an older one, if delayed."""
-        name = each.joint
+    def _own_torque(self, tape: Tape, each: Mounted, w: Real) -> Real:
+        """Torque of the joint's own motor at its servo's voltage and a rate of its shaft, N m."""
+        motor = self.motor(tape, each)
+        return torque(motor.kt, motor.resistance, motor.tau_max, self._voltage(tape, each), w)
+
+    def _command(self, tape: Tape, each: Mounted, w: Real, found: balance.Balanced | None) -> Real | None:
+        """The torque that the bed's drive is told at this tick, of the joint's size; None where it is told the servo's
+        voltage."""
+        if each.bed.drive == "voltage":
+            return None
+        mean = 0.5 * self.period if each.law.balance == "full" else 0.0
+        return drive.mean_torque(self.motor(tape, each), self._own_torque(tape, each, w), found, mean)
+
+    def _on_bed(
+        self, tape: Tape, each: Mounted, told: Real | None, w: Real, found: balance.Balanced | None
+    ) -> balance.Balanced | None:
+        """The joint's motion, with the torque that the bed's motor has in the coming tick in place of its own."""
+        if found is None or told is None:
+            return found
+        net = found.net - self._own_torque(tape, each, w) + told
+        return balance.Balanced(found.qdd, found.friction, found.s, net)
+
+    def _send(self, tape: Tape, each: Mounted, torque: Real | None, given: LawOutput) -> Wire:
+        """Puts a command on the wire, and gives back what the amplifiers hold from now on: an older one, if delayed.
+        torque: what the drive is told; None: the servo's voltage."""
+        name, tells = each.joint, each.bed.drive
         p = self._bed_values(tape, each)
         scale = self.scale(tape, each)
-        asked = Wire(self._voltage(tape, each) / scale.voltage, given.torque / scale.torque / p.kt_load)
+        told = self._voltage(tape, each) if torque is None else torque
+        asked = Wire(told / scale.of(DRIVES[tells][0]), given.torque / scale.torque / p.kt_load)
         with tape.part(READING):
             asked, limited = answer(self._owner(each), each.bed.taken, p, asked)
         cells.count(tape, limited, LIMITED)
         delay = self._delay(tape, each)
         late = self._queued(tape, each, delay)
         at_once = delay == 0.0
-        applied = Wire(where(at_once, asked.voltage, late.voltage), where(at_once, asked.current, late.current))
+        applied = Wire(where(at_once, asked.drive, late.drive), where(at_once, asked.current, late.current))
         if self.wire:
             early = self._queued(tape, each, delay - float(self.late))
             now = delay <= float(self.late)
-            tape.write(cell_names.SENT(name, "voltage"), where(now, asked.voltage, early.voltage))
+            tape.write(cell_names.SENT(name, tells), where(now, asked.drive, early.drive))
             tape.write(cell_names.SENT(name, "current"), where(now, asked.current, early.current))
         for i in reversed(range(1, QUEUE)):
-            tape.write(cell_names.QUEUED(name, i, "voltage"), tape.read(cell_names.QUEUED(name, i - 1, "voltage")))
+            tape.write(cell_names.QUEUED(name, i, tells), tape.read(cell_names.QUEUED(name, i - 1, tells)))
             tape.write(cell_names.QUEUED(name, i, "current"), tape.read(cell_names.QUEUED(name, i - 1, "current")))
-        tape.write(cell_names.QUEUED(name, 0, "voltage"), asked.voltage)
+        tape.write(cell_names.QUEUED(name, 0, tells), asked.drive)
         tape.write(cell_names.QUEUED(name, 0, "current"), asked.current)
-        tape.write(f"{name}.bed.drive_voltage", applied.voltage)
+        tape.write(f"{name}.bed.drive_{tells}", applied.drive)
         tape.write(f"{name}.bed.load_current", applied.current)
         return applied
 
@@ -373,8 +402,7 @@ class Substituted:
         sides = []
         for each, wire in zip(self.mounted, applied, strict=True):
             w_ref = tape.read(cell_names.REFERENCE_RATE(each.joint))
-            voltage = wire.voltage * self.scale(tape, each).voltage
-            sides.append(self._side(tape, each, w_ref, voltage, 0.0))
+            sides.append(self._side(tape, each, w_ref, self._bed_torque(tape, each, wire, w_ref), 0.0, bed=True))
             self._observe(tape, each, self._predicted(tape, each, self._observed(tape, each), wire))
         for each, side, one in zip(self.mounted, sides, balance.balanced(sides, Lambda, b_0), strict=True):
             after = side.w + self.period * side.ratio * one.qdd
@@ -382,13 +410,21 @@ class Substituted:
             tape.write(cell_names.REFERENCE_RATE(each.joint), after)
             tape.write(f"{each.joint}.law.reference_rate", side.w)
 
-    def _side(self, tape: Tape, each: Mounted, w: Real, voltage: Real, band: Real) -> balance.JointSide:
-        """A joint's side of the balance at a rate of its shaft and a voltage."""
+    def _bed_torque(self, tape: Tape, each: Mounted, wire: Wire, w: Real) -> Real:
+        """Torque of a motor as the law believes it, told what the amplifiers hold, at a rate of its shaft, N m."""
+        told = wire.drive * self.scale(tape, each).of(DRIVES[each.bed.drive][0])
+        return drive.bed_torque(each.bed.drive, self.motor(tape, each), told, w)
+
+    def _side(
+        self, tape: Tape, each: Mounted, w: Real, driving: Real, band: Real, *, bed: bool = False
+    ) -> balance.JointSide:
+        """A joint's side of the balance at a rate of its shaft and a torque of its motor. bed: that of the bed's."""
         motor = self.motor(tape, each)
-        mean = 0.0 if each.law.balance == "bare" else 0.5 * motor.damping * self.period
+        brakes = motor.f_v if bed and each.bed.drive != "voltage" else motor.damping
+        mean = 0.0 if each.law.balance == "bare" else 0.5 * brakes * self.period
         unknown = self._observed(tape, each)[3] if each.law.observer else 0.0
         viscous = 0.0 if each.law.balance == "bare" else motor.f_v * w
-        net = torque(motor.kt, motor.resistance, motor.tau_max, voltage, w) + unknown - viscous
+        net = driving + unknown - viscous
         return balance.JointSide(
             motor.ratio, motor.ratio * motor.ratio * (motor.inertia + mean), net, motor.f_c, w, band
         )
@@ -396,7 +432,10 @@ class Substituted:
     def _law_input(self, tape: Tape, each: Mounted, found: balance.Balanced | None) -> LawInput:
         motor, inertia, name = self.motor(tape, each), self._shaft_inertia(tape, each), each.joint
         mean = each.law.balance == "full"
-        extra = inertia * (self.period / lasting(motor.damping / inertia, self.period) - 1.0) if mean else 0.0
+        extra: Real = 0.0
+        if mean:
+            brakes = drive.bed_damping(each.bed.drive, motor, inertia, self.period)
+            extra = inertia * (self.period / lasting(brakes / inertia, self.period) - 1.0)
         return LawInput(
             motor=motor,
             inertia=inertia,
@@ -415,11 +454,12 @@ class Substituted:
         motor, band, scale = self.motor(tape, each), self._band(tape, each), self.scale(tape, each)
         load = self._bed_values(tape, each).kt_load * wire.current * scale.torque
         w, d = x[0], x[3]
-        drive = torque(motor.kt, motor.resistance, motor.tau_max, wire.voltage * scale.voltage, w)
-        rest = clip(drive + d + load - motor.f_v * w, -motor.f_c, motor.f_c)
+        driving = self._bed_torque(tape, each, wire, w)
+        rest = clip(driving + d + load - motor.f_v * w, -motor.f_c, motor.f_c)
         dry = where(absolute(w) > band, sign(w) * motor.f_c, rest)
         # Back-EMF is in the model; where the drive is at its limit this takes it out again.
-        u = drive + motor.kt * motor.kt / motor.resistance * w - dry + load
+        own = driving + motor.kt * motor.kt / motor.resistance * w if each.bed.drive == "voltage" else driving
+        u = own - dry + load
         return observer.predicted(self._model(tape, each), x, u)
 
     # What is known of a joint.
@@ -444,7 +484,7 @@ class Substituted:
 
     def _model(self, tape: Tape, each: Mounted) -> observer.DiscreteModel:
         inertia, f_cut = self._shaft_inertia(tape, each), self._bed_values(tape, each).f_cut
-        damping = self.motor(tape, each).damping
+        damping = drive.bed_damping(each.bed.drive, self.motor(tape, each), inertia, self.period)
         return observer.model(inertia=inertia, damping=damping, f_cut=f_cut, period=self.period)
 
     def _noise(self, tape: Tape, each: Mounted) -> observer.Noise:

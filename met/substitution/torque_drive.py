@@ -1,0 +1,73 @@
+"""A drive with a current loop of its own, emulated: it is told the torque of the motor, as most drives on a CAN are.
+
+    J w' = tau_m + Kt_load i - F_v w - s F_c + unevenness,   tau_m' = 2 pi bandwidth (gain tau_told - tau_m)
+
+The servo's law up to the motor's torque is ours: its voltage, the motor's resistance and back-EMF are computed, and the
+drive is told the mean torque of the coming tick. What is tried is the drive's torque: how fast it comes (`bandwidth`),
+how true it is (`gain`), where it ends (`tau_max`), besides the shaft, its friction and faults, which are those of
+`emulated`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from met.parameter import Memory, Parameter
+from met.sensors.digital import converted
+from met.substitution import emulated_shaft
+from met.substitution.bed import BedModel, Draw, Wire
+from met.substitution.drive import LEAST, at_least
+from met.trace import Real, Truth, absolute, clip, exp
+
+
+def begin(p: Any, w: Real) -> Mapping[str, Real]:
+    return {**emulated_shaft.begin(p, w), "motor_torque": 0.0}
+
+
+def advance(p: Any, held: Any, wire: Wire, time: float, draw: Draw) -> Mapping[str, Real]:
+    h = emulated_shaft.substep(time)
+    times = 2.0 * math.pi * p.bandwidth * h
+    left = exp(-times)
+    goal, tau = p.gain * wire.drive, held.motor_torque
+
+    def driving(w: Real) -> Real:
+        nonlocal tau
+        away, tau = tau - goal, goal + (tau - goal) * left
+        return goal + away * ((1.0 - left) / times)  # the mean of the substep
+
+    decay = at_least(p.f_v / p.inertia, LEAST / h)
+    found = emulated_shaft.turned(p, held, wire.current, time, draw, driving, decay)
+    return {**found, "motor_torque": tau}
+
+
+def taken(p: Any, wire: Wire) -> tuple[Wire, Truth]:
+    told, current = converted(wire.drive, p.converter_torque), converted(wire.current, p.converter_current)
+    held = Wire(clip(told, -p.tau_max, p.tau_max), clip(current, -p.i_max, p.i_max))
+    return held, absolute(current) > p.i_max
+
+
+BED = BedModel(
+    name="torque_drive",
+    doc=__doc__,
+    drive="torque",
+    parameters=(
+        emulated_shaft.TAU_MAX,
+        Parameter(name="gain", above=0.0, default=1.0, doc="torque that the drive gives for what it is told"),
+        Parameter(
+            name="bandwidth", unit="Hz", above=0.0, default=math.inf, doc="of the drive's current loop; inf: at once"
+        ),
+        *emulated_shaft.SHAFT,
+        *emulated_shaft.REST,
+        Parameter(name="converter_torque", unit="N*m", at_least=0.0, default=0.0, doc="resolution of the torque told"),
+        emulated_shaft.CURRENT,
+    ),
+    memory=(*emulated_shaft.MEMORY, Memory(name="motor_torque", unit="N*m", doc="torque of the drive motor")),
+    begin=begin,
+    advance=advance,
+    read=emulated_shaft.read,
+    taken=taken,
+    # 12 bits over +-0.15 N m, the torque of such a motor
+    presets={"none": {}, "typical": {**emulated_shaft.TYPICAL, "converter_torque": 0.3 / 4096.0}},
+)
