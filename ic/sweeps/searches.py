@@ -82,7 +82,7 @@ def read_search(
     if reader.against is not None:
         with complaints.gather():
             against = _against(definitions, complaints, reader, graph, noise_seed, fixed)
-    if complaints.error_count > before:
+    if complaints.error_count > before or (reader.against is not None and against is None):
         return empty
     chosen = [each for each in reader.chosen if each.parameter.path not in fixed]
     if not chosen:
@@ -337,7 +337,8 @@ def _against(
     seed: int,
     fixed: Collection[str],
 ) -> Sweep | None:
-    """The sweep that a tuning is held against. Raises Problem D364 where it is none that it can be held against."""
+    """The sweep that a tuning is held against; None where it has mistakes, which are reported. Raises Problem D364 where
+    it is none that it can be held against."""
     name = reader.against
     assert name is not None
     known, place = definitions.of_kind("sweep"), name.place
@@ -354,7 +355,7 @@ def _against(
                             help=remedy))  # fmt: skip
     before = complaints.error_count
     sweep = read_sweep(definitions, complaints, found, graph, seed=seed)
-    if complaints.error_count > before:
+    if complaints.error_count > before or not (sweep.axes or sweep.repeated):  # that it varies nothing is reported
         return None
     cannot = [
         *((column.place, "it chooses what decides the program") for column in sweep.chosen),

@@ -280,6 +280,16 @@ def test_a_tuning_that_is_none_is_refused(tmp_path: Path, old: str, new: str, me
     assert found[: len(message)] == message
 
 
+def test_a_sweep_that_varies_nothing_is_refused_once(tmp_path: Path) -> None:
+    text = f"sweep odd of hold {{ }}\n{TUNE.replace('against loads', 'against odd')}"
+    for name in ("gains", "odd"):
+        assert lines(said(tmp_path, text, name)) == [
+            "error[D126]: sweep `odd` varies nothing", "= help: write `vary PATH = [...] UNIT;`",
+        ]  # fmt: skip
+    found = check(tmp_path / "d.ic", include_dirs=[], defines=[], select=["odd", "gains"])
+    assert [each.code for each in found.diagnostics] == ["D126"]
+
+
 @pytest.mark.parametrize(
     ("block", "why"),
     [
