@@ -6,11 +6,12 @@ wrong with it is told where its program is built.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from types import SimpleNamespace
 from typing import Any, TypeVar
 
 from met import models
+from met.parameter import Parameter
 from met.plan import ServoUse
 from met.plan.uses import quantities, servo_parts
 from met.servos.servo import JointMotion, Seen, Setpoint
@@ -44,6 +45,13 @@ def reads(use: ServoUse, values: Mapping[str, Any]) -> frozenset[str] | None:
     return frozenset(inputs & set(quantities(use)))
 
 
+def of_law(use: ServoUse, values: Mapping[str, Any]) -> Hashable:
+    """All that `reads` goes by: uses of a servo in which this is equal read the same."""
+    decides = tuple((each.name, values[each.name]) for each in servo_parts(use).parameters if not _is_input(each))
+    kind = use.command.kind if use.command is not None else "none"
+    return use.model, use.words, use.continuous, kind, decides
+
+
 def accelerates(use: ServoUse, values: Mapping[str, Any]) -> bool | None:
     """True where the servo gives its joint's acceleration, at least at times. None: it could not be recorded."""
     servo, parts, graph = models.find("servo", use.model, use.place), servo_parts(use), Graph()
@@ -59,13 +67,18 @@ def _parameters(graph: Graph, declared: Iterable[Any], values: Mapping[str, Any]
     made: dict[str, Any] = {}
     for each in declared:
         path = f":{each.name}"
-        if each.shape == "number" and not each.decides:
-            made[each.name] = graph.input(path)
+        if not _is_input(each):
+            made[each.name] = values[each.name]
         elif each.shape == "vector":
             made[each.name] = tuple(graph.input(f"{path}.{axis}") for axis in "xyz")
         else:
-            made[each.name] = values[each.name]
+            made[each.name] = graph.input(path)
     return SimpleNamespace(**made)
+
+
+def _is_input(parameter: Parameter) -> bool:
+    """True of a parameter that has a name for its number."""
+    return parameter.shape == "vector" or (parameter.shape == "number" and not parameter.decides)
 
 
 def _named(graph: Graph, parts: Iterable[Any]) -> SimpleNamespace:

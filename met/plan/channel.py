@@ -42,7 +42,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 
 from met import models, units
@@ -195,6 +195,17 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
     Jacobians, which are as many as links times joints, are there of the first link and of links that are mentioned: in
     these names, or by the structure's own record and metrics.
     """
+    own = [*(recorded.name for recorded in structure.record), *(use.of for use in structure.metrics)]
+    return _channels(structure, [*names, *own], all_owners=True)
+
+
+def channels_beside(structure: Structure, paths: Iterable[str]) -> dict[str, Channel]:
+    """The channels of these paths that there are, with all others of the same joints and links, and of the arm."""
+    return _channels(structure, list(paths), all_owners=False)
+
+
+def _channels(structure: Structure, names: list[str], *, all_owners: bool) -> dict[str, Channel]:
+    """all_owners: of every joint and link; else of those which the names, and expressions of the structure, are of."""
     servos = {use.joint: use for use in structure.servos}
     on_beds = {use.joint: use for use in structure.substitutions}
     dynamics = structure.schedule.dynamics
@@ -207,7 +218,11 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
         for each in [f"{path}.{component}" for component in components] or [path]:
             found[each] = Channel(each, unit, doc, dynamics, joint, components, frame, True)
 
+    mentions = [*names, *(path for expression in structure.expressions for path in expression.channels)]
+    joints = {name.partition(".")[0] for name in mentions}
     for joint in structure.moving:
+        if not all_owners and joint.name not in joints:
+            continue
         for name, unit, doc in MOTION:
             add(f"{joint.name}.{name}", joint_unit(unit, joint), doc, dynamics, joint.name, JOINT_AXIS)
         for name, unit, doc, components, frame in (*OF_JOINT, *([LIMIT_MARGIN] if joint.limits else [])):
@@ -244,11 +259,11 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
         add(path, unit, f"what the {on_link.model} reads", on_link.divisor, "")
         for state in sensor_parts(on_link, "states"):
             add(f"{path}.{state.name}", watched_unit(state.unit, unit), state.doc, dynamics, "")
-    mentions = [*names, *(recorded.name for recorded in structure.record), *(use.of for use in structure.metrics)]
-    mentions += [path for expression in structure.expressions for path in expression.channels]
     mentioned = {name.split(".")[1] for name in mentions if name.startswith("links.")}
     mentioned |= {link.name for link in structure.links[:1]}
     for link in structure.links:
+        if not all_owners and link.name not in mentioned:
+            continue
         for name, unit, doc, parts, frame in OF_LINK:
             derive(f"links.{link.name}.{name}", unit, doc, parts, frame)
         if link.name not in mentioned:
@@ -300,14 +315,17 @@ def joint_of(name: str) -> str:
     return name.partition(".")[0]
 
 
-def recordable(structure: Structure, names: Iterable[str] = ()) -> dict[str, tuple[Recorded, ...]]:
-    """Every name that a record may write, with the variables that it stands for (names: as of `channels`).
+def recordable(
+    structure: Structure, names: Iterable[str] = (), known: Mapping[str, Channel] | None = None
+) -> dict[str, tuple[Recorded, ...]]:
+    """Every name that a record may write, with the variables that it stands for (names: as of `channels`; known: what
+    that comes to, where it is at hand).
 
     A name stands for one number (`elbow.q`, `elbow.reaction.force.x`), for a vector (`links.tip.position`), for that of
     all joints that have it (`q`, `reaction.force`), or for several variables (`reaction`, `energy`; `sensors`: what
     those of links read).
     """
-    known = channels(structure, names)
+    known = channels(structure, names) if known is None else known
     own: dict[str, Channel] = {}  # numbers and vectors, a vector before its components
     joints: dict[str, list[str]] = {}
     for path, channel in known.items():
@@ -337,7 +355,7 @@ def _of_all(name: str, channel: Channel) -> str:
 
 def _enter(
     found: dict[str, tuple[Recorded, ...]],
-    known: dict[str, Channel],
+    known: Mapping[str, Channel],
     name: str,
     joints: tuple[str, ...],
     components: tuple[str, ...],

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from met import models
 from met.plan import MetricUse, Recorded, Structure
-from met.plan.channel import channel_paths, channels, watched_unit
+from met.plan.channel import channel_paths, channels_beside, watched_unit
 from met.plan.linear_uses import FIGURES
 
 OF_ALL = {"rel": "1", "time": "s"}
@@ -30,7 +30,7 @@ def grappled_payloads(structure: Structure) -> tuple[str, ...]:
 def metric_units(structure: Structure, linear: Sequence[MetricUse] = ()) -> dict[str, str]:
     """SI unit of each metric's result; `of` in its declaration stands for the channel's unit. linear: those
     of linear answers."""
-    watched = channels(structure, [use.of for use in structure.metrics])
+    watched = channels_beside(structure, [use.of for use in structure.metrics])
     own = {use.name: _metric_unit(use, watched[use.of].unit) for use in structure.metrics}
     return own | {use.name: FIGURES[use.model].unit for use in linear}
 

@@ -227,15 +227,11 @@ class Parts:
 
 def parts(servo: Servo, words: Mapping[str, str], *, continuous: bool = False) -> Parts:
     """The parts of a servo that are present under these words, by parameter; a word left out has its default."""
-    words = {each.name: each.default for each in servo.parameters if isinstance(each.default, str)} | dict(words)
-    return Parts(
-        tuple(part for part in servo.parameters if is_present(part, words)),
-        tuple(part for part in servo.outputs if is_present(part, words)),
-        tuple(part for part in servo.integrals if is_present(part, words)),
-        tuple(part for part in servo.states if is_present(part, words)),
-        tuple(part for part in servo.signals if is_present(part, words)),
-        continuous,
-    )
+    groups = (servo.parameters, servo.outputs, servo.integrals, servo.states, servo.signals)
+    if any(part.only is not None for group in groups for part in group):
+        words = {each.name: each.default for each in servo.parameters if isinstance(each.default, str)} | dict(words)
+        groups = tuple(tuple(part for part in group if is_present(part, words)) for group in groups)  # type: ignore[assignment]
+    return Parts(*groups, continuous)
 
 
 if not TYPE_CHECKING:  # a type checker knows the new names alone

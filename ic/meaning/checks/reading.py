@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from typing import Any
 
 from ic.meaning.control.servos import Use
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
-from met.analysis.probe import reads
+from met.analysis.probe import of_law, reads
 from met.diagnostic import leave_out
 from met.plan import ServoUse, Structure
 from met.plan.uses import quantities
@@ -18,15 +18,19 @@ from met.plan.uses import quantities
 def remark_unread(scope: Scope, uses: Iterable[Use], structure: Structure) -> None:
     """Report sensors that no law sees through and nothing records, and dead ones that no law would see."""
     servos = {each.joint: each for each in structure.servos}
+    known: dict[Hashable, frozenset[str] | None] = {}  # many joints have one law
     for use in uses:
         servo = servos[use.joint]
-        read = reads(servo, use.parameters) if use.parameters is not None else None
+        read = None
+        if use.parameters is not None:
+            law = of_law(servo, use.parameters)
+            read = known[law] = known[law] if law in known else reads(servo, use.parameters)
         if read is None:
             continue
         label = f"the law of servo `{use.definition}` ({servo.model})"
         under = f" under a {servo.command.kind} command" if servo.command is not None else ""
-        known = [of for of in quantities(servo) if of in read]
-        helps = known_words(f"it reads{under}", known) if known else f"it reads nothing of its joint{under}"
+        seen = [of for of in quantities(servo) if of in read]
+        helps = known_words(f"it reads{under}", seen) if seen else f"it reads nothing of its joint{under}"
         for sensor in servo.sensors:
             if sensor.of not in read and sensor.place is not None and not _kept(structure, servo, sensor.of):
                 scope.complaints.remark(

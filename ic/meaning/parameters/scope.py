@@ -341,8 +341,8 @@ class Scope:
         if other is None or isinstance(other.value, str | tuple) or self.checks.failed(of):
             self.checks.fail(owner.join(wanted.name))
             return None
-        own = self._coordinate(owner, wanted.name, owner.homes) is not None
-        own = own or bool(self._given(owner, wanted.name, owner.homes))
+        paths = owner.paths(wanted.name, owner.homes)
+        own = self._coordinate(owner, wanted.name, owner.homes, paths) is not None or bool(self._given(paths))
         origin = replace(other.origin, note="" if own else f"that of `{of}`")
         if over is not None and not own:
             note = f"that of `{of}` over its scale"
@@ -361,6 +361,7 @@ class Scope:
             True,
             other.expression,
             needs=(of,),
+            paths=paths,
         )
         for paths in self.targets.values():
             if not own and of in paths:
@@ -454,15 +455,16 @@ class Scope:
                 self.value_checks.dimension(owner.as_written_in(homes), wanted, written)
                 value = self._plain(written.number)
             origin = self._origin(item, place)
-        coordinate = self._coordinate(owner, name, homes)
-        if value is None and (item is not None or coordinate is None) and not self._given(owner, name, homes):
+        paths = owner.paths(name, homes)
+        coordinate = self._coordinate(owner, name, homes, paths)
+        if value is None and (item is not None or coordinate is None) and not self._given(paths):
             if item is None:
                 self._missing(owner, wanted)
             for path in (owner.join(name), *(owner.join_local(home, name) for home in homes)):
                 self.checks.fail(path)
             return None
         expression = part if part is not None else item.value if item is not None else None
-        return self._finish(owner, wanted, name, homes, value, origin, place, record, expression)
+        return self._finish(owner, wanted, name, homes, value, origin, place, record, expression, paths=paths)
 
     def _finish(
         self,
@@ -476,11 +478,14 @@ class Scope:
         record: bool,
         expression: Expression | None = None,
         needs: tuple[str, ...] = (),
+        paths: tuple[str, ...] | None = None,
     ) -> Real:
+        """paths: all of the parameter (`Owner.paths`), where they are at hand."""
         path = owner.join(name)
-        for known in owner.paths(name, homes):
+        paths = owner.paths(name, homes) if paths is None else paths
+        for known in paths:
             self.known.setdefault(known, []).append(path)
-        for number, given in enumerate(self._given(owner, name, homes)):  # those of the run first
+        for number, given in enumerate(self._given(paths)):  # those of the run first
             if origin.note == ON_COMMAND_LINE if is_on_command_line(given.value.place) else number > 0:
                 self.complaints.error(
                     "D232",
@@ -493,7 +498,7 @@ class Scope:
             value, expression, place = self._plain(given.value.number), given.expression, given.value.place
             self._check_instead(owner, wanted, given.value, path)
             origin = given.overriding(origin)
-        coordinate = self._coordinate(owner, name, homes)
+        coordinate = self._coordinate(owner, name, homes, paths)
         if coordinate is not None:
             if origin.note == ON_COMMAND_LINE and not is_on_command_line(coordinate.place):
                 self.complaints.error(
@@ -526,9 +531,9 @@ class Scope:
             self.complaints.add(*problem.diagnostics)
             self.checks.fail(path)
 
-    def _given(self, owner: Owner, name: str, homes: Iterable[str]) -> list[CommandLineValue]:
-        """The numbers that the run and `--set` give for this parameter; several where several of its paths are set."""
-        found = [path for path in owner.paths(name, homes) if path in self.settings] if self.settings else []
+    def _given(self, paths: Iterable[str]) -> list[CommandLineValue]:
+        """The numbers that the run and `--set` give for a parameter of these paths; several where several are set."""
+        found = [path for path in paths if path in self.settings] if self.settings else []
         found.sort(key=lambda path: is_on_command_line(self.settings[path].place))
         for path in found:
             if path not in self.evaluated_settings:
@@ -537,10 +542,10 @@ class Scope:
                     self.evaluated_settings[path] = evaluate_setting(self.settings[path], path, self.names)
         return [given for path in found if (given := self.evaluated_settings[path]) is not None]
 
-    def _coordinate(self, owner: Owner, name: str, homes: tuple[str, ...]) -> VariedPath | None:
+    def _coordinate(self, owner: Owner, name: str, homes: tuple[str, ...], paths: tuple[str, ...]) -> VariedPath | None:
+        """The coordinate that varies a parameter; paths: all of it."""
         if not self.varied:
             return None
-        paths = owner.paths(name, homes)
         found = [varied for path, varied in self.varied.items() if path in paths]
         for other in found[1:]:
             self.targets.setdefault(other.path, [])

@@ -49,10 +49,13 @@ class ConditionMargin:
     mixed: tuple[Value, ...] = ()
 
 
-def resolve_signals(scope: Scope, block: MergedBlock, structure: Structure) -> ChannelTable:
-    """Every `signal NAME = EXPRESSION;` of a run, each of channels and of the signals before it."""
+def resolve_signals(scope: Scope, block: MergedBlock, structure: Structure, names: Iterable[str] = ()) -> ChannelTable:
+    """Every `signal NAME = EXPRESSION;` of a run, each of channels and of the signals before it.
+
+    names  for which the table is to have channels besides, as `met.plan.channel.channels` takes them
+    """
     written = [*(item.value for item in block.of_kind("signal")), *watched(block)]
-    signals = ChannelTable(scope, structure, [each for each in written if each is not None])
+    signals = ChannelTable(scope, structure, [each for each in written if each is not None], names)
     for item in block.of_kind("signal"):
         path = f"{SIGNALS}.{item.name}"
         signals.lost.add(path)
@@ -76,9 +79,11 @@ class ChannelTable:
     expressions  signals of the deck, in order
     """
 
-    def __init__(self, scope: Scope, structure: Structure, written: Iterable[Expression]) -> None:
+    def __init__(
+        self, scope: Scope, structure: Structure, written: Iterable[Expression], names: Iterable[str] = ()
+    ) -> None:
         self.scope, self.structure = scope, structure
-        self.known = channels(structure, [name.text for each in written for name in _names(each)])
+        self.known = channels(structure, [*(name.text for each in written for name in _names(each)), *names])
         self.lost: set[str] = set()
         self.expressions: list[SignalExpression] = []
         self._values: dict[str, Value] = {}

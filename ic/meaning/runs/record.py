@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Binary, Call, Expression, List, Name, Unary, WithUnit
@@ -14,7 +14,7 @@ from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import Help, Label, Place, did_you_mean, nearest, write
 from met.plan import Recorded, Structure
-from met.plan.channel import FAMILIES, carries, recordable
+from met.plan.channel import FAMILIES, Channel, carries, recordable
 
 COMPUTED = (Binary, Call, Unary, WithUnit)
 """Expressions that a signal could be."""
@@ -23,8 +23,10 @@ OF_SERVO = frozenset({"servo", "bed", "law"})
 """Heads of channels that a joint has only with a servo, or with its motor on a bed."""
 
 
-def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Structure) -> tuple[Recorded, ...]:
-    """The variables that are recorded, in the deck's order."""
+def resolve_record(
+    scope: Scope, run: Owner, item: Item | None, structure: Structure, channels: Mapping[str, Channel]
+) -> tuple[Recorded, ...]:
+    """The variables that are recorded, in the deck's order. channels: of the structure and of `names_in_record`."""
     scope.not_sweepable["record"] = NotSweepable("is one for the whole sweep", "record all that any case needs")
     if item is None:
         scope.complaints.missing(
@@ -40,7 +42,7 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
         )
         return ()
     asked = [name for expression in (item.value, *item.appended) for name in _names(scope, item, expression)]
-    known = recordable(structure, [name.text for name in asked])
+    known = recordable(structure, known=channels)
     found: dict[str, tuple[Recorded, Place]] = {}
     for name in asked:
         made = known.get(name.text)
@@ -66,6 +68,12 @@ def resolve_record(scope: Scope, run: Owner, item: Item | None, structure: Struc
             else:
                 found[each.name] = (each, name.place)
     return tuple(recorded for recorded, _ in found.values())
+
+
+def names_in_record(item: Item | None) -> list[str]:
+    """The names that a record has, as far as it is a list of names."""
+    lists = [] if item is None else [item.value, *item.appended]
+    return [name.text for each in lists if isinstance(each, List) for name in each.items if isinstance(name, Name)]
 
 
 def of_lost(scope: Scope, name: Name, structure: Structure) -> bool:

@@ -44,7 +44,7 @@ from ic.meaning.runs.linear import resolve_linear, resolve_linear_metrics
 from ic.meaning.runs.metrics import resolve_metrics
 from ic.meaning.runs.over_time import metrics_over_time
 from ic.meaning.runs.rates import resolve_rates, resolve_schedule
-from ic.meaning.runs.record import resolve_record
+from ic.meaning.runs.record import names_in_record, resolve_record
 from ic.meaning.runs.requirements import read_requirements, resolve_requirements
 from ic.meaning.runs.step_errors import resolve_step_errors
 from ic.meaning.runs.tolerances import resolve_tolerances
@@ -170,9 +170,9 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     if known:
         check_spins(scope, block, structure)
     check_guides(scope, guides, structure)
-    signals = resolve_signals(scope, block, structure)
+    signals = resolve_signals(scope, block, structure, names_in_record(block.get("record")))
     structure = replace(structure, expressions=tuple(signals.expressions))
-    record = resolve_record(scope, run, block.get("record"), structure)
+    record = resolve_record(scope, run, block.get("record"), structure, signals.known)
     metrics, watched = resolve_metrics(scope, block, signals)
     structure = replace(structure, metrics=metrics, record=record, expressions=(*structure.expressions, *watched))
     linear = resolve_linear(scope, block, structure)

@@ -89,3 +89,38 @@ def test_it_is_told_where_no_output_is_made_of_it(servo: str, of: str, read: boo
 )
 def test_a_sensor_whose_reading_is_kept_does_something(change: tuple[str, str], tmp_path: Path) -> None:
     assert codes(tmp_path, ARM, sensed(SERVO, "q"), changed(RUN, change)) == []
+
+
+TWO = """\
+arm pair {
+    link boom { mass = 2 kg;  shape = rod(length = 1 m, along = x); }
+    link tip { mass = 2 kg;  shape = rod(length = 1 m, along = x); }
+    joint hinge revolute { parent = base;  child = boom;  axis = z; }
+    joint knee revolute { parent = boom;  child = tip;  at = [1, 0, 0] m;  axis = z; }
+}
+run both {
+    arm = pair;  servos { hinge = HINGE;  knee = KNEE; }
+    rates { dynamics = 1 kHz;  servos = 1 kHz; }
+    duration = 1 s;  record = [q];
+}
+"""
+
+
+POSITIONED = "drive { command = position(0.1 rad);  k_position = 2 1/s; }"
+
+
+@pytest.mark.parametrize(
+    ("hinge", "knee", "told"),
+    [
+        ("drive", "drive", ["hinge", "knee"]),
+        ("drive", "drive { kp = 0.05 V*s/rad; }", ["hinge", "knee"]),
+        ("drive", POSITIONED, ["hinge"]),
+        (POSITIONED, "drive", ["knee"]),
+    ],
+)
+def test_of_two_joints_with_one_servo_the_command_of_each_counts(
+    hinge: str, knee: str, told: list[str], tmp_path: Path
+) -> None:
+    said = shown(tmp_path, sensed(SERVO, "q"), changed(TWO, ("HINGE", hinge), ("KNEE", knee)))
+    assert [joint for joint in ("hinge", "knee") if f"[{joint}.servo.sensor.q]" in said] == told
+    assert said.count("D290") == len(told)
