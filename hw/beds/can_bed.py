@@ -1,11 +1,11 @@
 """A bed of two drives on a CAN bus, `can:BENCH.toml`: one turns the motor under test, the other loads it.
 
-A drive has a current loop of its own. It is told a torque, or a voltage where its dialect has that; what a bed's driver
-is told, the voltage of one motor and the current of the other, becomes that here:
+A drive has a current loop of its own, and is told a torque. What a bed's driver is told, the voltage of one motor and
+the current of the other, becomes torques here:
 
-    load   torque = kt_load * current
-    drive  the voltage itself; or the torque that an armature of kt and resistance takes from that voltage at the rate
-           that was read last, kt/R (V - kt w), at most torque_max
+    load   kt_load i
+    drive  what an armature of kt and resistance takes from the voltage at the rate that was read last,
+           kt/R (V - kt w), at most torque_max
 
 Limits of voltage, current, their slews, rate and heat are watched here, besides those of the drives; what no host can
 do, to stop a shaft whose host is dead, the drives' own watchdogs do, and are made to prove it each time before arming.
@@ -15,7 +15,6 @@ Both drives tell of one shaft: an answer counts only where they agree.
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -45,6 +44,9 @@ STALE = 0.05
 OWED, GRACE = 0.01, 3e-4
 """Time after a question without an answer for which that may come yet, s; and how much longer it is listened then, so
 that it is not taken for the answer to a later question: frames have no numbers."""
+
+QUIET = 1e-3
+"""Time for which what is still to come is taken before drives are asked outside of a run, s."""
 
 DISAGREED = 5
 """Answers in a row in which the drives disagree, after which the bed stops."""
@@ -86,11 +88,7 @@ class CanBed(BedDriver):
         self._talk = talk = Talk(line, self._drives)
         bench = self._bench
         facts = [drive.greet(talk) for drive in self._drives]
-        says = {"velocity": False, "difference": True}
-        sides = [
-            Side(drive, each, says.get(bench.rate, each.difference))
-            for drive, each in zip(self._drives, facts, strict=True)
-        ]
+        sides = [Side(drive, each) for drive, each in zip(self._drives, facts, strict=True)]
         self._sides = (sides[0], sides[1])
         drive, load = self._sides
         figures = drive.drive.entry.figures
@@ -100,8 +98,7 @@ class CanBed(BedDriver):
         self._rated = load.drive.entry.figures["current_rated"]
         self._acceleration = (self._most + self._kt_load * current) / bench.shaft["inertia"]
         self._supply_max = min([bench.supply["voltage_max"], *(each.supply_max for each in facts if each.supply_max)])
-        by_voltage = drive.drive.entry.quantity == "voltage"
-        volts = drive.facts.voltage_count if by_voltage else drive.facts.torque_count * self._resistance / self._kt
+        volts = drive.facts.torque_count * self._resistance / self._kt
         scales = Scales(volts or FINE, load.facts.torque_count / self._kt_load or FINE, FINE, FINE_ANGLE, FINE, FINE)
         hz = min(each.control_hz for each in facts)
         rate = min(bench.shaft["rate_max"], *(each.rate_max for each in facts))
@@ -125,8 +122,9 @@ class CanBed(BedDriver):
         self._hold(0, 0, self._epoch)
         self._warmed, self._disagreed, self._owed_until = self._epoch, 0, self._epoch
         self._ask_both(about, agreed=False)
-        for side in self._sides:
-            side.begin()
+        readings = self._readings()
+        for side, reading in zip(self._sides, readings, strict=True):
+            side.begin(reading, readings[0].time)
         self._filtered = (self._sides[0].rate, 0.0)
         self.remarks = self._remarks()
         self._state = BedState.STOPPED if self._faults else BedState.DISARMED
@@ -149,16 +147,23 @@ class CanBed(BedDriver):
         """Longest time that the frames of an exchange take on the bus, s."""
         bus = self._bench.bus
         speeds = float(bus.get("bitrate", NOMINAL)), float(bus.get("data_bitrate", FAST))
-        frames = [each for d in self._drives for each in (*d.told(0.0), *d.asked(), *d.answers())]
-        return sum(on_bus(frame, *speeds) for frame in frames)
+        return sum(on_bus(frame, *speeds) for frame in self._exchanged())
+
+    def _exchanged(self) -> list[CanFrame]:
+        """Frames like those of an exchange, both ways."""
+        asked = [() if each.answers_commands else each.asked() for each in self._drives]
+        return [
+            frame
+            for each, asks in zip(self._drives, asked, strict=True)
+            for frame in (*each.told(0.0), *asks, *each.answers())
+        ]
 
     def line_time(self, about: About) -> float:
         return self._on_bus()
 
     def _remarks(self) -> tuple[tuple[str, str], ...]:
         bus, cut = self._bench.bus, self._bench.shaft["filter"]
-        frames = sum(len(each.told(0.0)) + len(each.asked()) + len(each.answers()) for each in self._drives)
-        most = f"{frames} frames an exchange, {1e3 * self._on_bus():.3g} ms on the bus at most"
+        most = f"{len(self._exchanged())} frames an exchange, {1e3 * self._on_bus():.3g} ms on the bus at most"
         filter = f"{cut:g} Hz here, the deck's f_cut" if cut else "none here: the deck's f_cut is the drive's"
         sides = ((side.drive.entry.role, side.words) for side in self._sides)
         return (*sides, ("bus", f"{bus['interface']} {bus['channel']}: {most}"), ("filter", filter))
@@ -310,8 +315,7 @@ class CanBed(BedDriver):
         return True
 
     def _agree(self) -> bool:
-        period = self.period if math.isfinite(self.period) else 1e-3
-        return agree(self._sides, self._readings(), self._acceleration, period)
+        return agree(self._sides, self._readings(), self._acceleration)
 
     def _readings(self) -> tuple[DriveReading, DriveReading]:
         one, other = (drive.reading for drive in self._drives)
@@ -324,6 +328,7 @@ class CanBed(BedDriver):
         talk = self._talk
         asks = [frame for drive in self._drives for frame in drive.asked()]
         for _ in range(ASKS):
+            talk.pump(talk.line.now() + QUIET)
             since = talk.line.now()
             if not talk.ask(asks, partial(self._answered, since)):
                 late = next(d for d in self._drives if d.reading is None or d.reading.time <= since)
@@ -380,9 +385,7 @@ class CanBed(BedDriver):
         return self._there().scales
 
     def _told(self, voltage: float) -> float:
-        """What the drive under test is told for a voltage: that, or the torque of an armature."""
-        if self._drives[0].entry.quantity == "voltage":
-            return voltage
+        """The torque of an armature at a voltage (V), which the drive under test is told, N m."""
         torque = self._kt / self._resistance * (voltage - self._kt * self._sides[0].rate)
         return min(max(torque, -self._most), self._most)
 
@@ -454,7 +457,7 @@ def _opened_port(opening: Opening) -> CanBed:
 PORT = PortKind(
     scheme="can",
     address="BENCH.toml",
-    doc="Two drives on a CAN bus: ODrive, moteus, Damiao ...; the file says which.",
+    doc="Two drives on a CAN bus: ODrive or Damiao; the file says which.",
     open=_opened_port,
     lock_step=lambda name, requested: requested,
 )

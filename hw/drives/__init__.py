@@ -6,7 +6,8 @@ in hw/players, which the tests of every dialect are derived from.
 
 from collections.abc import Mapping
 
+from hw.drives.damiao import DamiaoDrive
 from hw.drives.drive import Drive
 from hw.drives.odrive import OdriveDrive
 
-DIALECTS: Mapping[str, type[Drive]] = {each.dialect: each for each in (OdriveDrive,)}
+DIALECTS: Mapping[str, type[Drive]] = {each.dialect: each for each in (OdriveDrive, DamiaoDrive)}

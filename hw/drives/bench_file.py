@@ -46,16 +46,10 @@ FIGURES: Mapping[str, Mapping[str, tuple[str, float | None]]] = {
 }
 """The quantities of each table: their SI unit, and what they are where the file does not say; None: it has to."""
 
-QUANTITIES = ("voltage", "torque")
-"""The quantities by which the drive under test may be told what the servo's law came to."""
-
-RATES = ("velocity", "difference")
-"""The sources of the shaft's rate: the drive's own estimate, or its angle's difference from one sample to the next."""
-
 _WORDS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
-    "shaft": {"rate": RATES},
+    "shaft": {},
     "supply": {},
-    "drive": {"dialect": (), "quantity": QUANTITIES, "endpoints": ()},
+    "drive": {"dialect": (), "endpoints": ()},
     "load": {"dialect": (), "endpoints": ()},
 }
 _TABLES = ("bus", *FIGURES)
@@ -68,7 +62,6 @@ class DriveEntry:
 
     role      `drive`, the one under test, or `load`
     sense     1, or -1 where the drive counts the other way round: two motors that face each other
-    quantity  of `QUANTITIES`, by which it is commanded
     figures   those of `FIGURES`, SI
     endpoints  path of the file that says where an ODrive's properties are; "" where none is given
     """
@@ -77,15 +70,13 @@ class DriveEntry:
     dialect: str
     node: int
     sense: int
-    quantity: str
     figures: Mapping[str, float]
     endpoints: str = ""
 
 
 @frozen
 class TwoDrives:
-    """A bench of two drives on a bus. bus: what `can.Bus` is called with;  shaft, supply: of `FIGURES`, SI;  rate: of
-    `RATES`; "" where the dialect decides"""
+    """A bench of two drives on a bus. bus: what `can.Bus` is called with;  shaft, supply: of `FIGURES`, SI"""
 
     name: str
     bus: Mapping[str, Any]
@@ -93,7 +84,6 @@ class TwoDrives:
     supply: Mapping[str, float]
     drive: DriveEntry
     load: DriveEntry
-    rate: str = ""
     file: str = field(default="", compare=False)
 
 
@@ -140,8 +130,7 @@ class _BenchFile:
                 f"drive and load are both node {load.node}", "each has a number of its own", "load", "node"
             )
         shaft, supply = self._figures("shaft"), self._figures("supply")
-        rate = self._word("shaft", "rate", "")
-        return TwoDrives(name, self._bus(), shaft, supply, drive, load, rate, self.name)
+        return TwoDrives(name, self._bus(), shaft, supply, drive, load, self.name)
 
     def _bus(self) -> dict[str, Any]:
         found = self.tables["bus"]
@@ -165,12 +154,11 @@ class _BenchFile:
                 f"`reversed` of `[{role}]` is neither true nor false", "`reversed = true`", role, "reversed"
             )
         dialect = self._word(role, "dialect", None)
-        quantity = self._word(role, "quantity", "torque") if role == "drive" else "torque"
         endpoints = self._word(role, "endpoints", "")
         if endpoints:
             endpoints = os.path.join(os.path.dirname(self.name), endpoints)
         figures = self._figures(role, ("node", "reversed"))
-        return DriveEntry(role, dialect, node, -1 if reversed_ else 1, quantity, figures, endpoints)
+        return DriveEntry(role, dialect, node, -1 if reversed_ else 1, figures, endpoints)
 
     def _figures(self, table: str, others: tuple[str, ...] = ()) -> dict[str, float]:
         known = (*FIGURES[table], *_WORDS[table], *others)

@@ -1,7 +1,7 @@
 """The host's side of one drive on a CAN bus, as far as all dialects have it in common; each is a file of this folder.
 
-A drive of a bench is told a torque (N m) or a voltage (V), and says its angle (rad) and rate (rad/s), all of them in
-the sense of the bench's shaft. It disarms itself where it hears nothing for the time of its watchdog.
+A drive of a bench is told a torque (N m), and says its angle (rad) and rate (rad/s), all of them in the sense of the
+bench's shaft. It disarms itself where it hears nothing for the time of its watchdog.
 
     drive.greet(talk)        who is there: dialect, firmware, limits; it is idle afterwards
     drive.armed()            frames that arm it with nothing commanded, to be sent until its state says so
@@ -53,10 +53,9 @@ class DriveFacts:
     watchdog        s without a command after which it stops by itself
     torque_max      N m, the most that it gives;  rate_max: rad/s
     control_hz      rate of its own control, Hz
-    torque_count, voltage_count, angle_count, rate_count  N m, V, rad, rad/s of the smallest step that the dialect can
-                    tell; 0 where it has none (floats)
+    torque_count, angle_count, rate_count  N m, rad, rad/s of the smallest step that the dialect can tell; 0 where it
+                    has none (floats)
     angle_range     rad after which its angle begins anew; 0 where it does not
-    difference      True where its angle's difference says more of the rate than its own estimate
     braking         True where it shorts its windings when it stops; False where the shaft coasts
     supply_max      V beyond which it stops by itself; 0 where it does not say
     """
@@ -68,11 +67,9 @@ class DriveFacts:
     rate_max: float
     control_hz: float
     torque_count: float = 0.0
-    voltage_count: float = 0.0
     angle_count: float = 0.0
     rate_count: float = 0.0
     angle_range: float = 0.0
-    difference: bool = False
     braking: bool = False
     supply_max: float = 0.0
 
@@ -110,7 +107,7 @@ class Drive(ABC):
 
     @abstractmethod
     def told(self, value: float) -> Sequence[CanFrame]:
-        """Frames of a command, of the quantity that its entry says: N m or V."""
+        """Frames of a command, N m."""
 
     @abstractmethod
     def asked(self) -> Sequence[CanFrame]:

@@ -132,8 +132,6 @@ class OdriveDrive(Drive):
         watchdog = self._read(talk, endpoints, WATCHDOG_TIMEOUT)
         if not all(math.isfinite(each) and each > 0.0 for each in (kt, current, rate, supply, watchdog)):
             raise self.wrong("a limit of its is no number above zero", f"{', '.join(NEEDED[3:])}: set them")
-        if self.entry.quantity != "torque":
-            raise self.wrong("it takes no voltage over CAN", '`quantity = "torque"`')
         seen = self._beats
         if not talk.pump(talk.line.now() + 0.5, lambda: self._beats > seen + 1 and self.state != DriveState.DRIVING):
             raise talk.silent(self, "its heartbeat")

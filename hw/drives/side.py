@@ -7,7 +7,7 @@ import math
 from hw.drives.drive import Drive, DriveFacts, DriveReading
 
 LONGEST_STEP = 0.05
-"""Longest time between two samples whose difference is still taken for a rate, s."""
+"""Longest time between two samples of which one is still held against the other, s."""
 
 SKEW = 2e-4
 """Longest time between the instants at which two drives sampled, besides what their frames' times tell, s."""
@@ -25,96 +25,82 @@ class Side:
     angle  rad, without jumps, from what it was at the greeting;  rate: rad/s;  time: s of the line's clock
     """
 
-    def __init__(self, drive: Drive, facts: DriveFacts, difference: bool) -> None:
-        self.drive, self.facts, self.difference = drive, facts, difference
+    def __init__(self, drive: Drive, facts: DriveFacts) -> None:
+        self.drive, self.facts = drive, facts
         self.angle = self.rate = self.time = 0.0
-        self._before: DriveReading | None = None
-        self._zero: float | None = None
+        self.zero_unsure = 0.0
+        """By how much the angle may be off because the shaft turned when it began to count, rad."""
+        self._told = 0.0
+        """The angle as it was told last, rad."""
 
     @property
     def words(self) -> str:
         """What the drive is, for whoever asks what the bed is."""
         d, f = self.drive, self.facts
-        told = (f.voltage_count, "V") if d.entry.quantity == "voltage" else (f.torque_count, "N*m")
-        counts = (told, (f.angle_count, "rad"), (f.rate_count, "rad/s"))
+        counts = ((f.torque_count, "N*m"), (f.angle_count, "rad"), (f.rate_count, "rad/s"))
         steps = ", ".join(f"{count:.3g} {unit}" for count, unit in counts if count)
         said = [
             f"node {d.node}, {d.dialect} {f.firmware}, {f.hardware}",
-            f"told a {d.entry.quantity}{', counts it the other way round' if d.sense < 0 else ''}",
             f"in steps of {steps}" if steps else "in floats",
-            f"rate by {'the differences of its angle' if self.difference else 'its own estimate'}",
+            *(["counts the other way round"] if d.sense < 0 else []),
         ]
         return "; ".join(said if d.supply is None else [*said, f"supply {d.supply:.4g} V"])
 
-    def begin(self) -> None:
-        """Let the angle count from the last answer."""
-        reading = self.drive.reading
-        assert reading is not None
-        self._before, self._zero, self.angle, self.rate, self.time = (
-            reading,
+    def begin(self, reading: DriveReading, at: float) -> None:
+        """Let the angle count from what it is, by an answer, at a time of the line's clock, s."""
+        self._told, self.angle, self.rate, self.time = (
             reading.angle,
-            0.0,
+            -reading.rate * (at - reading.time),
             reading.rate,
             reading.time,
         )
-        if self.difference:
-            self.rate = 0.0
+        self.zero_unsure = abs(reading.rate) * SKEW
 
-    def looked(self, reading: DriveReading) -> tuple[float, float]:
-        """Angle (rad, without jumps) and rate (rad/s) that an answer would mean; nothing is kept."""
-        before = self._before
-        assert before is not None
-        turned = reading.angle - before.angle
+    def angle_of(self, reading: DriveReading) -> float:
+        """The angle that an answer means, rad, without jumps."""
+        turned = reading.angle - self._told
         if self.facts.angle_range:
             turned = math.remainder(turned, self.facts.angle_range)
-        time = reading.time - before.time
-        if not self.difference:
-            return self.angle + turned, reading.rate
-        return self.angle + turned, turned / time if 0.0 < time < LONGEST_STEP else reading.rate
+        return self.angle + turned
 
     def follow(self, reading: DriveReading) -> None:
         """Keep what an answer means."""
-        self.angle, self.rate = self.looked(reading)
-        self._before, self.time = reading, reading.time
+        self.angle, self.rate, self.time = self.angle_of(reading), reading.rate, reading.time
+        self._told = reading.angle
 
-    def unsure(self, reading: DriveReading, period: float) -> tuple[float, float]:
+    def unsure(self, reading: DriveReading) -> tuple[float, float]:
         """The angle (rad) and rate (rad/s) by which the dialect's steps alone let it be off."""
-        angle = self.facts.angle_count or FLOAT * abs(reading.angle) + FLOAT
-        if self.difference:
-            return angle, 2.0 * angle / period
-        return angle, self.facts.rate_count or FLOAT * abs(reading.rate) + FLOAT
-
-    def goes_on(self, reading: DriveReading, acceleration: float, period: float) -> bool:
-        """Whether an answer goes on from the one before: neither angle nor rate has jumped by more than twice the
-        largest acceleration (rad/s^2) makes of the time between. After a pause anything does."""
-        assert self._before is not None
-        time = reading.time - self._before.time
-        if not 0.0 <= time <= LONGEST_STEP:
-            return True
-        angle, rate = self.looked(reading)
-        angle_step, rate_step = self.unsure(reading, period)
-        slack = time + SKEW
-        turned = abs(angle - self.angle - self.rate * time)
-        return abs(rate - self.rate) <= 2.0 * (acceleration * slack + rate_step) and turned <= 2.0 * (
-            acceleration * slack * slack + abs(self.rate) * SKEW + rate_step * slack + angle_step
+        return (
+            self.facts.angle_count or FLOAT * abs(reading.angle) + FLOAT,
+            self.facts.rate_count or FLOAT * abs(reading.rate) + FLOAT,
         )
 
+    def goes_on(self, reading: DriveReading, acceleration: float) -> bool:
+        """Whether an answer goes on from the one before: neither angle nor rate has jumped by more than twice of what
+        the largest acceleration (rad/s^2) makes of the time between. After a pause anything does."""
+        time = reading.time - self.time
+        if not 0.0 <= time <= LONGEST_STEP:
+            return True
+        angle_step, rate_step = self.unsure(reading)
+        slack = time + SKEW
+        jump = abs(self.angle_of(reading) - self.angle - self.rate * time)
+        most = acceleration * slack * slack + 2.0 * (abs(self.rate) * SKEW + rate_step * slack + angle_step)
+        return jump <= most and abs(reading.rate - self.rate) <= 2.0 * (acceleration * slack + rate_step)
 
-def agree(
-    sides: tuple[Side, Side], readings: tuple[DriveReading, DriveReading], acceleration: float, period: float
-) -> bool:
+
+def agree(sides: tuple[Side, Side], readings: tuple[DriveReading, DriveReading], acceleration: float) -> bool:
     """Whether two drives on one shaft say the same of it, at once, and what goes on from before: their angles and rates
     differ by no more than the largest acceleration (rad/s^2) makes of the time between their samples, and by the steps
     in which they are told."""
-    if abs(readings[0].time - readings[1].time) > APART or not all(
-        side.goes_on(reading, acceleration, period) for side, reading in zip(sides, readings, strict=True)
-    ):
+    (one, other), (first, second) = sides, readings
+    apart = abs(first.time - second.time)
+    if apart > APART or not (one.goes_on(first, acceleration) and other.goes_on(second, acceleration)):
         return False
-    (angle, rate), (other_angle, other_rate) = (
-        side.looked(reading) for side, reading in zip(sides, readings, strict=True)
-    )
-    steps = [side.unsure(reading, period) for side, reading in zip(sides, readings, strict=True)]
-    apart = abs(readings[0].time - readings[1].time) + SKEW
-    rate_step = acceleration * apart + sum(each[1] for each in steps)
-    angle_step = (abs(rate) + rate_step) * apart + sum(each[0] for each in steps)
-    return abs(angle - other_angle) <= 2.0 * angle_step and abs(rate - other_rate) <= rate_step
+    steps = one.unsure(first), other.unsure(second)
+    rate_most = acceleration * (apart + SKEW) + steps[0][1] + steps[1][1]
+    angle_steps = steps[0][0] + steps[1][0] + one.zero_unsure + other.zero_unsure
+    angle_most = 2.0 * ((abs(first.rate) + rate_most) * (apart + SKEW) + angle_steps)
+    differ = one.angle_of(first) - other.angle_of(second)
+    if turns := max(one.facts.angle_range, other.facts.angle_range):
+        differ = math.remainder(differ, turns)  # after a pause nobody knows how often either went round
+    return abs(differ) <= angle_most and abs(first.rate - second.rate) <= rate_most

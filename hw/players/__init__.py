@@ -6,8 +6,9 @@ may be wrong alike: what a maker's firmware does is known once one was there.
 
 from collections.abc import Callable, Mapping
 
+from hw.players.damiao import PlayedDamiao
 from hw.players.odrive import PlayedOdrive
 from hw.players.player import PlayedDrive
 
-PLAYED: Mapping[str, Callable[[int, int], PlayedDrive]] = {"odrive": PlayedOdrive}
+PLAYED: Mapping[str, Callable[[int, int], PlayedDrive]] = {"odrive": PlayedOdrive, "damiao": PlayedDamiao}
 """Makes a played drive of a dialect: (node, sense)."""

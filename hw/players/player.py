@@ -66,13 +66,19 @@ class PlayedBench:
         shaft = self.shaft
         shaft.step(self.drive.output, self.load.output)
         self.ticked += shaft.period
-        self.drive.see(shaft.angle, shaft.rate)
-        self.load.see(shaft.angle + self.slip, shaft.rate)
+        self._look(0.0)
         return [frame for drive in self.drives for frame in drive.tick(self.ticked)]
 
     def receive(self, frame: CanFrame, now: float) -> list[CanFrame]:
-        """Frames with which the drives answer a frame that has come."""
+        """Frames with which the drives answer a frame that has come at a time, s."""
+        self._look(now - self.ticked)
         return [answer for drive in self.drives for answer in drive.receive(frame, now)]
+
+    def _look(self, ahead: float) -> None:
+        """Let the encoders see the shaft so many seconds after the last tick."""
+        angle = self.shaft.angle + self.shaft.rate * ahead
+        self.drive.see(angle, self.shaft.rate)
+        self.load.see(angle + self.slip, self.shaft.rate)
 
     @property
     def off(self) -> bool:

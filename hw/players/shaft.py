@@ -10,8 +10,7 @@ from met.frozen import frozen
 
 @frozen
 class Output:
-    """What a drive's bridge does: `off`, a `torque` (N m), a `voltage` (V) across an armature, or `short`, its windings
-    shorted."""
+    """What a drive's bridge does: `off`, a `torque` (N m), or `short`, its windings shorted."""
 
     kind: str = "off"
     value: float = 0.0
@@ -48,8 +47,7 @@ class InertiaShaft:
         for each in (drive, load):
             if each.kind == "torque":
                 torque += each.value
-            elif each.kind in ("voltage", "short"):
-                torque += self.kt / self.resistance * each.value
+            elif each.kind == "short":
                 brake += self.kt * self.kt / self.resistance
         rate = self.rate
         if rate == 0.0 and abs(torque) <= self.f_c:
@@ -98,7 +96,6 @@ class DeckShaft:
         volts = {
             "off": back,
             "short": 0.0,
-            "voltage": drive.value,
             "torque": back + self._resistance * drive.value / self._kt,
         }
         amperes = load.value / self._kt_load if load.kind == "torque" else 0.0

@@ -337,8 +337,8 @@ def _against(
     seed: int,
     fixed: Collection[str],
 ) -> Sweep | None:
-    """The sweep that a tuning is held against; None where it has mistakes, which are reported. Raises Problem D364 where
-    it is none that it can be held against."""
+    """The sweep that a tuning is held against; None where it has mistakes, which are reported. Raises Problem D364
+    where it is none that it can be held against."""
     name = reader.against
     assert name is not None
     known, place = definitions.of_kind("sweep"), name.place

@@ -12,8 +12,9 @@ from hw.beds.can_bed import CanBed
 from hw.drives import DIALECTS
 from hw.drives.bench_file import TwoDrives, two_drives
 from hw.drives.frames import CanLine
-from hw.players.odrive import PlayedOdrive, endpoints
-from hw.players.player import PlayedBench, PlayedDrive, PlayedLine
+from hw.players import PLAYED
+from hw.players.odrive import endpoints
+from hw.players.player import PlayedBench, PlayedLine
 from hw.players.shaft import InertiaShaft
 
 KT, RESISTANCE, INERTIA = 0.06, 1.5, 1.3e-4
@@ -51,7 +52,6 @@ heat          = "9 A^2*s"
 {more}"""
 
 MORE = {"odrive": 'endpoints = "flat_endpoints.json"\n'}
-PLAYED: dict[str, Callable[..., PlayedDrive]] = {"odrive": PlayedOdrive}
 
 
 def bench_file(folder: Path, dialect: str = "odrive", interface: str = "virtual", channel: str = "bench") -> Path:
@@ -62,11 +62,11 @@ def bench_file(folder: Path, dialect: str = "odrive", interface: str = "virtual"
     return path
 
 
-def played_bench(dialect: str = "odrive", **of_drive: float) -> PlayedBench:
+def played_bench(dialect: str = "odrive") -> PlayedBench:
     """Two played drives of a dialect on a shaft, the load's counting the other way round."""
     shaft = InertiaShaft(inertia=INERTIA, kt=KT, resistance=RESISTANCE, f_c=1e-3, f_v=1e-4)
     make = PLAYED[dialect]
-    return PlayedBench(shaft, make(1, **of_drive), make(2, -1, **of_drive))
+    return PlayedBench(shaft, make(1, 1), make(2, -1))
 
 
 def host_on(bench: TwoDrives, open_line: Callable[[], CanLine], period: float = 1e-3) -> CanBed:
@@ -100,5 +100,5 @@ class PlayedConformance(conformance.FreeRunning):
         if self.played.off or bed._about is None:
             return 0.0, 0.0
         scales = bed._about.scales
-        volts = drive.value if drive.kind == "voltage" else RESISTANCE * drive.value / KT
+        volts = RESISTANCE * drive.value / KT
         return round(volts / scales.voltage) * scales.voltage, round(load.value / KT / scales.current) * scales.current

@@ -157,7 +157,8 @@ def campaign(bed: CanBed, line: PlayedLine, played: PlayedBench, spoiler: Spoile
                 tally.stops, tally.faults = tally.stops + 1, tally.faults | sample.faults
                 break
             one, other = (side.time for side in bed._sides)
-            allowed = bed._acceleration * (abs(one - other) + SKEW) + 0.01
+            steps = sum(side.facts.rate_count for side in bed._sides)
+            allowed = bed._acceleration * (abs(one - other) + SKEW) + steps + 0.01
             _judge(tally, sample, truth.between(one - 1e-3, one), allowed)
         spoiler.on = False
         bed.stop()

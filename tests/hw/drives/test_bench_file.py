@@ -24,7 +24,7 @@ def test_its_figures_are_si_and_what_it_does_not_say_has_a_default(tmp_path: Pat
         "arming_rate": 5.0,
         "filter": 0.0,
     }
-    assert (bench.drive.role, bench.drive.node, bench.drive.sense, bench.drive.quantity) == ("drive", 1, 1, "torque")
+    assert (bench.drive.role, bench.drive.node, bench.drive.sense) == ("drive", 1, 1)
     assert (bench.load.sense, bench.load.figures["watchdog"]) == (-1, 0.020)
     assert bench.drive.endpoints == str(tmp_path / "flat_endpoints.json")
 

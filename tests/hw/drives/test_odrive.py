@@ -151,11 +151,3 @@ def test_a_limit_that_is_no_number_is_found(tmp_path: Path) -> None:
         odrive(played).values["axis0.controller.config.vel_limit"] = float("inf")
 
     assert "cannot be driven: a limit of its is no number above zero\n" in greeting(tmp_path, endless)
-
-
-def test_a_voltage_is_nothing_that_it_takes(tmp_path: Path) -> None:
-    def voltage(played: PlayedBench, folder: Path) -> None:
-        path = folder / "bench.toml"
-        path.write_text(path.read_text().replace("torque_max ", 'quantity = "voltage"\ntorque_max '))
-
-    assert "cannot be driven: it takes no voltage over CAN\n = help: `quantity = " in greeting(tmp_path, voltage)
