@@ -114,7 +114,7 @@ class GroupInMemory(ArchiveGroup):
         self.attributes = _as_read({**self._layout.attributes, "cases_in_table": experiment.cases.count})
         self.verified = self.summary = self.summed = None
         self.step_errors = ()
-        self.name, self.sweep, self.allowed = experiment.name, str(self.attributes.get("sweep", "")), ()
+        self.name, self.sweep = experiment.name, str(self.attributes.get("sweep", ""))
 
     @classmethod
     def of_run(cls, experiment: Experiment, run: Run) -> GroupInMemory:

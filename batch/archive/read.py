@@ -57,8 +57,11 @@ class ArchiveGroup:
         """The summary of all cases, once somebody has gone through their rows for it (batch/queries/streamed.py)."""
         self.name: str = self.attributes["experiment"]
         self.sweep: str = str(self.attributes.get("sweep", ""))
-        self.allowed: tuple[str, ...] = tuple(filter(None, str(self.attributes.get("allowed", "")).split("\n")))
+
+    @property
+    def allowed(self) -> tuple[str, ...]:
         """Warnings that were allowed, a line each: `D105, because the report's own rates`."""
+        return tuple(filter(None, str(self.attributes.get("allowed", "")).split("\n")))
 
     def allows(self, code: str) -> bool:
         """Return True if a warning with this code was allowed."""

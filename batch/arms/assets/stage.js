@@ -101,12 +101,16 @@ MET.stage = (() => {
       return all.filter((one) => one.own || beside(one.ends[0]));
     };
 
+    function ground(all) {
+      const lowest = all.reduce((low, { ends, radius }) => Math.min(low, ends[0][2] - radius, ends[1][2] - radius), Infinity);
+      floor = scene.moves ? lowest - 0.25 * arm.reach : Math.min(0, lowest);
+    }
+
     // Everything in view, seen from where most is seen of the chosen case.
     function home() {
       const all = pills(chosen, FITTED);
       if (!all.length) return;
-      const lowest = all.reduce((low, { ends, radius }) => Math.min(low, ends[0][2] - radius, ends[1][2] - radius), Infinity);
-      floor = scene.moves ? lowest - 0.25 * arm.reach : Math.min(0, lowest);
+      ground(all);
       camera.choose(all.flatMap(({ ends }) => ends));
       camera.fit([...all, ...(ghostly ? others.flatMap((each) => pills(each, FITTED_OF_GHOSTS)) : [])], BAR / view.clientHeight);
     }
@@ -281,7 +285,8 @@ MET.stage = (() => {
     const kept = () => ({ camera: seenFrom(camera), time, playing, rate, frames, ghostly });
 
     function resume(before) {
-      if (chosen) home();
+      const all = chosen ? pills(chosen, FITTED) : [];
+      if (all.length) ground(all);
       [fresh, moved, rate] = [false, true, before.rate];
       Object.assign(camera, seenFrom(before.camera));
       speed.value = rate;

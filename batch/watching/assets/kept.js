@@ -15,11 +15,16 @@ globalThis.metKept = (() => {
   // Where this page stands: case and sliders, clock and camera, the stretch of time that is zoomed to, and how far down.
   function take() {
     const found = page.position();
-    return { case: found < 0 ? null : page.data.positions[found], values: Object.fromEntries(names().map((name, n) => [name, page.values()[n]])),
+    return { run: page.data.description.name, case: found < 0 ? null : page.data.positions[found], values: Object.fromEntries(names().map((name, n) => [name, page.values()[n]])),
       stage: stage && stage.kept(), zoom: zoom(), scroll: [scrollX, scrollY] };
   }
 
+  // Of another run, which may be of another arm, no more than how far down one has read.
   function put(before) {
+    if (before.run !== page.data.description.name) {
+      scrollTo(...before.scroll);
+      return;
+    }
     const at = page.data.positions.indexOf(before.case);
     let values = page.values();
     if (before.case !== null && at >= 0) values = page.data.description.cases.inputs[at].slice();

@@ -177,11 +177,16 @@ def test_another_run_is_chosen_on_the_page(chromium: Chromium, tmp_path: Path) -
     deck = write_deck(tmp_path)
     with viewing(deck, "-q") as view:
         page = opened(chromium, view)
+        fitted = at(page)["stage"]["camera"]
+        page.run(f"{RUN}.document.querySelector('.transport input').value = 0.5")
+        page.run(f"{RUN}.document.querySelector('.transport input').dispatchEvent(new Event('input'))")
         choose = "(() => { const e = document.querySelector('.deck-bar select'); e.value = 'brief';"
         page.run(choose + " e.dispatchEvent(new Event('change')); })()")
         shown(page, 2)
         assert page.run(f"{RUN}.document.querySelector('h1').textContent") == "brief"
         assert page.run(f"{RUN}.document.querySelector('.knob')") is None
+        stage = at(page)["stage"]
+        assert stage["time"] == 0 and stage["camera"] != fitted  # it is another run: seen from where it is seen best
         silent(page, view)
         page.close()
 
