@@ -40,7 +40,7 @@ def test_substitute_says_its_keys_defaults_models_and_what_is_the_servos(capsys:
     assert "\nbeds; emulated unless written\n" in out and "\nlaws; velocity_tracking unless written\n" in out
     assert all(f"\n  {name} " in out for kind in ("bed", "law") for name in models.find_own(kind))
     assert "the servo's j_m " in out
-    assert [each["name"] for each in json.loads(printed(capsys, "substitute", "--format", "json"))] == ["bed", "law"]
+    assert [each["name"] for each in json.loads(printed(capsys, "substitute", "--format", "json"))] == ["bed", "law", "scale"]
 
 
 def test_units_lists_them_all_with_what_they_are_in_si(capsys: pytest.CaptureFixture[str]) -> None:
@@ -51,7 +51,7 @@ def test_units_lists_them_all_with_what_they_are_in_si(capsys: pytest.CaptureFix
 
 def test_the_list_of_models_ends_with_what_else_there_is(capsys: pytest.CaptureFixture[str]) -> None:
     assert printed(capsys).endswith(
-        "Blocks of a deck: arm, link, joint, run, rates, initial, payload, substitute, linear, tolerances, sweep, search, tune.\n"
+        "Blocks of a deck: arm, link, joint, run, rates, initial, payload, substitute, scale, linear, tolerances, sweep, search, tune.\n"
         "Also: designs, dh, distributions, functions, language, shapes, units; and the code of a message, as in `met doc D060`.\n"
     )
 
