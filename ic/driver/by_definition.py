@@ -20,7 +20,7 @@ from ic.language import EXPERIMENTS
 from ic.meaning.checks.degrees import remark_degrees
 from ic.meaning.control.servos import check_servo_definition
 from ic.meaning.definitions.resolve import Definition, Definitions
-from ic.meaning.mechanics.arm import check_arm, resolve_arm
+from ic.meaning.mechanics.arm import bring_arm, check_arm, packed_arm, resolve_arm
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.allowances import silence_of_all
 from ic.read import in_order, read_again
@@ -34,10 +34,14 @@ from met.plan import Allowance
 
 @frozen
 class KnownFindings:
-    """Findings about one definition, and the allowances of its experiments."""
+    """Findings about one definition, and the allowances of its experiments.
+
+    arm  of an arm's definition: the arm itself as runs share it, pickled; nothing where they cannot
+    """
 
     found: DefinitionFindings
     allowances: tuple[tuple[Allowance, ...], ...] = ()
+    arm: bytes = b""
 
 
 Known = Mapping[bytes, KnownFindings]
@@ -59,6 +63,8 @@ class DefinitionChecks:
         keys = _Keys(deck, self._definitions, self._complaints)
         self._keys = [keys.of(definition) for definition, _ in self._units]
         self._found = {n: known[key] for n, key in enumerate(self._keys) if key is not None and key in known}
+        for n, each in self._found.items():
+            bring_arm(self._definitions, self._units[n][0].name, each.arm)
         order = sorted(range(len(self._units)), key=lambda n: self._units[n][0].kind in EXPERIMENTS)
         self._waiting = [
             n for n in order if n not in self._found
@@ -78,7 +84,9 @@ class DefinitionChecks:
             complaints.error(
                 "D078", "this deck's values are nested too deeply", help="build them up in steps, with `let`"
             )
-        self._found[n] = KnownFindings(complaints.findings(), allowances)
+        definition = self._units[n][0]
+        arm = packed_arm(self._definitions, definition.name) if definition.kind == "arm" else b""
+        self._found[n] = KnownFindings(complaints.findings(), allowances, arm)
         return True
 
     @property

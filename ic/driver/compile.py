@@ -30,6 +30,7 @@ from ic.text.complaints import Complaints, known_words
 from ic.text.edition import FIRST
 from ic.text.files import NOTHING_UNSAVED, Unsaved
 from ic.text.lexer import COMMAND_LINE
+from met.analysis.memo import AnalysisMemo
 from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan import Allowance, Experiment, Plan
@@ -66,14 +67,19 @@ def check(
     settings: Sequence[str] = (),
     text: str | None = None,
     unsaved: Unsaved = NOTHING_UNSAVED,
+    memo: AnalysisMemo | None = None,
 ) -> Compiled:
-    """The deck at `path`, or of this text, compiled. unsaved: texts in place of what files hold, by real paths."""
+    """The deck at `path`, or of this text, compiled.
+
+    unsaved  texts in place of what files hold, by real paths
+    memo     answers of the analysis that are known, to which those are added that are found
+    """
     try:
         folders = [Path(each) for each in include_dirs]
         deck = read(Path(path), folders, defines, despite_errors=True, text=text, unsaved=unsaved)
     except Problem as problem:
         return Compiled(None, problem.diagnostics, problem.sources)
-    return compile_deck(deck, select=select, defines=defines, settings=settings)
+    return compile_deck(deck, select=select, defines=defines, settings=settings, memo=memo)
 
 
 _NO_NAME = ("`met check` takes no name: `met cases DECK NAME --vary ...` does, and says what is wrong",)
@@ -86,11 +92,13 @@ def compile_deck(
     defines: Iterable[str] = (),
     settings: Sequence[str] = (),
     complaints: Complaints | None = None,
+    memo: AnalysisMemo | None = None,
 ) -> Compiled:
     """The plan of the deck's runs and sweeps that `select` names, with everything that is wrong on the way.
 
     settings  `PATH=VALUE`, each as if the deck said so; `vary PATH=VALUES`, as if it had a sweep of the run that
               `select` names
+    memo      answers of the analysis that are known; those that are found are added
     """
     defines = tuple(defines)
     complaints = complaints if complaints is not None else Complaints(deck.warnings)
@@ -115,7 +123,8 @@ def compile_deck(
             select = "all" if select == "all" else (sweep.name,)
             selected = (select,) if isinstance(select, str) else select
     definitions = given.in_definitions(definitions)
-    source = DeckSource(definitions, complaints, partial(read_again, deck), given, Effects(given), sweep)
+    memo = memo if memo is not None else AnalysisMemo()
+    source = DeckSource(definitions, complaints, partial(read_again, deck), given, Effects(given), sweep, memo=memo)
     asked: list[Definition] = []
     experiments: list[Experiment] = []
     scopes: list[Scope] = []

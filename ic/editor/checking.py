@@ -14,6 +14,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,9 @@ LENGTH = struct.Struct("!Q")
 EARLY = 0.05
 """Seconds from the start of a check after which that is told which is found by then."""
 
+DEAR = 0.5
+"""Seconds of an audit after which what it has found is kept, though it may not come to its end."""
+
 AUDIT_PAUSE = 0.3
 """Seconds without a change behind which the audit begins."""
 
@@ -45,6 +49,7 @@ class CheckRequest:
     text     of a deck that is in no file
     unsaved  texts of files that an editor has open, by real paths
     known    findings of the deck's definitions, of the last check of which all were told
+    answers  of the analysis to the deck's experiments, of the last audit, pickled; none where it is empty
     """
 
     folder: str
@@ -54,6 +59,15 @@ class CheckRequest:
     defines: tuple[str, ...]
     unsaved: Mapping[str, str]
     known: Known = field(default_factory=dict)
+    answers: bytes = b""
+
+
+@frozen
+class FoundAnswers:
+    """Answers of the analysis that an audit has found, pickled: what it is to be asked with next time, also where it
+    does not come to its end."""
+
+    pickled: bytes
 
 
 @frozen
@@ -85,14 +99,19 @@ def answer(request: CheckRequest, out: int) -> None:
     """Check, and write what there is to say into the file descriptor."""
     os.chdir(request.folder)
     try:
-        for each in answers(request, pause=AUDIT_PAUSE):
+        for each in answers(request, pause=AUDIT_PAUSE, keep=partial(_send, out)):
             _send(out, each)
     except Exception:
         _send(out, Crash(traceback.format_exc()))
 
 
-def answers(request: CheckRequest, *, pause: float) -> Iterator[CheckReply | DeckIndex]:
-    """All that there is to say of a deck, in turn; the audit comes after the pause, in s."""
+def answers(
+    request: CheckRequest, *, pause: float, keep: Callable[[FoundAnswers], object] = lambda found: None
+) -> Iterator[CheckReply | DeckIndex]:
+    """All that there is to say of a deck, in turn; the audit comes after the pause, in s.
+
+    keep  called with what the audit has found so far, each time that it was dear, and in the end
+    """
     readable = False
     for reply in first_replies(request):
         readable |= not reply.audited
@@ -100,7 +119,7 @@ def answers(request: CheckRequest, *, pause: float) -> Iterator[CheckReply | Dec
     if not readable:
         return
     time.sleep(pause)
-    compiled, reply = compiled_with_reply(request)
+    compiled, reply = compiled_with_reply(request, keep)
     yield reply
     if compiled.plan is not None:
         from ic.editor.index import index_of
@@ -135,10 +154,22 @@ def first_replies(request: CheckRequest, clock: Callable[[], float] = time.monot
     yield _reply(*checks.diagnostics(), known=checks.findings, audited=False)
 
 
-def compiled_with_reply(request: CheckRequest) -> tuple[Compiled, CheckReply]:
-    """A deck compiled, and the reply to the request, made in this process."""
+def compiled_with_reply(
+    request: CheckRequest, keep: Callable[[FoundAnswers], object] = lambda found: None
+) -> tuple[Compiled, CheckReply]:
+    """A deck compiled, and the reply to the request, made in this process. keep: as of `answers`."""
     from ic.driver.compile import check
+    from met.analysis.memo import AnalysisMemo
 
+    kept_at = time.monotonic()
+
+    def found() -> None:
+        nonlocal kept_at
+        if time.monotonic() - kept_at > DEAR:
+            keep(FoundAnswers(pickle.dumps(memo.so_far, pickle.HIGHEST_PROTOCOL)))
+            kept_at = time.monotonic()
+
+    memo = AnalysisMemo(pickle.loads(request.answers) if request.answers else None, found)
     compiled = check(
         request.name,
         include_dirs=request.include_dirs,
@@ -146,7 +177,9 @@ def compiled_with_reply(request: CheckRequest) -> tuple[Compiled, CheckReply]:
         select="all",
         text=request.text,
         unsaved=request.unsaved,
+        memo=memo,
     )
+    keep(FoundAnswers(pickle.dumps(memo.asked, pickle.HIGHEST_PROTOCOL)))
     return compiled, _reply(compiled.diagnostics, compiled.sources)
 
 

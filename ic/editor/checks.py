@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ic.editor.checker_process import CheckerProcess
-from ic.editor.checking import CheckReply, CheckRequest, Crash
+from ic.editor.checking import CheckReply, CheckRequest, Crash, FoundAnswers
 from ic.editor.index import DeckIndex
 from ic.editor.positions import file_named, path_of
 from ic.editor.used import used_files
@@ -95,6 +95,7 @@ class DeckChecks:
         self.checked: dict[str, CheckedDeck] = {}
         self._stale: dict[str, None] = {}  # addresses of decks to be checked, in the order of changes
         self._known: dict[str, Known] = {}  # findings of each deck's definitions, by what they follow from
+        self._answers: dict[str, bytes] = {}  # of the analysis, of each deck's last audit
         self.indexes: dict[str, DeckIndex] = {}  # of each deck, when it could last be compiled
         self._failed: set[str] = set()  # decks whose last check has died; nothing is known of what they are now
         self._running: str | None = None
@@ -121,6 +122,7 @@ class DeckChecks:
         self.checked.pop(uri, None)
         self.indexes.pop(uri, None)
         self._known.pop(uri, None)
+        self._answers.pop(uri, None)
         self._stale.pop(uri, None)
         self.all_changed()
         self._tell(self.decks())
@@ -157,6 +159,7 @@ class DeckChecks:
             self.defines,
             self.unsaved(),
             self._known.get(deck.uri, {}),
+            self._answers.get(deck.uri, b""),
         )
 
     async def rest(self) -> None:
@@ -253,6 +256,8 @@ class DeckChecks:
                 f"{deck.path or deck.uri}:\n{answer.traceback}"
             )
             self._failed.add(deck.uri)
+        if isinstance(answer, FoundAnswers):
+            self._answers[deck.uri] = answer.pickled
         if isinstance(answer, DeckIndex):
             before, self.indexes[deck.uri] = self.indexes.get(deck.uri), answer
             if before is None or before.cases != answer.cases:

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import os
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future
 from functools import partial
 from typing import Any
 
@@ -98,6 +99,13 @@ class DeckServer(LanguageServer):
             self.workspace_semantic_tokens_refresh(None)
         if self._refreshes_lenses:
             self.workspace_code_lens_refresh(None)
+
+    def forget_notifications(self) -> None:
+        """Let go of what was dealt with: pygls keeps a future of each change of a text, as of a request that is yet to
+        be answered, a kilobyte each."""
+        waiting: dict[object, Future[object]] = self.protocol._request_futures
+        for number in [number for number, future in waiting.items() if future.done()]:
+            del waiting[number]
 
     def end(self) -> None:
         """End the process that checks."""
@@ -229,6 +237,7 @@ def make(
     def did_change(parameters: types.DidChangeTextDocumentParams) -> None:
         given = parameters.text_document
         text = server.workspace.get_text_document(given.uri).source
+        server.forget_notifications()
         server.checks.change(OpenText(given.uri, text, given.version))
 
     @server.feature(types.TEXT_DOCUMENT_DID_SAVE)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from ic.grammar.syntax import Binary, Expression, Number, OverCases, Range, Unary, WithUnit
 from met.diagnostic import Place
 
@@ -34,4 +32,7 @@ def spanned(first: Place, last: Place) -> Place:
     if (first.file, first.line, first.expansions) != (last.file, last.line, last.expansions):
         return first
     end = last.column + last.length
-    return replace(first, length=end - first.column) if end > first.column else first
+    length = end - first.column
+    return (
+        Place(first.file, first.line, first.column, length, first.expansions, first.included) if length > 0 else first
+    )

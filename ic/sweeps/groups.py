@@ -30,6 +30,7 @@ from ic.sweeps.searches import check_goal, each_case, read_search, with_corners
 from ic.sweeps.settings import Settings
 from ic.sweeps.table import columns, kept, repeats, structures
 from ic.text.complaints import PROVISIONAL, Complaints, known_words
+from met.analysis.memo import AnalysisMemo
 from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error, leave_out, write
 from met.frozen import frozen
 from met.plan import Allowance, Cases, Choice, Experiment, keys
@@ -49,6 +50,7 @@ class DeckSource:
     settings, effects  what is set from outside of the deck, and what was found to come of it
     sweep              that the command line adds to the deck's own, if it does
     audited            whether programs are built and looked into: for what has no effect, steps, contacts, beds
+    memo               answers of the analysis to the deck's experiments
     """
 
     definitions: Definitions
@@ -58,6 +60,7 @@ class DeckSource:
     effects: Effects = field(default_factory=lambda: Effects(Settings()))
     sweep: Definition | None = None
     audited: bool = True
+    memo: AnalysisMemo = field(default_factory=AnalysisMemo)
 
     def definitions_with(self, macros: Sequence[str]) -> Definitions:
         """The definitions of the deck read again with these macros, `NAME=VALUE`. Raises Problem."""
@@ -100,7 +103,7 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
             if not source.complaints.errors:
                 check_stops(source.complaints, made)
                 check_balance(source.complaints, made)
-                made = check_steps(scope, made)
+                made = check_steps(scope, made, source.memo)
                 check_beds(source.complaints, made)
             source.complaints.settle()
             return [(made, scope)]
@@ -271,11 +274,11 @@ class _Sweep:
             check_overridden(scope, run, self.source.settings.of_run(read.definitions, read.base))
             return ((made, scope), rows), dropped
         if not self.complaints.errors:
-            check_effects(self.complaints, there, made)
+            check_effects(self.complaints, there, made, self.source.memo)
             check_stops(self.complaints, made)
             check_balance(self.complaints, made)
             made = replace(made, notes=(*made.notes, *check_confidences(self.complaints, there, made)))
-            made = check_steps(scope, made)
+            made = check_steps(scope, made, self.source.memo)
             check_beds(self.complaints, made)
         self.complaints.settle()
         self.source.effects.examine(scope, run, made, self.definition.group.body)

@@ -7,6 +7,7 @@ from ic.sweeps.axes import Sweep
 from ic.sweeps.choices import ONE_OF_TWO
 from ic.text.complaints import Complaints, known_words
 from met import units
+from met.analysis.memo import AnalysisMemo
 from met.diagnostic import Label, did_you_mean, leave_out
 from met.plan import REPEAT, Coordinate, Experiment
 from met.plan.columns import CaseValues
@@ -138,13 +139,13 @@ def without_effect(experiment: Experiment) -> tuple[str, ...]:
     return idle_inputs(experiment)
 
 
-def check_effects(complaints: Complaints, sweep: Sweep, experiment: Experiment) -> None:
+def check_effects(complaints: Complaints, sweep: Sweep, experiment: Experiment, memo: AnalysisMemo) -> None:
     """Every coordinate changes something in the program, and so do repeats: else cases would be equal in silence."""
     if not experiment.cases.coordinates and not experiment.cases.noise:
         return
     places = {varied.path: varied.place for varied in sweep.varied}
     with complaints.gather():
-        for name in without_effect(experiment):
+        for name in memo.answer("idle inputs", experiment, lambda: without_effect(experiment)):
             if name in places:
                 complaints.error(
                     "D137",

@@ -77,6 +77,11 @@ class StepSize:
     loops: tuple[Unstable, ...]
     map: StepMap
 
+    def without_matrices(self) -> StepSize:
+        """The same in little memory: of the map only what says of which cases it is."""
+        nothing = np.empty(0)
+        return replace(self, map=replace(self.map, names=(), slope=nothing, step=nothing))
+
 
 def chosen_cases(experiment: Experiment, also: Iterable[int] = ()) -> tuple[int, ...]:
     """The first case, those in which each coordinate is least and largest, and `also`; as many as time allows."""

@@ -63,6 +63,12 @@ def _words(digests: np.ndarray) -> list[str]:
 
 
 def _case_key_digests(experiment: Experiment, rows: np.ndarray) -> np.ndarray:
+    head, table = _row_table(experiment, rows)
+    return _row_digests(head, table.view(np.uint8).reshape(len(rows), 8 * table.shape[1]))
+
+
+def _row_table(experiment: Experiment, rows: np.ndarray) -> tuple[bytes, np.ndarray]:
+    """What all rows of the case table have in common, and these rows: values of coordinates by path, and the repeat."""
     coordinates = sorted(experiment.cases.coordinates, key=lambda coordinate: coordinate.path)
     cases, count = experiment.cases, len(rows)
     table = np.zeros((count, len(coordinates) + 1), dtype="<f8")  # the last column is the repeat
@@ -74,7 +80,7 @@ def _case_key_digests(experiment: Experiment, rows: np.ndarray) -> np.ndarray:
     table[np.isnan(table)] = np.nan  # and so are all that are not numbers
     chosen = [[[choice.path, choice.value] for choice in sorted(cases.choices, key=lambda choice: choice.path)]]
     head = _bytes(["case_key", [coordinate.path for coordinate in coordinates], *(chosen if chosen[0] else [])])
-    return _row_digests(head, table.view(np.uint8).reshape(count, 8 * table.shape[1]))
+    return head, table
 
 
 def case_ids(experiment: Experiment, rows: Sequence[int] | np.ndarray | None = None) -> list[str]:
@@ -98,6 +104,16 @@ def id_head(experiment: Experiment) -> bytes:
     return _bytes(
         ["case_id", parameters, experiment.cases.seed, formulas.inputs, formulas.nodes, formulas.outputs, *own]
     )
+
+
+def content_digest(question: str, experiment: Experiment, rows: Sequence[int] = ()) -> bytes:
+    """Digest of a question about an experiment, with all that decides its numbers: structure, inputs, parameters, and
+    the coordinates of some rows of the case table. Of 32 bytes, for what must not be taken for another's."""
+    described = [question, _described(experiment.structure), list(inputs(experiment)), [int(row) for row in rows]]
+    made = hashlib.sha256(_bytes(described))
+    made.update(id_head(experiment))
+    made.update(_row_table(experiment, np.asarray(rows, np.int64))[1].tobytes())
+    return made.digest()
 
 
 def id_numbers(experiment: Experiment) -> np.ndarray:

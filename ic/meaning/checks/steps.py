@@ -22,7 +22,8 @@ from met.plan import Experiment
 from met.plan.columns import ends
 
 if TYPE_CHECKING:
-    from met.analysis.step_size import StepFault, StepSize
+    from met.analysis.memo import AnalysisMemo
+    from met.analysis.step_size import Remedy, StepFault, StepSize
 
 LARGEST = 700.0
 """The largest logarithm that a number has in double precision, rounded down."""
@@ -34,7 +35,7 @@ BEYOND = 1.2
 """Times the figure of what a servo declares of itself, above which the arm's own is reported in its place."""
 
 
-def check_steps(scope: Scope, experiment: Experiment) -> Experiment:
+def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Experiment:
     """The experiment with a note of its fastest mode; warns of modes that the steps do not follow."""
     complaints, declared = scope.complaints, scope.declared_rates
     known = experiment.structure.integrator in models.find_own("integrator")  # another package's is only recorded
@@ -43,9 +44,15 @@ def check_steps(scope: Scope, experiment: Experiment) -> Experiment:
         return experiment
     from met.analysis.step_size import chosen_cases, remedy, step_size
 
-    rows = [row for figure in declared.values() for row in figure[1]]
+    rows = chosen_cases(experiment, [row for figure in declared.values() for row in figure[1]])
+    looked: list[StepSize] = []
+
+    def look() -> StepSize:
+        looked.append(step_size(experiment, rows))
+        return looked[0]
+
     try:
-        found = step_size(experiment, chosen_cases(experiment, rows))
+        found = memo.answer("steps", experiment, lambda: look().without_matrices(), rows)
     except Problem:  # said where the program is built
         complaints.settle()
         return experiment
@@ -61,7 +68,11 @@ def check_steps(scope: Scope, experiment: Experiment) -> Experiment:
     for each in found.faults:
         if _is_told(each, kept, declared, found) or _is_of_loops(each, found):
             continue
-        better = remedy(experiment, found.map, each)
+
+        def better_step(fault: StepFault = each) -> Remedy:
+            return remedy(experiment, (looked[0] if looked else look()).map, fault)
+
+        better = memo.answer(f"remedy for what {each.kind}", experiment, better_step, rows)
         complaints.pass_on(fault_warning(experiment, each, better, scope.rate_place, _where(experiment, each, found)))
     if "D104" not in kept and not any(each.kind == "grows" and not _is_of_loops(each, found) for each in found.faults):
         for loop in found.loops:

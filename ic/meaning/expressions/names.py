@@ -15,6 +15,7 @@ from ic.text.complaints import MOST_DIAGNOSTICS, known_words
 from ic.text.lexer import COMMAND_LINE
 from met import units
 from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error
+from met.frozen import frozen
 from met.messages import other_units
 from met.trace import Real
 
@@ -35,6 +36,26 @@ def _if_a_unit(help: str) -> Help:
     return Help(f"if a unit is meant: {help}", *(help.changes if isinstance(help, Help) else ()))
 
 
+@frozen
+class FoundNames:
+    """What names were found to be worth: `let`s, cells of tables by the paths that asked for them, and the numbers of
+    such cells by identity."""
+
+    worth: Mapping[str, Value | ValueList | Problem]
+    cells: Mapping[str, tuple[CsvCell, ...]]
+    read: Mapping[int, tuple[float, Label]]
+
+    @property
+    def named(self) -> Collection[str]:
+        """Names whose values were asked for and found, those behind them included, and tables' of which a cell was."""
+        return self.worth.keys() | {path.partition(".")[0] for path in self.cells}
+
+    @property
+    def is_plain(self) -> bool:
+        """True where nothing in it is a mistake, or goes by identity."""
+        return not self.cells and not self.read and not any(isinstance(each, Problem) for each in self.worth.values())
+
+
 class Names:
     """Evaluates expressions in a deck; what a name is worth is found once.
 
@@ -53,16 +74,16 @@ class Names:
         self._read: dict[int, tuple[float, Label]] = {}  # the numbers of such cells, by identity
 
     @property
-    def named(self) -> Collection[str]:
-        """Names whose values were asked for and found, those behind them included, and tables' of which a cell was."""
-        return self._worth.keys() | {path.partition(".")[0] for path in self.cells}
+    def found(self) -> FoundNames:
+        """What was found so far."""
+        return FoundNames(self._worth, self.cells, self._read)
 
-    def take_over(self, others: Names) -> None:
+    def take_over(self, found: FoundNames) -> None:
         """Take over what others found, which is the same here."""
-        for name, worth in others._worth.items():
+        for name, worth in found.worth.items():
             self._worth.setdefault(name, worth)
-        self.cells = {**others.cells, **self.cells}
-        self._read = {**others._read, **self._read}
+        self.cells = {**found.cells, **self.cells}
+        self._read = {**found.read, **self._read}
 
     def evaluate(self, expression: Expression) -> Value | ValueList:
         return evaluate(expression, self.find)

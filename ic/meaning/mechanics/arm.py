@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import replace
@@ -11,7 +12,8 @@ from ic.grammar.syntax import Call, Expression, Name, Unary
 from ic.language import HEADS
 from ic.language.bodies import ARM, AT, AXIS, JOINT, JOINT_KINDS, JOINT_LIMITS, LINK, Q_MIN, RPY
 from ic.meaning.definitions.merge import Item, MergedBlock, no_block, with_meant_names
-from ic.meaning.definitions.resolve import Definition
+from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.expressions.names import FoundNames
 from ic.meaning.mechanics.bodies import check_moved
 from ic.meaning.mechanics.dh import use_dh
 from ic.meaning.mechanics.foreign import refuse_foreign_joint
@@ -19,7 +21,8 @@ from ic.meaning.mechanics.matter import use_matter
 from ic.meaning.parameters import not_sweepable
 from ic.meaning.parameters.addresses import in_arm
 from ic.meaning.parameters.models import check_keys, value_place, word_of
-from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.not_sweepable import NotSweepable
+from ic.meaning.parameters.owner import Owner, Settled
 from ic.meaning.parameters.relations import check_relations, no_direction
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import Complaints, known_words, where_it_belongs
@@ -59,11 +62,34 @@ class ResolvedArm:
 class SharedArm:
     """An arm in which nothing is wrong, resolved without a sweep: what runs that vary nothing of it have in common.
 
-    entered  the scope with its numbers alone
+    parameters, auxiliary, known, not_sweepable  as a scope has them that holds nothing but the arm
+    names  what the `let`s that it is made of are worth
     """
 
     arm: ResolvedArm
-    entered: Scope
+    parameters: Mapping[str, Settled]
+    auxiliary: Mapping[str, Settled]
+    known: Mapping[str, list[str]]
+    not_sweepable: Mapping[str, NotSweepable]
+    names: FoundNames
+
+
+def packed_arm(definitions: Definitions, name: str) -> bytes:
+    """The arm of a definition as runs share it, for `bring_arm`; nothing where it was not resolved, or cannot be."""
+    shared = definitions.memo.get(_memo_key(name))
+    if isinstance(shared, bytes):
+        return shared
+    return pickle.dumps(shared, pickle.HIGHEST_PROTOCOL) if shared is not None and shared.names.is_plain else b""
+
+
+def bring_arm(definitions: Definitions, name: str, packed: bytes) -> None:
+    """Have the runs of these definitions share an arm that was resolved before, of an equal definition."""
+    if packed:
+        definitions.memo[_memo_key(name)] = packed
+
+
+def _memo_key(name: str) -> tuple[str, str]:
+    return ("arm", name)
 
 
 def resolve_arm(scope: Scope, definition: Definition) -> ResolvedArm | None:
@@ -72,16 +98,15 @@ def resolve_arm(scope: Scope, definition: Definition) -> ResolvedArm | None:
     It is resolved once for all runs of the deck, but for those that set or vary something of it.
     """
     shared = _shared(scope, definition)
-    if shared is None or not _is_as_written(scope, shared.entered):
+    if shared is None or not _is_as_written(scope, shared):
         return _resolved(scope, definition)
-    entered = shared.entered
-    scope.parameters |= {path: copy(settled) for path, settled in entered.parameters.items()}
-    scope.auxiliary |= {path: copy(settled) for path, settled in entered.auxiliary.items()}
-    for path, parameters in entered.known.items():
+    scope.parameters |= {path: copy(settled) for path, settled in shared.parameters.items()}
+    scope.auxiliary |= {path: copy(settled) for path, settled in shared.auxiliary.items()}
+    for path, parameters in shared.known.items():
         scope.known.setdefault(path, []).extend(parameters)
-    for path, why in entered.not_sweepable.items():
+    for path, why in shared.not_sweepable.items():
         scope.not_sweepable.setdefault(path, why)
-    scope.names.take_over(entered.names)
+    scope.names.take_over(shared.names)
     return replace(shared.arm, free_of_errors=not scope.complaints.errors)
 
 
@@ -89,22 +114,28 @@ def _shared(scope: Scope, definition: Definition) -> SharedArm | None:
     """The arm as all runs have it; None where something of it is wrong, or worth a remark."""
     if scope.complaints.is_known_to_lack(definition.place):
         return None
-    memo, key = scope.definitions.memo, ("arm", definition.name)
+    memo, key = scope.definitions.memo, _memo_key(definition.name)
     if key not in memo:
         complaints = Complaints()
         alone = Scope(scope.definitions.reporting_to(complaints), complaints)
         arm = _resolved(alone, definition)
         plain = not (alone.notes or alone.targets or alone.removed or alone.joint_kinds)
-        memo[key] = SharedArm(arm, alone) if arm and plain and complaints.is_clear and alone.checks.is_clear else None
+        memo[key] = None
+        if arm and plain and complaints.is_clear and alone.checks.is_clear:
+            memo[key] = SharedArm(
+                arm, alone.parameters, alone.auxiliary, alone.known, alone.not_sweepable, alone.names.found
+            )
+    if isinstance(memo[key], bytes):
+        memo[key] = pickle.loads(memo[key])
     found: SharedArm | None = memo[key]
     return found
 
 
-def _is_as_written(scope: Scope, entered: Scope) -> bool:
+def _is_as_written(scope: Scope, shared: SharedArm) -> bool:
     """True where no sweep and nothing set from outside changes a number of the arm, or what one is made of."""
     given = {*scope.varied, *scope.settings}
-    named = entered.names.named
-    if not given.isdisjoint(entered.known) or not given.isdisjoint(named):
+    named = shared.names.named
+    if not given.isdisjoint(shared.known) or not given.isdisjoint(named):
         return False
     lets = scope.definitions.lets
     return not any("." in name and name not in lets for name in named) and not any(

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 from ic.grammar.places import place_of
@@ -328,7 +329,7 @@ class Scope:
 
     def derived(self, owner: Owner, name: str, value: Real, unit: str, note: str) -> Real:
         """A parameter that follows from others, unless a sweep varies it itself."""
-        wanted = Parameter(name=name, unit=unit, doc=note)
+        wanted = _derived_parameter(name, unit, note)
         origin = Origin("derived", owner.place, (), note)
         return self._finish(owner, wanted, name, owner.homes, self._plain(value), origin, owner.place, True)
 
@@ -592,3 +593,9 @@ class Scope:
         cells = self.names.cells.get(name.text, ()) if name is not None else ()
         at = f" ({cells[0].place})" if len(cells) == 1 else ""
         return written_origin(place, item.overrides, note + at)
+
+
+@lru_cache(maxsize=1024)
+def _derived_parameter(name: str, unit: str, doc: str) -> Parameter:
+    """The declaration of a parameter that follows from others: of a hundred links they are the same."""
+    return Parameter(name=name, unit=unit, doc=doc)

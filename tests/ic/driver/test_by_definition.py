@@ -11,6 +11,9 @@ import pytest
 
 from ic.driver.by_definition import DefinitionChecks, Known
 from ic.driver.compile import check
+from ic.meaning.definitions.resolve import Definition
+from ic.meaning.mechanics import arm as mechanics_arm
+from ic.meaning.parameters.scope import Scope
 from ic.read import read
 from ic.text.files import LIBRARY
 from met.diagnostic import Diagnostic, Problem
@@ -80,6 +83,37 @@ def test_an_edit_of_a_run_leaves_arms_servos_and_other_runs_as_they_were_found()
     _, known = found(ARM.replace("5 kg", "6 kg") + RUN, known, units)
     arms, servos, runs = 1, 2, 3
     assert units == [arms + servos + runs, 0, 1, 2, arms + servos + runs]
+
+
+def test_an_arm_that_has_not_changed_is_brought_along(monkeypatch: pytest.MonkeyPatch) -> None:
+    resolved: list[str] = []
+    resolve = mechanics_arm._resolved
+
+    def noted(scope: Scope, definition: Definition) -> mechanics_arm.ResolvedArm | None:
+        resolved.append(definition.name)
+        return resolve(scope, definition)
+
+    monkeypatch.setattr(mechanics_arm, "_resolved", noted)
+    run = RUN.replace("record = [q]", "record = [q, qd]")
+    _, known = found(ARM + RUN, {})
+    assert resolved == ["lever", "lever"], "by itself, and for the sweep that varies a mass of it"
+    resolved.clear()
+    told, again = found(ARM + run, known)
+    assert resolved == ["lever"]
+    assert told == found(ARM + run, {})[0] == ()
+    assert [each.arm for each in again.values() if each.arm] == [each.arm for each in known.values() if each.arm] != []
+    resolved.clear()
+    found(ARM.replace("heavy = 5 kg", "heavy = 6 kg") + RUN, known)
+    assert resolved == ["lever", "lever"]
+
+
+def test_an_arm_with_a_mistake_in_it_is_not_brought_along() -> None:
+    wrong = ARM.replace("let heavy = 5 kg", "let heavy = 5 m")
+    told, known = found(wrong + RUN, {})
+    assert [each.code for each in told] == ["D061"]
+    assert not any(each.arm for each in known.values())
+    assert found(ARM + RUN, known)[0] == ()
+    assert found(wrong + RUN.replace("[q]", "[qd]"), known)[0] == found(wrong + RUN.replace("[q]", "[qd]"), {})[0]
 
 
 def test_while_a_line_cannot_be_read_what_is_known_of_other_runs_counts() -> None:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
-from ic.editor.checking import EARLY, CheckRequest, first_replies
+import pytest
+
+from ic.editor import checking
+from ic.editor.checking import EARLY, CheckReply, CheckRequest, FoundAnswers, answers, first_replies
 from ic.text.files import LIBRARY
 from tests.ic.editor.client import Editor, uri
 
@@ -61,6 +65,20 @@ def test_mistakes_of_an_arm_are_told_first_where_the_rest_takes_long() -> None:
     first, every = replies(wrong, 2 * EARLY)
     assert "`mass` of link `a` is in kg, and this is in m" in first
     assert every == [*first, "no parameter `spar` in this run"]
+
+
+def test_an_audit_takes_along_what_the_last_one_found_also_where_it_was_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(checking, "DEAR", -1.0)  # everything is dear
+    request = CheckRequest(str(LIBRARY), "", DECK.replace("sweep spares", "// sweep spares"), (), (), {})
+    first: list[FoundAnswers] = []
+    told = [each.diagnostics for each in answers(request, pause=0.0, keep=first.append) if isinstance(each, CheckReply)]
+    for found, anew in ((b"", len(first)), (first[0].pickled, len(first) - 1), (first[-1].pickled, 1)):
+        again: list[FoundAnswers] = []
+        known = replace(request, answers=found)
+        replies = [each for each in answers(known, pause=0.0, keep=again.append) if isinstance(each, CheckReply)]
+        assert [each.diagnostics for each in replies] == told
+        assert len(again) == anew  # one for each that was found, and one in the end
+    assert len(first) > 3
 
 
 def test_a_change_of_another_deck_need_not_wait_for_an_audit(tmp_path: Path, editor: Editor) -> None:

@@ -1,0 +1,50 @@
+"""Answers of the analysis, each kept under a digest of all that it follows from, so that each is found once.
+
+The digest goes by structure, parameters and cases (`met.plan.keys.content_digest`), never by where a deck writes them:
+a deck whose lines have moved asks the same, and so do two runs that are equal. Nothing says when an answer is out of
+date, since another experiment has another digest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
+
+from met.plan import Experiment, keys
+
+T = TypeVar("T")
+
+MOST = 500
+"""Answers that are kept where it is not known yet which are asked for; each is some kilobytes."""
+
+
+class AnalysisMemo:
+    """The answers that were asked for, and those that were brought along from another time.
+
+    asked  by their digests: what is to be brought along next time
+    """
+
+    def __init__(self, known: Mapping[bytes, Any] | None = None, found: Callable[[], object] | None = None) -> None:
+        """found: called when an answer was found that was not brought along."""
+        self._known: Mapping[bytes, Any] = known or {}
+        self._found = found
+        self.asked: dict[bytes, Any] = {}
+
+    def answer(self, question: str, experiment: Experiment, find: Callable[[], T], rows: Sequence[int] = ()) -> T:
+        """The answer to a question about an experiment and these rows of its case table; what `find` raises is no
+        answer, and is raised again next time."""
+        key = keys.content_digest(question, experiment, rows)
+        if key not in self.asked:
+            brought = key in self._known
+            self.asked[key] = self._known[key] if brought else find()
+            if not brought and self._found is not None:
+                self._found()
+        answer: T = self.asked[key]
+        return answer
+
+    @property
+    def so_far(self) -> dict[bytes, Any]:
+        """What was asked for, and before it what was brought along and may be asked for yet: no more than `MOST`, of
+        whom the first leave."""
+        found = {**{key: each for key, each in self._known.items() if key not in self.asked}, **self.asked}
+        return dict(list(found.items())[-MOST:])
