@@ -87,19 +87,34 @@ def random_deck(seed: int, *, friction: bool = True) -> str:
     """A deck with one run; the same text for the same seed.
 
     1 to 5 joints on 1 to 5 links (a link may carry several), some without a servo, gravity or none, velocity products
-    on or off, dynamics from 250 Hz to 1 kHz, servos slower or faster; 0.4 s long. The gear and rotor are such that the
-    stability figure stays below 0.5 at 250 Hz.
+    on or off, joints that begin anywhere or as their commands do, dynamics from 250 Hz to 1 kHz, servos slower or
+    faster; 0.4 s long. The gear and rotor are such that the stability figure stays below 0.5 at 250 Hz.
     """
     pick = random.Random(seed)
+    newer = random.Random(f"{seed}: words that came later")  # of its own, so that all else stays as it was
 
     def number(low: float, high: float) -> str:
         return f"{pick.uniform(low, high):.4f}"
+
+    def pulse(unit: str) -> str:
+        to, over, rise = newer.uniform(-1, 1), newer.uniform(0.1, 0.2), newer.uniform(0.02, 0.05)
+        return f"pulse(to = {to:.4f} {unit}, slope = {abs(to) / rise + 1:.4f} {unit}/s, over = {over:.4f} s)"
+
+    def start(joint: int, unit: str, kind: str) -> str:
+        """Where a joint begins; kind: of its command, if it has one."""
+        q, qd = f"{number(-1, 1)} {unit}", f"{number(-1, 1)} {unit}/s"
+        if kind == "position" and newer.random() < 0.5:
+            q = "command"
+        if kind in ("position", "rate") and newer.random() < 0.5:
+            qd = "command"
+        return f"j{joint}.q = {q}; j{joint}.qd = {qd};"
 
     def vector(size: float, unit: str) -> str:
         return "[" + ", ".join(number(-size, size) for _ in range(3)) + f"] {unit}"
 
     count = pick.randint(1, 5)
     arm, servos, uses = [], [], []
+    joint_units, commands = [], {}
     for i in range(count):
         prismatic = pick.random() < 0.3
         parent = "base" if i == 0 else pick.choice([f"link{j}" for j in range(i)])
@@ -116,9 +131,10 @@ def random_deck(seed: int, *, friction: bool = True) -> str:
             f"    joint j{i} {kind} {{ parent = {parent}; child = link{i}; axis = {pick.choice(['x', 'y', 'z', '-x'])};"
             f" at = {vector(0.6, 'm')}; rpy = {vector(3, 'rad')}; }}"
         )
+        joint, effort = ("m", "N") if prismatic else ("rad", "N*m")
+        joint_units.append(joint)
         if pick.random() < 0.85:
-            joint, effort = ("m", "N") if prismatic else ("rad", "N*m")
-            kind = pick.choice(["rate", "rate", "position", "torque"])
+            commands[i] = kind = pick.choice(["rate", "rate", "position", "torque"])
             unit = {"rate": f"{joint}/s", "position": joint, "torque": effort}[kind]
             course = pick.choice(
                 [
@@ -129,6 +145,7 @@ def random_deck(seed: int, *, friction: bool = True) -> str:
                     f"table(times = [0, 0.1, 0.25] s, values = [0, {number(-1, 1)}, {number(-1, 1)}] {unit})",
                 ]
             )
+            course = pulse(unit) if newer.random() < 0.25 else course
             f_c = number(0.001, 0.05) if friction and pick.random() < 0.6 else "0"
             servos.append(
                 GEARBOX.format(
@@ -146,11 +163,7 @@ def random_deck(seed: int, *, friction: bool = True) -> str:
     gravity = f"gravity = {vector(9.81, 'm/s^2')};" if pick.random() < 0.7 else ""
     damping = "drag = joint_damping { damping = 0.3 N*m*s/rad; sliding = 4 N*s/m; };" if pick.random() < 0.3 else ""
     dynamics = pick.choice(["250 Hz", "500 Hz", "1 kHz"])
-    initial = " ".join(
-        f"j{i}.q = {number(-1, 1)} {unit}; j{i}.qd = {number(-1, 1)} {unit}/s;" if pick.random() < 0.5 else ""
-        for i in range(count)
-        for unit in (["m"] if f"joint j{i} prismatic" in "\n".join(arm) else ["rad"])
-    )
+    initial = " ".join(start(i, unit, commands.get(i, "")) for i, unit in enumerate(joint_units) if pick.random() < 0.5)
     return "\n".join(
         [
             *servos,
