@@ -21,6 +21,9 @@ from met.messages.visible import say
     help="How much may differ from it, as `met diff` has it: qd=1e-6rad/s,rel=1e-9,time=1ms; may be repeated.",
 )
 @click.option("--title", default="", metavar="TEXT", help="What stands above it [names of deck, runs and sweeps].")
+@click.option(
+    "--no-simulation", is_flag=True, help="Only what the archive has: the page runs no case again, and draws no arm."
+)
 @loudness_options
 def report(
     archive: str,
@@ -29,6 +32,7 @@ def report(
     against: str | None,
     tolerances: tuple[str, ...],
     title: str,
+    no_simulation: bool,
     quiet: bool,
     verbose: bool,
 ) -> int:
@@ -45,7 +49,14 @@ def report(
         raise click.UsageError("--tol is for a comparison: `--against BEFORE.h5` names the other archive")
     told = (lambda done: click.echo(f"stability of {done} cases is known", err=True)) if verbose else None
     target = make(
-        archive, output, experiments=experiments, title=title, against=against, tolerances=tolerances, progress=told
+        archive,
+        output,
+        experiments=experiments,
+        title=title,
+        against=against,
+        tolerances=tolerances,
+        simulate=not no_simulation,
+        progress=told,
     )
     if not quiet:
         say(f"{target}  ({size(target.stat().st_size)})")

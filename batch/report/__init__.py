@@ -21,6 +21,7 @@ def report(
     title: str = "",
     against: str | os.PathLike[str] | None = None,
     tolerances: str | Sequence[str] = (),
+    simulate: bool = True,
     progress: Callable[[int], None] | None = None,
 ) -> Path:
     """Write a report of an archive; its place. The same archives give the same bytes.
@@ -30,6 +31,7 @@ def report(
     title        what stands above it; "": the names of deck, runs and sweeps
     against      an earlier archive: what changed is in the page too
     tolerances   how much may differ from it, as `batch.diff` has them
+    simulate     whether the page can run the cases again, and draws the arm
     progress     called with the number of cases whose stability is known, where motors are on beds
 
     Raises met.diagnostic.Problem for what a user can mend.
@@ -60,6 +62,6 @@ def report(
             texts = [tolerances] if isinstance(tolerances, str) else tolerances
             found = rename_archives(diff(Path(against), archive, read(texts)), *display_names(Path(against), archive))
             other = ComparedArchive(stack.enter_context(ArchiveFile(Path(against))), found)
-        text = page(gather(file, experiments, title, progress, other))
+        text = page(gather(file, experiments, title, progress, other, simulate=simulate))
     write(target, text)
     return target

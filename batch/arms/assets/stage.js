@@ -252,12 +252,12 @@ MET.stage = (() => {
       redraw();
     }
 
-    // Cases that are ghosts: {taken, bad}.
-    function haunt(list) {
+    // Cases that are ghosts: {taken, bad}; words: what they are called.
+    function haunt(list, words = list.length === 1 ? "1 other case" : `${list.length} other cases`) {
       others = list.map(({ taken, bad }) => ({ at: taken.at, bad }));
       inks = null;
       withOthers.hidden = !list.length;
-      withOthers.textContent = list.length === 1 ? "1 other case" : `${list.length} other cases`;
+      withOthers.textContent = words;
       redraw();
     }
     haunt([]);

@@ -14,7 +14,9 @@ from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.differences.result import Diff, ExperimentDiff
 from batch.queries.pool import ENDED, CaseColumn, Pool
 from batch.queries.signals import deck_unit
+from met.diagnostic import Problem
 from met.frozen import frozen
+from met.plan import Experiment
 
 GOOD = (ENDED.index("met"), ENDED.index("done"))
 
@@ -35,18 +37,19 @@ class ComparedArchive:
             for number, group in enumerate(pool.groups)
             if group.name in by_name
         ]
-        return EarlierCases(pool, pairs) if pairs else None
+        return EarlierCases(pool, pairs, self.file) if pairs else None
 
 
 class EarlierCases:
     """The cases of the other archive that are those of a pool, in the pool's order.
 
-    pool   theirs;  pairs  of each structure in both: which of the first pool's it is, theirs, and how they differ
+    pool   theirs, of `file`
+    pairs  of each structure in both: which of the first pool's it is, theirs, and how they differ
     place  [case] which case of `pool` it is, -1 where there is none;  how: its place in VERDICTS, likewise
     """
 
-    def __init__(self, now: Pool, pairs: Sequence[tuple[int, ArchiveGroup, ExperimentDiff]]) -> None:
-        self.now, self.pairs = now, tuple(pairs)
+    def __init__(self, now: Pool, pairs: Sequence[tuple[int, ArchiveGroup, ExperimentDiff]], file: ArchiveFile) -> None:
+        self.now, self.pairs, self.file = now, tuple(pairs), file
         self.pool = Pool(now.name, [group for _, group, _ in pairs])
         self.place = np.full(now.count, -1)
         self.how = np.full(now.count, -1, np.int8)
@@ -70,6 +73,13 @@ class EarlierCases:
         """Numbers of the cases that differ most, the first ones first."""
         ranked = [each for _, _, experiment in self.pairs for each in experiment.worst]
         return tuple(each.case_b for each in sorted(ranked, key=lambda each: -each.score))
+
+    def experiments(self) -> dict[str, Experiment]:
+        """Those of the other archive's plan, by name; none where the plan cannot be read here."""
+        try:
+            return {each.name: each for each in self.file.plan().experiments}
+        except Problem:
+            return {}
 
     def values(self, metric: CaseColumn) -> np.ndarray | None:
         """A metric of the pool as it was, in its unit: [case], not a number where there is none; None where the other

@@ -18,11 +18,12 @@ from batch.report.contents import comparison
 from batch.report.contents.against import ComparedArchive, EarlierCases, of_groups
 from batch.report.contents.designs import design_answer
 from batch.report.contents.evidence import evidence_part
-from batch.report.contents.histories import MOST_VALUES, no_signals, signals
+from batch.report.contents.histories import MOST_VALUES, WHERE_RUN_AGAIN, no_signals, signals
 from batch.report.contents.influence import influences
 from batch.report.contents.overview import overview
 from batch.report.contents.parameters import parameters, varied
-from batch.report.contents.parts import Fact, Report, ReportSection, SourceListing, Stability
+from batch.report.contents.parts import Fact, Report, ReportSection, Signals, SourceListing, Stability
+from batch.report.contents.simulation import MOST_STRUCTURES, ComputedGroup, simulation
 from batch.report.contents.stability import stability
 from batch.report.contents.tables import best, replay, structures, worst
 from batch.report.contents.verdicts import metric_rows, verdict
@@ -47,12 +48,15 @@ def gather(
     title: str = "",
     progress: Callable[[int], None] | None = None,
     against: ComparedArchive | None = None,
+    *,
+    simulate: bool = False,
 ) -> Report:
     """Gather all that a page says of an archive, or of these runs and sweeps of it. Raises Problem E325 for another
     name.
 
     progress  called with the number of cases whose margin is known, where motors are on beds
     against   another archive to compare with
+    simulate  whether the page is to run cases again
     """
     groups = groups_named(archive, names)
     found = pools(groups)
@@ -65,7 +69,18 @@ def gather(
     befores = [None if against is None else against.of(pool) for pool in found]
     sections = tuple(
         replace(
-            _section(name, pool, pool.name if several else "", experiments, trouble, share, progress, before, archive),
+            _section(
+                name,
+                pool,
+                pool.name if several else "",
+                experiments,
+                trouble,
+                share,
+                progress,
+                before,
+                archive,
+                simulate,
+            ),
             changes=() if against is None else comparison.run_changes(against.found, before),
         )
         for pool, before in zip(found, befores, strict=True)
@@ -108,6 +123,7 @@ def _section(
     progress: Callable[[int], None] | None,
     before: EarlierCases | None,
     file: ArchiveFile,
+    simulate: bool,
 ) -> ReportSection:
     own = {group.name: experiments[group.name] for group in pool.groups if group.name in experiments}
     beds: Stability | None = None
@@ -117,10 +133,19 @@ def _section(
         beds = stability(pool, own, progress)
     except Problem as problem:
         trouble = trouble or "; ".join(diagnostic.message for diagnostic in problem.diagnostics)
-    recorded = any(group.recorded for group in pool.groups)
-    plan = written_plan(file) if recorded else None
-    units = [DeckUnits(plan, group) for group in pool.groups] if plan is not None else []
-    drawn = signals(pool, values, before, units)
+    points = overview(pool, before)
+    best_cases, worst_cases = best(pool, archive, only, before), worst(pool, archive, only, before)
+    computed = {
+        n: ComputedGroup(group, own[group.name])
+        for n, group in enumerate(pool.groups[:MOST_STRUCTURES])
+        if simulate and group.name in own
+    }
+    drawn = _signals(pool, file, before, values, computed)
+    played = None
+    if drawn is not None and computed:
+        first = [*drawn.shown, *(case for each in (best_cases, worst_cases) if each is not None for case in each.cases)]
+        first += [] if before is None else before.most
+        played = simulation(pool, own, drawn, first, points, before)
     errors = together(map(figures, pool.groups))
     return ReportSection(
         name=pool.name,
@@ -131,11 +156,12 @@ def _section(
         structures=structures(pool, before),
         evidence=evidence_part(pool, archive, several=bool(only)),
         designs=design_answer(file, pool),
-        best=best(pool, archive, only, before),
-        worst=worst(pool, archive, only, before),
-        overview=overview(pool, before),
+        best=best_cases,
+        worst=worst_cases,
+        overview=points,
         signals=drawn,
         no_signals="" if drawn else no_signals(pool),
+        simulation=played,
         stability=beds,
         parameters=rows,
         trouble=trouble,
@@ -144,6 +170,18 @@ def _section(
         by_step="" if errors is None else about_errors(errors),
         influences=influences(pool),
     )
+
+
+def _signals(
+    pool: Pool, file: ArchiveFile, before: EarlierCases | None, values: int, computed: Mapping[int, ComputedGroup]
+) -> Signals | None:
+    """The signals of a section, in the deck's units; fewer histories where all its cases can be run again."""
+    recorded = any(group.recorded for group in pool.groups)
+    plan = written_plan(file) if recorded or computed else None
+    units = [DeckUnits(plan, group) for group in pool.groups] if plan is not None else []
+    if before is None and len(computed) == len(pool.groups):
+        values = min(values, WHERE_RUN_AGAIN)
+    return signals(pool, values, before, units, computed)
 
 
 # What was run

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
 from batch.archive.read import ArchiveGroup
-from batch.queries.arrange import command_curves, joints_of
+from batch.queries.arrange import CommandCurve, command_curves, joints_of
 from batch.queries.deck_units import DeckUnits
 from batch.queries.pool import Pool
 from batch.queries.signals import Panel, history, panels
@@ -16,6 +17,7 @@ from batch.report.contents.against import EarlierCases
 from batch.report.contents.earlier import EarlierHistories
 from batch.report.contents.parts import History, PanelLine, SignalPanel, Signals
 from batch.report.contents.thinning import stretch, thin, thin_clock
+from met.plan.channel import channel_paths
 
 MOST_POINTS = 4000
 """Points of a line: of more rows each stretch gives its smallest and its largest value."""
@@ -23,6 +25,9 @@ MOST_POINTS = 4000
 FEWEST_POINTS = 500
 MOST_VALUES = 400_000
 """Numbers that a page holds, over all its lines; about five bytes each."""
+
+WHERE_RUN_AGAIN = 60_000
+"""The same where the page can run cases again."""
 
 MOST_HISTORIES, COMPARED = 200, 3
 """Cases whose signals are in a page; cases that are drawn together at first."""
@@ -35,24 +40,33 @@ MOST_PANELS = 32
 
 
 def signals(
-    pool: Pool, values: int = MOST_VALUES, before: EarlierCases | None = None, units: Sequence[DeckUnits] = ()
+    pool: Pool,
+    values: int = MOST_VALUES,
+    before: EarlierCases | None = None,
+    units: Sequence[DeckUnits] = (),
+    computed: Mapping[int, ArchiveGroup] = MappingProxyType({}),
 ) -> Signals | None:
-    """The histories of the worst cases that have some, and of the middle one; None where none has one.
+    """The histories of the worst cases that have some, and of the middle one; None where none has one and none can be
+    computed.
 
-    values  how many numbers there may be;  units  the deck's for each group of the pool; none: SI
+    values    how many numbers there may be;  units: the deck's for each group of the pool; none: SI
+    computed  by place in the pool, groups of which the page runs cases again, as they are with histories
     before  another archive to compare with: the cases that differ most from it come first, each with what it was there
     """
     known = _kept(pool, before)
-    if not known:
+    if not known and not computed:
         return None
     values = values if before is None else values // 3  # what it is, what it was, and the difference
     scaled: dict[tuple[str, str], Panel] = {}
     groups = []
     for n, group in enumerate(pool.groups):
         own = units[n] if units else None
-        groups.append(_Group(group, [place for number, place in known if number == n], own, scaled))
+        places = [place for number, place in known if number == n]
+        groups.append(_Group(group if places else computed.get(n, group), places, own, scaled))
+    if not any(each.panels for each in groups):
+        return None
     width = max(max((each.width for each in groups), default=1), 1)
-    few = min(len(known), COMPARED)
+    few = max(1, min(len(known), COMPARED))
     points = int(np.clip(values // (width * few), FEWEST_POINTS, MOST_POINTS))
     rows = max(min(each.rows, points) for each in groups if each.panels)
     most = int(np.clip(values // max(1, width * rows), few, MOST_HISTORIES))
@@ -91,9 +105,15 @@ def signals(
     changed = () if before is None else tuple(case for case in before.most if case in here)
     if middle is not None:
         shown[-1] = numbers[middle]
-    said = _said(groups, len(known), len(histories), len(names), points, before is not None)
     compared = None if middle is None else numbers[middle]
-    return Signals(found, joints, tuple(clocks), histories, tuple(shown), compared, said, changed, worst)
+    if not known:
+        order = pool.cases[pool.worst_first]
+        shown = order[: COMPARED - 1 if len(order) >= FEWEST_COMPARED else COMPARED].tolist()
+        compared = int(order[len(order) // 2]) if len(order) >= FEWEST_COMPARED else None
+        shown += [] if compared is None else [compared]
+    said = _said(groups, len(known), len(histories), len(names), points, before is not None, again=bool(computed))
+    sources = tuple(each.sources(found) for each in groups)
+    return Signals(found, joints, tuple(clocks), histories, tuple(shown), compared, said, changed, worst, sources)
 
 
 def _kept(pool: Pool, before: EarlierCases | None = None) -> list[tuple[int, int]]:
@@ -112,10 +132,17 @@ def _kept(pool: Pool, before: EarlierCases | None = None) -> list[tuple[int, int
     return list(dict.fromkeys(found))
 
 
-def _said(groups: Sequence[_Group], known: int, here: int, plots: int, points: int, compared: bool) -> tuple[str, ...]:
-    """Say what is not in the page. known, here: the numbers of recorded cases, and of those of them that are in it."""
+def _said(
+    groups: Sequence[_Group], known: int, here: int, plots: int, points: int, compared: bool, *, again: bool
+) -> tuple[str, ...]:
+    """Say what is not in the page. known, here: the numbers of recorded cases, and of those of them that are in it;
+    again: whether others are run again there."""
     out = []
-    if here < known:
+    if again and here < known:
+        out.append(
+            f"The records of {here:,} of {known:,} cases are in this page; others are run again where it is read."
+        )
+    elif here < known:
         which = "those that changed most and of the worst" if compared else "the worst"
         out.append(f"Signals of {which} of {known:,} recorded cases are in this page, {here:,} of them.")
     each = max(stretch(group.rows, points) for group in groups)
@@ -153,11 +180,12 @@ class _Group:
         self.group = group
         self.panels: tuple[Panel, ...] = ()
         self.rows = 0
-        if not positions or not group.role("signal"):
+        self.commands: dict[tuple[str, str], list[tuple[int, CommandCurve]]] = {}
+        if not group.role("signal"):
             return
         found = [self._in_unit(panel, units, scaled) for panel in panels(group)]
         self.rows = int(group.values("time").shape[0])
-        commands = command_curves(group, found, positions[:COMPARED], apart=True)
+        commands = command_curves(group, found, positions[:COMPARED], apart=True) if positions else {}
         drawn = {(command.variable, command.column) for command in commands.values()}
         self.panels = tuple(p for p in found if not drawn.issuperset((p.variable, column) for column in p.columns))
         self.commands = {
@@ -182,7 +210,25 @@ class _Group:
     def described(self, panel: Panel) -> SignalPanel:
         lines = [PanelLine(label, joint) for label, joint in zip(panel.lines, panel.joints, strict=True)]
         lines += [PanelLine(lines[n].label, lines[n].joint, True) for n, _ in self.commands[panel.name, panel.unit]]
-        return SignalPanel(panel.name, panel.about, panel.unit, tuple(lines))
+        return SignalPanel(panel.name, panel.about, panel.unit, tuple(lines), panel.scale)
+
+    def sources(self, found: Sequence[SignalPanel]) -> tuple[tuple[str, ...], ...]:
+        """The channel of each line of each of the page's panels; "" where this structure has none."""
+        out = [[""] * len(panel.lines) for panel in found]
+        keys = [(panel.name, panel.unit) for panel in found]
+        for panel in self.panels:
+            key = panel.name, panel.unit
+            if key in keys:
+                place = keys.index(key)
+                channels = [self._channel(panel.variable, column) for column in panel.columns]
+                channels += [self._channel(command.variable, command.column) for _, command in self.commands[key]]
+                for line, channel in zip(self.described(panel).lines, channels, strict=True):
+                    out[place][found[place].lines.index(line)] = channel
+        return tuple(map(tuple, out))
+
+    def _channel(self, variable: str, column: int) -> str:
+        stored = self.group.variables[variable]
+        return channel_paths(variable, self.group.joints(stored), self.group.components(stored))[column]
 
     def thinned(self, found: Sequence[SignalPanel], position: int, points: int) -> dict[int, np.ndarray]:
         """The lines of each of the page's panels, by its place: (point, line of that panel), not a number where this
@@ -207,4 +253,4 @@ def _joined(one: SignalPanel | None, other: SignalPanel) -> SignalPanel:
     """The panel of two structures: the lines of both."""
     if one is None:
         return other
-    return SignalPanel(one.name, one.about, one.unit, tuple(dict.fromkeys((*one.lines, *other.lines))))
+    return SignalPanel(one.name, one.about, one.unit, tuple(dict.fromkeys((*one.lines, *other.lines))), one.scale)

@@ -13,6 +13,7 @@ from batch.queries.evidence_table import EvidenceTexts
 from batch.queries.pool import CaseColumn
 from batch.queries.summary import MetricSpread
 from batch.report.contents.changes import ArchiveChanges, RunChanges
+from batch.report.contents.simulated import PageSimulation
 from met.frozen import frozen
 
 
@@ -204,14 +205,14 @@ class TextTable:
 
 @frozen
 class NotableCases:
-    """The best cases, or the worst: a table whose rows are these cases, the command that runs each again, and how many
-    more there are."""
+    """The best cases, or the worst: a table whose rows are these cases, the command that runs each again, and what is
+    said of more of them."""
 
     title: str
     table: TextTable
     cases: tuple[int, ...]
     commands: tuple[str, ...]
-    left: int
+    more: str = ""
 
 
 @frozen
@@ -398,12 +399,13 @@ class PanelLine:
 
 @frozen
 class SignalPanel:
-    """Lines that share an axis: of one signal in one unit."""
+    """Lines that share an axis: of one signal in one unit, of which one is `scale` SI units."""
 
     name: str
     about: str
     unit: str
     lines: tuple[PanelLine, ...]
+    scale: float = 1.0
 
 
 @frozen
@@ -430,6 +432,7 @@ class Signals:
     most    cases that differ most from the other archive, where one is compared with;  worst  the worst of all
     middle  the case in the middle of the order, to compare the worst with; None where there are few
     said    what was left out, and how lines were thinned
+    sources of each structure, by its place in the pool, the channel of each line of each panel; "" where it has none
     """
 
     panels: tuple[SignalPanel, ...]
@@ -441,6 +444,7 @@ class Signals:
     said: tuple[str, ...] = ()
     most: tuple[int, ...] = ()
     worst: int | None = None
+    sources: tuple[tuple[tuple[str, ...], ...], ...] = ()
 
 
 @frozen
@@ -502,6 +506,7 @@ class ReportSection:
 
     name        as it is asked for;  lede  what it is, in a sentence
     evidence    what the cases show of each requirement;  None where nothing is required
+    simulation  by which the page runs cases again;  None where it cannot, or was not to
     designs     which design of a sweep to use;  None where it chooses none, or requires nothing
     changes     against another archive, a structure each;  what one of them lacks is in `ArchiveChanges.alone`
     trouble     why parameters and stability are missing; "" where they are not
@@ -522,6 +527,7 @@ class ReportSection:
     overview: Overview | None
     signals: Signals | None
     no_signals: str
+    simulation: PageSimulation | None
     stability: Stability | None
     parameters: tuple[ParameterRow, ...]
     trouble: str = ""

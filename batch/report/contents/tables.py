@@ -11,6 +11,7 @@ from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
 from batch.queries.summary import median_text
 from batch.report.contents.against import GOOD, EarlierCases
 from batch.report.contents.parts import NotableCases, TextTable
+from ic.printing.columns import count as counted
 from met.distinct import distinct
 from met.outputs import quoted
 
@@ -31,7 +32,9 @@ def best(pool: Pool, archive: str, only: str, before: EarlierCases | None = None
     if not len(places):
         return None
     made = _case_table(pool, places[:MOST_BEST], archive, only, before)
-    return replace(made, title="Best cases", left=len(places) - len(made.cases))
+    left = len(places) - len(made.cases)
+    more = f"{counted(left, 'more case')} {'meets' if left == 1 else 'meet'} all." if left else ""
+    return replace(made, title="Best cases", more=more)
 
 
 def worst(pool: Pool, archive: str, only: str, before: EarlierCases | None = None) -> NotableCases | None:
@@ -40,7 +43,9 @@ def worst(pool: Pool, archive: str, only: str, before: EarlierCases | None = Non
     if pool.count < 2:
         return None
     made = _case_table(pool, pool.worst_first[:MOST_CASES], archive, only, before)
-    return replace(made, title=_title(pool, len(made.cases)), left=pool.count - len(made.cases))
+    left = pool.count - len(made.cases)
+    more = f"{counted(left, 'more case')} {'is' if left == 1 else 'are'} in the archive." if left else ""
+    return replace(made, title=_title(pool, len(made.cases)), more=more)
 
 
 def _case_table(pool: Pool, places: np.ndarray, archive: str, only: str, before: EarlierCases | None) -> NotableCases:
@@ -67,7 +72,7 @@ def _case_table(pool: Pool, places: np.ndarray, archive: str, only: str, before:
         marked=frozenset(marked),
     )
     numbers = tuple(int(pool.cases[place]) for place in places)
-    return NotableCases("", table, numbers, tuple(replay(archive, only, case) for case in numbers), 0)
+    return NotableCases("", table, numbers, tuple(replay(archive, only, case) for case in numbers))
 
 
 def replay(archive: str, only: str, case: int | str) -> str:

@@ -165,7 +165,7 @@ def _comparison(found: Verdict) -> Html:
     bars = bar([(cls, count) for cls, _, count in parts], "; ".join(text for _, text in words))
     moves = [*found.flows, *([found.ends] if found.ends is not None else [])]
     apart = [_moves(moves, better=better) for better in (True, False)] if moves else []
-    evidence = [join([bars, legend]) if found.cases > 1 else None, apart, _flows(found.flows)]
+    evidence = [join([bars, legend]) if found.cases > 1 else None, _flows(found.flows), apart]
     return el("div", answer, el("div", evidence, cls="evidence"), cls="verdict against")
 
 
@@ -203,9 +203,7 @@ def _moves(found: Sequence[RequirementFlow], *, better: bool) -> Html:
     name = "Improvements" if better else "Regressions"
     if not rows:
         return join([el("h4", name), el("p", "None of what is required.", cls="said")])
-    crossed, moved_head = (
-        ("met now, and not before", "more margin in") if better else ("no longer met", "less margin in")
-    )
+    crossed, moved_head = ("met now, and not before", "better in") if better else ("no longer met", "worse in")
     heads = (("requirement", None), (crossed, None), (moved_head, "right"), ("furthest", None))
     head = el("tr", [el("th", text, scope="col", cls=cls) for text, cls in heads])
     return join([el("h4", name), scrolling(el("table", el("thead", head), el("tbody", lines(rows))), name)])

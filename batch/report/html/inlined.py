@@ -7,6 +7,8 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
+from batch.arms.scripts import arm_scripts
+
 FOLDER = Path(__file__).with_name("assets")
 
 STYLES = ("uPlot.min.css", "report.css")
@@ -19,8 +21,11 @@ SCRIPTS = (
     "map.js",
     "signals.js",
     "stability.js",
-    "report.js",
 )
+SIMULATING = ("simulation.js", "posing.js")
+"""Those of a page that runs cases again."""
+
+LAST = "report.js"
 """In the order in which they stand in a page; each builds on those before."""
 
 
@@ -29,10 +34,14 @@ def style() -> str:
     return "\n".join(_read(name) for name in STYLES)
 
 
-@cache
-def script() -> str:
-    """All scripts, in their order."""
-    return licensed(*SCRIPTS)
+def script(modules: str = "") -> str:
+    """All scripts, in their order. modules: what a page runs cases again with (`payload.modules_script`)."""
+    if not modules:
+        return licensed(*SCRIPTS, LAST)
+    from met.backends.wasm.module import KERNEL_JS
+
+    kernel = KERNEL_JS.read_text(encoding="utf-8").strip()
+    return "\n".join([licensed(*SCRIPTS), arm_scripts(), kernel, *map(_read, SIMULATING), modules, _read(LAST)])
 
 
 @cache

@@ -4,21 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from batch.arms.scripts import arm_style
 from batch.report.contents.parts import Report, ReportSection
 from batch.report.html import blocks, changes, designs, inlined, tables
 from batch.report.html.head import page_head
 from batch.report.html.markup import Child, Html, el, join, lines
-from batch.report.html.payload import script_json, section_data
+from batch.report.html.payload import modules_script, script_json, section_data
 
 GENERATOR = "MET report"
 """The name in a page's `generator`, by which it is known as one of ours, which may be written over."""
 
 
+CODE = "'wasm-unsafe-eval'"
+"""A further source of code of a page that runs cases again: modules of WebAssembly, which stand in its script."""
+
+
 def page(report: Report) -> str:
     """The whole file. The same report gives the same text."""
     anchors = {file.name: (n, file.text.count("\n") + 1) for n, file in enumerate(report.sources)}
-    style, script = inlined.style(), inlined.script()
-    head = page_head(report.title, generator=GENERATOR, style=style, script=script)
+    running = any(section.simulation for section in report.sections)
+    style = f"{inlined.style()}\n{arm_style()}" if running else inlined.style()
+    script = inlined.script(modules_script(report.sections) if running else "")
+    head = page_head(report.title, generator=GENERATOR, style=style, script=script, allowed=CODE if running else "")
     data = [
         el(
             "script",
@@ -79,13 +86,19 @@ def _links(number: int, section: ReportSection, report: Report) -> list[tuple[st
         ("best", "Best cases", section.best is not None),
         ("worst", "Worst cases", section.worst is not None),
         ("overview", "Cases", section.overview is not None),
-        ("signals", "Signals", section.signals is not None),
+        ("signals", _signals_name(section), section.signals is not None),
         ("influence", "Which parameters matter", bool(section.influences)),
         ("structures", "Structures", section.structures is not None),
         ("stability", "Stability", section.stability is not None),
         ("run", "What was run", True),
     ]
     return [(f"s{number}-{key}", name) for key, name, there in found if there]
+
+
+def _signals_name(section: ReportSection) -> str:
+    found = section.simulation
+    drawn = found is not None and any(each.scene is not None for each in found.structures)
+    return "Arm and signals" if drawn else "Signals"
 
 
 def _main(report: Report, anchors: blocks.Anchors) -> Sequence[Child]:
@@ -153,8 +166,11 @@ def _section(number: int, section: ReportSection, anchors: blocks.Anchors, head:
     elif table is not None:
         out.append(part("overview", "Metrics", table))
     if section.signals is not None:
-        said = [el("p", each, cls="said") for each in section.signals.said]
-        out.append(part("signals", "Signals", el("div", cls="signals plot", data_plot="signals"), said))
+        run_again = section.simulation.said if section.simulation is not None else ()
+        said = [el("p", each, cls="said") for each in (*section.signals.said, *run_again)]
+        arm = el("div", cls="arm", data_plot="arm") if section.simulation is not None else None
+        plots = el("div", cls="signals plot", data_plot="signals")
+        out.append(part("signals", _signals_name(section), arm, plots, said))
     else:
         out.append(part("signals", "Signals", said=section.no_signals))
     if section.influences:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from batch.arms.scene import scene_json
 from batch.queries.colours import Reach, reach
 from batch.queries.pool import ENDED, CaseColumn
 from batch.queries.signals import pretty_unit
 from batch.report.contents.changes import ArchiveChanges
 from batch.report.contents.parts import History, Map, Overview, ReportSection, Ruler, Signals, Stability
+from batch.report.contents.simulated import PageSimulation, SimulatedStructure
 from batch.report.html.markup import Html
 from met.messages.visible import visible
 
@@ -37,6 +40,7 @@ def section_data(section: ReportSection, replay: str, changes: ArchiveChanges | 
         "ended": list(ENDED),
         "overview": None if section.overview is None else overview_data(section.overview),
         "signals": None if section.signals is None else _signals(section.signals),
+        "simulation": None if section.simulation is None else _simulation(section.simulation),
         "stability": None if section.stability is None else _stability(section.stability),
     }
 
@@ -66,6 +70,24 @@ def packed(values: np.ndarray) -> dict[str, Any]:
 
 def _base64(values: np.ndarray) -> str:
     return base64.b64encode(values.tobytes()).decode("ascii")
+
+
+def exact(values: np.ndarray) -> dict[str, Any]:
+    """Doubles to the bit, as base64: all of them, or each that there is once and which of these it is."""
+    bits = np.ascontiguousarray(values, "<f8").ravel().view("<i8")
+    each, which = np.unique(bits, return_inverse=True)
+    if len(each) > min(0x10000, len(bits) // 2):
+        return {"b": _base64(bits)}
+    return {"b": _base64(each), "n": _base64(which.ravel().astype("<u2"))}
+
+
+def modules_script(sections: Sequence[ReportSection]) -> str:
+    """The modules of WebAssembly of all sections by their digests, as a page's script has them: what it runs is of the
+    script's own digest."""
+    here = [each for section in sections if section.simulation for each in section.simulation.structures]
+    all_ = [each for one in here for each in (one, one.before) if each is not None]
+    found = {each.told["kernel"]["module"]: base64.b64encode(each.code).decode("ascii") for each in all_}
+    return f"MET.modules = {json.dumps(found)};"
 
 
 def _column(column: CaseColumn) -> dict[str, Any]:
@@ -157,6 +179,7 @@ def _signals(signals: Signals) -> dict[str, Any]:
                 "name": visible(panel.name),
                 "about": visible(panel.about),
                 "unit": visible("" if panel.unit == "1" else pretty_unit(panel.unit)),
+                "scale": panel.scale,
                 "lines": [
                     {"label": visible(e.label), "joint": visible(e.joint), "command": e.command} for e in panel.lines
                 ],
@@ -180,6 +203,48 @@ def _history(each: History | None) -> dict[str, Any]:
         return {}
     lines = {str(place): [packed(line) for line in values.T] for place, values in each.values.items()}
     return {"clock": each.clock, "panels": lines}
+
+
+def _simulation(found: PageSimulation) -> dict[str, Any]:
+    return {"structures": [_structure(each) for each in found.structures]}
+
+
+def _structure(found: SimulatedStructure) -> dict[str, Any]:
+    told, kernel = found.told, found.told["kernel"]
+    metrics = {each["name"]: each["output"] for each in told["metrics"]}
+    return {
+        "module": kernel["module"],
+        "kernel": {
+            **{name: kernel[name] for name in ("entry", "heap", "lanes", "base_hz", "record_divisor", "columns")},
+            **{name: {"length": len(kernel[name])} for name in ("inputs", "cells", "outputs")},
+        },
+        "ticks": told["ticks"],
+        "rows": told["rows"],
+        "failure": told["failure"],
+        "names": [visible(each["name"]) for each in told["inputs"]],
+        "sameCode": found.same_code,
+        "cases": packed(found.cases),
+        "inputs": [exact(column) for column in found.inputs.T],
+        "status": packed(found.status),
+        "metrics": [
+            {"name": visible(name), "output": metrics[name.removeprefix("metrics.")], "values": exact(values)}
+            for name, values in found.metrics
+        ],
+        "panels": [list(columns) for columns in found.panels],
+        "scene": None if found.scene is None else _visible_texts(scene_json(found.scene)),
+        "channels": list(found.channels),
+        "lacking": [visible(name) for name in found.lacking],
+        "before": None if found.before is None else _structure(found.before),
+    }
+
+
+def _visible_texts(value: Any) -> Any:
+    """The same data, with what cannot be seen in its texts as escapes."""
+    if isinstance(value, str):
+        return visible(value)
+    if isinstance(value, dict):
+        return {key: _visible_texts(each) for key, each in value.items()}
+    return [_visible_texts(each) for each in value] if isinstance(value, list) else value
 
 
 def _stability(found: Stability) -> dict[str, Any]:

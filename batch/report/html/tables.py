@@ -18,6 +18,9 @@ from batch.report.html.blocks import Anchors, case_link, mark, scrolling, spot_l
 from batch.report.html.markup import Child, Html, breaking, el, join, lines
 from batch.terminal.margin import stable_head
 
+SHOWN_CASES = 8
+"""Rows of the best and of the worst cases that are open; the others are folded away."""
+
 
 def table(found: TextTable, label: str, cells: Sequence[Sequence[Child]] = (), more: Sequence[str] = ()) -> Html:
     """A table of texts. cells, more: further cells of each row, and their heads."""
@@ -76,10 +79,15 @@ def cases(found: NotableCases) -> Html:
         for n, (head, unit) in enumerate(zip(columns.heads, columns.units, strict=True))
     ]
     heads.append(el("th", "run it again, to the same bits", scope="col", cls="command"))
-    made = scrolling(el("table", el("thead", el("tr", heads)), el("tbody", lines(rows)), cls="cases"), found.title)
-    left = f"{found.left:,} more cases are in the archive." if found.left else ""
+
+    def part(own: Sequence[Html]) -> Html:
+        made = el("table", el("thead", el("tr", heads)), el("tbody", lines(own)), cls="cases")
+        return scrolling(made, found.title)
+
+    folded = rows[SHOWN_CASES:]
+    more = el("details", el("summary", f"{len(folded)} more of them"), part(folded)) if folded else None
     again = el("p", el("code", found.commands[0]), " runs the first again, to the same bits.", cls="said printed")
-    return join([made, el("p", left, cls="said") if left else None, again])
+    return join([part(rows[:SHOWN_CASES]), more, el("p", found.more, cls="said") if found.more else None, again])
 
 
 EVIDENCE_HEADS = ("verdict", "missed", "of all cases", "percentile", "worst", "margin", "± step")

@@ -95,7 +95,7 @@ def test_the_difference_is_drawn_in_their_stead(page: Page) -> None:
 
 
 def test_both_are_read_at_one_time(page: Page) -> None:
-    page.run("document.querySelectorAll('.signals .frame')[1].focus()")
+    page.run("document.querySelectorAll('.signals.plot .frame')[1].focus()")
     page.key("ArrowRight")
     page.settle()
     said = page.run("document.querySelectorAll('.reading')[1].textContent")
@@ -107,7 +107,7 @@ def test_a_case_that_changed_is_chosen_from_its_table(page: Page) -> None:
     page.settle()
     card = page.run("document.querySelector('.card').textContent")
     assert "Case #23" in card and "0.9621 rad, before 1.499" in card
-    assert page.run("document.querySelector('.signals .chip').textContent").startswith("#23")
+    assert page.run("document.querySelector('.signals.plot .chip').textContent").startswith("#23")
     assert set(page.run("Array.from(document.querySelectorAll('tr.chosen'), e => e.dataset.case)")) == {"23"}
     quiet(page)
 

@@ -12,13 +12,18 @@ import numpy as np
 import pytest
 
 import batch
+from batch.archive.read import ArchiveFile
 from batch.report import report
+from batch.report.contents.against import ComparedArchive
+from batch.report.contents.gathering import gather
+from batch.report.html.page import page as html_page
 from met import run as engine
 from met.diagnostic import Problem
 from met.plan import Experiment
 from tests.batch import plans
 from tests.batch.report import archives
 from tests.batch.report.browser import Chromium, quiet
+from tests.batch.report.test_page import hostile
 
 pytestmark = pytest.mark.usefixtures("engine")
 
@@ -86,6 +91,27 @@ class TestInTheBrowser:
         page.settle()
         quiet(page)
         page.close()
+
+    def test_hostile_lines_of_decks_and_requirements_are_shown_and_not_run(
+        self, here: Path, chromium: Chromium, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        archives.made(here / "a.h5", plans.gains(6))
+        told(monkeypatch, settle=[1.0, 30.0])
+        one = plans.plan(plans.gains(6))
+        source = replace(one.sources[0], text="run nominal { }\n// another\n")
+        batch.run(replace(one, sources=(source,)), output="b.h5")
+        with ArchiveFile("b.h5") as file, ArchiveFile("a.h5") as other:
+            found = gather(file, against=ComparedArchive(other, batch.diff("a.h5", "b.h5")))
+        assert found.changes is not None and found.changes.decks[0].lines
+        assert found.verdicts[-1].flows[0].worse is not None
+        (here / "wild.html").write_text(html_page(hostile(found)), encoding="utf-8")
+        shown = chromium.open(here / "wild.html")
+        shown.settle()
+        assert shown.run("window.hostile") is None and shown.run("document.querySelectorAll('img').length") == 0
+        for place in (".textdiff", ".verdict.against td.words", ".verdict.against th code", "#changed summary"):
+            assert "</script>" in shown.run(f"document.querySelector({place!r}).textContent"), place
+        quiet(shown)
+        shown.close()
 
     def test_plus_may_be_held_down(self, here: Path, chromium: Chromium) -> None:
         archives.made(here / "a.h5", plans.nominal(), histories="all")

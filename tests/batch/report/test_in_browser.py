@@ -111,7 +111,7 @@ def test_a_case_is_chosen_by_a_click_and_its_signals_are_shown(page: Page) -> No
     page.settle()
     assert "Case #4" in page.run("document.querySelector('.card').textContent")
     assert "met run a.h5 --case '#4'" in page.run("document.querySelector('.card').textContent")
-    assert page.run("document.querySelector('.signals .chip').textContent").startswith("#4")
+    assert page.run("document.querySelector('.signals.plot .chip').textContent").startswith("#4")
     assert page.run("document.querySelector('tr.chosen').dataset.case") == "4"
     quiet(page)
 
@@ -146,7 +146,7 @@ def test_keys_do_what_the_mouse_does(page: Page) -> None:
     page.key("Enter", "\r")
     page.settle()
     assert page.run("MET.models[0].chosen") == 1
-    page.run("document.querySelectorAll('.signals .frame')[1].focus()")
+    page.run("document.querySelectorAll('.signals.plot .frame')[1].focus()")
     page.key("+", "+")
     page.settle()
     assert page.run("MET.models[0].signalPlots().map(u => u.scales.x.max - u.scales.x.min)") == [1] * 4

@@ -196,7 +196,7 @@ class TestWhatIsVendored:
         assert f"(v{version})" in inlined.script()
 
     def test_all_files_of_the_folder_are_used(self) -> None:
-        named = {*inlined.SCRIPTS, *inlined.STYLES, "uPlot.LICENSE", "README.md"}
+        named = {*inlined.SCRIPTS, *inlined.SIMULATING, inlined.LAST, *inlined.STYLES, "uPlot.LICENSE", "README.md"}
         assert {path.name for path in inlined.FOLDER.iterdir()} == named
 
     def test_is_installed_with_the_package(self) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from batch.queries import grids
-from batch.report.contents import histories, overview, stability
+from batch.report.contents import histories, overview, simulation, stability
 from batch.report.contents.gathering import MOST_LINES
 from tests.batch.report import figures
 from tests.batch.report.browser import PACKAGE, program
@@ -21,7 +21,10 @@ def test_the_limits_are_those_of_the_code() -> None:
         f"{overview.MOST_POINTS:,} cases",
         f"the {overview.KEPT} worst",
         f"{histories.MOST_POINTS:,} points",
-        f"{histories.MOST_VALUES:,} numbers",
+        f"{histories.WHERE_RUN_AGAIN:,} numbers",
+        f"{histories.MOST_VALUES:,} where cases are not run again",
+        f"of {simulation.MOST_STRUCTURES} structures",
+        f"{simulation.MOST_EXACT:,} bytes",
         f"{grids.MOST_LEVELS} × {grids.MOST_LEVELS} cells",
         f"{stability.MOST_CASES} cases, of six",
         f"{MOST_LINES:,} lines",

@@ -211,6 +211,6 @@ const MET = (() => {
     return made;
   }
 
-  return { unpack, number, ticks, span, prose, fitted, quantity, titled, node, palette, ramp, share, tone, BELOW, ABOVE, diverging, signed, grey, over, drawn, width, print, tip, pairs, model,
+  return { bytes, unpack, number, ticks, span, prose, fitted, quantity, titled, node, palette, ramp, share, tone, BELOW, ABOVE, diverging, signed, grey, over, drawn, width, print, tip, pairs, model,
     dark, isPrinting: () => printing };
 })();

@@ -3,6 +3,7 @@
 
 MET.map = (() => {
   const { node, number, titled, unpack } = MET;
+  const PADDING = 10;  // px on both sides of a table
   const MANY = [14, 24];  // columns, rows: of more, no number has room in a cell
 
   function make(root, model) {
@@ -28,7 +29,7 @@ MET.map = (() => {
       found.kind = (n) => kind(found, n);
       found.colour = (n) => (m.role === "change" ? MET.diverging(found.values[n] / found.reach.high) : MET.tone(found.values[n], found.reach));
       found.tell = (n) => tell(found, n);
-      const many = found.across > MANY[0] || found.up > MANY[1] || rem(11 + found.across * wide(found)) > MET.width(box) + 12;
+      const many = found.across > MANY[0] || found.up > MANY[1] || least(found) > MET.width(box) - PADDING;
       box.classList.toggle("drawn", many);
       drawn = (many ? MET.cells : table)(box, found, model);
       legend(found, many);
@@ -84,13 +85,16 @@ MET.map = (() => {
   // How wide a cell with its number is, in rem.
   const wide = (found) => Math.max(3.6, 0.62 * Array.from(found.values, (_, n) => text(found, n).length).reduce((a, b) => Math.max(a, b), 0));
 
+  // How wide a table of all is at least, px; its first column is narrower on a narrow page.
+  const least = (found) => rem((matchMedia("(max-width: 46rem)").matches ? 7 : 11) + found.across * wide(found));
+
   // Few cells, each with its number.
   function table(box, found, model) {
     const { map, x, y, across, cases } = found;
     const heads = map.xLevels.map((level) => node("th", { scope: "col" }, level));
     const rows = map.yLevels.map((level, row) => node("tr", null, node("th", { scope: "row" }, level),
       map.xLevels.map((_, column) => cell(row * across + column))));
-    box.replaceChildren(node("table", { class: "grid", style: { minWidth: `${11 + across * wide(found)}rem` } },
+    box.replaceChildren(node("table", { class: "grid", style: { minWidth: `${least(found)}px` } },
       node("thead", null, node("tr", null, node("th", { class: "axis" }, `${titled(y)} ↓`), node("th", { colspan: across }, `${titled(x)} →`)),
         node("tr", null, node("td", { class: "corner" }), heads)), node("tbody", null, rows.reverse())));
 

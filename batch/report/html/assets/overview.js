@@ -169,7 +169,7 @@ MET.overview = (() => {
         const missed = (c.limits || []).some((l) => (l.sense === "<" ? c.values[place] > l.value : c.values[place] < l.value));
         return node("div", null, node("dt", null, c.label), node("dd", { class: missed ? "bad" : "" }, compared(c, place)));
       });
-      const history = model.data.signals && model.data.signals.histories.some((each) => each.case === chosen);
+      const history = model.hasSignals && model.hasSignals(chosen);
       box.replaceChildren(
         node("div", { class: "top" }, node("b", null, `Case #${chosen}`), node("code", null, model.data.overview.ids[place]),
           outcome === "done" ? null : node("span", { class: BAD.includes(outcome) ? "bad" : "good" }, outcome),

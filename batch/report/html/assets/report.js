@@ -16,6 +16,8 @@
       MET.overview.card(place("card"), model);
       if (place("map")) MET.map.make(place("map"), model);
     }
+    model.simulation = MET.simulation ? MET.simulation.make(model) : null;
+    if (place("arm")) MET.posing.make(place("arm"), model);
     if (place("signals")) MET.signals.make(place("signals"), model);
     if (place("stability")) MET.stability.make(place("stability"), model);
     model.watch((chosen) => root.querySelectorAll("tr[data-case]").forEach((row) => row.classList.toggle("chosen", row.dataset.case === String(chosen))));
@@ -60,6 +62,18 @@
     }));
     table.classList.add("stacks");
   });
+
+  // A table that is wider than its place lets its cells follow one another, so that none is cut off.
+  function fit() {
+    document.querySelectorAll(".wide > table.stacks").forEach((table) => {
+      table.classList.remove("flows");
+      const { scrollWidth, clientWidth } = table.parentElement;
+      table.classList.toggle("flows", clientWidth > 0 && scrollWidth > clientWidth + 1);
+    });
+  }
+  fit();
+  addEventListener("resize", fit);
+  document.addEventListener("toggle", fit, true);
 
   // Rows that have all the words.
   document.querySelectorAll("details.all").forEach((box) => {

@@ -1,5 +1,6 @@
 // Recorded signals: a plot a quantity, a colour a joint, a dash a case; time is common to all. What another archive has
-// of them is wide and pale, under the lines of now; or the difference of the two is drawn.
+// of them is wide and pale, under the lines of now; or the difference of the two is drawn. A case whose history is not in
+// the page is run again, where its module is.
 "use strict";
 
 MET.signals = (() => {
@@ -7,6 +8,7 @@ MET.signals = (() => {
   const DASHES = [[], [7, 4], [2, 3], [10, 3, 2, 3]];
   const MOST = DASHES.length;
   const READ = 8;
+  const OFFERED = 25;  // cases of a structure that are offered by name, of all that can be run again
   const CLOSEST = 1e-9;  // of all time, what is shown at least
   const [WIDE, WAS] = [1.6, 5];  // px, how wide a line is, and one of before
 
@@ -14,11 +16,14 @@ MET.signals = (() => {
     const data = model.data.signals;
     const histories = new Map(data.histories.map((each) => [each.case, each]));
     const clocks = data.clocks.map(unpack);
+    const { simulation } = model;
+    const has = (case_) => histories.has(case_) || Boolean(simulation && simulation.has(case_));
     const lines = new Map();
     const sync = uPlot.sync(`${model.id}-time`);
-    let shown = data.shown.slice(0, MOST);
+    let shown = data.shown.filter(has).slice(0, MOST);
     const hidden = new Set();
-    const names = data.histories.some((each) => each.before.panels) ? model.data.against : null;
+    const compared = data.histories.some((each) => each.before.panels) || Boolean(simulation && simulation.structures.some((each) => each.before));
+    const names = compared ? model.data.against : null;
     let how = names ? "both" : "now";
     let [plots, range] = [[], null];
     const caseChips = node("div", { class: "chips" });
@@ -31,10 +36,43 @@ MET.signals = (() => {
     const panels = node("div");
     root.append(controls, panels);
 
+    // What there is of a case: its history in the page, or that of its run here.
+    const ran = new Map();
+    function historyOf(case_) {
+      if (histories.has(case_)) return histories.get(case_);
+      if (!ran.has(case_)) {
+        if (ran.size >= 2 * MOST) forget(ran.keys().next().value);
+        const now = { run: simulation.run(case_) };
+        now.clock = clockOf(now.run);
+        const before = simulation.hadBefore(case_) ? { run: simulation.run(case_, true) } : {};
+        if (before.run) before.clock = clockOf(before.run);
+        const change = before.clock === now.clock ? { clock: now.clock, runs: [now.run, before.run] } : {};
+        ran.set(case_, { case: case_, ...now, before, change });
+      }
+      return ran.get(case_);
+    }
+
+    // The place of a run's times among the clocks.
+    function clockOf({ own: { time } }) {
+      const same = clocks.findIndex((clock) => clock.length === time.length && clock.every((t, n) => t === time[n]));
+      return same < 0 ? clocks.push(time) - 1 : same;
+    }
+
+    function forget(case_) {
+      ran.delete(case_);
+      [...lines.keys()].filter((key) => key.startsWith(`${case_}/`)).forEach((key) => lines.delete(key));
+    }
+
     // The lines of a panel in a case, unpacked once; of: "now", "before", "change".
     function values(history, panel, of) {
       const key = `${history.case}/${panel}/${of}`;
-      const panels = of === "now" ? history.panels : history[of].panels || {};
+      const { run, runs } = of === "now" ? history : history[of];
+      if (!lines.has(key) && run) lines.set(key, simulation.lines(run, panel));
+      if (!lines.has(key) && runs) {
+        const [now, was] = runs.map((each) => simulation.lines(each, panel));
+        lines.set(key, now.map((line, n) => line.map((v, at) => (v === null || was[n][at] === null ? null : v - was[n][at]))));
+      }
+      const panels = (of === "now" ? history : history[of]).panels || {};
       if (!lines.has(key)) lines.set(key, (panels[panel] || []).map((packed) => Array.from(unpack(packed), (v) => (Number.isNaN(v) ? null : v))));
       return lines.get(key);
     }
@@ -49,7 +87,7 @@ MET.signals = (() => {
       const alone = (joint) => panel.lines.filter((line) => line.joint === joint && !line.command).length === 1;
       const out = [];
       shown.forEach((which, nth) => {
-        const history = histories.get(which);
+        const history = historyOf(which);
         for (const of of { both: ["before", "now"], change: ["change"], now: ["now"] }[how]) {
           const { clock } = of === "now" ? history : history[of];
           values(history, number_, of).forEach((points, at) => {
@@ -70,6 +108,7 @@ MET.signals = (() => {
     }
 
     function draw() {
+      if (!shown.length) return;
       plots.forEach((plot) => plot.u.destroy());
       plots = [];
       panels.replaceChildren();
@@ -155,6 +194,7 @@ MET.signals = (() => {
     function read(self, box, found, colour) {
       const at = self.cursor.idx;
       if (at === null || at === undefined || self.cursor.left < 0) return box.replaceChildren();
+      if (model.seek && !pointing && self.cursor.event) model.seek(self.data[0][at]);
       const now = found.filter((each) => !each.was);
       const several = shown.length > 1 && now.length <= READ;
       const listed = now.filter((each) => several || each.nth === 0).slice(0, READ);
@@ -167,6 +207,14 @@ MET.signals = (() => {
           node("b", null, text(each)), was ? node("i", null, `before ${text(was)}`) : null);
       }));
     }
+
+    // The cursors at a time, which the arm stands at.
+    let pointing = false;
+    model.point = (time) => {
+      pointing = true;
+      plots.forEach(({ u }) => u.setCursor({ left: u.valToPos(time, "x"), top: u.over.clientHeight / 2 }, true, false));
+      pointing = false;
+    };
 
     // A cross where a case came to its end too early.
     function ends(self, found, colour) {
@@ -198,14 +246,21 @@ MET.signals = (() => {
       if (names && how === "change") legend.replaceChildren(node("span", null, `${names[1]} − ${names[0]}`));
       else if (names) legend.replaceChildren(...(how === "both" ? [node("span", null, swatch(pale(colours.ink), [], WAS), names[0])] : []), node("span", null, swatch(colours.ink, []), names[1]));
       const told = (each) => (each === data.middle ? `#${each}, the middle one` : each === data.most[0] ? `#${each}, changed most` : each === data.worst ? `#${each}, the worst` : `#${each}`);
-      const several = histories.size > 1;
-      const offered = [...histories.keys()].filter((each) => !shown.includes(each));
+      const several = histories.size > 1 || (simulation && simulation.structures.some(({ cases }) => cases.length > 1));
+      const known = new Set([...histories.keys(), ...(simulation ? simulation.structures.flatMap(({ cases }) => cases.slice(0, OFFERED)) : [])]);
+      const offered = [...known].filter((each) => !shown.includes(each));
+      const any = simulation ? node("input", { type: "text", inputmode: "numeric", class: "any", placeholder: "any case: #", "aria-label": "Run a case again, by its number", change: () => {
+        const wanted = Number(any.value.replace("#", "").trim() || NaN);
+        if (has(wanted)) model.choose(wanted);
+        else any.setCustomValidity(`no case ${any.value} in this page`);
+        any.reportValidity();
+      }, input: () => any.setCustomValidity("") }) : null;
       const add = node("select", { "aria-label": "Add a case", change: () => { show(+add.value); } },
         node("option", { value: "" }, "add a case"), offered.map((each) => node("option", { value: each }, told(each))));
       caseChips.replaceChildren(...(several ? [...shown.map((each, nth) => node("button", { type: "button", class: "chip", title: `Case #${each}: take it out`,
         click: () => { if (shown.length > 1) { shown = shown.filter((other) => other !== each); draw(); } } },
         swatch(colours.ink, DASHES[nth]), told(each), shown.length > 1 ? node("span", { class: "drop", "aria-hidden": "true" }, "×") : null)),
-      offered.length ? add : null].filter(Boolean) : []));
+      offered.length ? add : null, any].filter(Boolean) : []));
       jointChips.replaceChildren(...(data.joints.length > 1 ? data.joints.map((joint, n) => node("button", { type: "button", class: "chip",
         "aria-pressed": String(!hidden.has(joint)), title: `${joint}: show or hide`,
         click: () => { if (!hidden.delete(joint)) hidden.add(joint); if (hidden.size === data.joints.length) hidden.clear(); draw(); } },
@@ -214,7 +269,7 @@ MET.signals = (() => {
 
     // A case is drawn first, the others after it.
     function show(number_) {
-      if (!histories.has(number_)) return;
+      if (!has(number_)) return;
       const others = shown.filter((each) => each !== number_);
       while (others.length >= MOST || (others.length > 1 && others.length >= data.shown.length)) {
         const last = others.length - 1;
@@ -224,9 +279,16 @@ MET.signals = (() => {
       draw();
     }
 
-    draw();
+    if (!shown.length) panels.append(node("p", { class: "note" }, "The archive has no histories, and this reader does not run WebAssembly, by which they would be computed here."));
+    if (shown.every((each) => histories.has(each))) draw();
+    else new IntersectionObserver((entries, observer) => {  // what has to be computed waits until it is looked at
+      if (!entries.some((entry) => entry.isIntersecting)) return;
+      observer.disconnect();
+      draw();
+    }, { rootMargin: "300px" }).observe(root);
     MET.drawn.push(draw);
     model.watch(show);
+    model.hasSignals = has;
     new ResizeObserver(() => plots.forEach(({ u, frame }) => {
       const wide = MET.width(frame);
       if (wide !== u.width) u.setSize({ width: wide, height: u.height });

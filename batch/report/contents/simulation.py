@@ -1,0 +1,156 @@
+"""How a page runs cases again: each structure's module, the cases' inputs, and what the archive has of them.
+
+A page that has only the histories of a few cases computes all others where it is read. Inputs and metrics are kept to
+the bit, so that it can compare what it computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from batch.archive.layout import layout
+from batch.archive.read import ArchiveGroup
+from batch.archive.stored import Stored
+from batch.archive.values import values_of_dimensions
+from batch.arms.scene import arm_scene, lacking
+from batch.modules.description import described
+from batch.queries.pool import Pool
+from batch.report.contents.against import EarlierCases
+from batch.report.contents.overview import MOST_POINTS
+from batch.report.contents.parts import Overview, Signals
+from batch.report.contents.simulated import PageSimulation, SimulatedStructure
+from met.plan import Experiment
+from met.run import inputs, prepare
+
+MOST_STRUCTURES = 8
+"""Structures of a page that have a module: one takes seconds to make."""
+
+MOST_EXACT = 600_000
+"""Bytes of inputs and metrics of a section's cases."""
+
+
+def simulation(
+    pool: Pool,
+    experiments: Mapping[str, Experiment],
+    drawn: Signals,
+    first: Sequence[int],
+    points: Overview | None,
+    before: EarlierCases | None = None,
+) -> PageSimulation | None:
+    """The modules of a pool's structures, and of as many cases as there is room for what they are run with; None where
+    the plan cannot be read here.
+
+    first   numbers of the cases that are wanted before others
+    points  the cases that are drawn, of which the worst come next; None: all are
+    before  another archive to compare with: its program of these cases is there too, where its plan can be read here
+    """
+    groups = [group for group in pool.groups[:MOST_STRUCTURES] if group.name in experiments]
+    if not groups:
+        return None
+    others = pool.cases[pool.worst_first]
+    others = others[np.isin(others, points.cases)] if points is not None else others[:MOST_POINTS]
+    numbers = np.array(list(dict.fromkeys([*first, *others.tolist()])), np.int64)
+    found, left = [], MOST_EXACT
+    earlier = {} if before is None else before.experiments()
+    for number, group in enumerate(pool.groups):
+        if group not in groups:
+            continue
+        here = pool.group_of == number
+        mine = numbers[np.isin(numbers, pool.cases[here])]
+        sources = drawn.sources[number]
+        made, left = _structure(group, experiments[group.name], mine, sources, left)
+        if before is not None:
+            was, left = _earlier(before, earlier, number, made, sources, left)
+            made = replace(made, before=was)
+        found.append(made)
+    said = []
+    count = sum(len(each.cases) for each in found)
+    if count < pool.count:
+        said.append(f"{count:,} of {pool.count:,} cases can be run again in this page.")
+    if len(groups) < len(pool.groups):
+        said.append(f"The first {len(groups)} of {len(pool.groups)} structures can be run again in this page.")
+    return PageSimulation(tuple(found), tuple(said))
+
+
+def _earlier(
+    before: EarlierCases,
+    experiments: Mapping[str, Experiment],
+    number: int,
+    now: SimulatedStructure,
+    sources: Sequence[Sequence[str]],
+    left: int,
+) -> tuple[SimulatedStructure | None, int]:
+    """What the other archive has of a structure's cases, and the bytes that are left; None where it has none of them or
+    its plan cannot be read here. number: the structure's place in the pool."""
+    for place, group, matched in before.pairs:
+        if place != number or group.name not in experiments:
+            continue
+        mine, theirs = before.now.groups[number].values("case"), group.values("case")
+        pairs = dict(zip(mine[matched.cases.b].tolist(), theirs[matched.cases.a].tolist(), strict=True))
+        both = [case for case in now.cases.tolist() if case in pairs]
+        wanted = np.array([pairs[case] for case in both], np.int64)
+        found, left = _structure(group, experiments[group.name], wanted, sources, left)
+        return replace(found, cases=np.array(both[: len(found.cases)], np.int64)), left
+    return None, left
+
+
+def _structure(
+    group: ArchiveGroup, experiment: Experiment, wanted: np.ndarray, sources: Sequence[Sequence[str]], left: int
+) -> tuple[SimulatedStructure, int]:
+    """A structure with as many of the cases that are wanted as `left` bytes hold, and the bytes that are left. sources:
+    the channel of each line of each panel."""
+    from met.backends.wasm.module import compiled
+
+    prepared = prepare(experiment)
+    module = compiled(prepared.recording)
+    told = described(prepared, module)
+    stored = {each.name.removeprefix("metrics."): each.name for each in group.role("metric")}
+    metrics = [stored[each["name"]] for each in told["metrics"] if each["name"] in stored]
+    width = 8 * (len(told["inputs"]) + len(metrics)) or 8
+    wanted = wanted[: left // width]
+    positions = np.searchsorted(group.values("case"), wanted)
+    rows = np.searchsorted(experiment.cases.table, wanted)
+    columns = {each["channel"]: place for place, each in enumerate(told["columns"])}
+    scene = arm_scene(experiment, list(columns))
+    missing = lacking(scene, list(columns))
+    made = SimulatedStructure(
+        code=module.code,
+        told=told,
+        same_code=prepared.code_key == group.attributes.get("code_key"),
+        cases=wanted,
+        inputs=inputs(experiment, np.asarray(rows, np.int64)),
+        metrics=tuple((name, group.at(name, positions)) for name in metrics),
+        status=group.at("status", positions),
+        panels=tuple(tuple(columns.get(channel, -1) for channel in panel) for panel in sources),
+        scene=None if missing else scene,
+        channels=() if missing else tuple(columns[channel] for channel in scene.channels),
+        lacking=missing,
+    )
+    return made, left - width * len(wanted)
+
+
+class ComputedGroup(ArchiveGroup):
+    """A group whose signals are in no archive: what a run of its experiment would record."""
+
+    def __init__(self, group: ArchiveGroup, experiment: Experiment) -> None:
+        self.__dict__.update(group.__dict__)
+        laid = layout(experiment, 1, 1).variables
+        self._dimensions = values_of_dimensions(experiment)
+        self.__dict__["variables"] = {
+            each.name: Stored(
+                each.name,
+                each.dims,
+                each.role,
+                each.unit,
+                tuple(each.attributes.get("units_by_joint", ())),
+                each.long_name,
+                dict(each.attributes),
+            )
+            for each in laid
+        }
+
+    def values(self, name: str) -> np.ndarray:
+        return np.asarray(self._dimensions[name])
