@@ -24,7 +24,7 @@ PAGES = {
               "diagnostics", "editors"],
     "Campaigns and results": ["cluster", "best", "search", "verification", "evidence", "sensitivity", "linear", "plots",
                               "report", "diff", "export", "webassembly", "notebooks"],
-    "A motor on a bed": ["bed", "bench", "drives", "protocol", "../hw/firmware/README"],
+    "A motor on a bed": ["bed", "bench", "drives", "pico", "pico_safety", "protocol", "../hw/firmware/README"],
     "From Python": ["python", "api"],
     "What it computes": ["physics", "paper", "engine"],
     "Inside": ["architecture", "glossary", "../CONTRIBUTING", "../SECURITY", "../CHANGELOG"],

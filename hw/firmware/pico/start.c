@@ -20,7 +20,7 @@ void *memmove(void *to, const void *from, size_t count);
 void *memset(void *to, int value, size_t count);
 
 /* What boot2 and the loader go by, at 0x10000100. `crc` is that of all that follows, which hw/pico.py writes, as it
-   does how many words these are. */
+   does how many words these are; so what the compiler sees here is not what is read. */
 typedef struct {
     uint32_t stack; /* in a bank of RAM that the program does not use */
     void (*entry)(void);
@@ -34,7 +34,7 @@ typedef struct {
 
 #define LOADER __attribute__((section(".loader"), noinline))
 
-__attribute__((section(".head"), used)) const image_head head = {0x20042000u, load, 0u, 0u};
+__attribute__((section(".head"), used)) const volatile image_head head = {0x20042000u, load, 0u, 0u};
 
 /* March C-: each word of RAM from the first address to before the last holds each bit both ways, whatever its neighbours
    do. False where one does not. */
@@ -95,7 +95,9 @@ LOADER void load(void)
         REGISTER(start + at) = REGISTER(from + at);
         sound = (REGISTER(start + at) == REGISTER(from + at)) && sound;
     }
-    while (!sound) {
+    if (!sound) {
+        for (;;) { /* for ever, by a constant: of any other condition a compiler may believe that it ends */
+        }
     }
     VTOR = start;
     __asm volatile("ldr r0, =image_start\n\t"

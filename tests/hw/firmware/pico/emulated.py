@@ -1,14 +1,21 @@
 """A Raspberry Pi Pico in its emulator, on a clock that passes when it is told to (emulator.mjs says what is around it).
 
-The emulator is rp2040js, which `scripts/rp2040js` fetches by its hash.
+The emulator is rp2040js by Uri Shaked (MIT licence, which is in it; github.com/wokwi/rp2040js): rp2040js-1.4.1.tgz
+beside this file is the package as `npm pack rp2040js@1.4.1` gives it, known by its hash.
 """
 
 from __future__ import annotations
 
+import atexit
+import functools
+import hashlib
+import io
 import json
 import os
 import shutil
 import subprocess
+import tarfile
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +25,11 @@ from hw.beds.wire import WireBed
 from hw.line import BedLine
 
 HERE = Path(__file__).parent
-EMULATOR = Path(__file__).parents[4] / "build" / "rp2040js-1.4.1"
+PACKAGE = HERE / "rp2040js-1.4.1.tgz"
+SHA_512 = (
+    "633af9c46ed9c1bb40e74218014d64fe84a84b20c084fb53e6a0bf436785029a"
+    "0bb80604f0341b3c830fb3fd2487821eb5de0fd0ea4a93708891f36a8dcaf9ea"
+)
 STACK_TOP = 0x20002000
 LOAD_ENABLE, DRIVE_ENABLE, BRAKE_RELEASE, PULSE, LED = (1 << pin for pin in (8, 9, 10, 11, 25))
 
@@ -30,15 +41,25 @@ def skip_without_tools() -> None:
     if missing:
         words = " ".join(packages[name] for name in missing)
         pytest.skip(f"no {' and no '.join(missing)}; on Debian or Ubuntu: apt-get install {words}")
-    if not (EMULATOR / "package.json").exists():
-        pytest.skip("no rp2040js, the Pico's emulator: scripts/rp2040js fetches it, 0.1 MB from registry.npmjs.org")
+
+
+@functools.cache
+def unpacked() -> Path:
+    """The emulator's package in a folder that lasts as long as this process."""
+    data = PACKAGE.read_bytes()
+    assert hashlib.sha512(data).hexdigest() == SHA_512, f"{PACKAGE.name} is not what npm gave"
+    folder = Path(tempfile.mkdtemp(prefix="met-rp2040js-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    with tarfile.open(fileobj=io.BytesIO(data)) as archive:
+        archive.extractall(folder, filter="data")
+    return folder / "package"
 
 
 class Emulator:
     """A Pico of this flash, switched on. motor: its pins are wired to a bench that turns, else to nothing."""
 
     def __init__(self, flash: bytes, **bench: Any) -> None:
-        command = ["node", str(HERE / "emulator.mjs"), str(EMULATOR)]
+        command = ["node", str(HERE / "emulator.mjs"), str(unpacked())]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.flash, self.out = flash, b""
         self.told: dict[str, Any] = {}

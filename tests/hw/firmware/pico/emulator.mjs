@@ -34,10 +34,11 @@ const bench = {
   f_cut: 50, voltage_full: 24, current_full: 5, current_range: 10, rate_range: 400, encoder_counts: 2000,
 };
 
-let mcu, flash, out = [], coming = [], resets = 0, due = 0, state, watch, hung = false;
+let mcu, base = 0, flash, out = [], coming = [], resets = 0, due = 0, state, watch, hung = false;
 let instructions = 0, cycles = 0, deepest = 0, spans = {};
 
 function boot(byWatchdog) {
+  base += mcu ? mcu.clock.nanos : 0;
   mcu = new RP2040();
   mcu.logger = SILENT;
   mcu.flash.set(flash);
@@ -48,7 +49,7 @@ function boot(byWatchdog) {
   }
   const dog = mcu.peripherals[0x40058];
   dog.reason = byWatchdog ? 1 : 0;
-  dog.onWatchdogTrigger = () => { hung = true; };
+  dog.onWatchdogTrigger = () => { hung = true; dog.alarm.enable = false; }; // or it rings for ever
   mcu.uart[0].onByte = (byte) => out.push(byte);
   mcu.pwm.channels.forEach((channel) => { channel.updateEnable = () => {}; }); // levels are read, edges are not
   mcu.pio.forEach((pio) => { pio.run = () => {}; });
@@ -188,7 +189,7 @@ function span(core, passed) {
 
 function answered() {
   const found = {
-    now: mcu.clock.nanos / 1000, out: Buffer.from(out).toString('hex'), pins: mcu.sio.gpioValue >>> 0,
+    now: (base + mcu.clock.nanos) / 1000, out: Buffer.from(out).toString('hex'), pins: mcu.sio.gpioValue >>> 0,
     enables: mcu.sio.gpioOutputEnable >>> 0, level: [level(0, 0), level(0, 1), level(1, 0), level(1, 1)],
     rate: state.rate, angle: state.angle, resets, instructions, cycles, deepest, spans,
   };
