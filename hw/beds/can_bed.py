@@ -106,7 +106,7 @@ class CanBed(BedDriver):
         slews = 2.0 * voltage * hz, 2.0 * current * hz
         limits = Limits(voltage, current, rate, bench.shaft["arming_rate"], *slews, load.drive.entry.figures["heat"])
         capabilities = Capability.ENCODER
-        if not all(each.braking for each in facts):
+        if not facts[0].braking:
             capabilities |= Capability.COASTS
         said = "\n".join(
             f"{d.dialect} {d.node} {f.hardware} {f.firmware}" for d, f in zip(self._drives, facts, strict=True)
@@ -128,9 +128,7 @@ class CanBed(BedDriver):
         self._filtered = (self._sides[0].rate, 0.0)
         self.remarks = self._remarks()
         self._state = BedState.STOPPED if self._faults else BedState.DISARMED
-        for each in self._drives:
-            if each.state == DriveState.FAILED and not self._faults:
-                self._latch(Fault.DEADMAN if each.starved else Fault.DRIVE, f"{each.words}: {each.errors}")
+        self._latch_failures()
         return about
 
     def _check_share(self) -> None:
@@ -183,6 +181,7 @@ class CanBed(BedDriver):
         about = self._there()
         self._ask_both(about)
         self._follow()
+        self._latch_failures()
         if self._state != BedState.DISARMED or not self._slow():
             raise self._refused("arm")
         self._disagreed, self.returned = 0, 0.0
@@ -233,6 +232,7 @@ class CanBed(BedDriver):
         self._ask_both(about)
         self._follow()
         self._silence(about)
+        self._latch_failures()
         return self._sample()
 
     def look(self) -> BedSample | None:
@@ -407,6 +407,12 @@ class CanBed(BedDriver):
         self._state, self._faults = BedState.STOPPED, self._faults | fault
         self._why = self._why or why
 
+    def _latch_failures(self) -> None:
+        """Latch that a drive has failed while the bed was disarmed, where nothing is latched yet."""
+        for each in self._drives:
+            if each.state == DriveState.FAILED and self._state == BedState.DISARMED:
+                self._latch(Fault.DEADMAN if each.starved else Fault.DRIVE, f"{each.words}: {each.errors}")
+
     def _stopped(self, fault: Fault, why: str) -> None:
         self._latch(fault, why)
         self._hold(0, 0, self._told_at)
@@ -457,7 +463,7 @@ def _opened_port(opening: Opening) -> CanBed:
 PORT = PortKind(
     scheme="can",
     address="BENCH.toml",
-    doc="Two drives on a CAN bus: ODrive or Damiao; the file says which.",
+    doc="Two drives on a CAN bus: ODrive, Damiao or moteus; the file says which.",
     open=_opened_port,
     lock_step=lambda name, requested: requested,
 )

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 from hw.drives.damiao import DamiaoDrive
 from hw.drives.drive import Drive
+from hw.drives.moteus import MoteusDrive
 from hw.drives.odrive import OdriveDrive
 
-DIALECTS: Mapping[str, type[Drive]] = {each.dialect: each for each in (OdriveDrive, DamiaoDrive)}
+DIALECTS: Mapping[str, type[Drive]] = {each.dialect: each for each in (OdriveDrive, DamiaoDrive, MoteusDrive)}

@@ -20,7 +20,7 @@ def begin_driving(talk: Talk) -> None:
     while not talk.pump(talk.line.now() + FEED, lambda: all(d.state == DriveState.DRIVING for d in talk.drives)):
         if talk.line.now() > end:
             late = next(d for d in talk.drives if d.state != DriveState.DRIVING)
-            switch_off(talk)
+            _give_up(talk)
             message = f"{late.words} does not begin to drive: {late.errors or 'it does not say why'}"
             raise Problem(error("E406", message, help="is it calibrated? its maker's tool says what it lacks"))
         for drive in talk.drives:
@@ -48,7 +48,7 @@ def prove_watchdogs(talk: Talk, deadman: float) -> tuple[float | None, ...]:
         talk.ask(asks, lambda: all(drive.stated > began + quiet for drive in late))
     for drive in talk.drives:
         if drive.state == DriveState.DRIVING:
-            switch_off(talk)
+            _give_up(talk)
             message = f"{drive.words} still drives {1e3 * quiet:.3g} ms after the last command, without torque, and "
             message += f"its watchdog was to stop it after {1e3 * deadman:.3g} ms"
             helps = (
@@ -57,7 +57,7 @@ def prove_watchdogs(talk: Talk, deadman: float) -> tuple[float | None, ...]:
             )
             raise Problem(error("E406", message, help=helps))
         if not drive.starved:
-            switch_off(talk)
+            _give_up(talk)
             message = f"{drive.words} stopped while it was armed without torque: "
             message += drive.errors or "it does not say why"
             raise Problem(error("E406", message, help="its maker's tool says what that means"))
@@ -66,6 +66,13 @@ def prove_watchdogs(talk: Talk, deadman: float) -> tuple[float | None, ...]:
         message = f"{late[0].words} does not forget that its watchdog stopped it"
         raise Problem(error("E406", message, help="switch it off and on"))
     return tuple(ended.get(drive.node) for drive in talk.drives)
+
+
+def _give_up(talk: Talk) -> None:
+    """Switch both outputs off, and let a drive forget that its watchdog did what it was to do."""
+    switch_off(talk)
+    if all(drive.starved for drive in talk.drives if drive.state == DriveState.FAILED):
+        forget(talk)
 
 
 def forget(talk: Talk) -> bool:

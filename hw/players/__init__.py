@@ -7,8 +7,13 @@ may be wrong alike: what a maker's firmware does is known once one was there.
 from collections.abc import Callable, Mapping
 
 from hw.players.damiao import PlayedDamiao
+from hw.players.moteus import PlayedMoteus
 from hw.players.odrive import PlayedOdrive
 from hw.players.player import PlayedDrive
 
-PLAYED: Mapping[str, Callable[[int, int], PlayedDrive]] = {"odrive": PlayedOdrive, "damiao": PlayedDamiao}
+PLAYED: Mapping[str, Callable[[int, int], PlayedDrive]] = {
+    "odrive": PlayedOdrive,
+    "damiao": PlayedDamiao,
+    "moteus": PlayedMoteus,
+}
 """Makes a played drive of a dialect: (node, sense)."""

@@ -25,7 +25,7 @@ name = "paper"
 [bus]
 interface = "{interface}"
 channel   = "{channel}"
-
+{bus}
 [shaft]
 inertia  = "1.3e-4 kg*m^2"
 rate_max = "380 rad/s"
@@ -51,6 +51,7 @@ current_rated = "2 A"
 heat          = "9 A^2*s"
 {more}"""
 
+BUS = {"moteus": "fd = true\n"}
 MORE = {"odrive": 'endpoints = "flat_endpoints.json"\n'}
 
 
@@ -58,7 +59,11 @@ def bench_file(folder: Path, dialect: str = "odrive", interface: str = "virtual"
     """A bench file of two drives of a dialect, with what it names beside it."""
     (folder / "flat_endpoints.json").write_text(json.dumps(endpoints()))
     path = folder / "bench.toml"
-    path.write_text(TEXT.format(dialect=dialect, interface=interface, channel=channel, more=MORE.get(dialect, "")))
+    path.write_text(
+        TEXT.format(
+            dialect=dialect, interface=interface, channel=channel, bus=BUS.get(dialect, ""), more=MORE.get(dialect, "")
+        )
+    )
     return path
 
 

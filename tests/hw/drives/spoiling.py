@@ -12,6 +12,7 @@ from hw.beds.can_bed import CanBed
 from hw.drives.frames import CanFrame
 from hw.drives.side import SKEW
 from hw.players.player import PlayedBench, PlayedLine
+from met.diagnostic import Problem
 
 SHARE = 0.05
 """Share of frames that a fault befalls."""
@@ -127,6 +128,11 @@ def campaign(bed: CanBed, line: PlayedLine, played: PlayedBench, spoiler: Spoile
     chance = random.Random(f"{spoiler.kind} drives")
     while tally.exchanges < exchanges:
         spoiler.on = False
+        line.sleep(0.05)  # a command that is late may still come, and be stopped by the watchdog
+        try:
+            bed.read()
+        except Problem:  # angles have begun anew: whoever greets it begins with what they are
+            bed.connect()
         if bed.read().state != BedState.DISARMED:
             bed.rest(0.2)
             while abs(bed.read().rate) > bed._there().limits.arming_rate:

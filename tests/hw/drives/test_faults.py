@@ -12,7 +12,7 @@ from hw.players.player import PlayedLine
 from tests.hw.drives.played import bench_file, host_of, played_bench
 from tests.hw.drives.spoiling import FAULTS, Spoiler, Tally, campaign
 
-DIALECTS = ("odrive", "damiao")
+DIALECTS = ("odrive", "damiao", "moteus")
 
 
 def through(folder: Path, dialect: str, kind: str, exchanges: int) -> tuple[Tally, Spoiler]:
@@ -42,9 +42,14 @@ def test_no_wrong_answer_of_ten_thousand_is_taken(tmp_path: Path, dialect: str, 
     assert tally.wrong == 0, tally
 
 
-def test_a_drive_that_has_rebooted_stops_the_bed(tmp_path: Path) -> None:
-    tally, spoiler = through(tmp_path, "odrive", "reboot", 1000)
-    assert tally.stops >= spoiler.befell - 1 > 0 and tally.faults == Fault.DRIVE
+@pytest.mark.parametrize(
+    ("dialect", "fault"), [("odrive", Fault.DRIVE), ("damiao", Fault.DRIVE), ("moteus", Fault.DISAGREEMENT)]
+)
+def test_a_drive_that_has_rebooted_stops_the_bed(tmp_path: Path, dialect: str, fault: Fault) -> None:
+    """A moteus drives again at the next command: that its angle has begun anew tells it, where it had gone round."""
+    tally, spoiler = through(tmp_path, dialect, "reboot", 1000)
+    assert spoiler.befell > 5 and tally.stops > 0 and tally.faults == fault
+    assert fault != Fault.DRIVE or tally.stops >= spoiler.befell - 1
 
 
 def table(folder: Path, exchanges: int = 10_000) -> None:

@@ -1,0 +1,218 @@
+"""moteus, by its registers over CAN-FD: each frame writes some and asks for others, and is answered with those.
+
+    told      position mode with gains of 0 and a torque, its largest torque, and the time that the command is valid for
+    answered  mode, position, velocity, fault, voltage and power of the supply
+    modes     0 stopped, 1 fault, 10 position, 11 the command's time is over, 15 windings shorted
+
+Its watchdog is that of the position mode: voltage and current modes have none. Facts are from mjbots' reference of the
+registers; no moteus was there.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+
+from hw.drives.bench_file import DriveEntry
+from hw.drives.drive import Drive, DriveFacts, DriveReading, DriveState, Talk
+from hw.drives.frames import CanFrame
+
+ASKS_ANSWER = 0x8000
+INT8, INT32, FLOAT = 0, 2, 3
+"""Kinds of values, as they stand in subframes; their struct formats are in `FORMATS`."""
+
+FORMATS = ("b", "h", "i", "f")
+WRITE, READ, ANSWER = 0x00, 0x10, 0x20
+WRITE_ERROR, READ_ERROR, NOTHING = 0x30, 0x31, 0x50
+SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)
+"""Lengths that a frame of CAN-FD may have."""
+
+MODE, POSITION, VELOCITY, POWER, VOLTAGE, FAULT = 0x000, 0x001, 0x002, 0x007, 0x00D, 0x00F
+TARGET, TORQUE, VALID_FOR, INTEGRAL_SCALE, MODEL = 0x020, 0x022, 0x027, 0x02B, 0x100
+
+STOPPED, FAILED, DRIVING, TIMED_OUT, BRAKING = 0, 1, 10, 11, 15
+BEGINNING = (2, 3, 4)
+FAULTS = {
+    32: "calibration",
+    33: "gate driver",
+    34: "supply over voltage",
+    35: "encoder",
+    36: "motor not configured",
+    37: "its cycle took too long",
+    38: "too hot",
+    39: "outside of its position limits",
+    40: "supply under voltage",
+    41: "configuration changed",
+    42: "no commutation encoder",
+    43: "no output encoder",
+    44: "gate driver not enabled",
+    46: "timing",
+}
+
+REGISTER_MAP = 5
+"""Version of the register map that the registers here are of."""
+
+CONTROL_HZ = 15000.0
+"""Least rate of the drive's own control, Hz."""
+
+_TURN = 2.0 * math.pi
+
+
+def number(value: int) -> bytes:
+    """A register's number as it goes over the bus: seven bits a byte, the lowest first."""
+    out = bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes(out) + bytes([value])
+
+
+def written(kind: int, first: int, *values: float) -> bytes:
+    """The subframe that writes values to registers from `first` on."""
+    count = bytes([WRITE | kind << 2 | len(values)]) if len(values) < 4 else bytes([WRITE | kind << 2, len(values)])
+    return count + number(first) + struct.pack(f"<{len(values)}{FORMATS[kind]}", *values)
+
+
+def asked_for(kind: int, first: int, count: int = 1) -> bytes:
+    """The subframe that asks for up to three registers from `first` on."""
+    return bytes([READ | kind << 2 | count]) + number(first)
+
+
+def padded(data: bytes) -> bytes:
+    """The data of a frame, filled up to a length that there is."""
+    return data.ljust(next(size for size in SIZES if size >= len(data)), bytes([NOTHING]))
+
+
+def answered(data: bytes) -> dict[int, float] | None:
+    """The registers that an answer tells, by number; None where it is no answer that can be read to its end."""
+    found: dict[int, float] = {}
+    at = 0
+    try:
+        while at < len(data):
+            head, at = data[at], at + 1
+            if head == NOTHING:
+                continue
+            if head in (WRITE_ERROR, READ_ERROR):
+                _, at = _number(data, at)
+                _, at = _number(data, at)
+                continue
+            if head & 0xF0 != ANSWER:
+                return None
+            kind, count = head >> 2 & 3, head & 3
+            if not count:
+                count, at = _number(data, at)
+            first, at = _number(data, at)
+            layout = struct.Struct(f"<{count}{FORMATS[kind]}")
+            found |= dict(enumerate(layout.unpack_from(data, at), first))
+            at += layout.size
+    except (IndexError, struct.error):
+        return None
+    return found
+
+
+def _number(data: bytes, at: int) -> tuple[int, int]:
+    value = shift = 0
+    while True:
+        byte, at = data[at], at + 1
+        value |= (byte & 0x7F) << shift
+        shift += 7
+        if byte < 0x80 or shift > 28:
+            return value, at
+
+
+_STATE = asked_for(FLOAT, MODE, 3) + asked_for(FLOAT, POWER) + asked_for(FLOAT, VOLTAGE) + asked_for(INT8, FAULT)
+
+
+class MoteusDrive(Drive):
+    """The host's side of a moteus."""
+
+    dialect = "moteus"
+    answers_commands = True
+
+    def __init__(self, entry: DriveEntry) -> None:
+        super().__init__(entry)
+        self._about: dict[int, float] = {}
+        figures = entry.figures
+        self._most = figures["torque_max"] if entry.role == "drive" else figures["kt"] * figures["current_max"]
+        self._watchdog = figures["watchdog"]
+
+    def greet(self, talk: Talk) -> DriveFacts:
+        self._about = {}
+        if not self.node > 0:
+            raise self.wrong("its number is everybody's", "a number from 1 to 127")
+        if not talk.ask([self._frame(asked_for(INT32, MODEL, 3))], lambda: len(self._about) == 3):
+            raise talk.silent(self, "what model it is")
+        model, version, registers = (int(self._about[MODEL + n]) for n in range(3))
+        if registers != REGISTER_MAP:
+            helps = f"firmware whose map is of version {REGISTER_MAP}"
+            raise self.other(f"its register map is of version {registers}", helps)
+        self.reading = None
+        talk.send(self.idle())
+        if not talk.ask(self.asked(), lambda: self.reading is not None and self.state != DriveState.DRIVING):
+            raise talk.silent(self, "what its angle is")
+        firmware = ".".join(str(version >> shift & 0xFF) for shift in (16, 8, 0))
+        braking = self.entry.role == "drive"
+        return DriveFacts(
+            firmware, f"model 0x{model:X}", self._watchdog, math.inf, math.inf, CONTROL_HZ, braking=braking
+        )
+
+    def _frame(self, data: bytes) -> CanFrame:
+        return CanFrame(ASKS_ANSWER | self.node, padded(data), extended=True, fd=True)
+
+    def armed(self) -> Sequence[CanFrame]:
+        return (self._frame(written(INT8, MODE, STOPPED)), *self.told(0.0))
+
+    def told(self, value: float) -> Sequence[CanFrame]:
+        torque = (self.own(value), 0.0, 0.0, self._most)  # and no part of its gains
+        data = written(INT8, MODE, DRIVING) + written(FLOAT, TARGET, math.nan) + written(FLOAT, TORQUE, *torque)
+        data += written(FLOAT, VALID_FOR, self._watchdog) + written(FLOAT, INTEGRAL_SCALE, 0.0)
+        return (self._frame(data + _STATE),)
+
+    def asked(self) -> Sequence[CanFrame]:
+        return (self._frame(_STATE),)
+
+    def idle(self) -> Sequence[CanFrame]:
+        """The drive under test brakes, the load lets go. What has failed is off, and stopping it would forget why."""
+        if self.state == DriveState.FAILED:
+            return ()
+        return (self._frame(written(INT8, MODE, BRAKING if self.entry.role == "drive" else STOPPED) + _STATE),)
+
+    def halted(self) -> Sequence[CanFrame]:
+        return self.idle()
+
+    def cleared(self) -> Sequence[CanFrame]:
+        return (self._frame(written(INT8, MODE, STOPPED)),)
+
+    def answers(self) -> Sequence[CanFrame]:
+        return (CanFrame(self.node << 8, bytes(32), extended=False, fd=True),)
+
+    def take(self, frame: CanFrame) -> bool:
+        if frame.id != self.node << 8 or not frame.fd or frame.remote:
+            return False
+        found = answered(frame.data)
+        if not found:
+            return False
+        if all(MODEL + n in found for n in range(3)):
+            self._about = {MODEL + n: found[MODEL + n] for n in range(3)}
+            return True
+        values = [found.get(each, math.nan) for each in (MODE, POSITION, VELOCITY, VOLTAGE, FAULT)]
+        if not all(math.isfinite(each) for each in values):
+            return False
+        mode, position, velocity, self.supply, fault = values
+        self.power = found.get(POWER)
+        self._state(int(mode), int(fault), frame.time)
+        self.reading = DriveReading(frame.time, self.own(_TURN * position), self.own(_TURN * velocity))
+        return True
+
+    def _state(self, mode: int, fault: int, time: float) -> None:
+        self.stated, self.errors, self.starved = time, "", mode == TIMED_OUT
+        if mode in (STOPPED, BRAKING, *BEGINNING):
+            self.state = DriveState.IDLE
+        elif mode == DRIVING:
+            self.state = DriveState.DRIVING
+        else:
+            self.state = DriveState.FAILED
+            self.errors = FAULTS.get(fault, f"fault {fault}") if mode == FAILED else f"mode {mode}"
+            if self.starved:
+                self.errors = "heard nothing for too long"
