@@ -231,3 +231,35 @@ def test_the_page_says_when_nothing_is_watched_any_more(chromium: Chromium, tmp_
         page.run(f"{RUN}.document.querySelectorAll('.knob input')[0].dispatchEvent(new Event('input'))")
         assert page.run(f"{RUN}.document.querySelector('.came').textContent").startswith("Case #4, ")
         page.close()
+
+
+MARGINS = """\
+#include <two_link.ic>
+run held like nominal {
+    duration = 0.4 s;  remove settle;
+    linear loop { at = 360 ms;  open = shoulder.servo.voltage; }
+    require gain_margin(loop) > 20;
+}
+default sweep tuned of held { vary gearbox.kp = [0.005, 0.02] V*s/rad; }
+"""
+
+
+def test_a_margin_comes_with_the_cases_and_is_not_known_between_them(chromium: Chromium, tmp_path: Path) -> None:
+    deck = write_deck(tmp_path, MARGINS)
+    with viewing(deck, "-q") as view:
+        page = opened(chromium, view)
+        row = f"{RUN}.document.querySelector('.answers tr:last-child').innerText"
+        for case, verdict in enumerate(("met", "missed")):
+            page.run(f"{RUN}.document.querySelector('.knob select').value = {case}")
+            page.run(f"{RUN}.document.querySelector('.knob select').dispatchEvent(new Event('change'))")
+            name, value, said = (cell.strip() for cell in page.run(row).split("\t"))
+            assert name == "loop_gain_margin" and value.endswith(", from the sweep")
+            assert said == f"gain_margin(loop) > 20: {verdict}"
+        page.run(f"{RUN}.document.querySelector('.knob input').value = 0.5")
+        page.run(f"{RUN}.document.querySelector('.knob input').dispatchEvent(new Event('input'))")
+        assert page.run(row).split("\t")[1].strip() == "not computed here"
+        assert page.run(f"{RUN}.document.querySelector('.came-of li').textContent") == (
+            "gain_margin(loop) > 20: 1 met, 1 missed"
+        )
+        silent(page, view)
+        page.close()
