@@ -15,11 +15,12 @@ import re
 import signal
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
-from benchmarks.benchmark import Benchmark, Target
-from ic.editor.checking import CheckRequest, compiled_with_reply, first_replies
+from benchmarks.benchmark import Benchmark, Derived, Target, ratio
+from ic.editor.checking import CheckRequest, FoundAnswers, compiled_with_reply, first_replies
 from ic.text.files import LIBRARY
 
 TITLE = "editor: from a keystroke to diagnostics, s"
@@ -142,10 +143,33 @@ def _at(share: float, which: int, name: str) -> Callable[[], float]:
     return measure
 
 
+@cache
+def _warm_up() -> None:
+    """Import what an audit imports, as the process that checks has it."""
+    compiled_with_reply(_request(_text("two_link"), {}))
+
+
 def _audit(name: str) -> Callable[[], float]:
+    _warm_up()
+
     def measure() -> float:
         began = time.process_time()
         compiled_with_reply(_request(_text(name), {}))
+        return time.process_time() - began
+
+    return measure
+
+
+def _audit_again(name: str) -> Callable[[], float]:
+    """The audit behind another one, of the deck with a line before it and another duration of its last run."""
+    kept: list[FoundAnswers] = []
+    compiled_with_reply(_request(_text(name), {}), kept.append)
+    head, last, tail = _text(name).rpartition("duration = ")
+    request = replace(_request(f"// a line\n{head}{last}1{tail}", {}), answers=kept[-1].pickled)
+
+    def measure() -> float:
+        began = time.process_time()
+        compiled_with_reply(request)
         return time.process_time() - began
 
     return measure
@@ -158,7 +182,7 @@ def _text(name: str) -> str:
 DECKS = {"two_link": 0.1, "station_arm": 0.1, "long": 0.25}
 """Decks, with the time in which something is to be told, s."""
 
-BENCHMARKS: tuple[Benchmark, ...] = tuple(
+BENCHMARKS: tuple[Benchmark | Derived, ...] = tuple(
     benchmark
     for name, most in DECKS.items()
     for benchmark in (
@@ -171,5 +195,11 @@ BENCHMARKS: tuple[Benchmark, ...] = tuple(
             turns=1,
         ),
         Benchmark(f"editor.{name}.audit", "all, as `met check`", "s", partial(_audit, name), turns=1, slow=True),
+        Benchmark(
+            f"editor.{name}.audit.again", "the same, where a line has moved and a run has another duration", "s",
+            partial(_audit_again, name), Target(2.0), 1, True,
+        ),
+        ratio(f"editor.{name}.audit.kept", "of an audit, what the next one takes", over=f"editor.{name}.audit.again",
+              under=f"editor.{name}.audit"),
     )
 )  # fmt: skip
