@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from ic.editor.carried import carried_over
 from ic.editor.checker_process import CheckerProcess
 from ic.editor.checking import CheckReply, CheckRequest, Crash, FoundAnswers
 from ic.editor.index import DeckIndex
@@ -267,6 +268,8 @@ class DeckChecks:
         if answer.known is not None:
             self._known[deck.uri], self._auditing = answer.known, True
             answer = replace(answer, known=None)
+        elif not answer.audited and deck.uri in self.checked:
+            answer = carried_over(self.checked[deck.uri].reply, answer)
         paths = (file_named(name, request.folder) for name in answer.sources)
         files = frozenset(os.path.realpath(path) for path in paths if path is not None)
         used = frozenset(name for text in answer.sources.values() for name in used_files(text))

@@ -412,6 +412,7 @@ def once_for_all_roofs(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
     first: dict[object, Diagnostic] = {}
     others: dict[object, dict[Place, None]] = {}
     kept: list[tuple[Diagnostic, object]] = []
+    key: object
     for each in found:
         place = each.at.place if each.at is not None else None
         key = (_mistake(each), place.turns) if place is not None and place.used else None

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from ic.editor import checking
+from ic.editor.carried import carried_over
 from ic.editor.checking import EARLY, CheckReply, CheckRequest, FoundAnswers, answers, first_replies
 from ic.text.files import LIBRARY
 from tests.ic.editor.client import Editor, uri
@@ -41,16 +42,21 @@ def test_what_a_definition_means_is_told_before_the_audit_begins(tmp_path: Path,
     editor.settle()
     *meanwhile, last = told(editor, deck)
     assert last == [NO_EFFECT], "errors leave no program to look into"
-    assert meanwhile in ([], [[]]), "where a check takes long, what is found by then: here nothing, of arms and servos"
+    assert meanwhile in ([], [[NO_NOISE]]), "where a check takes long, what was said before, until it is known better"
+
+
+def all_replies(text: str, seconds: float) -> list[CheckReply]:
+    """The replies before the audit, where each look at the clock takes so long."""
+    ticks = itertools.count()
+    request = CheckRequest(str(LIBRARY), "", text, (), (), {})
+    found = [each for each in first_replies(request, lambda: seconds * next(ticks)) if isinstance(each, CheckReply)]
+    assert not any(each.audited for each in found)
+    return found
 
 
 def replies(text: str, seconds: float) -> list[list[str]]:
     """The messages of each reply before the audit, where each look at the clock takes so long."""
-    ticks = itertools.count()
-    request = CheckRequest(str(LIBRARY), "", text, (), (), {})
-    found = list(first_replies(request, lambda: seconds * next(ticks)))
-    assert not any(each.audited for each in found)
-    return [[each.message for each in reply.diagnostics] for reply in found]
+    return [[each.message for each in reply.diagnostics] for reply in all_replies(text, seconds)]
 
 
 def test_all_mistakes_of_definitions_are_told_together_where_that_is_quick() -> None:
@@ -79,6 +85,20 @@ def test_an_audit_takes_along_what_the_last_one_found_also_where_it_was_ended(mo
         assert [each.diagnostics for each in replies] == told
         assert len(again) == anew  # one for each that was found, and one in the end
     assert len(first) > 3
+
+
+def test_what_was_said_of_lines_that_are_as_they_were_stays_where_they_are_now() -> None:
+    wrong = DECK.replace("vary spare", "vary spar").replace("duration = 1 s", "duration = 1") + "sweep s of ligt { }\n"
+    (*_, last) = all_replies(wrong, 0.0)
+    lines = wrong.split("\n")
+    changed = "\n".join(["// a line more", *lines[:2], "// and one", lines[2].replace("= 1;", "= 2;"), *lines[3:]])
+    first, every = all_replies(changed, 2 * EARLY)
+    assert not first.diagnostics and len(every.diagnostics) == 3
+    carried = carried_over(last, first)
+    assert [each for each in every.diagnostics if "bare number" not in each.message] == list(carried.diagnostics)
+    assert len(carried.edits) == len(carried.diagnostics) and not any(carried.edits)
+    assert carried_over(carried, first).diagnostics == carried.diagnostics
+    assert carried_over(last, every).diagnostics == every.diagnostics, "nothing is told twice"
 
 
 def test_a_change_of_another_deck_need_not_wait_for_an_audit(tmp_path: Path, editor: Editor) -> None:
