@@ -151,7 +151,9 @@ def _flows(pool: Pool, before: EarlierCases, *, named: bool) -> list[Requirement
 
 def _ends(both: Sequence[tuple[Pool, EarlierCases]]) -> RequirementFlow | None:
     """Which cases reach their end now, and which no longer; None where all do as before."""
-    gained, lost, was, now, of = [], [], 0, 0, 0
+    gained: list[str] = []
+    lost: list[str] = []
+    was = now = of = 0
     for pool, before in both:
         here, there = pool.ended < ENDED.index("failed"), before.ended < ENDED.index("failed")
         name = f"{pool.name}: " if len(both) > 1 else ""

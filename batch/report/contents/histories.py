@@ -108,9 +108,13 @@ def signals(
     compared = None if middle is None else numbers[middle]
     if not known:
         order = pool.cases[pool.worst_first]
-        shown = order[: COMPARED - 1 if len(order) >= FEWEST_COMPARED else COMPARED].tolist()
-        compared = int(order[len(order) // 2]) if len(order) >= FEWEST_COMPARED else None
+        middle_too = len(order) >= FEWEST_COMPARED and before is None
+        shown = order[: COMPARED - 1 if middle_too else COMPARED].tolist()
+        compared = int(order[len(order) // 2]) if middle_too else None
         shown += [] if compared is None else [compared]
+        if before is not None:
+            changed = before.most
+            shown = [*changed, *shown][:1]
     said = _said(groups, len(known), len(histories), len(names), points, before is not None, again=bool(computed))
     sources = tuple(each.sources(found) for each in groups)
     return Signals(found, joints, tuple(clocks), histories, tuple(shown), compared, said, changed, worst, sources)

@@ -59,6 +59,15 @@ INK = """(selector => Array.from(document.querySelectorAll(selector), canvas => 
 """Of each canvas the share of pixels that are drawn."""
 
 
+GATHERED = """new Promise(done => {
+    document.querySelector('.arm').scrollIntoView();
+    const stage = () => MET.models[0].stage();
+    const look = () => document.querySelector('[data-haunted]') && stage().isStill() ? done() : setTimeout(look, 20);
+    look();
+})"""
+"""Until a report's arm is drawn with all its ghosts, and stands."""
+
+
 class BrowserFailed(RuntimeError):
     """The browser did not do what it was told."""
 

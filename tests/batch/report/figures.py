@@ -4,7 +4,7 @@ python -m tests.batch.report.figures          writes docs/figures/report_*.png
 
 report_page.png       the head of a report: the Panda's payload sweep
 report_points.png     its cases, one of which is chosen, and two parameters at once
-report_signals.png    its worst cases, near to
+report_signals.png    its arm, and its worst cases near to
 report_stability.png  a motor on a bed, under arms of ten weights
 report_narrow.png     the head of the same on a telephone, dark
 report_designs.png    which design to use: the crane of docs/best.md
@@ -22,7 +22,7 @@ from pathlib import Path
 import batch
 import ic
 from batch.report import report
-from tests.batch.report.browser import Page, browser
+from tests.batch.report.browser import GATHERED, Page, browser
 from tests.docs import mended_servo
 
 FOLDER = Path(__file__).parents[3] / "docs" / "figures"
@@ -54,10 +54,14 @@ def draw(folder: Path) -> list[Path]:
         page.run("MET.models[0].choose(11)")
         page.settle()
         written.append(page.picture(folder / "report_points.png", "section.overview"))
+        page.run(GATHERED)
         left, top, width, height = page.box(".signals .u-over", 2)
         page.drag([(left + 0.66 * width, top + 30), (left + 0.7 * width, top + 30), (left + 0.84 * width, top + 40)])
         left, top, width, height = page.box(".signals .u-over", 2)
         page.mouse("mouseMoved", left + 0.4 * width, top + 0.5 * height)
+        page.run(
+            "new Promise(d => { const f = () => MET.models[0].stage().isStill() ? d() : setTimeout(f, 20); f(); })"
+        )
         page.settle()
         written.append(page.picture(folder / "report_signals.png", "section.signals"))
         page = chromium.open(loads, width=1180, height=960, scale=1.5)

@@ -46,6 +46,18 @@ MET.posing = (() => {
       return place === undefined ? found.failed : !["met", "done"].includes(model.outcome[place]);
     }
 
+    // The room of a structure is shown, and no other; its arm is there from the first, so that nothing moves down later.
+    function enter(room) {
+      if (shown === room) return;
+      shown = room;
+      rooms.forEach((each) => { each.box.hidden = each !== room; });
+      const { scene, lacking } = room.own;
+      if (scene) room.stage ??= MET.stage.make(room.box, scene, { seen: (time) => model.point && model.point(time) });
+      else if (!room.box.firstChild) {
+        room.box.append(node("p", { class: "note" }, `The arm is not drawn, for the run does not record ${lacking.join(", ")}: `, node("code", null, `record += [${lacking.join(", ")}];`)));
+      }
+    }
+
     function choose(case_) {
       if (!simulation.has(case_)) {
         said.textContent = `Case #${case_} is not among those that can be run again in this page.`;
@@ -57,13 +69,8 @@ MET.posing = (() => {
       chosen = case_;
       said.classList.toggle("bad", wrong);
       said.textContent = words;
-      if (shown !== room) rooms.forEach((each) => { each.box.hidden = each !== room; });
-      shown = room;
-      if (!room.own.scene) {
-        if (!room.box.firstChild) room.box.append(node("p", { class: "note" }, `The arm is not drawn, for the run does not record ${room.own.lacking.join(", ")}: `, node("code", null, `record += [${room.own.lacking.join(", ")}];`)));
-        return;
-      }
-      room.stage ??= MET.stage.make(room.box, room.own.scene, { seen: (time) => model.point && model.point(time) });
+      enter(room);
+      if (!room.stage) return;
       if (found.rows) room.stage.show(taken(room.stage.take, found), `case #${case_}`);
       haunt(room);
       if (seen) gather(room);
@@ -104,13 +111,15 @@ MET.posing = (() => {
     model.stage = () => (shown ? shown.stage : null);
     model.seek = (time) => { if (shown && shown.stage) shown.stage.seek(time, true); };
     model.watch(choose);
-    const begin = () => { if (chosen === null) choose(model.data.signals.shown[0]); };
+    const first = model.data.signals.shown.find(simulation.has);
+    if (first !== undefined) enter(rooms[simulation.structureOf(first)]);
+    const begin = () => { if (chosen === null && first !== undefined) choose(first); };
     new IntersectionObserver((entries, observer) => {
       if (!entries.some((entry) => entry.isIntersecting)) return;
       observer.disconnect();
       seen = true;
       begin();
-      if (shown) gather(shown);
+      if (chosen !== null) gather(shown);
     }, { rootMargin: "300px" }).observe(root);
     addEventListener("beforeprint", begin);
   }

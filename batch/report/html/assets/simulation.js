@@ -26,14 +26,14 @@ MET.simulation = (() => {
   function make(model) {
     const data = model.data.simulation;
     if (!data || !allowed()) return null;
-    const structureOf = (told) => {
+    const made = (told) => {
       const cases = Array.from(unpack(told.cases));
       const every = told.kernel.record_divisor / told.kernel.base_hz;
       return { ...told, cases, row: new Map(cases.map((case_, row) => [case_, row])), runner: null,
         time: Float64Array.from({ length: told.rows }, (_, row) => row * every), inputs: told.inputs.map(exact), status: unpack(told.status),
-        metrics: told.metrics.map((each) => ({ ...each, values: exact(each.values) })), before: told.before && structureOf(told.before) };
+        metrics: told.metrics.map((each) => ({ ...each, values: exact(each.values) })), before: told.before && made(told.before) };
     };
-    const structures = data.structures.map(structureOf);
+    const structures = data.structures.map(made);
     const places = new Map(structures.flatMap(({ cases }, n) => cases.map((case_) => [case_, n])));
     const kept = new Map();
     const has = (case_) => places.has(case_);
@@ -90,7 +90,7 @@ MET.simulation = (() => {
       return { bad: false, words: `${name} has the archive's bits in ${count === 1 ? "its metric" : `all ${count} metrics`}: ${how}` };
     }
 
-    return { has, hadBefore, run, lines, tell, structures };
+    return { has, structureOf: (case_) => places.get(case_), hadBefore, run, lines, tell, structures };
   }
 
   return { make };
