@@ -18,6 +18,11 @@ from met.messages.visible import say
 @click.argument("name", metavar="[NAME]", required=False)
 @click.option("-o", "--output", metavar="FILE", help="Of an archive: the page [ARCHIVE.view.html].")
 @click.option(
+    "--against",
+    metavar="FILE",
+    help="Of an archive: another archive, or a log as a CSV file, whose arm and signals are shown beside it.",
+)
+@click.option(
     "--port", type=click.IntRange(1, 65535), metavar="N", help="Of a deck: the port of 127.0.0.1 [a free one]."
 )
 @deck_options
@@ -26,6 +31,7 @@ def view(
     source: str,
     name: str | None,
     output: str | None,
+    against: str | None,
     port: int | None,
     defines: tuple[str, ...],
     include_dirs: tuple[str, ...],
@@ -48,22 +54,24 @@ def view(
     if names_archive(source):
         if port is not None:
             raise click.UsageError(f"--port is for decks: the page of the archive `{source}` is a file")
-        return _write(source, name, output, quiet)
+        return _write(source, name, output, against, quiet)
     if output is not None:
         raise click.UsageError(
             f"-o is for archives: the page of the deck `{source}` is served; `met run` makes an archive of it"
         )
+    if against is not None:
+        raise click.UsageError(f"--against is for archives: `met run {source}` makes one of the deck")
     return _watch(source, name, port or 0, defines, include_dirs, settings, quiet)
 
 
-def _write(archive: str, name: str | None, output: str | None, quiet: bool) -> int:
+def _write(archive: str, name: str | None, output: str | None, against: str | None, quiet: bool) -> int:
     from batch.portable import files
     from batch.portable.page import view as page
     from ic.printing.columns import size
 
     target = Path(archive).with_suffix(".view.html") if output is None else Path(output)
     files.check_page(target)
-    files.write_page(page(archive, () if name is None else (name,)), target)
+    files.write_page(page(archive, () if name is None else (name,), against), target)
     if not quiet:
         say(f"{target}  ({size(target.stat().st_size)})")
     return YES

@@ -49,7 +49,7 @@ def described(prepared: Prepared, module: WasmModule) -> dict[str, Any]:
         "ticks": schedule.ticks,
         "rows": schedule.rows,
         "inputs": _inputs(experiment),
-        "columns": _columns(experiment),
+        "columns": described_columns(experiment),
         "metrics": [
             {"name": use.name, "unit": units[use.name], "output": outputs.index(METRIC + use.name)}
             for use in structure.metrics
@@ -84,7 +84,8 @@ def _inputs(experiment: Experiment) -> list[dict[str, Any]]:
     ]
 
 
-def _columns(experiment: Experiment) -> list[dict[str, Any]]:
+def described_columns(experiment: Experiment) -> list[dict[str, Any]]:
+    """Of each number of a row its channel, the signal that it is of, its SI unit."""
     found = []
     for recorded in experiment.structure.record:
         count = len(recorded.channels)

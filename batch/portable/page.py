@@ -17,7 +17,8 @@ from batch.archive.read import ArchiveFile, ArchiveGroup, reading
 from batch.archive.stored import Unlike
 from batch.arms.scene import arm_scene, lacking, scene_json
 from batch.arms.scripts import arm_scripts, arm_style
-from batch.modules.description import MOST_CASES, described
+from batch.modules.description import MOST_CASES, described, described_columns
+from batch.portable import beside
 from batch.queries.deck_units import DeckUnits
 from batch.queries.groups import groups_named
 from batch.queries.signals import Panel, deck_unit, pretty_unit
@@ -41,9 +42,10 @@ _ASSETS = Path(__file__).with_name("assets")
 _CODE = "'wasm-unsafe-eval'"
 
 
-def view(archive: str | Path, names: tuple[str, ...] = ()) -> str:
-    """The page of the archive's only run or sweep, or of the one that is named. Raises Problem E473 where several are
-    meant."""
+def view(archive: str | Path, names: tuple[str, ...] = (), against: str | Path | None = None) -> str:
+    """The page of the archive's only run or sweep, or of the one that is named. against: another archive, or a log of
+    measured signals, that is shown beside it. Raises Problem E473 where several runs are meant, and those of
+    `batch.portable.beside`."""
     with ArchiveFile(archive) as file:
         file.need_every_row("a page that simulates")
         groups = groups_named(file, names)
@@ -54,7 +56,27 @@ def view(archive: str | Path, names: tuple[str, ...] = ()) -> str:
             )
         (group,) = groups
         experiment = next(each for each in file.plan().experiments if each.name == group.name)
-        return page_of(experiment, data_of(experiment, file, group))
+        data = data_of(experiment, file, group)
+        if against is not None:
+            data["beside"] = _beside(against, file, group, experiment)
+        return page_of(experiment, data)
+
+
+def _beside(against: str | Path, file: ArchiveFile, group: ArchiveGroup, experiment: Experiment) -> dict[str, Any]:
+    """What the page shows beside the archive: of another archive all that is known of that, of a log its numbers at
+    the rows of a run."""
+    name = visible(Path(against).name)
+    if beside.is_archive(against):
+        with ArchiveFile(against) as other:
+            other.need_every_row("a page that simulates")
+            theirs, of = beside.other_group(file, group, other)
+            units = [each["unit"] for each in described_columns(experiment)]
+            return {"name": name, "page": data_of(of, other, theirs) | {"own": units}}
+    schedule = experiment.structure.schedule
+    rows = np.arange(schedule.rows) * schedule.record / schedule.base_hz
+    found = beside.log_data(against, described_columns(experiment), rows)
+    values = [None if each is None else doubles(each) for each in found["values"]]
+    return {"name": name, "values": values, "told": found["told"], "unused": found["unused"]}
 
 
 def data_of(
@@ -173,7 +195,7 @@ def page_text(
             arm_scripts(),
             KERNEL_JS.read_text(encoding="utf-8"),
             f"const MET_PAGE = {script_json(data)};",
-            (_ASSETS / "view.js").read_text(encoding="utf-8"),
+            *((_ASSETS / name).read_text(encoding="utf-8") for name in ("beside.js", "view.js")),
             *after,
         ]
     )

@@ -31,6 +31,7 @@ MET.stage = (() => {
     let [chosen, others, floor, time, playing, rate, end] = [null, [], null, 0, false, 1, 0];
     let [frames, ghostly, fresh, asked, touched, moved, before] = [false, true, true, false, false, false, 0];
     let [path, still, rest, pace, coarse, inks, saidAt] = [[], true, 0, 0, 1, null, 0];
+    let [twin, twinned] = [null, true];  // another arm beside the chosen case: its solids at a time
     const fingers = new Map();  // and mice: places where the view is held, by pointer
 
     const canvas = node("canvas");
@@ -46,9 +47,11 @@ MET.stage = (() => {
     };
     const withFrames = toggle("frames", "Axes of the links' frames: x red, y green, z blue", frames, () => (frames = !frames));
     const withOthers = toggle("", "The other cases, as ghosts", ghostly, () => (ghostly = !ghostly));
+    const withTwin = toggle("", "What stands beside the run", true, () => (twinned = !twinned));
+    withTwin.hidden = true;
     const whole = node("button", { type: "button", class: "chip", title: "Everything in view (0)", click: () => { home(); redraw(); } }, "fit");
     const view = node("div", { class: "view", tabindex: 0, role: "application", "aria-label": "The arm in 3D. Space plays, comma and full stop step, arrows turn, with shift they move, plus and minus zoom, 0 shows all." },
-      canvas, paper, told, scaled, node("div", { class: "tools" }, withOthers, withFrames, whole));
+      canvas, paper, told, scaled, node("div", { class: "tools" }, withTwin, withOthers, withFrames, whole));
     const sign = node("path", { d: "M3 1.5 L14 8 L3 14.5 Z" });
     const play = node("button", { type: "button", class: "play", "aria-label": "Play", click: () => run(!playing) }, node("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, sign));
     const scrub = node("input", { type: "range", min: 0, max: 1, step: "any", "aria-label": "Time", input: () => { run(false); seek(Number(scrub.value) * end); } });
@@ -77,7 +80,7 @@ MET.stage = (() => {
       return {
         solid: (each) => (each.role === "joint" && each.joint >= 0 ? joints[each.joint % joints.length] : by[each.role]),
         ghost: (n) => (others[n] && others[n].bad ? bad : plain),
-        trace: rgb(mine.accent), grid: rgb(MET.dark() ? "#5d6873" : "#aab3bc", 0.9), ground: rgb(mine.paper, MET.dark() ? 0.16 : 0.55),
+        trace: rgb(mine.accent), twin: rgb(mine.accent, 0.5), grid: rgb(MET.dark() ? "#5d6873" : "#aab3bc", 0.9), ground: rgb(mine.paper, MET.dark() ? 0.16 : 0.55),
         shade: MET.dark() ? [0, 0, 0, 0.42] : [0.02, 0.028, 0.036, 0.17],
       };
     }
@@ -86,19 +89,21 @@ MET.stage = (() => {
       const numbers = chosen.at(at);
       const solids = [...arm.solids(numbers), ...(frames ? arm.frames(numbers) : [])];
       const shown = all && ghostly ? others : [];
-      return { camera, solids, arm, ghosts: shown.map((each) => each.at(at)), trace: path, floor, step, reach: arm.reach, limb: arm.limb, colours: (inks ||= inksOf()), fine, shadow: !scene.moves };
+      const second = twin && twinned ? twin(at) : [];
+      return { camera, solids, arm, ghosts: shown.map((each) => each.at(at)), twin: second, trace: path, floor, step, reach: arm.reach, limb: arm.limb, colours: (inks ||= inksOf()), fine, shadow: !scene.moves };
     }
 
     // Everything that a case comes to, as pills. What has run away is left out, and a payload that is more than a reach from
     // the box round all that the arm comes to: it comes into view.
     const near = ({ ends }) => ends.flat().every((x) => Math.abs(x) < FAR * arm.reach);
-    const pills = (each, count) => {
-      const all = Array.from({ length: count }, (_, n) => arm.solids(each.at((end * n) / (count - 1)))).flat()
+    const pills = (each, count) => inView((at) => arm.solids(each.at(at)), count);
+    const inView = (solids, count) => {
+      const all = Array.from({ length: count }, (_, n) => solids((end * n) / (count - 1))).flat()
         .map((one) => ({ ...MET.arm.ends(one), own: one.role !== "payload" })).filter(near);
       const box = [0, 1, 2].map((axis) => all.filter((one) => one.own).flatMap(({ ends }) => ends.map((p) => p[axis])))
         .map((places) => [places.reduce((a, b) => Math.min(a, b), Infinity), places.reduce((a, b) => Math.max(a, b), -Infinity)]);
-      const beside = (p) => Math.hypot(...box.map(([low, high], axis) => Math.max(low - p[axis], p[axis] - high, 0))) <= arm.reach;
-      return all.filter((one) => one.own || beside(one.ends[0]));
+      const close = (p) => Math.hypot(...box.map(([low, high], axis) => Math.max(low - p[axis], p[axis] - high, 0))) <= arm.reach;
+      return all.filter((one) => one.own || close(one.ends[0]));
     };
 
     function ground(all) {
@@ -112,7 +117,7 @@ MET.stage = (() => {
       if (!all.length) return;
       ground(all);
       camera.choose(all.flatMap(({ ends }) => ends));
-      camera.fit([...all, ...(ghostly ? others.flatMap((each) => pills(each, FITTED_OF_GHOSTS)) : [])], BAR / view.clientHeight);
+      camera.fit([...all, ...(twin && twinned ? inView(twin, FITTED_OF_GHOSTS) : []), ...(ghostly ? others.flatMap((each) => pills(each, FITTED_OF_GHOSTS)) : [])], BAR / view.clientHeight);
     }
 
     // Dots of the canvas; fine: as many as make edges smooth.
@@ -229,6 +234,7 @@ MET.stage = (() => {
       else if (event.key === "+" || event.key === "=") zoom(0.85);
       else if (event.key === "-") zoom(1 / 0.85);
       else if (event.key === "0" || event.key === "Home") home();
+      else if (event.key === "b" && !withTwin.hidden) withTwin.click();
       else if (event.key === "f") withFrames.click();
       else if (event.key === "g" && !withOthers.hidden) withOthers.click();
       else return;
@@ -261,6 +267,14 @@ MET.stage = (() => {
       redraw();
     }
     haunt([]);
+
+    // An arm beside the chosen case, of other numbers or measured. solids: at a time, null where there is none.
+    function accompany(solids, name) {
+      twin = solids;
+      withTwin.hidden = !solids;
+      withTwin.replaceChildren(node("i", { class: "swatch" }), name);
+      redraw();
+    }
 
     // All ghosts are there: they too come into view, unless somebody has looked round.
     function settle() {
@@ -306,7 +320,7 @@ MET.stage = (() => {
       }
       return (performance.now() - begun) / count;
     }
-    return { take: arm.take, show, haunt, settle, seek, kept, resume, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
+    return { take: arm.take, show, haunt, accompany, settle, seek, kept, resume, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
   }
 
   return { make };

@@ -26,6 +26,8 @@
   let values = cases[0].slice();
   let plots = [];
   let lines = [];
+  let pale = [];  // of what stands beside, under them
+  const other = data.beside ? MET.beside.make(data.beside, data, time) : null;
 
   // Sliders, and which case of the archive they stand at.
   const knobs = told.inputs.map((input, n) => {
@@ -59,6 +61,7 @@
     const { tick, failed, rows } = ended(found.outputs);
     const width = told.columns.length;
     lines = told.columns.map((_, c) => Array.from(time, (_t, row) => (row < rows ? found.rows[row * width + c] / data.columnScales[c] : null)));
+    if (other) accompany();
     draw();
     const which = position();
     chosen.value = which < 0 ? "" : which;
@@ -67,6 +70,13 @@
     tell(which, measured, failed, tick, took);
     if (stage && rows) stage.show(taken(values, found.rows, rows), which < 0 ? `not in the ${source}` : `case #${data.positions[which]}`);
     if (stage) stage.haunt(others.filter((each) => each.n !== which));
+  }
+
+  // What stands beside the run, with the same numbers.
+  function accompany() {
+    const { columns, solids } = other.at(values);
+    pale = columns.map((numbers, c) => Array.from(time, (_, row) => (numbers && !Number.isNaN(numbers[row]) ? numbers[row] / data.columnScales[c] : null)));
+    if (stage) stage.accompany(solids, other.name);
   }
 
   // How a case ended, and how many rows it has.
@@ -166,7 +176,7 @@
   // A plot a signal, of unlike units one a unit: the columns of each.
   const plotted = (n) => `${told.columns[n].signal}\n${data.columnUnits[n]}`;
   const signals = [...new Set(told.columns.map((_, n) => plotted(n)))].map((which) => told.columns.flatMap((_, n) => (plotted(n) === which ? [n] : [])));
-  const drawn = (columns) => [time, ...columns.map((n) => lines[n])];
+  const drawn = (columns) => [time, ...(other ? columns.map((n) => pale[n]) : []), ...columns.map((n) => lines[n])];
 
   function draw() {
     if (plots.length) plots.forEach((plot, n) => plot.setData(drawn(signals[n])));
@@ -197,7 +207,7 @@
         node("div", { class: "reading" }, names)), frame));
       return new uPlot({ width: MET.width(frame), height: 190, padding: [8, 14, 0, 0], legend: { show: false },
         scales: { x: { time: false } }, cursor: { y: false, sync: { key: "time" } }, hooks: { setCursor: [pointed] },
-        series: [{}, ...columns.map((_, nth) => ({ stroke: inks[nth], width: 1.6, points: { show: false }, spanGaps: false }))],
+        series: [{}, ...(other ? columns.map((_, nth) => ({ stroke: `${inks[nth]}55`, width: 6, points: { show: false }, spanGaps: false })) : []), ...columns.map((_, nth) => ({ stroke: inks[nth], width: 1.6, points: { show: false }, spanGaps: false }))],
         axes: [{ ...axis, size: 26, values: (self, v) => ticks(v) }, { ...axis, size: 62, space: 32, values: (self, v) => ticks(v) }],
       }, drawn(columns), frame);
     });
@@ -206,7 +216,7 @@
 
   main.replaceChildren(room,
     ...(cases.length > 1 ? [node("div", { class: "knobs" }, node("label", { class: "knob" }, "Case", chosen, node("output", null, `of ${data.count}`)), knobs.map((knob) => knob.box))] : []),
-    came, node("table", { class: "answers" }, answers), panels);
+    came, ...(other ? [node("p", { class: "note" }, "Beside it, wide and pale: ", node("b", null, other.name), `, ${other.note}.`)] : []), node("table", { class: "answers" }, answers), panels);
   knobs.forEach((knob) => knob.put());
   update();
   if (stage && cases.length > 1) requestAnimationFrame(() => setTimeout(haunt));

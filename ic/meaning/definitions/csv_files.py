@@ -21,10 +21,12 @@ from ic.grammar.syntax import Deck
 from ic.language.unit_words import in_degrees
 from ic.named_files import NamedFiles
 from ic.text.complaints import known_words
+from ic.text.files import decode
 from ic.text.limits import MOST_CSV_BYTES, MOST_CSV_ROWS
 from met import units
 from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error, write, write_either
 from met.frozen import frozen
+from met.host.files import read_regular
 from met.messages.other_units import suggest
 from met.unit_parser import parse_unit
 from met.units import PURE, Dimension, Measure
@@ -192,6 +194,18 @@ def csv_files(deck: Deck) -> NamedFiles[CsvTable]:
         most=MOST_CSV_BYTES,
         missing="D190",
     )
+
+
+def read_csv(path: str) -> CsvTable:
+    """A CSV file that a command is given. Raises Problem D190 where it cannot be read, and D002, D191 to D198."""
+    try:
+        data = read_regular(path, MOST_CSV_BYTES)
+    except OSError as reason:
+        raise Problem(error("D190", f"cannot read the CSV file `{path}`: {reason.strerror}")) from None
+    text, fault = decode(data, path, "CSV file")
+    if fault is not None:
+        raise Problem(fault)
+    return _table(path, text)
 
 
 def _table(file: str, text: str, declared: Collection[str] = ()) -> CsvTable:
