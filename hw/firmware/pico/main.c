@@ -16,6 +16,9 @@
 /* Rounds in which a crystal or PLL starts, with room: ms at the ring oscillator's 6.5 MHz. */
 #define ROUNDS 1000000u
 
+/* In the watchdog's scratch register while it is ours: the ROM resets by the watchdog, too, once it has flashed. */
+#define WATCHED 0x4D455421u
+
 volatile uint32_t pico_beats;
 
 static void wait_for(const volatile uint32_t *from, uint32_t bits)
@@ -88,6 +91,7 @@ static void start_watchdog(void)
     if (board_wiring.watchdog != 0u) {
         PSM_WDSEL = PSM_ALL_BUT_OSCILLATORS;
         port_kick();
+        WATCHDOG_SCRATCH = WATCHED;
         WATCHDOG_CTRL = WATCHDOG_ENABLE;
     }
 }
@@ -105,7 +109,8 @@ static void send(void)
 
 void pico_main(void)
 {
-    const bed_cause cause = ((WATCHDOG_REASON & WATCHDOG_BY_TIMER) != 0u) ? BED_WATCHDOG : BED_POWER;
+    const bool by_timer = (WATCHDOG_REASON & WATCHDOG_BY_TIMER) != 0u;
+    const bed_cause cause = (by_timer && (WATCHDOG_SCRATCH == WATCHED)) ? BED_WATCHDOG : BED_POWER;
     out_of_reset(RESET_IO_BANK0 | RESET_PADS_BANK0);
     board_start(); /* the safe state, by pins that are driven now */
     start_clocks();
@@ -113,6 +118,7 @@ void pico_main(void)
     board_boot(cause);
     start_timer();
     start_line();
+    __asm volatile("cpsie i");
     for (;;) {
         pico_beats++;
         __asm volatile("wfi");

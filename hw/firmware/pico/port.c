@@ -163,8 +163,9 @@ void board_start(void)
             drive_pin(pin);
         }
     }
-    CLEAR_BITS(RESETS_RESET) = RESET_PWM | RESET_PIO0;
-    for (uint32_t k = 0u; (k < ADC_ROUNDS) && ((RESETS_DONE & RESET_PWM) == 0u); k++) {
+    const uint32_t both = RESET_PWM | RESET_PIO0;
+    CLEAR_BITS(RESETS_RESET) = both;
+    for (uint32_t k = 0u; (k < ADC_ROUNDS) && ((RESETS_DONE & both) != both); k++) {
     }
     start_slice(SLICE_DRIVE);
     start_slice(SLICE_LOAD);

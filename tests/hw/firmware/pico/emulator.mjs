@@ -9,6 +9,7 @@
 //     {"do": "run", "us": N}             N us, or until a frame has been answered
 //     {"do": "sleep", "us": N}           N us
 //     {"do": "set", "bench": {...}}     the bench: see `bench` below
+//     {"do": "glitch"}                   both wires of the encoder change at once, and back
 //     {"do": "hang"}                     the processor takes no interrupt any more
 //     {"do": "spans"}                    the longest stays in interrupts are counted anew
 //
@@ -39,6 +40,7 @@ let instructions = 0, cycles = 0, deepest = 0, spans = {};
 
 function boot(byWatchdog) {
   base += mcu ? mcu.clock.nanos : 0;
+  const scratch = byWatchdog && mcu ? mcu.peripherals[0x40058].scratchData : null;
   mcu = new RP2040();
   mcu.logger = SILENT;
   mcu.flash.set(flash);
@@ -49,6 +51,7 @@ function boot(byWatchdog) {
   }
   const dog = mcu.peripherals[0x40058];
   dog.reason = byWatchdog ? 1 : 0;
+  if (scratch) dog.scratchData = scratch;
   dog.onWatchdogTrigger = () => { hung = true; dog.alarm.enable = false; }; // or it rings for ever
   mcu.uart[0].onByte = (byte) => out.push(byte);
   mcu.pwm.channels.forEach((channel) => { channel.updateEnable = () => {}; }); // levels are read, edges are not
@@ -214,6 +217,12 @@ for await (const line of createInterface({ input: process.stdin })) {
     case 'run': advance(mcu.clock.nanos + asked.us * 1000, true); break;
     case 'sleep': advance(mcu.clock.nanos + asked.us * 1000, false); break;
     case 'spans': spans = {}; break;
+    case 'glitch': // both wires of the encoder change at once, and back
+      for (let k = 0; k < 2; k++) {
+        for (const n of [2, 3]) mcu.gpio[n].setInputValue(!mcu.gpio[n].rawInputValue);
+        samples(2);
+      }
+      break;
     case 'hang': mcu.core.interruptsUpdated = false; mcu.core.checkForInterrupts = () => false; break;
     case 'set': Object.assign(bench, asked.bench); wires(); break;
   }

@@ -23,6 +23,7 @@ from tests.hw.firmware.pico.emulated import (
     LED,
     LOAD_ENABLE,
     PULSE,
+    STACK_TOP,
     Emulator,
     PicoBed,
     skip_without_tools,
@@ -194,7 +195,23 @@ def test_a_processor_that_hangs_is_reset_and_the_next_session_is_told(
     assert emulator.told["level"] == [0, 0, 0, 0] and emulator.told["pins"] & LINES == 0
 
 
-def test_an_encoder_counts_both_ways_and_a_change_of_both_wires_at_once_is_found(emulator: Emulator) -> None:
+def test_a_change_of_both_wires_of_the_encoder_at_once_stops_it(bed: PicoBed) -> None:
+    bed.emulator.ask("glitch")
+    assert off_after(bed, 2e-3) <= 1.2e-3
+    assert bed.read().interlock == InterlockReason.ENCODER
+
+
+def test_a_reset_by_the_rom_after_flashing_is_none_by_the_watchdog() -> None:
+    flash = pico_image(pico_bench())
+    with Emulator(flash, motor=True) as emulator:
+        emulator.ask("boot", flash=flash.hex(), by_watchdog=True, stack=STACK_TOP)
+        emulator.sleep(0.15)
+        with PicoBed(emulator, 1e-3) as bed:
+            bed.connect()
+            assert bed.read().faults == Fault(0)
+
+
+def test_an_encoder_counts_both_ways(emulator: Emulator) -> None:
     with PicoBed(emulator, 1e-3) as bed:
         bed.connect()
         for way in (1.0, -1.0, 1.0):
