@@ -40,7 +40,11 @@ def test_substitute_says_its_keys_defaults_models_and_what_is_the_servos(capsys:
     assert "\nbeds; emulated unless written\n" in out and "\nlaws; velocity_tracking unless written\n" in out
     assert all(f"\n  {name} " in out for kind in ("bed", "law") for name in models.find_own(kind))
     assert "the servo's j_m " in out
-    assert [each["name"] for each in json.loads(printed(capsys, "substitute", "--format", "json"))] == ["bed", "law", "scale"]
+    assert [each["name"] for each in json.loads(printed(capsys, "substitute", "--format", "json"))] == [
+        "bed",
+        "law",
+        "scale",
+    ]
 
 
 def test_units_lists_them_all_with_what_they_are_in_si(capsys: pytest.CaptureFixture[str]) -> None:
