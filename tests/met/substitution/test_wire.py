@@ -55,7 +55,7 @@ def test_a_bed_outside_the_kernel_makes_the_same_run_as_the_emulated_one_inside(
         if k:
             waiting.append(Wire(block.outputs[told["voltage"], 0], block.outputs[told["current"], 0]))
             held = SimpleNamespace(**emulated.advance(p, held, waiting.pop(0), 1.0 / 500.0, lambda name: 0.0))
-        block.inputs[0, :] = emulated.read(p, held)
+        block.inputs[0, :] = emulated.BED.read(p, held)
         at = block.recorded(k, k)
         if k % step == 0:
             rows.append(at[0, 0, :5])
