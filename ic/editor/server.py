@@ -6,7 +6,6 @@ import asyncio
 import logging
 import os
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import Future
 from functools import partial
 from typing import Any
 
@@ -103,7 +102,7 @@ class DeckServer(LanguageServer):
     def forget_notifications(self) -> None:
         """Let go of what was dealt with: pygls keeps a future of each change of a text, as of a request that is yet to
         be answered, a kilobyte each."""
-        waiting: dict[object, Future[object]] = self.protocol._request_futures
+        waiting = self.protocol._request_futures
         for number in [number for number, future in waiting.items() if future.done()]:
             del waiting[number]
 

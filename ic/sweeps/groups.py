@@ -104,7 +104,7 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
                 check_stops(source.complaints, made)
                 check_balance(source.complaints, made)
                 made = check_steps(scope, made, source.memo)
-                check_beds(source.complaints, made)
+                check_beds(source.complaints, made, source.memo)
             source.complaints.settle()
             return [(made, scope)]
     if definition.parts:
@@ -279,7 +279,7 @@ class _Sweep:
             check_balance(self.complaints, made)
             made = replace(made, notes=(*made.notes, *check_confidences(self.complaints, there, made)))
             made = check_steps(scope, made, self.source.memo)
-            check_beds(self.complaints, made)
+            check_beds(self.complaints, made, self.source.memo)
         self.complaints.settle()
         self.source.effects.examine(scope, run, made, self.definition.group.body)
         self.own.examine(scope, run, made, self.definition.group.body)

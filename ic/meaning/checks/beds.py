@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ic.meaning.checks.step_words import at_the_start
 from ic.text.complaints import Complaints
+from met.analysis.memo import AnalysisMemo
 from met.diagnostic import Diagnostic, Label, Problem
 from met.plan import Experiment
 
@@ -16,7 +17,7 @@ MOST_CASES = 3
 """Cases that are looked at: each takes some 25 ms."""
 
 
-def check_beds(complaints: Complaints, experiment: Experiment) -> None:
+def check_beds(complaints: Complaints, experiment: Experiment, memo: AnalysisMemo) -> None:
     """Warns of each joint on a bed that is unstable in the first case, or where something is least or largest."""
     if not experiment.structure.substitutions or not experiment.cases.count:
         return
@@ -27,7 +28,7 @@ def check_beds(complaints: Complaints, experiment: Experiment) -> None:
     cases = chosen_cases(experiment)[:MOST_CASES]
     left = experiment.cases.count - len(cases)
     try:
-        found = margins(experiment, cases)
+        found = memo.answer("margins", experiment, lambda: margins(experiment, cases), cases)
     except Problem:  # said where the program is built
         return
     for each in (one for of_case in found for one in of_case):

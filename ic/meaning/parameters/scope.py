@@ -364,9 +364,9 @@ class Scope:
             needs=(of,),
             paths=paths,
         )
-        for paths in self.targets.values():
-            if not own and of in paths:
-                paths.append(owner.join(wanted.name))
+        for taken in self.targets.values():
+            if not own and of in taken:
+                taken.append(owner.join(wanted.name))
         return value
 
     def keep_derived(self, path: str, value: Real, unit: str, item: Item, note: str) -> None:

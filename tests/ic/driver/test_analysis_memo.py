@@ -10,9 +10,11 @@ from typing import Any
 import pytest
 
 from ic.driver.compile import Compiled, check
+from ic.text.files import LIBRARY
 from met.analysis.memo import MOST, AnalysisMemo
 from met.plan import file as plan_file
 from tests.ic.driver.test_by_definition import ARM, RUN, typed
+from tests.ic.meaning.checks.test_beds import BENCH, ROTOR
 
 SPRING = """\
 servo spring { model = passive;  stiffness = 2000 N*m/rad; }
@@ -98,6 +100,28 @@ def test_a_remedy_that_is_not_known_is_found_for_a_fault_that_is() -> None:
     again, _, found = audited(deck, faults)
     assert found == 1
     assert_same(again, first, deck)
+
+
+def test_motors_on_beds_and_all_else_of_a_shipped_deck_are_looked_into_once() -> None:
+    deck = (LIBRARY / "two_link.ic").read_text()
+    _, known, anew = audited(deck, {})
+    moved = f"// a line\n{deck}"
+    again, kept, found = audited(moved, known)
+    assert (anew, found, kept.keys()) == (len(known), 0, known.keys())
+    assert_same(again, plain(moved), moved)
+    other = deck.replace("duration    = 20 s", "duration    = 25 s")
+    changed, _, found = audited(other, known)
+    assert other != deck and found > 0
+    assert_same(changed, plain(other), other)
+
+
+def test_a_bed_that_is_unstable_is_told_again_where_it_was_known() -> None:
+    heavy = BENCH.replace("[1, 1, 1]", str([5.4 * ROTOR] * 3)).replace("{ command", "{ kp = 0.02 V*s/rad;  command")
+    first, known, _ = audited(heavy, {})
+    assert [each.code for each in first.diagnostics] == ["D321"]
+    again, _, found = audited(heavy, known)
+    assert found == 0
+    assert_same(again, first, heavy)
 
 
 def test_of_what_may_be_asked_for_yet_the_oldest_leave() -> None:
