@@ -158,7 +158,22 @@ class Chromium:
         scale: float = 1.0,
         scripts: bool = True,
     ) -> Page:
-        """A page of this size (CSS pixels), when all of it is there."""
+        """A file's page of this size (CSS pixels), when all of it is there."""
+        return self.open_address(
+            path.resolve().as_uri(), width=width, height=height, dark=dark, scale=scale, scripts=scripts
+        )
+
+    def open_address(
+        self,
+        address: str,
+        *,
+        width: int = 1280,
+        height: int = 900,
+        dark: bool = False,
+        scale: float = 1.0,
+        scripts: bool = True,
+    ) -> Page:
+        """The page at an address."""
         target = self.ask("Target.createTarget", url="about:blank")["targetId"]
         session = self.ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         page = Page(self, session, target)
@@ -178,7 +193,7 @@ class Chromium:
         )
         if not scripts:
             page.ask("Emulation.setScriptExecutionDisabled", value=True)
-        page.ask("Page.navigate", url=path.resolve().as_uri())
+        page.ask("Page.navigate", url=address)
         page.until_loaded()
         return page
 
