@@ -143,9 +143,7 @@ def _said(
     again: whether others are run again there."""
     out = []
     if again and here < known:
-        out.append(
-            f"The records of {here:,} of {known:,} cases are in this page; others are run again where it is read."
-        )
+        out.append(f"{here:,} of {known:,} recorded cases are in this page; the others are run again where it is read.")
     elif here < known:
         which = "those that changed most and of the worst" if compared else "the worst"
         out.append(f"Signals of {which} of {known:,} recorded cases are in this page, {here:,} of them.")

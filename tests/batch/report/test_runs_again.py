@@ -23,6 +23,7 @@ from batch.report.contents.gathering import gather
 from batch.report.contents.parts import Report
 from batch.report.html.page import page as html_page
 from batch.report.html.payload import exact
+from met import cli
 from met.messages.visible import visible
 from met.run import inputs
 from tests.batch.report import archives
@@ -98,6 +99,8 @@ class TestWhatIsInIt:
     def test_is_left_out_where_it_is_not_asked_for(self, sent: Path) -> None:
         source = report(sent / "ways.h5", sent / "without.html", simulate=False).read_text(encoding="utf-8")
         assert "unsafe" not in source and "MET.modules" not in source and "No histories were kept." in source
+        words = ["report", str(sent / "ways.h5"), "-o", str(sent / "command.html"), "--no-simulation", "-q"]
+        assert cli.main(words) == cli.YES and (sent / "command.html").read_text(encoding="utf-8") == source
 
     def test_stands_under_the_digest_of_the_page_s_script(self, sent: Path) -> None:
         source = (sent / "ways.html").read_text(encoding="utf-8")
@@ -277,7 +280,7 @@ class TestInTheBrowser:
     def test_a_run_that_records_no_position_says_what_to_record(self, chromium: Chromium, sent: Path) -> None:
         page = chromium.open(sent / "blind.html")
         page.run("document.querySelector('.arm').scrollIntoView()")
-        page.run(f"new Promise(d => {{ const f = () => {SAID} ? d() : setTimeout(f, 20); f(); }})")
+        page.run(f"new Promise(d => {{ const f = () => {SAID}.trim() ? d() : setTimeout(f, 20); f(); }})")
         said = page.run("document.querySelector('.arm').innerText")
         assert "The arm is not drawn, for the run does not record q: record += [q];" in said
         assert page.run("document.querySelector('.stage')") is None
@@ -342,6 +345,21 @@ class TestInTheBrowser:
             heads = page.run("getComputedStyle(document.querySelector('.cases thead')).display")
             assert heads == "none"  # each number has its heading beside it
             page.close()
+
+    @pytest.mark.parametrize("width", [1280, 400])
+    def test_all_that_is_read_at_the_pointer_is_seen_and_no_plot_moves(
+        self, chromium: Chromium, compared: Path, width: int
+    ) -> None:
+        page = opened(chromium, compared / "b.html", width=width)
+        left, top, wide, high = page.box(".signals .u-over", 1)
+        page.mouse("mouseMoved", left + 0.5 * wide, top + 0.5 * high)
+        page.settle()
+        hidden = "e => e.scrollWidth > e.clientWidth + 1 || e.scrollHeight > e.clientHeight + 1"
+        assert page.run("document.querySelector('.reading').textContent").count("before") == 2
+        assert page.run(f"Array.from(document.querySelectorAll('.reading')).filter({hidden}).length") == 0
+        assert page.box(".signals .u-over", 1)[1] == top
+        quiet(page)
+        page.close()
 
     def test_on_paper_it_is_a_filmstrip(self, chromium: Chromium, sent: Path, tmp_path: Path) -> None:
         page = opened(chromium, sent / "many.html")

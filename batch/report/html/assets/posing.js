@@ -14,7 +14,7 @@ MET.posing = (() => {
       return;
     }
     const rooms = simulation.structures.map((own) => ({ own, box: node("div", { hidden: true }), stage: null, ghosts: [], earlier: earlierArm(own), wanted: ghostsOf(own) }));
-    const said = node("p", { class: "computed", role: "status" });
+    const said = node("p", { class: "computed", role: "status" }, "\u00a0");  // a line of text from the first
     root.append(...rooms.map(({ box }) => box), said);
     let shown = null;  // the room of the chosen case
     let chosen = null;

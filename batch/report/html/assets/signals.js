@@ -127,6 +127,7 @@ MET.signals = (() => {
       const box = node("div", { class: "panel" }, node("div", { class: "head" }, node("b", null, change ? "change of " : null, node("code", null, panel.name), unit),
         node("span", { class: "about" }, panel.about), reading), frame);
       panels.append(box);
+      roomFor(box, reading, found, MET.width(frame));
       frame.setAttribute("aria-label", `${change ? "change of " : ""}${panel.name}${unit} against time, cases ${shown.map((c) => `#${c}`).join(", ")}. Arrow keys move the reading, plus and minus zoom, Escape shows all.`);
       const flat = found.every((each) => each.points.every((v) => v === null || v === 0));
       const font = "12px " + getComputedStyle(document.body).fontFamily;
@@ -153,6 +154,21 @@ MET.signals = (() => {
       }, joined(found), frame);
       frame.addEventListener("keydown", (event) => keys(event, u));
       return { u, panel, frame };
+    }
+
+    // What is read at the pointer, of the first lines.
+    function listed(found) {
+      const now = found.filter((each) => !each.was);
+      const several = shown.length > 1 && now.length <= READ;
+      return now.filter((each) => several || each.nth === 0).slice(0, READ);
+    }
+
+    // As many lines of text as that needs, kept free: a plot that moved under the pointer would lose it.
+    function roomFor(box, reading, found, wide) {
+      const need = 90 + listed(found).length * (found.some((each) => each.was) ? 240 : 150);  // px, about
+      if (need <= wide - 320) return;
+      box.classList.add("many");
+      reading.style.height = `${1.35 * Math.ceil(need / wide)}rem`;
     }
 
     // A plot was zoomed: the others go with it.
@@ -190,16 +206,14 @@ MET.signals = (() => {
       event.preventDefault();
     }
 
-    // What stands at the pointer, of the first lines.
+    // What stands at the pointer.
     function read(self, box, found, colour) {
       const at = self.cursor.idx;
       if (at === null || at === undefined || self.cursor.left < 0) return box.replaceChildren();
       if (model.seek && !pointing && self.cursor.event) model.seek(self.data[0][at]);
-      const now = found.filter((each) => !each.was);
-      const several = shown.length > 1 && now.length <= READ;
-      const listed = now.filter((each) => several || each.nth === 0).slice(0, READ);
+      const several = shown.length > 1 && found.filter((each) => !each.was).length <= READ;
       const text = (each) => { const value = each && self.data[found.indexOf(each) + 1][at]; return value === null || value === undefined ? "–" : number(value); };
-      box.replaceChildren(node("span", null, "t ", node("b", null, `${number(self.data[0][at])} s`)), ...listed.map((each) => {
+      box.replaceChildren(node("span", null, "t ", node("b", null, `${number(self.data[0][at])} s`)), ...listed(found).map((each) => {
         const was = found.find((other) => other.was && other.which === each.which && other.at === each.at);
         const label = shown.length > 1 && several ? `#${each.which}` : each.line.label;  // the colour says which joint
         const words = [label, each.line.command ? "command" : ""].filter(Boolean).join(" ");
