@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from batch.archive.in_memory import GroupInMemory
-from batch.portable.description import MOST_CASES
+from batch.modules.description import MOST_CASES
 from batch.portable.page import data_of, doubles, page_text
 from batch.queries.pool import ENDED, Pool
 from batch.report.contents.overview import overview

@@ -122,7 +122,20 @@ MET.arm = (() => {
       return { mesh: "can", role: "xyz"[which], joint: -1, at: plus(up(origin(numbers, body)), axis, far / 2), axes: along(axis), size: [0.2 * limb, 0.2 * limb, 0.2 * limb, far] };
     }));
 
-    return { take, solids, write, meshes, frames, scene, limb, reach: scene.reach };
+    // Forces as arrows from the origins of their bodies' frames. forces: [body, x, y, z], in the body's axes, N; metres: of
+    // a newton.
+    const [SHAFT, HEAD] = [[0.22], [0.6, 1.9]];  // radius and, of the head, length, in limbs
+    const arrows = (numbers, forces, metres) => forces.flatMap(([body, ...force]) => {
+      const far = metres * size(force);
+      if (!(far > 0.2 * limb)) return [];
+      const R = rows(numbers, body);
+      const axes = along(up(R.map((row) => dot(row, force))));
+      const [head, begin] = [Math.min(HEAD[1] * limb, 0.6 * far), up(origin(numbers, body))];
+      const part = (mesh, radius, at, length) => ({ mesh, role: "force", joint: -1, at: plus(begin, axes[2], at), axes, size: [radius * limb, radius * limb, mesh === "can" ? 0.1 * limb : 0, length] });
+      return [part("can", SHAFT[0], (far - head) / 2, far - head), part("cone", HEAD[0], far - head / 2, head)];
+    });
+
+    return { take, solids, arrows, write, meshes, frames, scene, limb, reach: scene.reach };
   }
 
   // Ends and radius of a solid as if it were a pill, by which it is fitted into a picture.

@@ -40,6 +40,10 @@ MET.painter = (() => {
         }));
         return;
       }
+      if (each.mesh === "cone") {
+        path(far, { d: d(hull([...ring(two[0], each.axes, radius).map(seen), b])), fill: css(colour, 0.9), ...line });
+        return;
+      }
       if (each.mesh === "can") {
         const rings = two.map((end) => ring(end, each.axes, radius).map(seen));
         path(far, { d: d(hull(rings.flat())), fill: css(colour, 0.86), ...line });

@@ -9,6 +9,7 @@ MET.stage = (() => {
   const FAR = 1e4;  // reaches, farther than which nothing is fitted
   const [REST, SLOW] = [120, 45];  // ms after which a picture that stands is drawn fine; of a picture, more than which is slow
   const PAUSE = 100;  // ms between which plots follow an arm that plays, where a processor draws
+  const LONGEST = 0.35;  // of the reach: the arrow of the largest force
   const TRACED = 240;  // points of the tip's path
   const FILM = 6;  // pictures on paper
   const rgb = (hex, alpha = 1) => [...[1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255), alpha];
@@ -32,6 +33,7 @@ MET.stage = (() => {
     let [frames, ghostly, fresh, asked, touched, moved, before] = [false, true, true, false, false, false, 0];
     let [path, still, rest, pace, coarse, inks, saidAt] = [[], true, 0, 0, 1, null, 0];
     let [twin, twinned] = [null, true];  // another arm beside the chosen case: its solids at a time
+    let [forces, forceful] = [null, true];  // {at: of a time, most: the largest of the case, N}
     const fingers = new Map();  // and mice: places where the view is held, by pointer
 
     const canvas = node("canvas");
@@ -47,11 +49,13 @@ MET.stage = (() => {
     };
     const withFrames = toggle("frames", "Axes of the links' frames: x red, y green, z blue", frames, () => (frames = !frames));
     const withOthers = toggle("", "The other cases, as ghosts", ghostly, () => (ghostly = !ghostly));
+    const withForces = toggle("forces", "Forces of the joints on their links, as arrows", true, () => (forceful = !forceful));
+    withForces.hidden = true;
     const withTwin = toggle("", "What stands beside the run", true, () => (twinned = !twinned));
     withTwin.hidden = true;
     const whole = node("button", { type: "button", class: "chip", title: "Everything in view (0)", click: () => { home(); redraw(); } }, "fit");
     const view = node("div", { class: "view", tabindex: 0, role: "application", "aria-label": "The arm in 3D. Space plays, comma and full stop step, arrows turn, with shift they move, plus and minus zoom, 0 shows all." },
-      canvas, paper, told, scaled, node("div", { class: "tools" }, withTwin, withOthers, withFrames, whole));
+      canvas, paper, told, scaled, node("div", { class: "tools" }, withTwin, withOthers, withForces, withFrames, whole));
     const sign = node("path", { d: "M3 1.5 L14 8 L3 14.5 Z" });
     const play = node("button", { type: "button", class: "play", "aria-label": "Play", click: () => run(!playing) }, node("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, sign));
     const scrub = node("input", { type: "range", min: 0, max: 1, step: "any", "aria-label": "Time", input: () => { run(false); seek(Number(scrub.value) * end); } });
@@ -72,7 +76,7 @@ MET.stage = (() => {
     function inksOf() {
       const mine = palette();
       const [link, base, payload] = BODY[MET.dark() ? "dark" : "light"];
-      const by = { link: rgb(link), base: rgb(base), rail: rgb(base), payload: rgb(payload), joint: rgb(base) };
+      const by = { force: rgb(MET.dark() ? "#ff7ad1" : "#b5127f"), link: rgb(link), base: rgb(base), rail: rgb(base), payload: rgb(payload), joint: rgb(base) };
       Object.entries(AXES).forEach(([axis, colour]) => { by[axis] = rgb(colour); });
       const joints = mine.lines.map((each) => rgb(each));
       const faint = Math.min(0.2, Math.max(0.06, 2 / Math.max(1, others.length)));
@@ -89,6 +93,7 @@ MET.stage = (() => {
       const numbers = chosen.at(at);
       const solids = [...arm.solids(numbers), ...(frames ? arm.frames(numbers) : [])];
       const shown = all && ghostly ? others : [];
+      if (forces && forceful) solids.push(...arm.arrows(numbers, forces.at(at), (LONGEST * arm.reach) / forces.most));
       const second = twin && twinned ? twin(at) : [];
       return { camera, solids, arm, ghosts: shown.map((each) => each.at(at)), twin: second, trace: path, floor, step, reach: arm.reach, limb: arm.limb, colours: (inks ||= inksOf()), fine, shadow: !scene.moves };
     }
@@ -235,6 +240,7 @@ MET.stage = (() => {
       else if (event.key === "-") zoom(1 / 0.85);
       else if (event.key === "0" || event.key === "Home") home();
       else if (event.key === "b" && !withTwin.hidden) withTwin.click();
+      else if (event.key === "a" && !withForces.hidden) withForces.click();
       else if (event.key === "f") withFrames.click();
       else if (event.key === "g" && !withOthers.hidden) withOthers.click();
       else return;
@@ -242,8 +248,11 @@ MET.stage = (() => {
       redraw();
     });
 
-    // The case that is solid, taken by `take`; label: what it is called.
-    function show(taken, label) {
+    // The case that is solid, taken by `take`; label: what it is called; acting: its forces.
+    function show(taken, label, acting = null) {
+      forces = acting && acting.most > 0 ? acting : null;
+      withForces.hidden = !forces;
+      scaled.textContent = `grid ${number(step)} m${forces ? ` · longest arrow ${number(forces.most)} N` : ""}`;
       const first = !chosen;
       chosen = taken;
       end = taken.end;
@@ -320,7 +329,7 @@ MET.stage = (() => {
       }
       return (performance.now() - begun) / count;
     }
-    return { take: arm.take, show, haunt, accompany, settle, seek, kept, resume, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
+    return { take: arm.take, forces: () => forces, show, haunt, accompany, settle, seek, kept, resume, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
   }
 
   return { make };

@@ -143,6 +143,8 @@ MET.webgl = (() => {
   // The same of few faces, with sharp edges.
   const drum = (sides) => lathe([[0, 0, -0.5, 0, -1], [1, 0, -0.5, 0, -1], [1, 0, -0.5, 1, 0], [1, 0, 0.5, 1, 0], [1, 0, 0.5, 0, 1], [0, 0, 0.5, 0, 1]], sides);
 
+  const cone = (sides) => lathe([[0, 0, -0.5, 0, -1], [1, 0, -0.5, 0, -1], [1, 0, -0.5, 0.9, 0.43], [0, 0, 0.5, 0.9, 0.43]], sides);
+
   function block() {
     const vertices = [];
     const faces = [];
@@ -214,9 +216,9 @@ MET.webgl = (() => {
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, of.ways ||= gl.createBuffer());
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, faces, gl.STATIC_DRAW);
     }
-    const fine = { pill: mesh(pill(28, 8)), can: mesh(can(36)), block: mesh(block()) };
-    const quick = { pill: mesh(pill(10, 2)), can: mesh(drum(16)), block: fine.block };  // while a processor draws it moving
-    const coarse = { pill: mesh(pill(8, 1)), can: mesh(drum(8)), block: fine.block };
+    const fine = { pill: mesh(pill(28, 8)), can: mesh(can(36)), block: mesh(block()), cone: mesh(cone(28)) };
+    const quick = { pill: mesh(pill(10, 2)), can: mesh(drum(16)), block: fine.block, cone: mesh(cone(12)) };  // while a processor draws it moving
+    const coarse = { pill: mesh(pill(8, 1)), can: mesh(drum(8)), block: fine.block, cone: mesh(cone(8)) };
     const [sparse, flat] = [2, 1].map((steps) => ({ ...coarse, pill: mesh(ribbon(steps)) }));
     const kept = software ? { frame: gl.createFramebuffer(), dots: gl.createRenderbuffer(), of: "" } : null;
 

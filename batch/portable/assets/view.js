@@ -68,7 +68,7 @@
     knobs.forEach(({ shown, input, n }) => { shown.textContent = `${number(values[n] / input.scale)} ${data.units[n]}`; });
     const measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
     tell(which, measured, failed, tick, took);
-    if (stage && rows) stage.show(taken(values, found.rows, rows), which < 0 ? `not in the ${source}` : `case #${data.positions[which]}`);
+    if (stage && rows) stage.show(taken(values, found.rows, rows), which < 0 ? `not in the ${source}` : `case #${data.positions[which]}`, acting(found.rows, rows));
     if (stage) stage.haunt(others.filter((each) => each.n !== which));
   }
 
@@ -94,6 +94,20 @@
     const width = told.columns.length;
     const columns = channels.map((c) => Float64Array.from({ length: rows }, (_, row) => numbers[row * width + c]));
     return stage.take(Object.fromEntries(told.inputs.map((input, n) => [input.name, inputs[n]])), time.subarray(0, rows), columns);
+  }
+
+  // The forces of joints on their links, where all three of their numbers are recorded: of a time, and the largest, N.
+  const recorded = data.arm.scene ? data.arm.scene.joints.map((joint, n) => [
+    data.arm.scene.shapes.find(([, , role, of]) => role === "joint" && of === n)?.[0],
+    ...["x", "y", "z"].map((axis) => told.columns.findIndex(({ channel }) => channel === `${joint}.reaction.force.${axis}`)),
+  ]).filter((places) => places.every((place) => place >= 0)) : [];
+  function acting(numbers, rows) {
+    if (!recorded.length) return null;
+    const width = told.columns.length;
+    const of = (row) => recorded.map(([body, ...columns]) => [body, ...columns.map((column) => numbers[row * width + column])]);
+    let most = 0;
+    for (let row = 0; row < rows; row++) of(row).forEach(([, ...force]) => { most = Math.max(most, Math.hypot(...force)); });
+    return { most, at: (t) => of(Math.min(rows - 1, Math.round((t * told.kernel.base_hz) / told.kernel.record_divisor))) };
   }
 
   function haunt() {

@@ -5,6 +5,7 @@ python -m tests.batch.portable.figures          writes docs/figures/view_*.png
 view_arm.png      the Panda with an upper arm of seven lengths, one of them solid
 view_narrow.png   the same page on a telephone, dark
 view_film.png     six instants, as the page prints them
+view_beside.png   the arm with the forces of its joints, beside a log of which one joint lags
 
 It says how large the page is, and how long its pictures take.
 """
@@ -15,15 +16,19 @@ import base64
 import tempfile
 from pathlib import Path
 
+import numpy as np
+
 import batch
 import ic
 from met import cli
-from tests.batch.report.browser import Page, browser
+from tests.batch.report.browser import Chromium, Page, browser
 
 FOLDER = Path(__file__).parents[3] / "docs" / "figures"
 
 UPPER = "#include <panda.ic>\nsweep upper of reach { vary d3 = linspace(0.2, 0.45, 7) m; }\n"
 HUNDRED = "#include <panda.ic>\nsweep hundred of reach { vary links.load.mass = linspace(0.1, 3, 101) kg; }\n"
+
+FORCES = "#include <panda.ic>\nrun forces like reach { record += [reaction.force]; }\n"
 
 READY = """new Promise(done => { const look = () =>
     document.documentElement.dataset.haunted && MET.shown.isStill() ? done() : setTimeout(look, 30); look(); })"""
@@ -51,6 +56,8 @@ def draw(folder: Path) -> list[Path]:
         written.append(folder / "view_narrow.png")
         written[-1].write_bytes(base64.b64decode(picture))
 
+        written.append(beside(chromium, home, folder))
+
         (home / "hundred.ic").write_text(HUNDRED, encoding="utf-8")
         batch.run(ic.compile(home / "hundred.ic", select=["hundred"]), output=home / "hundred.h5", histories="none")
         for width in (1280, 400):
@@ -60,8 +67,24 @@ def draw(folder: Path) -> list[Path]:
     return written
 
 
-def _page(archive: Path) -> Path:
-    assert cli.main(["view", str(archive), "-q"]) == 0
+def beside(chromium: Chromium, home: Path, folder: Path) -> Path:
+    """The picture of a run beside a log that is made of it: its joint 2 is 0.3 s late."""
+    (home / "forces.ic").write_text(FORCES, encoding="utf-8")
+    batch.run(ic.compile(home / "forces.ic", select=["forces"]), output=home / "forces.h5")
+    with batch.open(home / "forces.h5") as data:
+        time, joints, q = data["time"].values, data["joint"].values.tolist(), data["q"].values.reshape(-1, 7)
+    late = np.stack(
+        [np.interp(time - 0.3 * (name == "joint2"), time, q[:, n]) for n, name in enumerate(joints)], axis=1
+    )
+    rows = ["time [s], " + ", ".join(f"{name}.q [rad]" for name in joints)]
+    rows += [", ".join(f"{x:.6g}" for x in (t, *row)) for t, row in zip(time, late, strict=True)]
+    (home / "bench.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    shown = chromium.open(_page(home / "forces.h5", "--against", str(home / "bench.csv")), width=1180, scale=1.5)
+    return _at(shown, 1.2).picture(folder / "view_beside.png", ".stage")
+
+
+def _page(archive: Path, *words: str) -> Path:
+    assert cli.main(["view", str(archive), "-q", *words]) == 0
     page = archive.with_suffix(".view.html")
     print(f"{page.name}: {page.stat().st_size / 1024:.0f} KiB")
     return page
