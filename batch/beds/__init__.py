@@ -9,6 +9,7 @@ after a fault.
     chosen_bed        the bed that a user means, for the commands below
     probe             `met bed probe`: who is there
     clearing          `met bed clear`: forget latched faults
+    flashing          `met bed firmware`: the image of a board (hw/pico.py)
     jitter            `met bed jitter`: the timing of exchanges (hw/jitter.py)
     identifying       `met bed identify`: a bed's parameters from guided moves (hw/identify)
 """

@@ -10,13 +10,14 @@ import struct
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from hw.bed import BedState, Capability, Fault, InterlockReason
 from hw.pico import pico_image
-from hw.pico_bench import PicoBench, pico_bench
+from hw.pico_bench import SHIPPED, PicoBench, pico_bench
 from tests.hw.firmware.pico.emulated import (
     BRAKE_RELEASE,
     DRIVE_ENABLE,
@@ -224,6 +225,19 @@ def test_an_encoder_counts_both_ways(emulator: Emulator) -> None:
             assert before is not None and after is not None
             assert after - before == pytest.approx(way * 2.0, abs=0.02)
             assert after == pytest.approx(emulator.told["angle"], abs=0.004)
+
+
+@pytest.mark.parametrize("rate", [40.0, -40.0])
+def test_without_a_tachometer_the_rate_is_the_encoder_s(tmp_path: Path, rate: float) -> None:
+    lines = SHIPPED.read_text(encoding="utf-8").splitlines()
+    path = tmp_path / "bench.toml"
+    path.write_text("\n".join(line for line in lines if not line.startswith("rate_range")), encoding="utf-8")
+    bench = pico_bench(path)
+    with Emulator(pico_image(bench), motor=True, turned=rate, tachometer=False) as emulator:
+        emulator.sleep(0.15)
+        with PicoBed(emulator, 1e-3) as bed:
+            bed.connect()
+            assert bed.read().rate == pytest.approx(rate, abs=bench.config.scales.rate)
 
 
 # Boot
