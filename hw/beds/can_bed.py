@@ -463,7 +463,7 @@ def _opened_port(opening: Opening) -> CanBed:
 PORT = PortKind(
     scheme="can",
     address="BENCH.toml",
-    doc="Two drives on a CAN bus: ODrive, Damiao or moteus; the file says which.",
+    doc="Two drives on a CAN bus: ODrive, Damiao, moteus, CiA 402; the file says which.",
     open=_opened_port,
     lock_step=lambda name, requested: requested,
 )

@@ -6,9 +6,12 @@ in hw/players, which the tests of every dialect are derived from.
 
 from collections.abc import Mapping
 
+from hw.drives.cia402 import Cia402Drive
 from hw.drives.damiao import DamiaoDrive
 from hw.drives.drive import Drive
 from hw.drives.moteus import MoteusDrive
 from hw.drives.odrive import OdriveDrive
 
-DIALECTS: Mapping[str, type[Drive]] = {each.dialect: each for each in (OdriveDrive, DamiaoDrive, MoteusDrive)}
+DIALECTS: Mapping[str, type[Drive]] = {
+    each.dialect: each for each in (OdriveDrive, DamiaoDrive, MoteusDrive, Cia402Drive)
+}

@@ -6,6 +6,7 @@ may be wrong alike: what a maker's firmware does is known once one was there.
 
 from collections.abc import Callable, Mapping
 
+from hw.players.cia402 import PlayedCia402
 from hw.players.damiao import PlayedDamiao
 from hw.players.moteus import PlayedMoteus
 from hw.players.odrive import PlayedOdrive
@@ -15,5 +16,6 @@ PLAYED: Mapping[str, Callable[[int, int], PlayedDrive]] = {
     "odrive": PlayedOdrive,
     "damiao": PlayedDamiao,
     "moteus": PlayedMoteus,
+    "cia402": PlayedCia402,
 }
 """Makes a played drive of a dialect: (node, sense)."""

@@ -12,7 +12,7 @@ from hw.players.player import PlayedLine
 from tests.hw.drives.played import bench_file, host_of, played_bench
 from tests.hw.drives.spoiling import FAULTS, Spoiler, Tally, campaign
 
-DIALECTS = ("odrive", "damiao", "moteus")
+DIALECTS = ("odrive", "damiao", "moteus", "cia402")
 
 
 def through(folder: Path, dialect: str, kind: str, exchanges: int) -> tuple[Tally, Spoiler]:

@@ -29,7 +29,7 @@ from tests.hw.drives.played import bench_file, host_on, played_bench
 
 pytestmark = pytest.mark.alone
 
-DIALECTS = ("odrive", "damiao", "moteus")
+DIALECTS = ("odrive", "damiao", "moteus", "cia402")
 GROUP = "239.74.163.2"
 """Multicast group, of this machine alone, in whose place a bus is."""
 

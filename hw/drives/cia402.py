@@ -1,0 +1,225 @@
+"""Drives of CiA 402 over CANopen, in mode 10, cyclic synchronous torque: maxon, Elmo, Copley, Nanotec and others.
+
+    told      PDO: controlword and target torque; then a heartbeat of the host, and a SYNC
+    answered  at a SYNC, two PDOs: statusword; position and velocity, in one frame so that they are of one instant
+    watchdog  the drive consumes the host's heartbeat, and fails where that stays away
+    asked     by SDO, when it is greeted: device, modes, units, limits; PDOs are mapped then, and nothing is saved
+
+Facts are from CiA 301 and 402 as their public descriptions have them; no such drive was there.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+
+from hw.drives.bench_file import DriveEntry
+from hw.drives.drive import Drive, DriveFacts, DriveReading, DriveState, Talk
+from hw.drives.frames import CanFrame
+
+NMT, SYNC, EMERGENCY, TPDO1, RPDO1, TPDO2, SDO_ANSWER, SDO_ASK, HEARTBEAT = (
+    0x000,
+    0x080,
+    0x080,
+    0x180,
+    0x200,
+    0x280,
+    0x580,
+    0x600,
+    0x700,
+)
+"""Identifiers, to which a node's number is added but for the first two."""
+
+HOST = 127
+"""The host's number, under which its heartbeat goes."""
+
+START, PREOPERATIONAL = 1, 0x80
+PROFILE, TORQUE_MODE, MODE_BIT = 402, 10, 1 << 9
+HEARTBEAT_LOST = 0x8130
+RATE_UNITS = {0x00B44700: 2.0 * math.pi / 60.0, 0x00B40300: 2.0 * math.pi}
+"""Units of velocity as object 60A9h tells them, rad/s: turns a minute, turns a second. Its highest byte is a power of
+ten, signed."""
+
+DEVICE, PRODUCT, CONSUMED, ABORT = (0x1000, 0), (0x1018, 2), (0x1016, 1), (0x6007, 0)
+REVISION, MODES, MODE, RATED, MOST, SPEED = (0x1018, 3), (0x6502, 0), (0x6060, 0), (0x6076, 0), (0x6072, 0), (0x6080, 0)
+STEPS, TURNS, VELOCITY_UNIT = (0x608F, 1), (0x608F, 2), (0x60A9, 0)
+"""Objects, by index and subindex."""
+
+CONTROL_HZ = 1000.0
+"""Rate at which two such drives answer on a bus of 1 Mbit/s."""
+
+OFF, SHUT_DOWN, SWITCH_ON, ENABLE, RESET = 0x00, 0x06, 0x07, 0x0F, 0x80
+_TURN = 2.0 * math.pi
+
+
+class Cia402Drive(Drive):
+    """The host's side of a CiA 402 drive."""
+
+    dialect = "cia402"
+    answers_commands = True
+
+    def __init__(self, entry: DriveEntry) -> None:
+        super().__init__(entry)
+        self._answer: bytes | None = None
+        self._control, self._wanted, self._error = OFF, False, 0
+        self._rated = self._step = self._rate_unit = 1.0
+
+    def greet(self, talk: Talk) -> DriveFacts:
+        self._wanted, self._control = False, OFF
+        if not 0 < self.node < HOST:
+            raise self.wrong("its number is none of CANopen's, or the host's", "a number from 1 to 126")
+        device = self._read(talk, DEVICE, "<I")
+        if int(device) & 0xFFFF != PROFILE:
+            raise self.other(f"its device profile is {int(device) & 0xFFFF}, and a drive's is 402", "another node?")
+        if not int(self._read(talk, MODES, "<I")) & MODE_BIT:
+            raise self.other("it has no cyclic synchronous torque, mode 10", "it is told a torque, and nothing else")
+        unit = int(self._read(talk, VELOCITY_UNIT, "<I"))
+        if unit & 0xFFFFFF not in RATE_UNITS:
+            helps = "set object 60A9h to thousandths of a turn a minute, 0xFDB44700"
+            raise self.wrong(f"its unit of velocity is 0x{unit:08X}", helps)
+        ten = struct.unpack("<b", bytes([unit >> 24]))[0]
+        self._rate_unit = RATE_UNITS[unit & 0xFFFFFF] * 10.0**ten
+        self._rated = 1e-3 * self._read(talk, RATED, "<I")
+        most = 1e-3 * self._rated * self._read(talk, MOST, "<H")
+        rate = _TURN / 60.0 * self._read(talk, SPEED, "<I")
+        steps, turns = self._read(talk, STEPS, "<I"), self._read(talk, TURNS, "<I")
+        if not all(each > 0.0 for each in (self._rated, most, rate, steps, turns)):
+            raise self.wrong("a limit or a unit of its is 0", "objects 6072h, 6076h, 6080h and 608Fh")
+        self._step = _TURN * turns / steps
+        self._set_up(talk)
+        talk.send([CanFrame(NMT, bytes((START, self.node))), *self.idle()])
+        self.reading = None
+        if not talk.ask(self.asked(), lambda: self.reading is not None and self.state != DriveState.DRIVING):
+            raise talk.silent(self, "SYNC")
+        product, revision = int(self._read(talk, PRODUCT, "<I")), int(self._read(talk, REVISION, "<I"))
+        return DriveFacts(
+            f"revision 0x{revision:X}",
+            f"product 0x{product:X}",
+            self.entry.figures["watchdog"],
+            most,
+            rate,
+            CONTROL_HZ,
+            torque_count=1e-3 * self._rated,
+            angle_count=self._step,
+            rate_count=self._rate_unit,
+            angle_range=self._step * 2.0**32,
+        )
+
+    def _set_up(self, talk: Talk) -> None:
+        """Map the PDOs, and set mode and watchdog."""
+        talk.send([CanFrame(NMT, bytes((PREOPERATIONAL, self.node)))])
+        for parameters, mapping, cob, kind, objects in (
+            (0x1400, 0x1600, RPDO1, 255, (0x60400010, 0x60710010)),
+            (0x1800, 0x1A00, TPDO1, 1, (0x60410010,)),
+            (0x1801, 0x1A01, TPDO2, 1, (0x60640020, 0x606C0020)),
+        ):
+            self._write(talk, (parameters, 1), "<I", 0x80000000 | cob + self.node)
+            self._write(talk, (parameters, 2), "<B", kind)
+            self._write(talk, (mapping, 0), "<B", 0)
+            for n, each in enumerate(objects, 1):
+                self._write(talk, (mapping, n), "<I", each)
+            self._write(talk, (mapping, 0), "<B", len(objects))
+            self._write(talk, (parameters, 1), "<I", cob + self.node)
+        self._write(talk, ABORT, "<h", 1)
+        self._write(talk, CONSUMED, "<I", HOST << 16 | round(1e3 * self.entry.figures["watchdog"]))
+        self._write(talk, MODE, "<b", TORQUE_MODE)
+
+    def _sdo(self, talk: Talk, data: bytes, what: str) -> bytes:
+        """The answer to an SDO of up to four bytes. Raises Problem E402 where none comes, E404 where it is refused."""
+        self._answer = None
+        asked = data[1:4]
+
+        def answered() -> bool:
+            return self._answer is not None and self._answer[1:4] == asked
+
+        if not talk.ask([CanFrame(SDO_ASK + self.node, data.ljust(8, b"\0"))], answered):
+            raise talk.silent(self, what)
+        assert self._answer is not None
+        if self._answer[0] == 0x80:
+            code = struct.unpack_from("<I", self._answer, 4)[0]
+            raise self.wrong(f"it refuses {what}, 0x{code:08X}", "its documentation says whether it has that object")
+        return self._answer
+
+    def _read(self, talk: Talk, which: tuple[int, int], layout: str) -> float:
+        """An object, read twice: a limit is not taken from one frame."""
+        what = f"object {which[0]:04X}h:{which[1]}"
+        request = struct.pack("<BHB", 0x40, *which)
+        size = struct.calcsize(layout)
+        first, second = (self._sdo(talk, request, what) for _ in range(2))
+        if first != second or first[0] & 0xE3 != 0x43 or 4 - (first[0] >> 2 & 3) < size:
+            raise self.wrong(f"{what} is not what it is in a drive", "two nodes of one number on the bus?")
+        return float(struct.unpack_from(layout, first, 4)[0])
+
+    def _write(self, talk: Talk, which: tuple[int, int], layout: str, value: int) -> None:
+        size = struct.calcsize(layout)
+        head = 0x23 | (4 - size) << 2
+        what = f"to set object {which[0]:04X}h:{which[1]}"
+        self._sdo(talk, struct.pack("<BHB", head, *which) + struct.pack(layout, value), what)
+
+    # Frames
+
+    def _pdo(self, control: int, torque: int = 0) -> CanFrame:
+        return CanFrame(RPDO1 + self.node, struct.pack("<Hh", control, torque))
+
+    def armed(self) -> Sequence[CanFrame]:
+        self._wanted = True
+        return self.told(0.0)
+
+    def told(self, value: float) -> Sequence[CanFrame]:
+        """The next step towards operation, or the torque once it is there. The drive's come last: they end with the
+        heartbeat that feeds both watchdogs, and the SYNC at which both answer."""
+        torque = 0
+        if self.state == DriveState.DRIVING:
+            counts = self.own(value) / (1e-3 * self._rated)
+            torque = math.trunc(counts + math.copysign(1e-6, counts))  # rounding must not lose a step
+        frames = (self._pdo(self._control if self._wanted else OFF, torque),)
+        return frames if self.entry.role == "load" else (*frames, CanFrame(HEARTBEAT + HOST, b"\x05"), *self.asked())
+
+    def asked(self) -> Sequence[CanFrame]:
+        return (CanFrame(SYNC),)
+
+    def idle(self) -> Sequence[CanFrame]:
+        self._wanted = False
+        return (self._pdo(OFF),)
+
+    def halted(self) -> Sequence[CanFrame]:
+        return self.idle()
+
+    def cleared(self) -> Sequence[CanFrame]:
+        self._wanted, self._error = False, 0
+        return (self._pdo(OFF), self._pdo(RESET), self._pdo(OFF))
+
+    def answers(self) -> Sequence[CanFrame]:
+        return (CanFrame(TPDO1 + self.node, bytes(2)), CanFrame(TPDO2 + self.node, bytes(8)))
+
+    def take(self, frame: CanFrame) -> bool:
+        if frame.extended or frame.fd or frame.remote or frame.id & 0x7F != self.node:
+            return False
+        which, data = frame.id & 0x780, frame.data
+        if which == SDO_ANSWER and len(data) == 8:
+            self._answer = data
+        elif which == TPDO1 and len(data) == 2:
+            self._status(struct.unpack("<H", data)[0], frame.time)
+        elif which == TPDO2 and len(data) == 8:
+            position, velocity = struct.unpack("<ii", data)
+            angle, rate = position * self._step, velocity * self._rate_unit
+            self.reading = DriveReading(frame.time, self.own(angle), self.own(rate))
+        elif which == EMERGENCY and len(data) == 8:
+            self._error = self._error or struct.unpack_from("<H", data)[0]
+        else:
+            return False
+        return True
+
+    def _status(self, status: int, time: float) -> None:
+        self.stated = time
+        if status & 0x4F in (0x08, 0x0F):
+            self.state, self.errors = DriveState.FAILED, f"error 0x{self._error:04X}"
+        elif status & 0x6F == 0x27:
+            self.state, self.errors = DriveState.DRIVING, ""
+        else:
+            self.state, self.errors = DriveState.IDLE, ""
+        self.starved = self.state == DriveState.FAILED and self._error == HEARTBEAT_LOST
+        self._control = {0x40: SHUT_DOWN, 0x21: SWITCH_ON, 0x23: ENABLE, 0x27: ENABLE}.get(
+            status & 0x4F if status & 0x4F == 0x40 else status & 0x6F, SHUT_DOWN
+        )

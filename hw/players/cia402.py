@@ -1,0 +1,167 @@
+"""A drive of CiA 402 in mode 10, over canopen's LocalNode: its object dictionary and SDO server are that library's.
+
+canopen is imported when one is made.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+from typing import Any
+
+from hw.drives.frames import CanFrame
+from hw.players.player import PlayedDrive
+from hw.players.shaft import OFF, Output
+
+_OBJECTS = (
+    ("device", 0x1000, 0, 7, 0x00020192),
+    ("consumed", 0x1016, 1, 7, 0),
+    ("vendor", 0x1018, 1, 7, 0xFB),
+    ("product", 0x1018, 2, 7, 0x6050),
+    ("revision", 0x1018, 3, 7, 0x0170),
+    *((f"rpdo1 {n}", 0x1400, n, kind, 0) for n, kind in ((1, 7), (2, 5))),
+    *((f"rpdo1 map {n}", 0x1600, n, 5 if n == 0 else 7, 0) for n in range(5)),
+    *((f"tpdo1 {n}", 0x1800, n, kind, 0) for n, kind in ((1, 7), (2, 5))),
+    *((f"tpdo2 {n}", 0x1801, n, kind, 0) for n, kind in ((1, 7), (2, 5))),
+    *((f"tpdo1 map {n}", 0x1A00, n, 5 if n == 0 else 7, 0) for n in range(5)),
+    *((f"tpdo2 map {n}", 0x1A01, n, 5 if n == 0 else 7, 0) for n in range(5)),
+    ("abort", 0x6007, 0, 3, 0),
+    ("mode", 0x6060, 0, 2, 0),
+    ("most torque", 0x6072, 0, 6, 3000),
+    ("rated torque", 0x6076, 0, 7, 200),
+    ("most speed", 0x6080, 0, 7, 6000),
+    ("steps", 0x608F, 1, 7, 65536),
+    ("turns", 0x608F, 2, 7, 1),
+    ("velocity unit", 0x60A9, 0, 7, 0x00B44700),
+    ("modes", 0x6502, 0, 7, 0x3ED),
+)
+"""Name, index, subindex, type (CiA 301) and value of each object."""
+
+_LAYOUTS = {2: "<b", 3: "<h", 5: "<B", 6: "<H", 7: "<I"}
+_LAYOUT = {(index, sub): struct.Struct(_LAYOUTS[kind]) for _, index, sub, kind, _ in _OBJECTS}
+
+
+class PlayedCia402(PlayedDrive):
+    """A CiA 402 drive. watches: False for one that does not miss the host's heartbeat"""
+
+    def __init__(self, node: int, sense: int = 1) -> None:
+        super().__init__(node, sense)
+        import canopen
+
+        class Network(canopen.Network):
+            """A network whose frames go into a list."""
+
+            def __init__(self) -> None:
+                super().__init__()
+                self.sent: list[CanFrame] = []
+
+            def send_message(self, can_id: int, data: Any, remote: bool = False) -> None:
+                self.sent.append(CanFrame(can_id, bytes(data), remote=remote))
+
+        dictionary = canopen.ObjectDictionary()
+        for name, index, sub, kind, value in _OBJECTS:
+            variable = canopen.objectdictionary.ODVariable(name, index, sub)
+            variable.data_type, variable.access_type, variable.default = kind, "rw", value
+            if any(each[1] == index and each[2] for each in _OBJECTS):
+                if index not in dictionary:
+                    dictionary.add_object(canopen.objectdictionary.ODRecord(f"record {index:X}", index))
+                record = dictionary[index]
+                assert isinstance(record, canopen.objectdictionary.ODRecord)
+                record.add_member(variable)
+            else:
+                dictionary.add_object(variable)
+        self._network = Network()
+        self._node = canopen.LocalNode(node, dictionary)
+        self._node.associate_network(self._network)
+        self.watches = True
+        self.reboot()
+
+    def reboot(self) -> None:
+        """As after its supply came back: what was not saved is gone."""
+        for _, index, sub, _, value in _OBJECTS:
+            self.set_value(index, sub, value)
+        self.status, self.torque, self.heard, self.error = 0x40, 0.0, math.inf, 0
+        self._operational = False
+
+    def value(self, index: int, sub: int = 0) -> int:
+        """An object's value."""
+        return int(_LAYOUT[index, sub].unpack(self._node.get_data(index, sub))[0])
+
+    def set_value(self, index: int, sub: int, value: int) -> None:
+        """Set an object."""
+        self._node.set_data(index, sub, _LAYOUT[index, sub].pack(value))
+
+    @property
+    def bridge(self) -> Output:
+        return Output("torque", self.torque) if self.status == 0x27 else OFF
+
+    def receive(self, frame: CanFrame, now: float) -> Sequence[CanFrame]:
+        if frame.extended or frame.fd:
+            return ()
+        data = frame.data
+        if frame.id == 0x000 and len(data) == 2 and data[1] in (0, self.node):
+            self._operational = {1: True, 0x80: False, 2: False}.get(data[0], self._operational)
+        elif frame.id == 0x600 + self.node and len(data) == 8:
+            self._network.notify(frame.id, bytearray(data), now)
+            sent, self._network.sent = self._network.sent, []
+            return sent
+        elif frame.id == 0x700 + (self.value(0x1016, 1) >> 16) and self.value(0x1016, 1):
+            self.heard = now
+        elif self._operational and frame.id == self.value(0x1400, 1) and len(data) >= 4:
+            self._obey(*struct.unpack_from("<Hh", data))
+        elif self._operational and frame.id == 0x080 and not data:
+            return self._answers()
+        return ()
+
+    def _answers(self) -> Sequence[CanFrame]:
+        """Its two PDOs, as they are mapped."""
+        turns = 2.0 * math.pi
+        per_turn = self.value(0x608F, 1) / self.value(0x608F, 2)
+        values = {
+            0x60410010: struct.pack("<H", self.status),
+            0x60640020: struct.pack("<i", _wrapped(math.floor(self.angle / turns * per_turn))),
+            0x606C0020: struct.pack(
+                "<i", round(self.rate / turns * 60.0 * (1000 if self.value(0x60A9) == 0xFDB44700 else 1))
+            ),
+        }
+        out = []
+        for parameters, mapping in ((0x1800, 0x1A00), (0x1801, 0x1A01)):
+            cob, count = self.value(parameters, 1), self.value(mapping, 0)
+            if not cob & 0x80000000 and count and self.value(parameters, 2) == 1:
+                out.append(CanFrame(cob, b"".join(values[self.value(mapping, n)] for n in range(1, count + 1))))
+        return out
+
+    def _obey(self, control: int, torque: int) -> None:
+        """Follow the state machine of CiA 402 by a step."""
+        if self.status == 0x08:
+            if control & 0x80:
+                self.status, self.error = 0x40, 0
+            return
+        if not control & 0x02:
+            self.status = 0x40
+        elif control & 0x0F == 0x06:
+            self.status = 0x21
+        elif control & 0x0F == 0x07 and self.status in (0x21, 0x27):
+            self.status = 0x23
+        elif control & 0x0F == 0x0F and self.status == 0x23:
+            self.status = 0x27
+        rated = 1e-3 * self.value(0x6076)
+        most = self.value(0x6072)
+        runs = self.status == 0x27 and self.value(0x6060) == 10
+        self.torque = 1e-3 * rated * min(max(torque, -most), most) if runs else 0.0
+
+    def tick(self, now: float) -> Sequence[CanFrame]:
+        time = 1e-3 * (self.value(0x1016, 1) & 0xFFFF)
+        lost = self.watches and time and self._operational and now - self.heard > time
+        return self.fail(0x8130) if lost and self.value(0x6007) == 1 and self.status == 0x27 else ()
+
+    def fail(self, error: int) -> Sequence[CanFrame]:
+        """Fail, and say so."""
+        self.status, self.torque, self.error = 0x08, 0.0, error
+        return (CanFrame(0x080 + self.node, struct.pack("<HB5x", error, 0x11)),)
+
+
+def _wrapped(value: int) -> int:
+    """A whole number as 32 bits hold it."""
+    return (value + (1 << 31)) % (1 << 32) - (1 << 31)
