@@ -18,7 +18,7 @@ from hw.identify.driving import MovesRequest
 from hw.process import talk
 from ic.printing.columns import columns, quantity
 from met import models
-from met.analysis.shaft_work import scale_of
+from met.analysis.shaft_work import of_cases, scale_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import new_file
@@ -324,7 +324,7 @@ def included(
 def _scale_of(experiment: Experiment, joint: str) -> BedScale:
     """The scales of a joint's bed in the first case."""
     found = scale_of(experiment, joint, np.array([0]))
-    return BedScale(*(float(np.ravel(each)[0]) for each in (found.torque, found.rate, found.voltage)))
+    return BedScale(*(float(of_cases(each)[0]) for each in (found.torque, found.rate, found.voltage)))
 
 
 def _believed(experiment: Experiment, use: Substitution) -> list[str]:
