@@ -79,10 +79,10 @@ def sheet_of(experiment: Experiment, joint: str, kt_load: float | None) -> DataS
         return float(outputs[value.output] if isinstance(value, Formula) else value)  # type: ignore[arg-type]
 
     bed, scale = bed_values(experiment, joint), _scale_of(experiment, joint)
-    values = {name: servo(own) / scale.of(UNITS[name]) for name, own in OF_SERVO.items()}
+    values = {name: float(servo(own) / scale.of(UNITS[name])) for name, own in OF_SERVO.items()}
     values |= {"kt_load": bed["kt_load"] if kt_load is None else kt_load, "f_cut": bed["f_cut"]}
     if f"{joint}.servo.v_max" in experiment.parameters:
-        values["v_max"] = servo("v_max") / scale.voltage
+        values["v_max"] = float(servo("v_max") / scale.voltage)
     origin = experiment.parameters[f"{joint}.bed.kt_load"].origin
     return DataSheet(values, kt_load is not None or origin.place is not None)
 
