@@ -18,7 +18,7 @@ from hw.identify.driving import MovesRequest
 from hw.process import talk
 from ic.printing.columns import columns, quantity
 from met import models
-from met.analysis.shaft_work import scale_of
+from met.analysis.shaft_work import of_cases, scale_of
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import new_file
@@ -79,10 +79,10 @@ def sheet_of(experiment: Experiment, joint: str, kt_load: float | None) -> DataS
         return float(outputs[value.output] if isinstance(value, Formula) else value)  # type: ignore[arg-type]
 
     bed, scale = bed_values(experiment, joint), _scale_of(experiment, joint)
-    values = {name: servo(own) / scale.of(UNITS[name]) for name, own in OF_SERVO.items()}
+    values = {name: float(servo(own) / scale.of(UNITS[name])) for name, own in OF_SERVO.items()}
     values |= {"kt_load": bed["kt_load"] if kt_load is None else kt_load, "f_cut": bed["f_cut"]}
     if f"{joint}.servo.v_max" in experiment.parameters:
-        values["v_max"] = servo("v_max") / scale.voltage
+        values["v_max"] = float(servo("v_max") / scale.voltage)
     origin = experiment.parameters[f"{joint}.bed.kt_load"].origin
     return DataSheet(values, kt_load is not None or origin.place is not None)
 
@@ -324,7 +324,7 @@ def included(
 def _scale_of(experiment: Experiment, joint: str) -> BedScale:
     """The scales of a joint's bed in the first case."""
     found = scale_of(experiment, joint, np.array([0]))
-    return BedScale(*(float(np.ravel(each)[0]) for each in (found.torque, found.rate, found.voltage)))
+    return BedScale(*(float(of_cases(each)[0]) for each in (found.torque, found.rate, found.voltage)))
 
 
 def _believed(experiment: Experiment, use: Substitution) -> list[str]:

@@ -176,7 +176,7 @@ def _block(experiment: Experiment, joint: str, found: Any, rows: np.ndarray) -> 
     ratio = motor["ratio"][:, None]
     scale = scale_of(experiment, joint, rows)
     if use is not None:
-        bed = motor | {name: motor[name] / _of_cases(scale.of(unit)) for name, unit in ELECTRICAL.items()}
+        bed = motor | {name: motor[name] / of_cases(scale.of(unit)) for name, unit in ELECTRICAL.items()}
         bed |= {
             name: parameter(experiment, path, rows)
             for name in ("inertia", "kt_load", "kt", "resistance", "tau_max")
@@ -203,7 +203,7 @@ def _block(experiment: Experiment, joint: str, found: Any, rows: np.ndarray) -> 
         voltage=voltage,
         load=load,
         arm=of["J_eff"] / ratio**2 / scale.inertia,
-        rotor=motor["inertia"] / _of_cases(scale.inertia),
+        rotor=motor["inertia"] / of_cases(scale.inertia),
         shaft=bed["inertia"],
         kt=bed["kt"],
         kt_load=bed.get("kt_load"),
@@ -222,7 +222,7 @@ def scale_of(experiment: Experiment, joint: str, rows: np.ndarray) -> BedScale:
     return BedScale(*(parameter(experiment, f"{joint}.bed.scale.{name}", rows)[:, None] for name in names))  # type: ignore[arg-type]
 
 
-def _of_cases(scale: Any) -> np.ndarray:
+def of_cases(scale: Any) -> np.ndarray:
     """A scale of [case, 1], or of all cases, as [case], or [1]."""
     return np.ravel(scale)
 
