@@ -66,6 +66,8 @@ class Capability(enum.IntFlag):
     LOCK_STEP = 1 << 4
     SIMULATED = 1 << 5
     INTERLOCK = 1 << 6
+    COASTS = 1 << 16
+    """Its safe state is outputs that are off: the shaft is not braked."""
 
 
 class InterlockReason(enum.IntFlag):
@@ -85,8 +87,6 @@ class InterlockReason(enum.IntFlag):
     LOAD = 1 << 10
     TICK = 1 << 11
     MAIN = 1 << 12
-    COASTS = 1 << 16
-    """Its safe state is outputs that are off: the shaft is not braked."""
 
 
 @frozen
