@@ -9,7 +9,6 @@ import os
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +83,6 @@ class TwoDrives:
     supply: Mapping[str, float]
     drive: DriveEntry
     load: DriveEntry
-    file: str = field(default="", compare=False)
 
 
 def two_drives(path: str | os.PathLike[str]) -> TwoDrives:
@@ -130,7 +128,7 @@ class _BenchFile:
                 f"drive and load are both node {load.node}", "each has a number of its own", "load", "node"
             )
         shaft, supply = self._figures("shaft"), self._figures("supply")
-        return TwoDrives(name, self._bus(), shaft, supply, drive, load, self.name)
+        return TwoDrives(name, self._bus(), shaft, supply, drive, load)
 
     def _bus(self) -> dict[str, Any]:
         found = self.tables["bus"]

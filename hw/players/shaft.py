@@ -1,4 +1,4 @@
-"""The shaft that two played drives turn: an inertia with friction, or the bed of a deck."""
+"""The shaft that two played drives turn: an inertia with friction."""
 
 from __future__ import annotations
 
@@ -63,41 +63,3 @@ class InertiaShaft:
         if self.rate * way < 0.0:
             self.rate = 0.0
         self.angle += 0.5 * (rate + self.rate) * self.period
-
-
-class DeckPlant(Protocol):
-    """A deck's bed in this process (met.plant.Plant)."""
-
-    period: float
-
-    def start(self, rate: float, seed: float, repeat: float) -> float: ...
-
-    def tick(self, voltage: float, current: float) -> float: ...
-
-    @property
-    def shaft_rate(self) -> float: ...
-
-    @property
-    def shaft_angle(self) -> float: ...
-
-
-class DeckShaft:
-    """The shaft of a deck's bed: a torque is the voltage that its armature would need at the rate that a tick begins
-    with, and the current that its load motor would take. kt, kt_load N m/A;  resistance ohm"""
-
-    def __init__(self, plant: DeckPlant, *, kt: float, resistance: float, kt_load: float) -> None:
-        self._plant, self._kt, self._resistance, self._kt_load = plant, kt, resistance, kt_load
-        self.period = plant.period
-        plant.start(0.0, 0.0, 0.0)
-        self.angle, self.rate = plant.shaft_angle, plant.shaft_rate
-
-    def step(self, drive: Output, load: Output) -> None:
-        back = self._kt * self.rate
-        volts = {
-            "off": back,
-            "short": 0.0,
-            "torque": back + self._resistance * drive.value / self._kt,
-        }
-        amperes = load.value / self._kt_load if load.kind == "torque" else 0.0
-        self._plant.tick(volts[drive.kind], amperes)
-        self.angle, self.rate = self._plant.shaft_angle, self._plant.shaft_rate
