@@ -149,7 +149,7 @@ def test_what_only_a_deck_writes_is_in_no_plan() -> None:
 
 
 def test_a_whole_number_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    (bed,) = BEDS
+    bed = BEDS[0]
     parameters = tuple(replace(p, whole=True) if p.name == "delay" else p for p in bed.parameters)
     monkeypatch.setattr("met.substitution.BEDS", (replace(bed, parameters=parameters),))
     said = said_of(lambda e: e["parameters"]["elbow.bed.delay"].update(value=0.5))

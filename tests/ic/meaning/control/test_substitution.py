@@ -399,7 +399,7 @@ error[D140]: no bed model `emulatd`
 1 | run it like base_run { substitute one { bed = emulatd; law = bar; } }
   |                                               ^^^^^^^
   = help: did you mean `emulated`?
-  = help: bed models: emulated
+  = help: bed models: emulated, torque_drive
 
 error[D140]: no law model `bar`
  --> deck.ic:1:62
@@ -422,7 +422,7 @@ error[D141]: `substitute one` has no `bedd`
 1 | run it like base_run { substitute one { bedd = emulated; law = bare(band = 1 rad/s); } }
   |                                         ^^^^
   = help: did you mean `bed`?
-  = help: it has: bed, law
+  = help: it has: bed, law, scale
 
 error[D141]: law `bare` of joint `one` has no `band`
  --> deck.ic:1:69
@@ -509,7 +509,7 @@ error[D077]: `delay` of bed `emulated` of joint `one` must be whole and at least
 @pytest.fixture
 def whole_delay(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A bed whose delay is declared to be whole."""
-    (bed,) = BEDS
+    bed = BEDS[0]
     parameters = tuple(replace(p, whole=True, doc="ticks") if p.name == "delay" else p for p in bed.parameters)
     monkeypatch.setattr(met.substitution, "BEDS", (replace(bed, parameters=parameters),))
     yield
