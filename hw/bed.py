@@ -68,6 +68,8 @@ class Capability(enum.IntFlag):
     INTERLOCK = 1 << 6
     COASTS = 1 << 16
     """Its safe state is outputs that are off: the shaft is not braked."""
+    ARMATURE = 1 << 17
+    """Its drive takes torques, and is told what an armature would take from the voltage that the bed is sent."""
 
 
 class InterlockReason(enum.IntFlag):
@@ -120,6 +122,7 @@ class Limits:
 class About:
     """A bed's description of itself, its answer when it is greeted.
 
+    version   of MET's protocol; 0 where the bed speaks another one, and its firmware is then of all that it consists of
     firmware  first eight bytes of the SHA-256 of what was built, in hexadecimal
     session   another number after each boot
     tick_hz   rate of the bed's own ticks, Hz;  deadman: s without a new command after which it stops
@@ -218,6 +221,10 @@ class BedDriver(ABC):
     def line_time(self, about: About) -> float:
         """Time that the bytes of an exchange take on the line, s; 0 where the line's speed is not what counts."""
         return 0.0
+
+    def account(self) -> tuple[str, ...]:
+        """Lines for people about what was driven since the bed was armed, once it is stopped."""
+        return ()
 
     def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> BedSample:
         """Start a simulated plant anew, disarmed: its shaft turning at rate (rad/s), its noise from the beginning."""

@@ -104,6 +104,9 @@ def run(request: CaseRequest) -> loop.LoopEnd:
             ended = loop.drive(
                 beds, driven, of, driven.exchanges, put, lock_step=lock_step, stop_requested=stop_requested
             )
+        for joint, bed in zip(joints, beds, strict=True):
+            for line in bed.account():
+                process.say(said=f"{joint}: {line}")
         refusals.check_stopped(beds, abouts, ended.why)
         return ended
     finally:

@@ -42,8 +42,9 @@ def opened(port: Port, experiment: Experiment | None, joint: str, row: int, peri
 
 def check_model(name: str, experiment: Experiment, joint: str) -> None:
     """Raises Problem E429, at the deck's `substitute`, where the bed model of a joint lacks a parameter that the driver
-    at a port reads."""
+    at a port reads, and what the driver itself says of a deck that is for another bed."""
     kind = kind_of(name)
+    kind.check(name.partition(":")[2], experiment, joint)
     if not kind.needs:
         return
     use = next(each for each in experiment.structure.substitutions if each.joint == joint)

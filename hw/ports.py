@@ -12,10 +12,12 @@ from collections.abc import Callable
 from hw.bed import BedDriver
 from hw.line import BAUD
 from hw.transcript import TranscriptFile
+from met import models
 from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Experiment
 from met.plant import bed_values
+from met.substitution.bed import Drive
 
 
 @frozen
@@ -59,6 +61,14 @@ class Opening:
         assert self.experiment is not None
         return self.experiment
 
+    @property
+    def drive(self) -> Drive | None:
+        """What the deck's bed model sends the drive; None where no deck was given."""
+        if self.experiment is None:
+            return None
+        use = next(each for each in self.experiment.structure.substitutions if each.joint == self.joint)
+        return models.find("bed", use.bed, use.place).drive
+
     def bed_values(self) -> dict[str, float]:
         """The parameters of the deck's bed model in this case, SI, by name."""
         return bed_values(self.simulated(), self.joint, self.row)
@@ -83,6 +93,7 @@ class PortKind:
     open        (Opening) -> the driver, which is not connected yet. Raises Problem
     simulated   True where the deck's bed is simulated, so that a deck must be given, and each joint has its own bed
     needs       parameters that the deck's bed model must declare, besides `met.substitution.bed.PARAMETERS`
+    check       (address, experiment, joint) raises Problem where the bed there cannot be that of a deck
     lock_step   (port, requested) -> True where the bed has no time of its own and waits for each exchange; requested:
                 whether the user says `--lock-step`
     replays     True where the bed answers from a transcript, so that only what made it can be asked again
@@ -95,6 +106,7 @@ class PortKind:
     address: str = ""
     simulated: bool = False
     needs: tuple[Parameter, ...] = ()
+    check: Callable[[str, Experiment, str], None] = lambda address, experiment, joint: None
     lock_step: Callable[[str, bool], bool] = as_requested
     replays: bool = False
     recognizes: Callable[[str], bool] = lambda name: False

@@ -96,8 +96,8 @@ def lines(result: ProbeResult) -> list[str]:
     out = [f"bed `{about.name}` at {result.port}"]
     sensors = (f"{name.replace('_', ' ')} {quantity(value, unit)}" for name, value, unit in _read(sample))
     rows = [
-        ["firmware", f"{about.firmware}, version {about.version} of the protocol, session {about.session}"],
-        ["has", ", ".join([f"drive {about.drive}", "load current", "tachometer", *capabilities(about)])],
+        ["firmware", _firmware(about)],
+        ["has", ", ".join(_properties(about))],
         ["ticks", f"{number(about.tick_hz)} Hz; stops itself after {number(1e3 * about.deadman)} ms without a command"],
         [
             "limits",
@@ -161,8 +161,24 @@ def capabilities(about: About) -> list[str]:
         Capability.COASTS: "a shaft that coasts when it is stopped",
     }
     return [
-        words.get(each, str(each.name).lower().replace("_", " ")) for each in Capability if each in about.capabilities
+        words.get(each, str(each.name).lower().replace("_", " "))
+        for each in Capability
+        if each in about.capabilities and each != Capability.ARMATURE
     ]
+
+
+def _firmware(about: About) -> str:
+    if not about.version:
+        return f"{about.firmware}, of what both drives say of themselves; they speak no protocol of MET's"
+    return f"{about.firmware}, version {about.version} of the protocol, session {about.session}"
+
+
+def _properties(about: About) -> list[str]:
+    """Outputs and sensors in words. A bed that speaks no protocol of MET's has drives that tell their rate."""
+    if not about.version:
+        drive = "drive torque" + " of an armature at a voltage" * (Capability.ARMATURE in about.capabilities)
+        return [drive, "load torque by a current", "rate as the drive tells it", *capabilities(about)]
+    return [f"drive {about.drive}", "load current", "tachometer", *capabilities(about)]
 
 
 def _trips(bed: BedDriver) -> tuple[float, ...]:

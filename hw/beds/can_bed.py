@@ -1,11 +1,11 @@
 """A bed of two drives on a CAN bus, `can:BENCH.toml`: one turns the motor under test, the other loads it.
 
-A drive has a current loop of its own, and is told a torque. What a bed's driver is told, the voltage of one motor and
-the current of the other, becomes torques here:
+A drive has a current loop of its own, and is told a torque. What a bed's driver is told, for one motor what the deck's
+bed model sends, and the current of the other, becomes torques here:
 
     load   kt_load i
-    drive  what an armature of kt and resistance takes from the voltage at the rate that was read last,
-           kt/R (V - kt w), at most torque_max
+    drive  a torque as it is sent; of a voltage what an armature of kt and resistance takes from it at the rate that was
+           read last, kt/R (V - kt w); either at most torque_max
 
 Limits of voltage, current, their slews, rate and heat are watched here, besides those of the drives; what no host can
 do, to stop a shaft whose host is dead, the drives' own watchdogs do, and are made to prove it each time before arming.
@@ -22,7 +22,7 @@ from functools import partial
 from hw import refusals
 from hw.bed import About, BedDriver, BedSample, BedState, Capability, Fault, Limits, Scales, real_plant
 from hw.beds import greeting
-from hw.beds.emulated import FINE, FINE_ANGLE
+from hw.beds.emulated import FINE, FINE_ANGLE, WIDE
 from hw.drives import DIALECTS
 from hw.drives.arming import begin_driving, forget, prove_watchdogs, switch_off
 from hw.drives.bench_file import TwoDrives, two_drives
@@ -32,8 +32,10 @@ from hw.drives.frames import FAST, NOMINAL, CanFrame, CanLine, on_bus
 from hw.drives.side import Side, agree
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
-from met.diagnostic import Problem, did_you_mean, error
+from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
+from met.plan import Experiment
 from met.substitution import butterworth
+from met.substitution.bed import Drive as DriveKind
 
 LONGEST_SHARE = 0.8
 """Largest share of a period that the frames of an exchange may take on the bus."""
@@ -57,14 +59,22 @@ class CanBed(BedDriver):
 
     bench, drives  what the file says, and the host's sides of its drive and load
     open_line      opens the bus;  period: s from one exchange to the next, infinite where none are made
+    drive          what it is sent for the drive: a voltage or a torque
     proved         s after which each drive had stopped by itself when it was last armed; None where it said so only
                    when it was asked
     returned       J that the drives gave back to the supply since the bed was armed, as far as they say so
     """
 
     def __init__(
-        self, bench: TwoDrives, drives: tuple[Drive, Drive], open_line: Callable[[], CanLine], *, period: float
+        self,
+        bench: TwoDrives,
+        drives: tuple[Drive, Drive],
+        open_line: Callable[[], CanLine],
+        *,
+        period: float,
+        drive: DriveKind = "voltage",
     ) -> None:
+        self._kind = drive
         self._bench, self._drives, self._open, self.period = bench, drives, open_line, period
         self._line: CanLine | None = None
         self._about: About | None = None
@@ -98,21 +108,23 @@ class CanBed(BedDriver):
         self._rated = load.drive.entry.figures["current_rated"]
         self._acceleration = (self._most + self._kt_load * current) / bench.shaft["inertia"]
         self._supply_max = min([bench.supply["voltage_max"], *(each.supply_max for each in facts if each.supply_max)])
-        volts = drive.facts.torque_count * self._resistance / self._kt
-        scales = Scales(volts or FINE, load.facts.torque_count / self._kt_load or FINE, FINE, FINE_ANGLE, FINE, FINE)
+        by_voltage = self._kind == "voltage"
+        count = drive.facts.torque_count * (self._resistance / self._kt if by_voltage else 1.0)
+        scales = Scales(count or FINE, load.facts.torque_count / self._kt_load or FINE, FINE, FINE_ANGLE, FINE, FINE)
         hz = min(each.control_hz for each in facts)
         rate = min(bench.shaft["rate_max"], *(each.rate_max for each in facts))
-        voltage = figures["voltage_max"]
-        slews = 2.0 * voltage * hz, 2.0 * current * hz
-        limits = Limits(voltage, current, rate, bench.shaft["arming_rate"], *slews, load.drive.entry.figures["heat"])
-        capabilities = Capability.ENCODER
+        most = figures["voltage_max"] if by_voltage else WIDE * self._most
+        slews = 2.0 * most * hz, 2.0 * current * hz
+        limits = Limits(most, current, rate, bench.shaft["arming_rate"], *slews, load.drive.entry.figures["heat"])
+        capabilities = Capability.ENCODER | (Capability.ARMATURE if by_voltage else Capability(0))
         if not facts[0].braking:
             capabilities |= Capability.COASTS
         said = "\n".join(
             f"{d.dialect} {d.node} {f.hardware} {f.firmware}" for d, f in zip(self._drives, facts, strict=True)
         )
         firmware = hashlib.sha256(said.encode()).hexdigest()[:16]
-        about = About(bench.name, 1, firmware, 0, capabilities, hz, max(f.watchdog for f in facts), scales, limits)
+        deadman = max(f.watchdog for f in facts)
+        about = About(bench.name, 0, firmware, 0, capabilities, hz, deadman, scales, limits, self._kind)
         if not greeting.DEADMAN[0] <= about.deadman <= greeting.DEADMAN[1] or min(f.watchdog for f in facts) < 0.002:
             helps = "`watchdog` of the bench file: 10 to 20 ms"
             raise Problem(error("E404", f"bed `{about.name}` would stop {1e3 * about.deadman:g} ms late", help=helps))
@@ -193,12 +205,13 @@ class CanBed(BedDriver):
 
     def exchange(self, voltage: float, current: float) -> BedSample | None:
         about, force, scales = self._there(), self._in_force, self._about_scales()
+        kind, unit = ("a voltage", "V") if self._kind == "voltage" else ("a torque", "N*m")
         volts = greeting.commanded(voltage, scales.voltage, force.voltage)
         amperes = greeting.commanded(current, scales.current, force.current)
         if volts is None or amperes is None:
             self.stop()
             if volts is None:
-                raise refusals.no_command(about, "a voltage", voltage, "V", force.voltage * scales.voltage)
+                raise refusals.no_command(about, kind, voltage, unit, force.voltage * scales.voltage)
             raise refusals.no_command(about, "a current", current, "A", force.current * scales.current)
         talk = self._talk
         now = talk.line.now()
@@ -252,6 +265,13 @@ class CanBed(BedDriver):
             raise self._refused("clear")
         self._state, self._faults, self._why = BedState.DISARMED, Fault(0), ""
         return self._sample()
+
+    def account(self) -> tuple[str, ...]:
+        said = [drive.power is not None for drive in self._drives]
+        if not any(said):
+            return ("neither drive says its power: what went back to the supply is not known",)
+        whose = "the drives" if all(said) else f"the {self._drives[said.index(True)].entry.role}, which alone says it,"
+        return (f"{whose} gave {self.returned:.3g} J back to the supply",)
 
     def rest(self, time: float) -> BedSample:
         self._there()
@@ -384,9 +404,12 @@ class CanBed(BedDriver):
     def _about_scales(self) -> Scales:
         return self._there().scales
 
-    def _told(self, voltage: float) -> float:
-        """The torque of an armature at a voltage (V), which the drive under test is told, N m."""
-        torque = self._kt / self._resistance * (voltage - self._kt * self._sides[0].rate)
+    def _told(self, sent: float) -> float:
+        """The torque that the drive under test is told, N m: what was sent, or that of an armature at it, V."""
+        if self._kind == "torque":
+            torque = sent
+        else:
+            torque = self._kt / self._resistance * (sent - self._kt * self._sides[0].rate)
         return min(max(torque, -self._most), self._most)
 
     def _hold(self, volts: int, amperes: int, at: float) -> None:
@@ -440,16 +463,34 @@ class CanBed(BedDriver):
         return BedSample(self._state, True, self._faults, refused, tick, self._rate() * FINE, angle)
 
 
+def _check_filter(path: str, experiment: Experiment, joint: str) -> None:
+    """Raise Problem E444 where the bench's filter is not the one that the deck believes the rate to be behind."""
+    bench = _bench(path)
+    cut, believed = bench.shaft["filter"], experiment.parameters[f"{joint}.bed.f_cut"]
+    if bench.filter_at is None or believed.value == cut:
+        return
+    says = f"{believed.value:g} Hz" if isinstance(believed.value, float) else "varied by a sweep"
+    also = [] if believed.origin.place is None else [Label(believed.origin.place, "the deck's")]
+    message = f"the bench filters the rate at {cut:g} Hz, and the `f_cut` of joint `{joint}` is {says}"
+    helps = (f"in the deck: `bed = ...(f_cut = {cut:g} Hz)`", "or another `filter` in the bench's file")
+    raise Problem(error("E444", message, bench.filter_at, also=also, help=helps), {path: bench.text})
+
+
+def _bench(path: str) -> TwoDrives:
+    """The bench of a file. Raises Problem E446."""
+    try:
+        return two_drives(path)
+    except OSError as reason:
+        why = (reason.strerror or str(reason)).lower()
+        raise Problem(error("E446", f"{path} cannot be read: {why}", help="`can:` takes a bench's file")) from None
+
+
 def _opened_port(opening: Opening) -> CanBed:
     if opening.port.transcript is not None:
         helps = "records are kept of every exchange; `candump` keeps what goes over a bus"
         raise Problem(error("E409", "no transcript is kept of a CAN bus", help=helps))
     path = opening.port.address
-    try:
-        bench = two_drives(path)
-    except OSError as reason:
-        why = (reason.strerror or str(reason)).lower()
-        raise Problem(error("E446", f"{path} cannot be read: {why}", help="`can:` takes a bench's file")) from None
+    bench = _bench(path)
     drives = []
     for entry in (bench.drive, bench.load):
         dialect = DIALECTS.get(entry.dialect)
@@ -457,7 +498,14 @@ def _opened_port(opening: Opening) -> CanBed:
             known = (*did_you_mean(entry.dialect, DIALECTS), f"dialects: {', '.join(DIALECTS)}")
             raise Problem(error("E446", f"{path}: no dialect `{entry.dialect}`", help=known))
         drives.append(dialect(entry))
-    return CanBed(bench, (drives[0], drives[1]), lambda: PythonCanLine(bench.bus), period=opening.period)
+    drive = opening.drive or "voltage"
+    bed = CanBed(bench, (drives[0], drives[1]), lambda: PythonCanLine(bench.bus), period=opening.period, drive=drive)
+    if opening.experiment is not None and bench.filter_at is None:
+        cut = opening.bed_values()["f_cut"]
+        message = f"the bench has no filter: the deck's `f_cut`, {cut:g} Hz, has to be that of the drive's own rate"
+        remedy = (f'else `filter = "{cut:g} Hz"` in `[shaft]` of {path}',)
+        bed.warnings = (Diagnostic("E444", message, help=remedy, severity="warning"),)
+    return bed
 
 
 PORT = PortKind(
@@ -465,5 +513,6 @@ PORT = PortKind(
     address="BENCH.toml",
     doc="Two drives on a CAN bus: ODrive, Damiao, moteus, CiA 402; the file says which.",
     open=_opened_port,
+    check=_check_filter,
     lock_step=lambda name, requested: requested,
 )

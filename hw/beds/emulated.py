@@ -16,7 +16,6 @@ from hw.bed import About, BedDriver, BedSample, BedState, Capability, Fault, Lim
 from hw.beds import greeting
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
-from met import models
 from met.diagnostic import Problem, error
 from met.plant import Plant
 from met.substitution.bed import SIMULATION_PARAMETERS, Drive
@@ -245,8 +244,7 @@ def _opened_port(opening: Opening) -> EmulatedBed:
     values = opening.bed_values()
     experiment = opening.simulated()
     plant = Plant(experiment, opening.joint, case=opening.row, period=opening.period)
-    use = next(each for each in experiment.structure.substitutions if each.joint == opening.joint)
-    drive = models.find("bed", use.bed, use.place).drive
+    drive = opening.drive or "voltage"
     most = {} if drive == "voltage" else {"voltage": WIDE * values["tau_max"]}
     return EmulatedBed(plant, scales(values, drive), limits(values, opening.period, **most), drive=drive)
 

@@ -75,7 +75,8 @@ class DriveEntry:
 
 @frozen
 class TwoDrives:
-    """A bench of two drives on a bus. bus: what `can.Bus` is called with;  shaft, supply: of `FIGURES`, SI"""
+    """A bench of two drives on a bus. bus: what `can.Bus` is called with;  shaft, supply: of `FIGURES`, SI;
+    filter_at: where the filter is written, None where it is not;  text: the file's"""
 
     name: str
     bus: Mapping[str, Any]
@@ -83,6 +84,8 @@ class TwoDrives:
     supply: Mapping[str, float]
     drive: DriveEntry
     load: DriveEntry
+    filter_at: Place | None = None
+    text: str = ""
 
 
 def two_drives(path: str | os.PathLike[str]) -> TwoDrives:
@@ -128,7 +131,8 @@ class _BenchFile:
                 f"drive and load are both node {load.node}", "each has a number of its own", "load", "node"
             )
         shaft, supply = self._figures("shaft"), self._figures("supply")
-        return TwoDrives(name, self._bus(), shaft, supply, drive, load)
+        filter_at = self._place("shaft", "filter") if "filter" in self.tables["shaft"] else None
+        return TwoDrives(name, self._bus(), shaft, supply, drive, load, filter_at, self.text)
 
     def _bus(self) -> dict[str, Any]:
         found = self.tables["bus"]
@@ -193,6 +197,10 @@ class _BenchFile:
 
     def wrong(self, message: str, help: str | tuple[str, ...], table: str = "", key: str = "") -> Problem:
         """The error about a table's line, or that of a key of it."""
+        return Problem(error("E446", message, self._place(table, key), help=help), {self.name: self.text})
+
+    def _place(self, table: str, key: str) -> Place:
+        """A table's line, or that of a key of it."""
         lines, at = self.text.split("\n"), 0
         head = re.compile(rf"\s*\[\s*{re.escape(table)}\s*\]") if table else None
         if head is not None:
@@ -202,5 +210,4 @@ class _BenchFile:
             at = next((line for line in range(at, len(lines)) if named.match(lines[line])), at)
         text = lines[at]
         column = len(text) - len(text.lstrip()) + 1
-        place = Place(self.name, at + 1, column, max(1, len(text.rstrip()) - column + 1))
-        return Problem(error("E446", message, place, help=help), {self.name: self.text})
+        return Place(self.name, at + 1, column, max(1, len(text.rstrip()) - column + 1))

@@ -16,6 +16,7 @@ from hw.players import PLAYED
 from hw.players.odrive import endpoints
 from hw.players.player import PlayedBench, PlayedLine
 from hw.players.shaft import InertiaShaft
+from met.substitution.bed import Drive
 
 KT, RESISTANCE, INERTIA = 0.06, 1.5, 1.3e-4
 
@@ -74,15 +75,17 @@ def played_bench(dialect: str = "odrive") -> PlayedBench:
     return PlayedBench(shaft, make(1, 1), make(2, -1))
 
 
-def host_on(bench: TwoDrives, open_line: Callable[[], CanLine], period: float = 1e-3) -> CanBed:
+def host_on(
+    bench: TwoDrives, open_line: Callable[[], CanLine], period: float = 1e-3, drive: Drive = "voltage"
+) -> CanBed:
     """The host's side of a bench, on lines that `open_line` gives."""
-    drive, load = (DIALECTS[entry.dialect](entry) for entry in (bench.drive, bench.load))
-    return CanBed(bench, (drive, load), open_line, period=period)
+    one, other = (DIALECTS[entry.dialect](entry) for entry in (bench.drive, bench.load))
+    return CanBed(bench, (one, other), open_line, period=period, drive=drive)
 
 
-def host_of(bench: TwoDrives, line: PlayedLine, period: float = 1e-3) -> CanBed:
+def host_of(bench: TwoDrives, line: PlayedLine, period: float = 1e-3, drive: Drive = "voltage") -> CanBed:
     """The host's side of a bench, on a line."""
-    return host_on(bench, lambda: line, period)
+    return host_on(bench, lambda: line, period, drive)
 
 
 class PlayedConformance(conformance.FreeRunning):

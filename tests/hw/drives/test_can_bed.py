@@ -8,11 +8,15 @@ from pathlib import Path
 
 import pytest
 
+import ic
+from batch.beds.probe import ProbeResult, lines
 from hw.bed import BedState, Capability, Fault
 from hw.beds.can_bed import CanBed
+from hw.drivers import check_model, opened
 from hw.drives.bench_file import two_drives
 from hw.players.odrive import PlayedOdrive
 from hw.players.player import PlayedBench, PlayedLine
+from hw.ports import Port
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import INERTIA, KT, RESISTANCE, bench_file, host_of, played_bench
 
@@ -238,3 +242,98 @@ def test_a_watchdog_is_10_to_20_ms(on: Callable[..., Bench], time: str) -> None:
         ("heat ", f'watchdog = "{time}"\nheat '),
     )
     assert refusal(bench.bed.connect).startswith(f"error[E404]: bed `paper` would stop {time.split()[0]} ms late\n")
+
+
+def test_it_says_what_went_back_to_the_supply(on: Callable[..., Bench]) -> None:
+    bench = on()
+    bench.bed.connect()
+    bench.bed.arm()
+    bench.go(0.5, voltage=4.0)
+    bench.go(0.05, voltage=-4.0)
+    bench.bed.stop()
+    assert bench.bed.account() == (f"the drives gave {bench.bed.returned:.3g} J back to the supply",)
+    bench.bed._drives[0].power = None
+    said = f"the load, which alone says it, gave {bench.bed.returned:.3g} J back to the supply"
+    assert bench.bed.account() == (said,)
+    bench.bed._drives[1].power = None
+    assert bench.bed.account() == ("neither drive says its power: what went back to the supply is not known",)
+
+
+def test_a_torque_is_told_as_it_is_sent_up_to_the_largest(tmp_path: Path) -> None:
+    played, path = played_bench(), bench_file(tmp_path)
+    line = PlayedLine(played)
+    with host_of(two_drives(path), line, drive="torque") as bed:
+        about = bed.connect()
+        assert (about.drive, about.limits.voltage, about.version) == ("torque", 0.8, 0)
+        bed.arm()
+        line.sleep(1e-3)
+        bed.exchange(0.05, 0.0)
+        assert played.drive.output.value == pytest.approx(0.05, rel=1e-5)
+        line.sleep(1e-3)
+        bed.exchange(0.6, 0.0)
+        assert played.drive.output.value == pytest.approx(0.4, rel=1e-6)
+        words = refusal(lambda: bed.exchange(0.9, 0.0))
+        assert words.startswith("error[E408]: a torque of 0.9 N*m for bed `paper` is beyond the limit of 0.799999 N*m;")
+    assert played.off
+
+
+DECK = """\
+#include <two_link.ic>
+run bench like nominal {
+    rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }
+    substitute shoulder { bed = torque_drive(delay = 1, f_cut = 80 Hz); }
+}
+sweep cuts of bench { vary shoulder.bed.f_cut = [50, 80] Hz; }
+"""
+
+
+def test_a_filter_that_is_not_the_deck_s_is_refused(tmp_path: Path) -> None:
+    path = bench_file(tmp_path)
+    text = path.read_text().replace('rate_max = "380 rad/s"', 'rate_max = "380 rad/s"\nfilter   = "50 Hz"')
+    path.write_text(text)
+    (tmp_path / "deck.ic").write_text(DECK)
+    bench, cuts = ic.compile(tmp_path / "deck.ic", select=["bench", "cuts"]).experiments
+    words = refusal(lambda: check_model(f"can:{path}", bench, "shoulder")).replace(str(tmp_path), "FOLDER")
+    assert words == (
+        "error[E444]: the bench filters the rate at 50 Hz, and the `f_cut` of joint `shoulder` is 80 Hz\n"
+        "  --> FOLDER/bench.toml:10:1\n"
+        "   |\n"
+        '10 | filter   = "50 Hz"\n'
+        "   | ^^^^^^^^^^^^^^^^^^\n"
+        "  ::: FOLDER/deck.ic:4:61  the deck's\n"
+        "   = help: in the deck: `bed = ...(f_cut = 50 Hz)`\n"
+        "   = help: or another `filter` in the bench's file"
+    )
+    assert "the `f_cut` of joint `shoulder` is varied by a sweep\n" in refusal(
+        lambda: check_model(f"can:{path}", cuts, "shoulder")
+    )
+    path.write_text(text.replace("50 Hz", "80 Hz"))
+    check_model(f"can:{path}", bench, "shoulder")
+
+
+def test_a_bench_without_a_filter_says_whose_the_deck_s_has_to_be(tmp_path: Path) -> None:
+    path = bench_file(tmp_path)
+    (tmp_path / "deck.ic").write_text(DECK)
+    (experiment,) = ic.compile(tmp_path / "deck.ic", select=["bench"]).experiments
+    check_model(f"can:{path}", experiment, "shoulder")
+    bed = opened(Port(f"can:{path}"), experiment, "shoulder", 0, 1e-3)
+    (warning,) = bed.warnings
+    assert (warning.severity, warning.message) == (
+        "warning",
+        "the bench has no filter: the deck's `f_cut`, 80 Hz, has to be that of the drive's own rate",
+    )
+    assert warning.help == (f'else `filter = "80 Hz"` in `[shaft]` of {path}',)
+    assert opened(Port(f"can:{path}"), None, "", 0, 1e-3).warnings == ()
+
+
+def test_probe_has_words_for_what_a_bench_of_drives_is(tmp_path: Path) -> None:
+    path = bench_file(tmp_path)
+    for kind, told in (("voltage", "drive torque of an armature at a voltage"), ("torque", "drive torque")):
+        with host_of(two_drives(path), PlayedLine(played_bench()), drive=kind) as bed:
+            about = bed.connect()
+            rows = lines(ProbeResult("can:bench.toml", about, bed.read(), (), 0, 0.0, (), bed.remarks))
+        assert rows[1].endswith(", of what both drives say of themselves; they speak no protocol of MET's")
+        assert rows[2] == (
+            f"  has       {told}, load torque by a current, rate as the drive tells it, encoder, "
+            "a shaft that coasts when it is stopped"
+        )

@@ -1,0 +1,231 @@
+"""The paper's test with bought drives: figures 7 and 8 with each dialect played, the shoulder's motor between two.
+
+    python -m tests.batch.beds.played_paper      the table of docs/drives.md
+
+The drives' sides of hw/players turn the shaft of the deck's own bed model, told torques: its friction and inertia, and
+no faults but the dialect's steps, latency and bus. Host, bus and drives are in one process, in a simulated time, so
+that figures are the same each time.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import ic
+from hw import loop
+from hw.bed import BedDriver, BedSample
+from hw.beds import emulated
+from hw.beds.can_bed import CanBed
+from hw.beds.emulated import EmulatedBed
+from hw.case import pace_of
+from hw.driven import LANES, CaseKernel
+from hw.drives import DIALECTS
+from hw.drives.bench_file import two_drives
+from hw.players import PLAYED
+from hw.players.odrive import PlayedOdrive, endpoints
+from hw.players.player import PlayedBench, PlayedLine
+from hw.players.shaft import Output
+from hw.records import ANSWERED, LAYOUT
+from met import models
+from met import run as engine
+from met.plan import Experiment
+from met.plant import Plant, bed_values
+from tests.hw.drives.played import BUS, MORE
+
+SLOW = 0.03
+KT, KT_LOAD, RESISTANCE = 0.061, 0.072, 2.05
+PERIOD = 5e-4
+"""Of a tick of the played shaft, s."""
+
+DECK = """\
+#include <two_link.ic>
+run plain like nominal { remove settle;  remove volts;  record = [q, qd]; }
+run volts like plain {
+    substitute shoulder { bed = emulated();  law = velocity_tracking; }
+}
+run torques like plain {
+    substitute shoulder { bed = torque_drive();  law = velocity_tracking; }
+}
+run fast like plain { rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 25 Hz; } }
+run fast_volts like fast {
+    substitute shoulder { bed = emulated(delay = 1);  law = velocity_tracking; }
+}
+run fast_torques like fast {
+    substitute shoulder { bed = torque_drive(delay = 1);  law = velocity_tracking; }
+}
+"""
+
+BENCH = """\
+name = "paper"
+
+[bus]
+interface = "virtual"
+channel   = "paper"
+{bus}
+[shaft]
+inertia  = "6.38e-5 kg*m^2"
+rate_max = "200 rad/s"
+filter   = "50 Hz"
+
+[supply]
+voltage_max = "40 V"
+
+[drive]
+dialect     = "{dialect}"
+node        = 1
+kt          = "0.061 N*m/A"
+resistance  = "2.05 ohm"
+voltage_max = "20 V"
+torque_max  = "0.144 N*m"
+{more}
+[load]
+dialect       = "{dialect}"
+node          = 2
+reversed      = true
+kt            = "0.072 N*m/A"
+current_max   = "3 A"
+current_rated = "2 A"
+heat          = "9 A^2*s"
+{more}"""
+
+
+class PlantShaft:
+    """The shaft of a deck's bed model `torque_drive`, turned by two played drives.
+
+    load  the share of its torque that the load gives
+    """
+
+    def __init__(self, experiment: Experiment, joint: str, load: float = 1.0) -> None:
+        self.period, self.angle, self.rate, self._share = PERIOD, 0.0, 0.0, load
+        self._plant = Plant(experiment, joint, period=PERIOD)
+        self._plant.start(0.0)
+
+    def step(self, drive: Output, load: Output) -> None:
+        self._plant.tick(self._torque(drive, KT), self._share * self._torque(load, KT_LOAD) / KT_LOAD)
+        self.angle, self.rate = self._plant.shaft_angle, self._plant.shaft_rate
+
+    def _torque(self, output: Output, kt: float) -> float:
+        """N m; of shorted windings, what they brake with at the rate of the tick before."""
+        return -kt * kt / RESISTANCE * self.rate if output.kind == "short" else output.value
+
+
+class OnTime(CanBed):
+    """A bench on a played line, whose exchanges are a period apart in the line's time."""
+
+    line: PlayedLine
+
+    def arm(self) -> BedSample:
+        sample = super().arm()
+        self._due = self.line.now()
+        return sample
+
+    def exchange(self, voltage: float, current: float) -> BedSample | None:
+        self._due += self.period
+        self.line.sleep(max(0.0, self._due - self.line.now()))
+        return super().exchange(voltage, current)
+
+
+def compiled(name: str) -> Experiment:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "paper.ic"
+        path.write_text(DECK)
+        return ic.compile(path, select=[name]).experiments[0]
+
+
+def bench(dialect: str, name: str, folder: Path) -> OnTime:
+    """Two played drives of a dialect, for a run of the deck; both kinds of run have the same shaft."""
+    (folder / "flat_endpoints.json").write_text(json.dumps(endpoints()))
+    path = folder / "bench.toml"
+    path.write_text(BENCH.format(dialect=dialect, bus=BUS.get(dialect, ""), more=MORE.get(dialect, "")))
+    described, experiment = two_drives(path), compiled(name)
+    shaft = PlantShaft(compiled("torques"), "shoulder")
+    drives = PLAYED[dialect](1, 1), PLAYED[dialect](2, -1)
+    for drive, kt in zip(drives, (KT, KT_LOAD), strict=True):
+        if isinstance(drive, PlayedOdrive):
+            drive.values["axis0.config.motor.torque_constant"] = kt
+    line = PlayedLine(PlayedBench(shaft, *drives))
+    own = DIALECTS[dialect]
+    sides = own(described.drive), own(described.load)
+    use = experiment.structure.substitutions[0]
+    kind = models.find("bed", use.bed, use.place).drive
+    bed = OnTime(described, sides, lambda: line, period=pace_of(experiment).period, drive=kind)
+    bed.line = line
+    return bed
+
+
+def serial(name: str) -> EmulatedBed:
+    """The bed whose bits a serial line has (tests/batch/beds/test_paper.py), told voltages."""
+    experiment = compiled(name)
+    period, values = pace_of(experiment).period, bed_values(experiment, "shoulder")
+    plant = Plant(experiment, "shoulder", period=period)
+    return EmulatedBed(plant, emulated.scales(values), emulated.limits(values, period))
+
+
+def driven(bed: BedDriver, name: str) -> np.ndarray:
+    """Rates of both joints in a run of the deck on a bed, rad/s: [time, joint]."""
+    experiment = compiled(name)
+    pace = pace_of(experiment)
+    prepared = engine.prepare(experiment, wire=True, late=pace.late(False), lanes=LANES)
+    kernel = CaseKernel(prepared, 0, pace.repeats)
+    records: list[bytes] = []
+    with bed:
+        bed.connect()
+        bed.patience = pace.patience(False)
+        # the bench waits in its line's time, so the loop itself waits for no clock
+        ended = loop.drive([bed], kernel, pace, kernel.exchanges, records.append, lock_step=True)
+    assert not ended.why, ended
+    rows = np.frombuffer(b"".join(records), LAYOUT)
+    rates, told = [], 0.0
+    for row in rows:
+        told = float(row["rate"]) if row["flags"] & ANSWERED else told
+        rates.append([told])
+    history, outputs, _ = kernel.again(rates[:: pace.repeats])
+    run = engine.results(prepared, np.array([0]), history[None], outputs[None])
+    assert not run.status.any(), run.cause
+    found: np.ndarray = run.signals["qd"][0]
+    return found
+
+
+def alone(name: str) -> np.ndarray:
+    """Rates of both joints in a run without a bed, rad/s: [time, joint]."""
+    run = engine.run(compiled(name))
+    assert not run.status.any(), run.cause
+    found: np.ndarray = run.signals["qd"][0]
+    return found
+
+
+def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Rates apart, rms over the run, as a share of the rate that is asked: [joint]."""
+    found: np.ndarray = np.sqrt(((one - other) ** 2).mean(axis=0)) / SLOW
+    return found
+
+
+def errors(dialect: str, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """How far a run with a played dialect is from the run in software, and from the serial bed's: [joint] each."""
+    fast = "fast_" if name.startswith("fast") else ""
+    with tempfile.TemporaryDirectory() as folder:
+        found = driven(bench(dialect, name, Path(folder)), name)
+    line = driven(serial(f"{fast}volts"), f"{fast}volts")
+    return apart(found, alone("fast" if fast else "plain")), apart(found, line)
+
+
+def main() -> None:
+    for fast in ("", "fast_"):
+        line = driven(serial(f"{fast}volts"), f"{fast}volts")
+        off = apart(line, alone("fast" if fast else "plain"))
+        print(f"{fast}serial: off the run in software", *(f"{each:.3%}" for each in off), flush=True)
+        for dialect in DIALECTS:
+            for kind in ("volts", "torques"):
+                off, beside = errors(dialect, fast + kind)
+                words = [" ".join(f"{each:.3%}" for each in both) for both in (off, beside)]
+                print(
+                    f"{fast}{kind} {dialect}: off the run in software {words[0]}, the serial bed {words[1]}", flush=True
+                )
+
+
+if __name__ == "__main__":
+    main()
