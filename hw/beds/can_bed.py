@@ -463,17 +463,22 @@ class CanBed(BedDriver):
         return BedSample(self._state, True, self._faults, refused, tick, self._rate() * FINE, angle)
 
 
-def _check_filter(path: str, experiment: Experiment, joint: str) -> None:
-    """Raise Problem E444 where the bench's filter is not the one that the deck believes the rate to be behind."""
+def _check_deck(path: str, experiment: Experiment, joint: str) -> None:
+    """Raise Problem E444 where the filter of the rate, or the load's torque constant, is not what the deck believes."""
     bench = _bench(path)
-    cut, believed = bench.shaft["filter"], experiment.parameters[f"{joint}.bed.f_cut"]
-    if bench.filter_at is None or believed.value == cut:
-        return
-    says = f"{believed.value:g} Hz" if isinstance(believed.value, float) else "varied by a sweep"
-    also = [] if believed.origin.place is None else [Label(believed.origin.place, "the deck's")]
-    message = f"the bench filters the rate at {cut:g} Hz, and the `f_cut` of joint `{joint}` is {says}"
-    helps = (f"in the deck: `bed = ...(f_cut = {cut:g} Hz)`", "or another `filter` in the bench's file")
-    raise Problem(error("E444", message, bench.filter_at, also=also, help=helps), {path: bench.text})
+    held = (
+        (bench.filter_at, bench.shaft["filter"], "Hz", "f_cut", "the bench filters the rate at", "`filter`"),
+        (bench.load_kt_at, bench.load.figures["kt"], "N*m/A", "kt_load", "the bench's load gives", "`kt` of `[load]`"),
+    )
+    for at, here, unit, name, words, key in held:
+        believed = experiment.parameters[f"{joint}.bed.{name}"]
+        if at is None or believed.value == here:
+            continue
+        says = f"{believed.value:g} {unit}" if isinstance(believed.value, float) else "varied by a sweep"
+        also = [] if believed.origin.place is None else [Label(believed.origin.place, "the deck's")]
+        message = f"{words} {here:g} {unit}, and the `{name}` of joint `{joint}` is {says}"
+        helps = (f"in the deck: `bed = ...({name} = {here:g} {unit})`", f"or another {key} in the bench's file")
+        raise Problem(error("E444", message, at, also=also, help=helps), {path: bench.text})
 
 
 def _bench(path: str) -> TwoDrives:
@@ -513,6 +518,6 @@ PORT = PortKind(
     address="BENCH.toml",
     doc="Two drives on a CAN bus: ODrive, Damiao, moteus, CiA 402; the file says which.",
     open=_opened_port,
-    check=_check_filter,
+    check=_check_deck,
     lock_step=lambda name, requested: requested,
 )

@@ -76,7 +76,8 @@ class DriveEntry:
 @frozen
 class TwoDrives:
     """A bench of two drives on a bus. bus: what `can.Bus` is called with;  shaft, supply: of `FIGURES`, SI;
-    filter_at: where the filter is written, None where it is not;  text: the file's"""
+    filter_at, load_kt_at: where the filter, None where there is none, and the load's kt are written;  text: the file's
+    """
 
     name: str
     bus: Mapping[str, Any]
@@ -85,6 +86,7 @@ class TwoDrives:
     drive: DriveEntry
     load: DriveEntry
     filter_at: Place | None = None
+    load_kt_at: Place | None = None
     text: str = ""
 
 
@@ -132,7 +134,7 @@ class _BenchFile:
             )
         shaft, supply = self._figures("shaft"), self._figures("supply")
         filter_at = self._place("shaft", "filter") if "filter" in self.tables["shaft"] else None
-        return TwoDrives(name, self._bus(), shaft, supply, drive, load, filter_at, self.text)
+        return TwoDrives(name, self._bus(), shaft, supply, drive, load, filter_at, self._place("load", "kt"), self.text)
 
     def _bus(self) -> dict[str, Any]:
         found = self.tables["bus"]

@@ -281,7 +281,7 @@ DECK = """\
 #include <two_link.ic>
 run bench like nominal {
     rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }
-    substitute shoulder { bed = torque_drive(delay = 1, f_cut = 80 Hz); }
+    substitute shoulder { bed = torque_drive(delay = 1, f_cut = 80 Hz, kt_load = 0.06 N*m/A); }
 }
 sweep cuts of bench { vary shoulder.bed.f_cut = [50, 80] Hz; }
 """
@@ -300,7 +300,7 @@ def test_a_filter_that_is_not_the_deck_s_is_refused(tmp_path: Path) -> None:
         "   |\n"
         '10 | filter   = "50 Hz"\n'
         "   | ^^^^^^^^^^^^^^^^^^\n"
-        "  ::: FOLDER/deck.ic:4:61  the deck's\n"
+        "  ::: FOLDER/deck.ic:4:65  the deck's\n"
         "   = help: in the deck: `bed = ...(f_cut = 50 Hz)`\n"
         "   = help: or another `filter` in the bench's file"
     )
@@ -309,6 +309,10 @@ def test_a_filter_that_is_not_the_deck_s_is_refused(tmp_path: Path) -> None:
     )
     path.write_text(text.replace("50 Hz", "80 Hz"))
     check_model(f"can:{path}", bench, "shoulder")
+    path.write_text(text.replace("50 Hz", "80 Hz").replace('0.06 N*m/A"\ncurrent', '0.07 N*m/A"\ncurrent'))
+    assert refusal(lambda: check_model(f"can:{path}", bench, "shoulder")).startswith(
+        "error[E444]: the bench's load gives 0.07 N*m/A, and the `kt_load` of joint `shoulder` is 0.06 N*m/A\n"
+    )
 
 
 def test_a_bench_without_a_filter_says_whose_the_deck_s_has_to_be(tmp_path: Path) -> None:
