@@ -40,6 +40,7 @@ FIGURES: Mapping[str, str] = {
 
 _WORDS = ("name", "maker", "model", "source", "note")
 _BENCH = ("name", "drive", "load")
+_PART = ("name", "kind", "maker", "model", "source", "note")
 _QUANTITY = re.compile(r"\s*([\d.]+(?:[eE][+-]?\d+)?)\s*(\S.*?)\s*")
 
 
@@ -70,11 +71,24 @@ class Bench:
 
 
 @frozen
+class BenchPart:
+    """What a bench needs besides motors, in words. kind: amplifier, drive, supply, brake resistor, encoder ..."""
+
+    name: str
+    kind: str
+    source: str
+    maker: str = ""
+    model: str = ""
+    note: str = ""
+
+
+@frozen
 class PartsList:
-    """The motors and benches of some files, by name."""
+    """The motors and benches of some files, and what a bench needs besides, by name."""
 
     motors: Mapping[str, MotorPart]
     benches: Mapping[str, Bench]
+    others: Mapping[str, BenchPart] = field(default_factory=dict)
 
     def motor(self, name: str) -> MotorPart:
         """The motor of a name. Raises Problem E442."""
@@ -91,7 +105,8 @@ def parts_list(more: str | os.PathLike[str] | None = None) -> PartsList:
     motors = {name: each for one in found for name, each in one.motors.items()}
     names = dict.fromkeys(name for one in own_first for name in one.motors)
     benches = {name: each for one in found for name, each in one.benches.items()}
-    return PartsList({name: motors[name] for name in names}, benches)
+    others = {name: each for one in found for name, each in one.others.items()}
+    return PartsList({name: motors[name] for name in names}, benches, others)
 
 
 class _File:
@@ -115,8 +130,9 @@ class _File:
 
     def parts(self) -> PartsList:
         for key in self.tables:
-            if key not in ("motor", "bench"):
-                raise self.wrong(f"no `{key}` belongs here", "motors are `[[motor]]`, benches `[[bench]]`", key=key)
+            if key not in ("motor", "bench", "part"):
+                helps = "motors are `[[motor]]`, benches `[[bench]]`, what else a bench needs `[[part]]`"
+                raise self.wrong(f"no `{key}` belongs here", helps, key=key)
         motors: dict[str, MotorPart] = {}
         for number, table in enumerate(self._several("motor")):
             motor = self._motor(number, table)
@@ -132,7 +148,22 @@ class _File:
                     message = f"bench `{found['name']}`: there is no motor `{found[role]}` in this file"
                     raise self.wrong(message, f"its motors: {', '.join(motors)}", "bench", number, role)
             benches[found["name"]] = Bench(**found)
-        return PartsList(motors, benches)
+        return PartsList(motors, benches, self._others())
+
+    def _others(self) -> dict[str, BenchPart]:
+        found: dict[str, BenchPart] = {}
+        for number, table in enumerate(self._several("part")):
+            self._only(_PART, "part", number, table)
+            words = {key: self._text("part", number, table, key) for key in _PART if key in table}
+            for key, why in (("name", "a name of its own"), ("kind", "what it is for"), ("source", "where it is from")):
+                if not words.get(key):
+                    raise self.wrong(f"part number {number + 1} has no `{key}`", why, "part", number)
+            if words["name"] in found:
+                raise self.wrong(
+                    f"part `{words['name']}` is there twice", "give each a name of its own", "part", number
+                )
+            found[words["name"]] = BenchPart(**words)
+        return found
 
     def _several(self, kind: str) -> list[dict[str, Any]]:
         found = self.tables.get(kind, [])

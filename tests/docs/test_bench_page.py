@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from hw.motor_parts import parts_list
 from met import cli
 
 FILE = Path(__file__).parents[2] / "docs" / "bench.md"
@@ -38,6 +39,13 @@ def test_what_it_shows_is_what_is_said(command: str, shown: str, tmp_path: Path)
         assert [(each["part"], each["fits"]) for each in found["parts"]] == [("shelf", True)]
     else:
         assert shown == said(command, tmp_path)
+
+
+def test_it_lists_what_a_bench_needs_besides_motors_as_the_file_of_parts_does() -> None:
+    rows = re.findall(r"^\| `(\S+)` \| (.*?) \|", PAGE.split("## What else to order")[1], re.MULTILINE)
+    others = parts_list().others
+    assert {name for name, _ in rows} == set(others)
+    assert all(others[name].kind in what for name, what in rows)
 
 
 def rewritten(page: str) -> str:

@@ -67,6 +67,20 @@ def test_figures_are_si_and_a_file_of_one_s_own_goes_before(tmp_path: Path) -> N
     assert parts_list(tmp_path / "mine.toml").motor("maxon-353297").figures["torque_rated"] == 0.08
 
 
+def test_what_a_bench_needs_besides_has_a_kind_and_a_source(tmp_path: Path) -> None:
+    kinds = {each.kind for each in parts_list().others.values()}
+    assert kinds == {"amplifier", "drive", "supply", "brake resistor", "encoder", "coupling", "CAN adapter"}
+    assert all(each.source.startswith("https://") and each.note for each in parts_list().others.values())
+    path = tmp_path / "mine.toml"
+    path.write_text(MINE + '[[part]]\nname = "box"\nkind = "supply"\nsource = "the shelf"\n', encoding="utf-8")
+    assert parts_list(path).others["box"].kind == "supply"
+    said = complained(path, MINE + '[[part]]\nname = "box"\nsource = "the shelf"\n')
+    assert said.splitlines()[0] == "error[E441]: part number 1 has no `kind`"
+    assert "a part has no `kindd`" in complained(path, MINE + '[[part]]\nname = "box"\nkindd = "x"\nsource = "y"\n')
+    twice = '[[part]]\nname = "box"\nkind = "x"\nsource = "y"\n'
+    assert "part `box` is there twice" in complained(path, MINE + twice + twice)
+
+
 @pytest.mark.parametrize(
     ("was", "put", "message", "line"),
     [
