@@ -19,7 +19,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from socket import socket
 from socketserver import TCPServer
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs
 
 from batch.watching.board import Board
 from batch.watching.frame import FRAME_POLICY, frame
@@ -131,7 +131,7 @@ class _Request(BaseHTTPRequestHandler):
         if what is None:
             return
         size = self.headers.get("Content-Length", "")
-        if what != "choose" or not size.isascii() or not size.isdigit() or int(size) > MOST_CHOICE:
+        if what != "choose" or not _is_number(size) or int(size) > MOST_CHOICE:
             self._refuse(HTTPStatus.NOT_FOUND if what != "choose" else HTTPStatus.BAD_REQUEST)
             return
         told = parse_qs(self.rfile.read(int(size)).decode("utf-8", "replace"))
@@ -150,12 +150,12 @@ class _Request(BaseHTTPRequestHandler):
         foreign = origin != f"http://{hosts[0]}" and (posted or origin is not None)
         if foreign or site not in ("none", "same-origin"):
             return self._refuse(HTTPStatus.FORBIDDEN)
-        first, _, rest = urlsplit(self.path).path.removeprefix("/").partition("/")
+        first, _, rest = self.path.partition("?")[0].removeprefix("/").partition("/")
         known = hmac.compare_digest(first.encode("utf-8", "replace"), self.server.token.encode())
         what, _, number = rest.partition("/")
         if not known or not self.path.startswith(f"/{self.server.token}/"):
             return self._refuse(HTTPStatus.NOT_FOUND)
-        if number and not (number.isascii() and number.isdigit() and len(number) < 10):
+        if number and not _is_number(number):
             return self._refuse(HTTPStatus.NOT_FOUND)
         return what, int(number or 0)
 
@@ -201,3 +201,8 @@ class _Request(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *words: Any) -> None:
         """Nothing is logged: an address holds the token."""
+
+
+def _is_number(text: str) -> bool:
+    """True for at most nine digits."""
+    return text.isascii() and text.isdigit() and len(text) < 10

@@ -66,7 +66,7 @@ def test_who_does_not_know_the_token_is_told_nothing(server: PageServer) -> None
     "what",
     ["../../etc/passwd", "page/../../../etc/passwd", "%2e%2e/%2e%2e/etc/passwd", "page/1/../..", "page/-1",
      "page/99", "page/1e0", "page/٣", "page/" + "9" * 5000, "deck.ic", "assets/frame.js", "page//etc/passwd",
-     "numbers/2", "choose"],
+     "numbers/2", "choose", "[", "page/[1"],
 )  # fmt: skip
 def test_nothing_of_the_disk_can_be_asked_for(server: PageServer, what: str) -> None:
     path = f"/{server.token}/{what}".encode().decode("latin-1")
@@ -83,6 +83,19 @@ def test_who_comes_by_another_name_is_refused(server: PageServer, host: str | No
     named = None if host is None else host.format(port=server.server_port)
     answer = get(server, "page/1", Host=named)
     assert (answer.status, answer.body) == (421, b"")
+
+
+@pytest.mark.parametrize("address", ["http://[", "//[", "http://[::1", "/[", "?", "#", "%", "a:[/b"])
+def test_an_address_that_is_none_is_refused_without_a_word(
+    server: PageServer, address: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with socket.create_connection(("127.0.0.1", server.server_port), 20) as connection:
+        host = f"Host: 127.0.0.1:{server.server_port}\r\n"
+        connection.sendall(f"GET {address} HTTP/1.1\r\n{host}\r\n".encode())
+        assert connection.recv(100).split()[1] == b"404"
+        while connection.recv(1000):
+            pass
+    assert capfd.readouterr() == ("", "")
 
 
 def test_two_names_are_refused(server: PageServer) -> None:
@@ -119,7 +132,7 @@ def test_a_choice_is_of_what_there_is_and_of_the_page_itself(server: PageServer)
     assert choose("run=two", Origin=None) == 403
     for wrong in ("run=three", "group=one.a", "", "run=one&group=two.b", "run=%ff"):
         assert choose(wrong) == 400
-    for length in ("-1", "99999999999", "x", None):
+    for length in ("-1", "99999999999", "9" * 5000, "x", None):
         assert choose("run=two", Content_Length=length) == 400
     assert not server.board.is_chosen()
     assert choose("run=one&group=one.b") == 200
