@@ -8,6 +8,7 @@ from ic.meaning.mechanics.shapes import SHAPES
 from met import models
 from met.frozen import frozen
 from met.parameter import Parameter
+from met.plan.channel import COMMAND_UNIT
 
 _OPEN, _CLOSED = ("(", "[", "{"), (")", "]", "}")
 
@@ -36,11 +37,8 @@ class OpenCall:
         return next((each for each in self.parameters if each.name == self.argument), None)
 
 
-def open_call(texts: Sequence[str], of_shape: bool = False) -> OpenCall | None:
-    """The innermost call that the words of an entry, those before a cursor, leave open; None outside of any.
-
-    of_shape  whether the entry is the shape of a link
-    """
+def open_call(texts: Sequence[str]) -> OpenCall | None:
+    """The innermost call that the words of an entry, those before a cursor, leave open; None outside of any."""
     depth, opened = 0, len(texts) - 1
     while opened >= 0 and not (texts[opened] == "(" and depth == 0):
         depth += (texts[opened] in _CLOSED) - (texts[opened] in _OPEN)
@@ -58,14 +56,24 @@ def open_call(texts: Sequence[str], of_shape: bool = False) -> OpenCall | None:
             given.append(argument)
             argument = ""
     name = texts[opened - 1]
-    return OpenCall(name, argument, tuple(given), _parameters(name, of_shape))
+    return OpenCall(name, argument, tuple(given), _parameters(name, texts[0]))
 
 
-def _parameters(name: str, of_shape: bool) -> tuple[Parameter, ...]:
-    if of_shape:
+def ends_a_model(texts: Sequence[str]) -> bool:
+    """True where the last word closes a call that is no number: of a model, of a shape, of a kind of command."""
+    call = open_call(texts[:-1]) if texts[-1:] == [")"] else None
+    return call is not None and (call.name in COMMAND_UNIT or bool(call.parameters))
+
+
+def _parameters(name: str, entry: str) -> tuple[Parameter, ...]:
+    """The arguments of a call in an entry that begins with this word: `max` is a metric, and a function elsewhere."""
+    if entry == "shape":
         return SHAPES[name].parameters if name in SHAPES else ()
+    metric = models.available("metric").get(name)
+    if metric is not None and entry == "metric":
+        return (WATCHES, *models.written(metric))
     for kind in models.GROUPS:
         model = models.available(kind).get(name)
         if model is not None:
-            return (WATCHES, *models.written(model)) if kind == "metric" else models.written(model)
+            return models.written(model)
     return ()

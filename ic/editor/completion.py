@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator
 
 from lsprotocol import types
 
-from ic.editor.calls import WATCHES, open_call
+from ic.editor.calls import WATCHES, ends_a_model, open_call
 from ic.editor.index import DeckIndex
 from ic.editor.names import REMOVED, NamesInTexts
 from ic.editor.structure import NAMING, UNIT, DeckText, TextEntry, indices_around, through_loops
@@ -145,6 +145,8 @@ def _of_entry(
     if last.text == ".":
         yield from _rest_of_path(words, names, index)
         return
+    if ends_a_model(texts):
+        return
     if last.kind in NUMBERS or (last.text in ("]", ")") and "=" in texts):
         yield from _units(_parameter(texts, around, names), names)
         return
@@ -228,9 +230,12 @@ def _parameter(texts: list[str], around: TextEntry | None, names: NamesInTexts) 
     """The parameter that an entry sets, where it is declared."""
     if around is None or not texts:
         return None
-    call = open_call(texts, texts[0] == "shape")
+    call = open_call(texts)
     if call is not None:
         return call.wanted
+    compared = [n for n, each in enumerate(texts) if each in COMPARISONS]
+    if texts[0] == "require" and compared:
+        return _limit(texts[compared[-1] - 1], names)
     for each in parameters_of(around, names):
         if each.name == texts[0]:
             return each
@@ -239,6 +244,15 @@ def _parameter(texts: list[str], around: TextEntry | None, names: NamesInTexts) 
     block = BLOCKS.get(around.block)
     entries = [entry for entry in block.entries if entry.name == texts[0]] if block is not None else []
     return entries[0].parameter if entries else None
+
+
+def _limit(metric: str, names: NamesInTexts) -> Parameter | None:
+    """The limit on a metric of the texts, in the metric's unit."""
+    for found in names.by_name.get(metric, ()):
+        if found.kind == "metric" and found.entry is not None:
+            model = models.available("metric").get(names.model_of(found.entry))
+            return Parameter(name=metric, unit=model.unit, doc="the limit") if model is not None else None
+    return None
 
 
 def _units(wanted: Parameter | None, names: NamesInTexts) -> Iterator[Offer]:
@@ -312,7 +326,7 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
         yield from (Offer(each, types.CompletionItemKind.EnumMember, wanted.doc) for each in wanted.words)
         return
     where = around.kind if around is not None else ""
-    call = open_call(texts, key == "shape")
+    call = open_call(texts)
     if key == "against" and around is not None:
         yield from _sweeps_of(around.word_behind("of"), names)
         return
