@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Iterator
 
 from lsprotocol import types
 
+from ic.editor.calls import WATCHES, ends_a_model, open_call
 from ic.editor.index import DeckIndex
 from ic.editor.names import REMOVED, NamesInTexts
 from ic.editor.structure import NAMING, UNIT, DeckText, TextEntry, indices_around, through_loops
@@ -17,6 +18,7 @@ from ic.language.bodies import JOINT_KINDS
 from ic.language.unit_words import units_of
 from ic.meaning.definitions.row_tables import ALL as ALL_ROWS
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, USAGE
+from ic.meaning.mechanics.arm import AXES
 from ic.meaning.mechanics.shapes import SHAPES
 from ic.meaning.runs.linear import EQUILIBRIUM
 from ic.meaning.runs.requirements import PERCENTILE
@@ -28,10 +30,12 @@ from ic.text.preprocess import DIRECTIVES
 from met import models
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan.channel import COMMAND_UNIT
+from met.plan.channel import COMMAND_UNIT, MOTION, OF_JOINT
 from met.plan.linear_uses import FIGURES
 from met.unit_parser import parse_unit
 from met.units import UNITS
+
+GOALS = ("minimise", "maximise")
 
 _PATHS = ("record", "of", "against", "choose", "signal")
 
@@ -41,12 +45,16 @@ _VARIED = ("vary", "with", "exclude")
 _NOT_VARIED = ("seed", "record")
 """Keys of a run with a path, that no sweep varies."""
 
-GOALS = ("minimise", "maximise")
-
 COMPARISONS = ("<", "<=", ">", ">=")
+
+_SAID = {"of": "the unit of what is watched", "command": "the unit of the command"}
+"""Units that depend on another word of the deck, as a person says them."""
 
 _SIGNALS_ALONE = ("record", "open")
 """Keys whose values are signals and no parameters."""
+
+_OF_SIGNALS = (*_PATHS, *_SIGNALS_ALONE, *GOALS, "metric", "require")
+"""Words of entries in whose values the path of a signal may stand."""
 
 
 @frozen
@@ -137,6 +145,8 @@ def _of_entry(
     if last.text == ".":
         yield from _rest_of_path(words, names, index)
         return
+    if ends_a_model(texts):
+        return
     if last.kind in NUMBERS or (last.text in ("]", ")") and "=" in texts):
         yield from _units(_parameter(texts, around, names), names)
         return
@@ -156,6 +166,11 @@ def _of_entry(
     if len(texts) == 2 and texts[0] == "joint":
         yield from (Offer(each, types.CompletionItemKind.Keyword) for each in JOINT_KINDS)
         return
+    if len(texts) == 2 and texts[0] == "link" and last.kind == NAME:
+        return
+    if len(texts) == 2 and texts[0] in DEFINITIONS and around is None:
+        yield from _behind_a_name(texts[0])
+        return
     if texts[0] == "remove":
         yield from _named(names, *REMOVED, around=around)
         return
@@ -163,6 +178,15 @@ def _of_entry(
         yield from _named(names, "joint", around=around)
         return
     yield from _values(texts, around, names, index)
+
+
+def _behind_a_name(definition: str) -> Iterator[Offer]:
+    """The words between the name of a definition and its block."""
+    if definition in OF_A_RUN:
+        yield Offer("of", types.CompletionItemKind.Keyword, f"the run whose cases it has: `{definition} NAME of RUN`")
+    else:
+        said = f"has all that another {definition} has, and what it writes itself: `{definition} NAME like OTHER`"
+        yield Offer("like", types.CompletionItemKind.Keyword, said)
 
 
 def _beginnings(around: TextEntry | None, names: NamesInTexts) -> Iterator[Offer]:
@@ -206,20 +230,29 @@ def _parameter(texts: list[str], around: TextEntry | None, names: NamesInTexts) 
     """The parameter that an entry sets, where it is declared."""
     if around is None or not texts:
         return None
-    if "(" in texts:  # an argument: `trapezoid(max_rate = 5 deg/s)`
-        opened = len(texts) - 1 - texts[::-1].index("(")
-        name = texts[opened - 1] if opened else ""
-        key = texts[len(texts) - 1 - texts[::-1].index("=") - 1] if "=" in texts[opened:] else ""
-        for kind in models.GROUPS:
-            if name in models.available(kind):
-                return models.parameter(models.available(kind)[name], key)
-        return None
+    call = open_call(texts)
+    if call is not None:
+        return call.wanted
+    compared = [n for n, each in enumerate(texts) if each in COMPARISONS]
+    if texts[0] == "require" and compared:
+        return _limit(texts[compared[-1] - 1], names)
     for each in parameters_of(around, names):
         if each.name == texts[0]:
             return each
+    if around.block == "servo" and texts[0] == "rate":
+        return BLOCKS["rates"]["servos"].parameter
     block = BLOCKS.get(around.block)
     entries = [entry for entry in block.entries if entry.name == texts[0]] if block is not None else []
     return entries[0].parameter if entries else None
+
+
+def _limit(metric: str, names: NamesInTexts) -> Parameter | None:
+    """The limit on a metric of the texts, in the metric's unit."""
+    for found in names.by_name.get(metric, ()):
+        if found.kind == "metric" and found.entry is not None:
+            model = models.available("metric").get(names.model_of(found.entry))
+            return Parameter(name=metric, unit=model.unit, doc="the limit") if model is not None else None
+    return None
 
 
 def _units(wanted: Parameter | None, names: NamesInTexts) -> Iterator[Offer]:
@@ -258,7 +291,10 @@ def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> 
         if not signals_alone and each.path.startswith(head):
             part, _, more = each.path[len(head) :].partition(".")
             about.setdefault(part, "" if more else f"{each.value}; {each.doc}")
-    for path in index.signals:
+    signals = index.signals
+    if words[0].text in _OF_SIGNALS and not any(path.startswith(head) for path in signals):
+        signals = tuple(f"{head}{name}" for name, *_ in (*MOTION, *OF_JOINT) if _names_a_joint(head, names))
+    for path in signals:
         if path.startswith(head):
             part, _, more = path[len(head) :].partition(".")
             about.setdefault(part, "" if more else "signal")
@@ -277,6 +313,11 @@ def _rest_of_path(words: list[Token], names: NamesInTexts, index: DeckIndex) -> 
             yield from (_of_parameter(each) for each in parameters_of(found.entry, names))
 
 
+def _names_a_joint(head: str, names: NamesInTexts) -> bool:
+    """True for `JOINT.`, with a joint of the texts: it has signals before the deck was ever without an error."""
+    return any(found.kind == "joint" for found in names.by_name.get(head[:-1], ()))
+
+
 def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
     """The words that a value may begin with."""
     key = texts[0]
@@ -285,9 +326,12 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
         yield from (Offer(each, types.CompletionItemKind.EnumMember, wanted.doc) for each in wanted.words)
         return
     where = around.kind if around is not None else ""
+    call = open_call(texts)
     if key == "against" and around is not None:
         yield from _sweeps_of(around.word_behind("of"), names)
         return
+    if where == "joint" and texts in (["axis", "="], ["axis", "=", "-"]):
+        yield from (Offer(each, types.CompletionItemKind.EnumMember, "an axis of the joint's frame") for each in AXES)
     if texts[-2:] == ["rows", "="]:
         yield Offer(ALL_ROWS, types.CompletionItemKind.EnumMember, "every row is to be used")
         return
@@ -329,7 +373,8 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
     if key in _VARIED:
         yield from _of_varied(texts, names, index)
         return
-    if key in _PATHS or key in _SIGNALS_ALONE:
+    watches = key == "metric" and call is not None and call.argument == WATCHES.name
+    if key in _PATHS or key in _SIGNALS_ALONE or watches:
         values = () if key in _SIGNALS_ALONE else index.values
         heads = dict.fromkeys(each.path.partition(".")[0] for each in values)
         heads |= dict.fromkeys(path.partition(".")[0] for path in index.signals)
@@ -338,12 +383,10 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
             yield from _named(names, "joint", "macro", around=around)
             return
         yield from _named(names, "joint", "metric", "servo", around=around)
-    if "(" in texts:
-        opened = len(texts) - 1 - texts[::-1].index("(")
-        for each in models.GROUPS:
-            model = models.available(each).get(texts[opened - 1])
-            if model is not None and texts[-1] in ("(", ",", ";"):
-                yield from (_of_parameter(parameter) for parameter in models.written(model))
+    if call is not None and texts[-1] in ("(", ",", ";") and not call.argument:
+        yield from (_of_parameter(each) for each in call.parameters if each.name not in call.given)
+        if key == "shape":
+            return
     yield from _of_expression(names)
 
 
@@ -416,5 +459,5 @@ def _named(names: NamesInTexts, *kinds: str, around: TextEntry | None = None) ->
 
 
 def _of_parameter(parameter: Parameter) -> Offer:
-    unit = f" in {parameter.unit}" if parameter.unit not in ("", "1") else ""
+    unit = f" in {_SAID.get(parameter.unit, parameter.unit)}" if parameter.unit not in ("", "1") else ""
     return Offer(parameter.name, types.CompletionItemKind.Property, f"{parameter.doc}{unit}")

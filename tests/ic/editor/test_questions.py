@@ -93,6 +93,23 @@ def test_a_servo_has_the_parameters_of_its_model_through_what_it_is_like(editor:
         ("run more like nominal { servos { |", ["shoulder", "elbow"]),
         ("run more like nominal { arm = |", ["two"]),
         ("joint wrist |", ["revolute", "prismatic", "fixed"]),
+        ("arm b { link hand |", []),
+        ("servo further |", ["like"]),
+        ("sweep more |", ["of"]),
+        ("servo further like gearbox { rate = 1 |", ["Hz", "kHz"]),
+        ("arm b { joint a revolute { axis = |", ["x", "y", "z"]),
+        ("arm b { joint a revolute { axis = -|", ["x", "y", "z"]),
+        ("arm b { link a { shape = cylinder(|", ["radius", "length", "along"]),
+        ("arm b { link a { shape = cylinder(along = x, |", ["radius", "length"]),
+        ("arm b { link a { shape = cylinder(along = |", ["x", "y", "z"]),
+        ("arm b { link a { shape = box(size = [1, 2, 3 |", ["m", "km"]),
+        ("servo f like gearbox { command = rate(step(at = 1 s, |", ["start", "to"]),
+        ("servo f like gearbox { command = rate(step(at = 1 s) |", []),
+        ("arm b { link a { shape = rod(length = 1 m, along = x) |", []),
+        ("run more like nominal { metric m = settling_time(of = q); require m < 1 |", ["s", "ms"]),
+        ("arm b { link a { mass = max(|", ["slow"]),
+        ("run more like nominal { metric m = max(|", ["of"]),
+        ("run more like nominal { metric m = settling_time(|", ["of", "target", "band", "within"]),
         ("servo f { model = |", list(models.available("servo"))),
         ("run more like nominal { integrator = |", list(models.available("integrator"))),
         ("run more like nominal { duration = 5 |", ["s", "ms", "us", "min", "h"]),
@@ -180,6 +197,20 @@ def test_rows_and_columns_stand_behind_the_name_of_a_table(editor: Editor, tmp_p
     assert words(editor, deck, text + "arm a { link b { mass = bodies.boom.com.|") == ["x", "y", "z"]
     looped = "arm a { for side in [left] { link b_{side} { mass = bodies.stick_{side}.|"
     assert words(editor, deck, text + looped) == columns[:2]
+
+
+def test_signals_of_a_joint_are_offered_before_the_deck_was_ever_without_an_error(
+    editor: Editor, tmp_path: Path
+) -> None:
+    deck = tmp_path / "new.ic"
+    arm = "arm one { link upper { mass = 1 kg; }  joint swing revolute { parent = base; child = upper; axis = z; } }\n"
+    editor.open(deck, arm)
+    signals = ["q", "qd", "qdd", "tau", "tau_load", "J_eff", "b", "mode", "reaction"]
+    for written in ("record = [swing.|", "metric m = final(of = swing.|", "require always(swing.|"):
+        assert words(editor, deck, arm + "run a { arm = one; " + written) == signals, written
+    assert "swing" in words(editor, deck, arm + "run a { arm = one; metric m = final(of = |")
+    assert words(editor, deck, arm + "run a { arm = one; record = [upper.|") == [], "no joint"
+    assert words(editor, deck, arm + "run a { arm = one; with swing.|") == [], "no signal varies"
 
 
 def test_parts_of_a_signal_are_offered(editor: Editor, deck: Path) -> None:
