@@ -37,6 +37,8 @@ from met.substitution import bed_scale
 from met.substitution.bed_scale import BedScale
 
 DEFAULTS: dict[models.Kind, str] = {"bed": BED, "law": LAW}
+SLOWEST_BED_HZ = 10.0
+"""Rate at which a bed is exchanged with at least: its shaft is reckoned in steps of 250 us, each of them recorded."""
 USAGE = "write `substitute JOINT { bed = BED(...);  law = LAW(...); }`"
 
 
@@ -81,6 +83,15 @@ def check_ticks(scope: Scope, found: tuple[Substitution, ...], ticks: Mapping[st
                 f"the servo of joint `{use.joint}` is continuous, and its motor is on a bed",
                 use.place,
                 help="a bed's servo ticks: write a rate in Hz",
+            )
+        elif schedule.base_hz / ticks[use.joint].divisor < SLOWEST_BED_HZ and use.place is not None:
+            rate = schedule.base_hz / ticks[use.joint].divisor
+            scope.complaints.error(
+                "D367",
+                f"the servo of joint `{use.joint}` ticks at {rate:g} Hz, too seldom for a motor on a bed",
+                use.place,
+                help=f"give it {SLOWEST_BED_HZ:g} Hz or more: between two ticks the shaft goes on with what it was "
+                "told last",
             )
     for use in found[1:]:
         rates = [schedule.base_hz / ticks[each.joint].divisor for each in (use, found[0])]

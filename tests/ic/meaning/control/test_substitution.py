@@ -335,6 +335,20 @@ error[D178]: the servo of joint `two` ticks at 500 Hz, and that of joint `one`, 
     )
 
 
+def test_a_servo_that_ticks_too_seldom_for_a_bed(tmp_path: Path) -> None:
+    assert (
+        shown(tmp_path, "servos { one { rate = 5 Hz; } }  substitute one {}")
+        == """\
+error[D367]: the servo of joint `one` ticks at 5 Hz, too seldom for a motor on a bed
+ --> deck.ic:1:57
+  |
+1 | run it like base_run { servos { one { rate = 5 Hz; } }  substitute one {} }
+  |                                                         ^^^^^^^^^^^^^^
+  = help: give it 10 Hz or more: between two ticks the shaft goes on with what it was told last
+"""
+    )
+
+
 def test_one_joint_and_a_block(tmp_path: Path) -> None:
     assert (
         shown(tmp_path, "substitute one two {}")
