@@ -42,11 +42,11 @@ class Owner:
     def as_written_in(self, homes: Sequence[str]) -> Owner:
         """The same for a value that the first of these definitions writes, and the others take over with `like`: its
         label names the one that writes it."""
-        if tuple(homes) == self.homes:
-            return self
         label = self.label
         if homes and self.homes and homes[0] != self.homes[-1]:
             label = label.replace(f"servo `{self.homes[-1]}`", f"servo `{homes[0]}`")
+        elif tuple(homes) == self.homes:
+            return self
         return replace(self, label=label, homes=tuple(homes))
 
     def what(self, wanted: Parameter) -> str:
