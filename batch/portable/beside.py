@@ -1,13 +1,16 @@
 """What a page shows beside its own run, as a second arm and as wide pale lines: another archive's run, computed in the
 page by that archive's own code, or a log of measured signals.
 
-A log is a CSV file as decks name them: its head names `time` and channels of the run, each with its unit.
+A log is an MCAP file (`batch.portable.mcap_log`), or a CSV file as decks name them: its head names `time` and channels
+of the run, each with its unit. Units may stand in a line of their own above it, as `met export` writes them.
 
     time [s], shoulder.q [deg], elbow.q [deg]
 """
 
 from __future__ import annotations
 
+import csv
+import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,14 +19,21 @@ import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.plotting.against import beside
+from batch.portable.mcap_log import MeasuredSignals, mcap_signals
 from ic.meaning.definitions.csv_files import CsvTable, read_csv
-from met.diagnostic import Label, Problem, error
+from met.diagnostic import Label, Place, Problem, error
+from met.host.files import open_regular
 from met.host.sources import names_archive
 from met.messages.visible import visible
 from met.plan import Experiment
 from met.unit_parser import parse_unit
 
-TIME = "time"
+TIME, CASE = "time", "case"
+UNITS = "# units: "
+LONGEST_LINE, MOST_REMARKS = 1 << 16, 100
+"""Characters and number of the lines above a head that are looked into."""
+
+NANOSECOND = 1e-9
 SHOWN = 12
 """Channels that a message or a page names."""
 
@@ -44,54 +54,102 @@ def is_archive(path: str | Path) -> bool:
 def log_data(path: str | Path, columns: Sequence[Mapping[str, str]], rows: np.ndarray) -> dict[str, Any]:
     """A log at the rows of a run.
 
-    columns  what the run records: of each number its channel and SI unit
+    columns  what the run records: of each number its channel, signal and SI unit
     rows     times of the run's rows, s; between rows of the log its numbers are on a straight line, before its first
              and after its last they are none
 
-    Gives `values`, of each column an array over `rows` in SI, or none where the log has not the channel; and `told`,
-    what the log's columns are, with their units. Raises Problem E478, and those of CSV files.
+    Gives `values`, of each column an array over `rows` in SI, or none where the log has not the channel; `told`, what
+    the log's columns are, with their units; and `unused`, those that are not shown. Raises Problem E478, and those of
+    CSV files.
     """
-    if Path(path).suffix.lower() != ".csv":
+    readers = {".csv": _csv_signals, ".mcap": mcap_signals}
+    ending = Path(path).suffix.lower()
+    if ending not in readers:
         helps = "write it as a CSV file whose head names `time [s]` and channels with their units: `elbow.q [deg]`"
-        raise Problem(error("E478", f"{path} is neither an archive nor a CSV file", help=helps))
-    table = read_csv(str(path))
+        raise Problem(error("E478", f"{path} is neither an archive nor a CSV or MCAP file", help=helps))
+    log = readers[ending](path, columns)
+    channels = [each["channel"] for each in columns]
+    if not log.signals:
+        what = "column" if ending == ".csv" else "topic"
+        raise Problem(
+            error(
+                "E478",
+                f"no {what} of `{path}` is a signal that the run records",
+                log.head,
+                help=f"it records {_listed(channels)}: name {what}s so",
+            )
+        )
+    begin, end = (pick(time[at] for time, _ in log.signals.values()) for pick, at in ((min, 0), (max, -1)))
+    if not (begin < rows[-1] and end > rows[0]):
+        message = f"the log is from {begin:g} s to {end:g} s, and the run from {rows[0]:g} s to {rows[-1]:g} s"
+        raise Problem(error("E478", message, log.head, help="let its times begin where the run begins, at 0 s"))
+    values = [_at(rows, *log.signals[name]) if name in log.signals else None for name in channels]
+    return {"values": values, "told": log.told, "unused": log.unused}
+
+
+def _at(rows: np.ndarray, time: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """Numbers at other times, on straight lines; none before the first and after the last, but for what a clock that
+    counts nanoseconds rounds."""
+    inside = (rows >= time[0] - NANOSECOND) & (rows <= time[-1] + NANOSECOND)
+    return np.where(inside, np.interp(rows, time, numbers), np.nan)
+
+
+def _csv_signals(path: str | Path, columns: Sequence[Mapping[str, str]]) -> MeasuredSignals:
+    table = _with_units(read_csv(str(path)))
     head = table.columns[0].place
     time_column = table.column(TIME)
-    channels = [each["channel"] for each in columns]
     if time_column is None:
         raise Problem(error("E478", f"`{path}` has no column `{TIME}`", head, help="name it in the head: `time [s]`"))
     if len(table.rows) < 2:
         raise Problem(error("E478", f"`{path}` has fewer than two rows", head, help="a log has a row an instant"))
+    case = table.column(CASE)
+    if case is not None:
+        texts = [table.cell(case, number) for number in range(len(table.rows))]
+        other = next((each for each in texts if each.text != texts[0].text), None)
+        if other is not None:
+            helps = "export one: `met export ARCHIVE --case '#0' -o log.csv`"
+            raise Problem(error("E478", f"`{path}` has several cases, and a log is of one", other.place, help=helps))
     time = table.numbers(time_column, "s", parse_unit("s").dimension, Label(time_column.place, "times of the log"))
     table.rising(time_column, time)
-    if not (time[0] < rows[-1] and time[-1] > rows[0]):
-        message = f"the log is from {time[0]:g} s to {time[-1]:g} s, and the run from {rows[0]:g} s to {rows[-1]:g} s"
-        raise Problem(
-            error("E478", message, time_column.place, help="let its times begin where the run begins, at 0 s")
-        )
-    values = [_column(table, each, time, rows) for each in columns]
-    if all(each is None for each in values):
-        message = f"no column of `{path}` is a signal that the run records"
-        raise Problem(error("E478", message, head, help=f"it records {_listed(channels)}: name columns so"))
-    known = {TIME, *channels}
+    instants = np.array(time)
+    found = {each["channel"]: _column(table, each) for each in columns}
+    signals = {name: (instants, np.array(numbers)) for name, numbers in found.items() if numbers is not None}
+    known = {TIME, *found}
     used = [f"{each.name} [{each.unit or '1'}]" for each in table.columns if each.name in known]
-    return {
-        "values": values,
-        "told": [visible(each) for each in used],
-        "unused": [visible(each.name) for each in table.columns if each.name not in known],
-    }
+    unused = [visible(each.name) for each in table.columns if each.name not in known]
+    return MeasuredSignals(signals, [visible(each) for each in used], unused, time_column.place if signals else head)
 
 
-def _column(
-    table: CsvTable, recorded: Mapping[str, str], time: tuple[float, ...], rows: np.ndarray
-) -> np.ndarray | None:
+def _with_units(table: CsvTable) -> CsvTable:
+    """The table with the units of the line `# units: s,rad`, which stands above the head of what `met export` wrote.
+    Raises Problem E478 where that line has not a unit a column."""
+    line = table.columns[0].place.line
+    if any(each.unit is not None for each in table.columns) or line < 2:
+        return table
+    with open_regular(table.file) as file:
+        above = [file.readline(LONGEST_LINE).decode("utf-8", "replace") for _ in range(min(line - 1, MOST_REMARKS))]
+    number, told = next(((n, each) for n, each in enumerate(above, 1) if each.startswith(UNITS)), (0, ""))
+    if not number:
+        return table
+    units = next(csv.reader([told.removeprefix(UNITS).rstrip("\r\n")]), [])
+    if len(units) != len(table.columns):
+        message = f"this line has {len(units)} units, and {len(table.columns)} columns follow"
+        place = Place(table.file, number, 1, max(len(told.rstrip()), 1))
+        raise Problem(error("E478", message, place, help="give each column its unit, and 1 where it has none"))
+    columns = zip(table.columns, units, strict=True)
+    return dataclasses.replace(
+        table, columns=tuple(dataclasses.replace(each, unit=unit.strip() or None) for each, unit in columns)
+    )
+
+
+def _column(table: CsvTable, recorded: Mapping[str, str]) -> tuple[float, ...] | None:
+    """A channel's numbers in SI; none where the log has it not."""
     column = table.column(recorded["channel"])
     if column is None:
         return None
     unit = recorded["unit"]
     label = Label(column.place, f"the run records it in {unit}" if unit != "1" else "the run records it without a unit")
-    numbers = table.numbers(column, unit, parse_unit(unit).dimension, label)
-    return np.interp(rows, time, numbers, left=np.nan, right=np.nan)
+    return table.numbers(column, unit, parse_unit(unit).dimension, label)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -48,7 +48,7 @@ def chromium() -> Iterator[Chromium]:
 
 
 def test_a_log_is_in_si_on_straight_lines_between_its_rows_and_nothing_outside_of_them(folder: Path) -> None:
-    columns = [{"channel": f"{joint}.q", "unit": "rad"} for joint in ("elbow", "shoulder", "wrist")]
+    columns = [{"channel": f"{joint}.q", "signal": "q", "unit": "rad"} for joint in ("elbow", "shoulder", "wrist")]
     found = log_data(folder / "log.csv", columns, np.array([0.0, 0.3, 0.6, 0.7]))
     elbow, shoulder, wrist = found["values"]
     assert wrist is None
@@ -107,7 +107,7 @@ def test_what_is_neither_archive_nor_log_and_an_archive_of_no_same_case_are_refu
     for against, said in (
         (
             "deck.ic",
-            "error[E478]: deck.ic is neither an archive nor a CSV file\n"
+            "error[E478]: deck.ic is neither an archive nor a CSV or MCAP file\n"
             " = help: write it as a CSV file whose head names `time [s]` and channels with their units: "
             "`elbow.q [deg]`\n",
         ),
