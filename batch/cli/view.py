@@ -23,6 +23,11 @@ from met.messages.visible import say
     help="Of an archive: another archive, or a log as a CSV file, whose arm and signals are shown beside it.",
 )
 @click.option(
+    "--numbers",
+    metavar="DECK",
+    help="Of an archive: its deck, whose numbers can be dragged then, by a second module.",
+)
+@click.option(
     "--port", type=click.IntRange(1, 65535), metavar="N", help="Of a deck: the port of 127.0.0.1 [a free one]."
 )
 @deck_options
@@ -32,6 +37,7 @@ def view(
     name: str | None,
     output: str | None,
     against: str | None,
+    numbers: str | None,
     port: int | None,
     defines: tuple[str, ...],
     include_dirs: tuple[str, ...],
@@ -54,24 +60,28 @@ def view(
     if names_archive(source):
         if port is not None:
             raise click.UsageError(f"--port is for decks: the page of the archive `{source}` is a file")
-        return _write(source, name, output, against, quiet)
+        return _write(source, name, output, against, numbers, quiet)
     if output is not None:
         raise click.UsageError(
             f"-o is for archives: the page of the deck `{source}` is served; `met run` makes an archive of it"
         )
     if against is not None:
         raise click.UsageError(f"--against is for archives: `met run {source}` makes one of the deck")
+    if numbers is not None:
+        raise click.UsageError(f"--numbers is for archives: `met run {source}` makes one of the deck")
     return _watch(source, name, port or 0, defines, include_dirs, settings, quiet)
 
 
-def _write(archive: str, name: str | None, output: str | None, against: str | None, quiet: bool) -> int:
+def _write(
+    archive: str, name: str | None, output: str | None, against: str | None, numbers: str | None, quiet: bool
+) -> int:
     from batch.portable import files
     from batch.portable.page import view as page
     from ic.printing.columns import size
 
     target = Path(archive).with_suffix(".view.html") if output is None else Path(output)
     files.check_page(target)
-    files.write_page(page(archive, () if name is None else (name,), against), target)
+    files.write_page(page(archive, () if name is None else (name,), against, numbers), target)
     if not quiet:
         say(f"{target}  ({size(target.stat().st_size)})")
     return YES

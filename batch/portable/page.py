@@ -13,12 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from batch.archive.in_memory import GroupInMemory
 from batch.archive.read import ArchiveFile, ArchiveGroup, reading
 from batch.archive.stored import Unlike
 from batch.arms.scene import arm_scene, lacking, scene_json
 from batch.arms.scripts import arm_scripts, arm_style
 from batch.modules.description import MOST_CASES, described, described_columns
 from batch.portable import beside
+from batch.portable.numbers import deck_of, limits
 from batch.queries.deck_units import DeckUnits
 from batch.queries.groups import groups_named
 from batch.queries.signals import Panel, deck_unit, pretty_unit
@@ -26,6 +28,7 @@ from batch.report.html import inlined
 from batch.report.html.head import page_head
 from batch.report.html.markup import Html, el, lines
 from batch.report.html.payload import script_json
+from ic.driver.given_values import VariedRun
 from met.backends.wasm.module import KERNEL_JS, compiled
 from met.diagnostic import Problem, error
 from met.messages.visible import visible
@@ -42,10 +45,15 @@ _ASSETS = Path(__file__).with_name("assets")
 _CODE = "'wasm-unsafe-eval'"
 
 
-def view(archive: str | Path, names: tuple[str, ...] = (), against: str | Path | None = None) -> str:
+def view(
+    archive: str | Path,
+    names: tuple[str, ...] = (),
+    against: str | Path | None = None,
+    numbers: str | Path | None = None,
+) -> str:
     """The page of the archive's only run or sweep, or of the one that is named. against: another archive, or a log of
-    measured signals, that is shown beside it. Raises Problem E473 where several runs are meant, and those of
-    `batch.portable.beside`."""
+    measured signals, that is shown beside it. numbers: the archive's deck, whose numbers can be others there. Raises
+    Problem E473 where several runs are meant, and those of `batch.portable.beside` and `batch.portable.numbers`."""
     with ArchiveFile(archive) as file:
         file.need_every_row("a page that simulates")
         groups = groups_named(file, names)
@@ -59,7 +67,17 @@ def view(archive: str | Path, names: tuple[str, ...] = (), against: str | Path |
         data = data_of(experiment, file, group)
         if against is not None:
             data["beside"] = _beside(against, file, group, experiment)
+        if numbers is not None:
+            data["numbers"] = _numbers(deck_of(file, experiment, numbers), file.plan())
         return page_of(experiment, data)
+
+
+def _numbers(run: VariedRun, plan: Plan) -> dict[str, Any]:
+    """Data of the second module, whose inputs are the deck's numbers, as those of a page of one case."""
+    experiment, status = run.experiment, np.full(1, -1, np.int8)
+    empty = {use.name: np.full(1, np.nan) for use in experiment.metrics}
+    group = GroupInMemory.of_metrics(experiment, np.arange(1), status, empty)
+    return data_of(experiment, plan, group, source="deck") | {"limits": limits(run)}
 
 
 def _beside(against: str | Path, file: ArchiveFile, group: ArchiveGroup, experiment: Experiment) -> dict[str, Any]:
