@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from met import run as engine
-from met.analysis.blame import Unstable, closed
 from met.analysis import loops as servo_loops
+from met.analysis.blame import Unstable, closed
 from met.analysis.loops import fastest, frame, growing, growths, uncoupled
 from met.analysis.step_map import Linearizer
 from met.plan import Experiment
@@ -218,11 +218,11 @@ def arms(joints: int, row: int) -> str:
     """Chains of `row` joints on a base that stands, all of one servo."""
     bars = [
         f"link bar_{i} {{ mass = {1 + i % 3} kg;  shape = rod(length = 0.2 m, along = x); }}\n"
-        f"joint hinge_{i} revolute {{ parent = {'base' if i % row == 0 else f'bar_{i - 1}'};  child = bar_{i};  axis = z;"
-        f"  at = [{0.2 if i % row else 0} m, 0 m, 0 m]; }}"
+        f"joint hinge_{i} revolute {{ parent = {'base' if i % row == 0 else f'bar_{i - 1}'};  child = bar_{i};"
+        f"  axis = z;  at = [{0.2 if i % row else 0} m, 0 m, 0 m]; }}"
         for i in range(joints)
     ]
-    head, _, tail = deck(2.0).partition("servo drive")
+    _, _, tail = deck(2.0).partition("servo drive")
     servos = "  ".join(f"hinge_{i} = drive;" for i in range(joints))
     return "arm swing {\n" + "\n".join(bars) + "\n}\nservo drive" + tail.replace("hinge = drive;", servos)
 
