@@ -68,7 +68,7 @@ def varied(run: GivenRun) -> VariedRun:
     for path in paths:  # one that cannot vary is left out
         one = {path: (float(there[path].value), there[path].unit)}  # type: ignore[arg-type]
         try:
-            run.vary(one)  # type: ignore[arg-type]
+            run.vary(one)
         except Problem:
             continue
         numbers.update(one)

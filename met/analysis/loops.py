@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,6 +29,9 @@ LEAST = 1e-5
 
 SLOWEST = 1e-3
 """The same of a second, of the arm with laws that have no ticks, 1/s."""
+
+WHOLE = 200
+"""States and memory up to which an arm is looked at as a whole, though parts of it be uncoupled."""
 
 Gains = Mapping[str, float]
 """Shares of the gains of joints' laws; 1 where nothing is said."""
@@ -154,6 +158,9 @@ def growths(
 
     ticks  of a frame; else of the arm with all laws continuous, without delays of ticks
     """
+    parts = uncoupled(found)
+    if len(parts) > 1:
+        return np.concatenate([growths(each, lanes, gains, ticks=ticks, direct=direct) for each in parts], axis=1)
     if ticks:
         with np.errstate(all="ignore"):  # what overflows is no number
             sizes = np.abs(_eigenvalues(frame(found, lanes, gains, direct=direct)))
@@ -162,6 +169,55 @@ def growths(
         return _eigenvalues(_over(found, lanes, gains, direct, found.laws)[0]).real
     except np.linalg.LinAlgError:
         return np.full((len(lanes), 1), math.inf)
+
+
+def uncoupled(found: SampledLoops) -> tuple[SampledLoops, ...]:
+    """Parts of a large arm that do not act on each other in any lane, such as chains on a base that stands, each with
+    its own laws; else the whole. A frame of a part is no longer than the whole's."""
+    n, p, count = found.states, found.positions, found.states + len(found.held)
+    if count <= WHOLE:
+        return (found,)
+    places = {name: at for at, name in enumerate(found.held, n)}
+    acts = np.zeros((count, count), dtype=bool)
+    acts[:n] = np.any(found.slope[:, :n] != 0.0, axis=0)
+    acts[np.arange(p), np.arange(p, 2 * p)] = True
+    first = {}
+    for law in found.laws:
+        at = [places[name] for name in law.memory]
+        first[law.joint] = at[0]
+        acts[at[0], at] = True
+        for slopes in (law.slope, law.direct):
+            acts[at[0]] |= np.any(slopes != 0.0, axis=(0, 1))
+    made = []
+    for cells in _components(acts | acts.T):
+        made.append(
+            replace(
+                found,
+                states=int(np.count_nonzero(cells < n)),
+                positions=int(np.count_nonzero(cells < p)),
+                held=tuple(found.held[cell - n] for cell in cells[cells >= n].tolist()),
+                slope=found.slope[:, cells[cells < n]][:, :, cells],
+                laws=tuple(
+                    replace(law, slope=law.slope[..., cells], direct=law.direct[..., cells])
+                    for law in found.laws
+                    if first[law.joint] in cells
+                ),
+            )
+        )
+    return tuple(made)
+
+
+def _components(joined: np.ndarray) -> Iterator[np.ndarray]:
+    """The connected parts of a graph, ascending. joined: whether two are neighbours, symmetric, [any, any]"""
+    left = np.ones(len(joined), dtype=bool)
+    while left.any():
+        part = np.zeros(len(joined), dtype=bool)
+        new = np.arange(len(joined)) == np.argmax(left)
+        while new.any():
+            part |= new
+            new = joined[new].any(axis=0) & ~part
+        left &= ~part
+        yield np.flatnonzero(part)
 
 
 def _eigenvalues(matrices: np.ndarray) -> np.ndarray:

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from met import run as engine
+from met.analysis import loops as servo_loops
 from met.analysis.blame import Unstable, closed
-from met.analysis.loops import fastest, frame, growing
+from met.analysis.loops import fastest, frame, growing, growths, uncoupled
 from met.analysis.step_map import Linearizer
 from met.plan import Experiment
 from tests.ic.small_decks import changed, check, experiment
@@ -211,3 +212,39 @@ def test_slopes_whose_step_overflows_are_no_defect(tmp_path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert check(tmp_path, deck_of, select="stiff").plan is not None
+
+
+def arms(joints: int, row: int) -> str:
+    """Chains of `row` joints on a base that stands, all of one servo."""
+    bars = [
+        f"link bar_{i} {{ mass = {1 + i % 3} kg;  shape = rod(length = 0.2 m, along = x); }}\n"
+        f"joint hinge_{i} revolute {{ parent = {'base' if i % row == 0 else f'bar_{i - 1}'};  child = bar_{i};"
+        f"  axis = z;  at = [{0.2 if i % row else 0} m, 0 m, 0 m]; }}"
+        for i in range(joints)
+    ]
+    _, _, tail = deck(2.0).partition("servo drive")
+    servos = "  ".join(f"hinge_{i} = drive;" for i in range(joints))
+    return "arm swing {\n" + "\n".join(bars) + "\n}\nservo drive" + tail.replace("hinge = drive;", servos)
+
+
+@pytest.mark.parametrize("ticks", [True, False])
+def test_chains_that_do_not_act_on_each_other_grow_as_the_whole_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ticks: bool
+) -> None:
+    sampled = Linearizer(experiment(tmp_path, arms(6, 2)), [0]).sampled()
+    assert sampled is not None and uncoupled(sampled) == (sampled,)
+    whole = np.sort(growths(sampled, np.array([0]), ticks=ticks))
+    monkeypatch.setattr(servo_loops, "WHOLE", 1)
+    parts = uncoupled(sampled)
+    assert [part.states for part in parts] == [sampled.states // 3] * 3
+    assert sorted(law.joint for part in parts for law in part.laws) == [f"hinge_{i}" for i in range(6)]
+    of_parts = np.sort(growths(sampled, np.array([0]), ticks=ticks))
+    moves = np.isfinite(whole) & (whole > -100.0)
+    assert np.allclose(of_parts[moves], whole[moves], rtol=1e-6, atol=1e-6) and moves.sum() >= 6
+
+
+def test_a_chain_is_one_part(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sampled = Linearizer(experiment(tmp_path, arms(4, 4)), [0]).sampled()
+    monkeypatch.setattr(servo_loops, "WHOLE", 1)
+    assert sampled is not None
+    assert len(uncoupled(sampled)) == 1
