@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from lsprotocol import types
 
-from ic.editor.structure import LOOP, DeckText, TextEntry
+from ic.editor.structure import LOOP, DeckText, TextEntry, through_loops
 from ic.language import BLOCKS
 from ic.text.lexer import Token
 
@@ -36,10 +36,9 @@ def symbols(text: DeckText, position: Position) -> list[types.DocumentSymbol]:
 
 
 def _symbols(entries: Iterable[TextEntry], position: Position) -> Iterator[types.DocumentSymbol]:
-    for entry in entries:
+    for entry in through_loops(entries):
         name = entry.named
         if entry.kind == LOOP and entry.opened is not None:
-            yield from _symbols(entry.entries, position)
             continue
         if name is None and (entry.opened is None or entry.kind not in BLOCKS):
             continue
