@@ -124,3 +124,5 @@ def test_loops_in_loops_are_answered_however_deep_they_go(editor: Editor, tmp_pa
     assert [each["name"] for each in editor.ask("textDocument/documentSymbol", document)] == ["a"]
     assert editor.ask("textDocument/foldingRange", document) is not None
     assert editor.about("textDocument/hover", deck, 0, 1)["contents"]["value"].startswith("`arm NAME { ... }`")
+    editor.change(deck, "arm a { link b { " * 1500)
+    assert [each["name"] for each in editor.ask("textDocument/documentSymbol", document)] == ["a"]
