@@ -7,9 +7,10 @@ from types import MappingProxyType
 
 from lsprotocol import types
 
-from ic.editor.structure import LOOP, DeckText, TextEntry
+from ic.editor.structure import LOOP, DeckText, TextEntry, through_loops
 from ic.language import BLOCKS
 from ic.text.lexer import Token
+from ic.text.limits import DEPTH
 
 Position = Callable[[int], types.Position]
 """Where an offset of a text is."""
@@ -35,11 +36,11 @@ def symbols(text: DeckText, position: Position) -> list[types.DocumentSymbol]:
     return sorted(found, key=lambda each: (each.range.start.line, each.range.start.character))
 
 
-def _symbols(entries: Iterable[TextEntry], position: Position) -> Iterator[types.DocumentSymbol]:
-    for entry in entries:
+def _symbols(entries: Iterable[TextEntry], position: Position, levels: int = DEPTH) -> Iterator[types.DocumentSymbol]:
+    """The definitions among some entries, with those in their blocks as deep as a deck may go."""
+    for entry in through_loops(entries):
         name = entry.named
         if entry.kind == LOOP and entry.opened is not None:
-            yield from _symbols(entry.entries, position)
             continue
         if name is None and (entry.opened is None or entry.kind not in BLOCKS):
             continue
@@ -50,7 +51,7 @@ def _symbols(entries: Iterable[TextEntry], position: Position) -> Iterator[types
             types.Range(position(entry.words[0].offset), position(max(entry.closed, shown.end))),
             types.Range(position(shown.offset), position(shown.end)),
             detail=" ".join(each for each in entry.texts if each != shown.text)[:80] or None,
-            children=list(_symbols(entry.entries, position)),
+            children=list(_symbols(entry.entries, position, levels - 1)) if levels else [],
         )
 
 

@@ -216,10 +216,12 @@ def innermost_around(entries: Iterable[TextEntry], offset: int) -> TextEntry | N
 
 def through_loops(entries: Iterable[TextEntry]) -> Iterator[TextEntry]:
     """Entries of a block with those that loops in it have, as the block is read."""
-    for entry in entries:
+    waiting = list(reversed(list(entries)))
+    while waiting:
+        entry = waiting.pop()
         yield entry
         if _no_loop(entry) is not entry:
-            yield from through_loops(entry.entries)
+            waiting += reversed(entry.entries)
 
 
 def indices_around(entries: Iterable[TextEntry], offset: int) -> set[str]:

@@ -111,3 +111,18 @@ def test_a_value_of_all_turns_is_shown(tmp_path: Path, editor: Editor) -> None:
     assert all(f"`links.seg_{i}.mass` = 0.1 kg" in found for i in range(3))
     found = editor.about("textDocument/hover", deck, *at(CHAIN, "span ="))["contents"]["value"]
     assert "`span` = 0.1 m" in found and "let `span`" in found
+
+
+def test_loops_in_loops_are_answered_however_deep_they_go(editor: Editor, tmp_path: Path) -> None:
+    deck = tmp_path / "deep.ic"
+    text = "arm a { " + "for i in [1] { " * 2000
+    editor.open(deck, text)
+    assert [each["message"] for each in editor.of(deck)] == ["this `{` is not closed"]
+    found = editor.about("textDocument/completion", deck, 0, len(text))
+    assert {"link", "joint"} <= {each["label"] for each in found}
+    document = {"textDocument": {"uri": uri(deck)}}
+    assert [each["name"] for each in editor.ask("textDocument/documentSymbol", document)] == ["a"]
+    assert editor.ask("textDocument/foldingRange", document) is not None
+    assert editor.about("textDocument/hover", deck, 0, 1)["contents"]["value"].startswith("`arm NAME { ... }`")
+    editor.change(deck, "arm a { link b { " * 1500)
+    assert [each["name"] for each in editor.ask("textDocument/documentSymbol", document)] == ["a"]
