@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ic.grammar.syntax import Binary, Expression, Number, OverCases, Range, Unary, WithUnit
 from met.diagnostic import Place
 
@@ -32,7 +34,4 @@ def spanned(first: Place, last: Place) -> Place:
     if (first.file, first.line, first.expansions) != (last.file, last.line, last.expansions):
         return first
     end = last.column + last.length
-    length = end - first.column
-    return (
-        Place(first.file, first.line, first.column, length, first.expansions, first.included) if length > 0 else first
-    )
+    return replace(first, length=end - first.column) if end > first.column else first
