@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -22,6 +23,9 @@ PAUSE = 0.05
 SETTLED, LONGEST = 0.02, 0.5
 """Seconds without a change after which a file counts as written; and the most that are waited for that."""
 
+NAMED, MOST_NAMED = re.compile(rb"""["<]([^"<>\x00-\x1f]{1,200})/[^"<>/\r\n]{1,200}[">]"""), 100
+"""A file in another folder, as decks name one, included or read; and how many of a file are heeded."""
+
 Stamp = tuple[int, int, int] | None
 """Time, size and inode of a file; None where there is none."""
 
@@ -30,9 +34,11 @@ class DeckFiles:
     """The files and folders that are watched, as they were when they were last looked at."""
 
     def __init__(self, deck: Path, include_dirs: Sequence[str] = ()) -> None:
-        self._deck, self._folders = deck, [Path(each) for each in include_dirs]
+        more = [each for each in os.environ.get("MET_DECK_PATH", "").split(os.pathsep) if each]
+        self._deck, self._folders = deck, [Path(each) for each in (*include_dirs, *more)]
         self._stamps: dict[Path, Stamp] = {}
         self._digests: dict[Path, bytes] = {}
+        self._named: dict[Path, list[str]] = {}
         self._around: dict[Path, Stamp] = {}
         self._look(deck)
 
@@ -54,7 +60,7 @@ class DeckFiles:
         paths = dict.fromkeys([self._deck, *(path_of(name) for name in names if name != COMMAND_LINE)])
         new = [path for path in paths if path not in self._stamps]
         for path in [path for path in self._stamps if path not in paths]:
-            del self._stamps[path], self._digests[path]
+            del self._stamps[path], self._digests[path], self._named[path]
         for path in new:
             self._look(path)
         self._around |= {folder: _stamp(folder) for folder in self._all_folders() if folder not in self._around}
@@ -91,15 +97,26 @@ class DeckFiles:
         """Take a file as it is now. True where its bytes are others."""
         self._stamps[path] = _stamp(path)
         try:
-            digest = hashlib.sha256(read_regular(path)).digest()
+            text = read_regular(path)
         except OSError:
-            digest = b""
+            text = None
+        digest = b"" if text is None else hashlib.sha256(text).digest()
+        named = () if text is None or LIBRARY in path.parents else dict.fromkeys(NAMED.findall(text))
+        self._named[path] = [os.fsdecode(each) for each in [*named][:MOST_NAMED]]
         before = self._digests.get(path)
         self._digests[path] = digest
         return before is not None and before != digest
 
     def _all_folders(self) -> list[Path]:
-        return list(dict.fromkeys([*(path.parent for path in self._stamps), *self._folders]))
+        """Where a file is looked for: beside those that are watched, in the `-I` folders those of MET_DECK_PATH, and
+        in what a deck names of these, there or not."""
+        named = [
+            base / each
+            for path, names in self._named.items()
+            for base in (path.parent, *self._folders)
+            for each in names
+        ]
+        return list(dict.fromkeys([*(path.parent for path in self._stamps), *self._folders, *named]))
 
 
 def path_of(name: str) -> Path:

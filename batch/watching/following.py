@@ -56,6 +56,7 @@ class _Loop:
         self._is_broken = False
         self._cases: threading.Thread | None = None
         self._stop = threading.Event()
+        self._running = threading.Lock()
 
     def run(self) -> None:
         """Compile, show, wait; for ever."""
@@ -117,12 +118,18 @@ class _Loop:
 
         if stop.wait(HEAD_START_SECONDS):
             return
+        while not self._running.acquire(timeout=HEAD_START_SECONDS):  # a long case of an earlier deck is not cut short
+            if stop.is_set():
+                return
+            board.tell(page, doing="waiting for the end of a case of an earlier deck")
         try:
             for run in answers.run_cases(prepared, stop.is_set, progress):
                 board.show("numbers", answers.numbers(experiment, run), page)
             board.tell(page, doing="")
         except Problem as problem:
             board.tell(page, messages=_words(problem), doing="the cases were not run")
+        finally:
+            self._running.release()
 
 
 def _words(problem: Problem) -> str:

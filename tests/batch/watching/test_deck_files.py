@@ -96,3 +96,22 @@ def test_it_waits_until_a_file_is_written(files: DeckFiles) -> None:
 
 def test_it_waits_no_longer_when_something_else_has_happened(files: DeckFiles) -> None:
     files.wait(until=lambda: True)
+
+
+def test_a_file_that_is_looked_for_in_another_folder_is_noticed_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MET_DECK_PATH", "shared")
+    for folder in ("parts", "shared/servos", "elsewhere"):
+        Path(folder).mkdir(parents=True)
+    Path("deck.ic").write_text('#include "parts/a.ic"\n#include <servos/b.ic>\n#include "not/yet/c.ic"\n"\0/d"\n')
+    files = DeckFiles(Path("deck.ic"))
+    assert not files.found(("deck.ic",), files.begin())
+    assert not files.changed(around=True)
+    for name in ("parts/a.ic", "shared/servos/b.ic", "shared/e.ic", "not/yet/c.ic"):
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_text("let b = 1;\n")
+        assert files.changed(around=True) and not files.changed(around=True), name
+    Path("elsewhere/f.ic").write_text("let b = 1;\n")
+    assert not files.changed(around=True)

@@ -11,12 +11,18 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import ic
+from batch.watching import answers
+from batch.watching.answers import WatchedDeck
+from batch.watching.board import Board
+from batch.watching.following import _Loop
 from met import cli
 from met.messages.render import render
 from met.run import prepare, run
@@ -193,6 +199,31 @@ def test_a_deck_that_has_no_run_says_so_on_the_page(tmp_path: Path) -> None:
 
 
 # Several at once, and the end
+
+
+def test_of_a_deck_that_is_saved_again_and_again_the_cases_of_one_are_run_at_a_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    deck = write_deck(tmp_path)
+    begun, let = threading.Semaphore(0), threading.Event()
+
+    def endless(*_: object) -> Iterator[object]:
+        begun.release()
+        assert let.wait(60)
+        yield from ()
+
+    monkeypatch.setattr(answers, "run_cases", endless)
+    board = Board("deck.ic")
+    loop = _Loop(WatchedDeck(str(deck), deck), "brief", board)
+    loop._once()
+    assert begun.acquire(timeout=60)
+    for limit in ("3.5", "3.4", "3.3"):
+        deck.write_text(DECK.replace("3.55", limit))
+        loop._once()
+    assert not begun.acquire(timeout=1)
+    let.set()
+    assert begun.acquire(timeout=60) and not begun.acquire(timeout=1)  # of the last one alone
+    loop.give_up(60)
 
 
 def test_two_views_of_one_deck_and_two_pages_of_one_view_follow_it(tmp_path: Path) -> None:
