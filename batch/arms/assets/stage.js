@@ -305,7 +305,7 @@ MET.stage = (() => {
 
     // Where it is seen from and at which instant; and back there, on a page that takes another's place.
     const seenFrom = ({ azimuth, elevation, distance, target }) => ({ azimuth, elevation, distance, target });
-    const kept = () => ({ camera: seenFrom(camera), time, playing, rate, frames, ghostly });
+    const kept = () => ({ camera: seenFrom(camera), time, playing, rate, frames, ghostly, forceful, twinned });
 
     function resume(before) {
       const all = chosen ? pills(chosen, FITTED) : [];
@@ -315,6 +315,8 @@ MET.stage = (() => {
       speed.value = rate;
       if (before.frames !== frames) withFrames.click();
       if (before.ghostly !== ghostly) withOthers.click();
+      if (before.forceful !== forceful) withForces.click();
+      if (before.twinned !== twinned) withTwin.click();
       seek(before.time);
       if (before.playing) run(true);
     }

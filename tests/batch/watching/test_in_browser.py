@@ -68,7 +68,8 @@ def test_a_save_changes_the_run_and_leaves_the_view_where_it_was(chromium: Chrom
         page.drag([middle, (middle[0] + 60, middle[1] + 25)])  # the view is turned
         page.run(f"{RUN}.document.querySelector('.knob input').value = 0.4")
         page.run(f"{RUN}.document.querySelector('.knob input').dispatchEvent(new Event('input'))")
-        page.run(f"{RUN}.document.querySelectorAll('.stage .chip')[1].click()")  # frames
+        chips = f"[...{RUN}.document.querySelectorAll('.stage .chip')]"
+        page.run(f"{chips}.find((each) => each.textContent === 'frames').click()")
         page.run(f"{RUN}.scrollTo(0, 700)")
         page.settle()
         zoomed = page.run(f"(() => {{ const b = {RUN}.document.querySelector('.panel .u-over').getBoundingClientRect();"
