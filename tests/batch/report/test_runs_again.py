@@ -194,7 +194,7 @@ class TestInTheBrowser:
         assert page.run(f"{plots}.map(u => u.series.length - 1)") == [4, 4, 4, 2]
         assert page.run(f"{plots}[0].data.slice(1).map(line => line[0])") == pytest.approx([0.0, 30.0, 0.0, 40.0])
         assert page.run("[MET.models[0].stage().ghosts(), MET.models[0].stage().isStill()]")[0] == 1
-        assert page.run("document.querySelector('.stage .tools .chip').textContent") == "in a.h5"
+        assert page.run("document.querySelector('.stage .tools .chip:not([hidden])').textContent") == "in a.h5"
         page.run("""(() => { const e = document.querySelector('select.how'); e.value = 'change';
             e.dispatchEvent(new Event('change')); })()""")
         page.settle()
