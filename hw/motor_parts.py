@@ -6,18 +6,14 @@ A file is data of others: bounded, and each figure is a number with a unit of it
 from __future__ import annotations
 
 import os
-import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Any
 
-from met import units
-from met.diagnostic import Place, Problem, did_you_mean, error
+from hw.toml_file import TomlFile, quantity
+from met.diagnostic import Problem, did_you_mean, error
 from met.frozen import frozen
-from met.host.files import read_regular
-from met.unit_parser import parse_unit
 
 SHIPPED = Path(__file__).with_suffix(".toml")
 MOST_BYTES = 1 << 20
@@ -41,7 +37,6 @@ FIGURES: Mapping[str, str] = {
 _WORDS = ("name", "maker", "model", "source", "note")
 _BENCH = ("name", "drive", "load")
 _PART = ("name", "kind", "maker", "model", "source", "note")
-_QUANTITY = re.compile(r"\s*([\d.]+(?:[eE][+-]?\d+)?)\s*(\S.*?)\s*")
 
 
 @frozen
@@ -109,24 +104,12 @@ def parts_list(more: str | os.PathLike[str] | None = None) -> PartsList:
     return PartsList({name: motors[name] for name in names}, benches, others)
 
 
-class _File:
-    """One file of parts, and the places in it."""
+class _File(TomlFile):
+    """One file of parts."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.name = os.fspath(path)
-        data = read_regular(path, MOST_BYTES)
-        try:
-            self.text = data.decode()
-        except UnicodeDecodeError as reason:
-            raise Problem(error("E441", f"{self.name} is no text in UTF-8", help="a file of parts is TOML")) from reason
-        try:
-            self.tables = tomllib.loads(self.text)
-        except (tomllib.TOMLDecodeError, RecursionError) as reason:
-            line = re.search(r"at line (\d+), column (\d+)", str(reason))
-            message = re.sub(r" \(at .*\)$", "", str(reason))
-            at = None if line is None else Place(self.name, int(line[1]), int(line[2]), 1)
-            wrong = error("E441", f"{self.name} is no TOML: {message}", at, help="`met doc E441` shows a file of parts")
-            raise Problem(wrong, {self.name: self.text}) from reason
+        about = "`met doc E441` shows a file of parts"
+        super().__init__(path, code="E441", most=MOST_BYTES, kind="a file of parts is TOML", about=about)
 
     def parts(self) -> PartsList:
         for key in self.tables:
@@ -137,7 +120,9 @@ class _File:
         for number, table in enumerate(self._several("motor")):
             motor = self._motor(number, table)
             if motor.name in motors:
-                raise self.wrong(f"motor `{motor.name}` is there twice", "give each a name of its own", "motor", number)
+                raise self.wrong(
+                    f"motor `{motor.name}` is there twice", "give each a name of its own", "motor", number=number
+                )
             motors[motor.name] = motor
         benches: dict[str, Bench] = {}
         for number, table in enumerate(self._several("bench")):
@@ -146,7 +131,7 @@ class _File:
             for role in _BENCH[1:]:
                 if found[role] not in motors:
                     message = f"bench `{found['name']}`: there is no motor `{found[role]}` in this file"
-                    raise self.wrong(message, f"its motors: {', '.join(motors)}", "bench", number, role)
+                    raise self.wrong(message, f"its motors: {', '.join(motors)}", "bench", role, number)
             benches[found["name"]] = Bench(**found)
         return PartsList(motors, benches, self._others())
 
@@ -157,10 +142,10 @@ class _File:
             words = {key: self._text("part", number, table, key) for key in _PART if key in table}
             for key, why in (("name", "a name of its own"), ("kind", "what it is for"), ("source", "where it is from")):
                 if not words.get(key):
-                    raise self.wrong(f"part number {number + 1} has no `{key}`", why, "part", number)
+                    raise self.wrong(f"part number {number + 1} has no `{key}`", why, "part", number=number)
             if words["name"] in found:
                 raise self.wrong(
-                    f"part `{words['name']}` is there twice", "give each a name of its own", "part", number
+                    f"part `{words['name']}` is there twice", "give each a name of its own", "part", number=number
                 )
             found[words["name"]] = BenchPart(**words)
         return found
@@ -178,7 +163,7 @@ class _File:
         words = {key: self._text("motor", number, table, key) for key in _WORDS if key in table}
         for key, why in (("name", "`--drive` and `--load` call it so"), ("source", "say where its figures are from")):
             if not words.get(key):
-                raise self.wrong(f"motor number {number + 1} has no `{key}`", why, "motor", number)
+                raise self.wrong(f"motor number {number + 1} has no `{key}`", why, "motor", number=number)
         figures = {key: self._figure(number, table, key) for key in FIGURES if key in table}
         return MotorPart(**words, figures=figures, file=self.name)
 
@@ -186,45 +171,20 @@ class _File:
         for key in table:
             if key not in known:
                 helps = (*did_you_mean(key, known), f"a {kind} has {', '.join(known)}")
-                raise self.wrong(f"a {kind} has no `{key}`", helps, kind, number, key)
+                raise self.wrong(f"a {kind} has no `{key}`", helps, kind, key, number)
 
     def _text(self, kind: str, number: int, table: dict[str, Any], key: str) -> str:
         found = table.get(key)
         if not isinstance(found, str) or not found.isprintable():
             message = f"`{key}` of {kind} number {number + 1} is no text in a line"
-            raise self.wrong(message, f'`{key} = "..."`', kind, number, key)
+            raise self.wrong(message, f'`{key} = "..."`', kind, key, number)
         return found
 
     def _figure(self, number: int, table: dict[str, Any], key: str) -> float:
         """A quantity above zero, SI."""
         unit, value = FIGURES[key], table[key]
-        match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
         try:
-            if match is None:
-                raise ValueError
-            of = parse_unit(match[2])
-            found = of.to_si(float(match[1]), match[1])
-            if not units.same(of.dimension, parse_unit(unit).dimension) or not 0.0 < found < float("inf"):
-                raise ValueError
+            return quantity(value, unit)
         except ValueError:
             message = f"`{key}` is no quantity above zero in {unit}: {value!r}"
-            raise self.wrong(message, f'write `{key} = "1.5 {unit}"`', "motor", number, key) from None
-        return found
-
-    def wrong(
-        self, message: str, help: str | tuple[str, ...], kind: str = "", number: int = 0, key: str = ""
-    ) -> Problem:
-        """The error about a table's line, or that of a key of it."""
-        return Problem(error("E441", message, self._place(kind, number, key), help=help), {self.name: self.text})
-
-    def _place(self, kind: str, number: int, key: str) -> Place:
-        lines, at = self.text.split("\n"), 0
-        heads = [line for line, text in enumerate(lines) if kind and re.match(rf"\s*\[\[\s*{kind}\s*\]\]", text)]
-        if number < len(heads):
-            at = heads[number]
-        if key:
-            named = re.compile(rf"\s*\[*\s*{re.escape(key)}\b")
-            at = next((line for line in range(at, len(lines)) if named.match(lines[line])), at)
-        text = lines[at]
-        column = len(text) - len(text.lstrip()) + 1
-        return Place(self.name, at + 1, column, max(1, len(text.rstrip()) - column + 1))
+            raise self.wrong(message, f'write `{key} = "1.5 {unit}"`', "motor", key, number) from None

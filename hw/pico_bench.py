@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
-import tomllib
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -18,11 +16,9 @@ from typing import Any
 from hw.bed import Capability, Limits, Scales
 from hw.build import Config, Shaft, Uncountable, config_c
 from hw.interlock import Interlock
-from met import units
-from met.diagnostic import Place, Problem, did_you_mean, error
+from hw.toml_file import TomlFile, quantity
+from met.diagnostic import did_you_mean
 from met.frozen import frozen
-from met.host.files import read_regular
-from met.unit_parser import parse_unit
 
 SHIPPED = Path(__file__).with_name("firmware") / "pico" / "bench.toml"
 MOST_BYTES = 1 << 16
@@ -107,7 +103,6 @@ _TOGETHER = (
     ("interlock", "bus_full", "bus_least", "bus_most"),
 )
 _OPTIONAL = {("shaft", "rate_range"), *((table, key) for table, *keys in _TOGETHER for key in keys)}
-_QUANTITY = re.compile(r"\s*(-?[\d.]+(?:[eE][+-]?\d+)?)\s*(\S.*?)\s*")
 
 
 @frozen
@@ -257,33 +252,22 @@ def _bus(of: Mapping[str, Any]) -> tuple[int, int]:
     return math.ceil(least), math.floor(most)
 
 
-class _File:
-    """A bench's file, and the places in it."""
+class _File(TomlFile):
+    """A bench's file."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.name = os.fspath(path)
-        try:
-            self.text = read_regular(path, MOST_BYTES).decode()
-            self.tables = tomllib.loads(self.text)
-        except UnicodeDecodeError as reason:
-            raise Problem(error("E447", f"{self.name} is no text in UTF-8", help="a bench is TOML")) from reason
-        except (tomllib.TOMLDecodeError, RecursionError) as reason:
-            line = re.search(r"at line (\d+), column (\d+)", str(reason))
-            message = re.sub(r" \(at .*\)$", "", str(reason))
-            at = None if line is None else Place(self.name, int(line[1]), int(line[2]), 1)
-            wrong = error("E447", f"{self.name} is no TOML: {message}", at, help=_BEGIN)
-            raise Problem(wrong, {self.name: self.text}) from reason
+        super().__init__(path, code="E447", most=MOST_BYTES, kind="a bench is TOML", about=_BEGIN)
 
     def figures(self) -> dict[str, Any]:
         """All figures in SI, by `table.key`."""
         for table, keys in self.tables.items():
             if table not in _SCHEMA or not isinstance(keys, dict):
                 helps = [*did_you_mean(table, _SCHEMA), f"a bench has {', '.join(f'[{each}]' for each in _SCHEMA)}"]
-                raise self.wrong(f"a bench has no `{table}`", *helps, key=table)
+                raise self.wrong(f"a bench has no `{table}`", helps, key=table)
             for key in keys:
                 if key not in _SCHEMA[table]:
                     helps = [*did_you_mean(key, _SCHEMA[table]), f"it has {', '.join(_SCHEMA[table])}"]
-                    raise self.wrong(f"[{table}] has no `{key}`", *helps, table=table, key=key)
+                    raise self.wrong(f"[{table}] has no `{key}`", helps, table=table, key=key)
         found = {}
         for table, schema in _SCHEMA.items():
             given = self.tables.get(table, {})
@@ -313,35 +297,12 @@ class _File:
                 message = f"`{key}` is no {what[kind]}: {value!r}"
                 raise self.wrong(message, f"write `{key} = {shown[kind]}`", table=table, key=key)
             return value
-        match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
         try:
-            if match is None:
-                raise ValueError
-            of = parse_unit(match[2])
-            si: float = of.to_si(float(match[1]), match[1])
-            signed = key.startswith("angle")
-            if not units.same(of.dimension, parse_unit(kind).dimension) or not -math.inf < si < math.inf:
-                raise ValueError
-            if si <= 0.0 and not signed:
-                raise ValueError
+            return quantity(value, kind, signed=key.startswith("angle"))
         except ValueError:
             above = "" if key.startswith("angle") else " above zero"
             message = f"`{key}` is no quantity{above} in {kind}: {value!r}"
             raise self.wrong(message, f'write `{key} = "1.5 {kind}"`', table=table, key=key) from None
-        return si
-
-    def wrong(self, message: str, *helps: str, table: str = "", key: str = "") -> Problem:
-        """The error about a table's line, or that of a key of it."""
-        lines, at = self.text.split("\n"), 0
-        if table:
-            at = next((k for k, line in enumerate(lines) if re.match(rf"\s*\[\s*{table}\s*\]", line)), 0)
-        if key:
-            named = re.compile(rf"\s*\[*\s*{re.escape(key)}\b")
-            at = next((k for k in range(at, len(lines)) if named.match(lines[k])), at)
-        text = lines[at]
-        column = len(text) - len(text.lstrip()) + 1
-        place = Place(self.name, at + 1, column, max(1, len(text.rstrip()) - column + 1))
-        return Problem(error("E447", message, place, help=helps), {self.name: self.text})
 
 
 _BEGIN = "`met bed firmware --board pico --show` prints one to begin with"

@@ -6,17 +6,13 @@ A file is data of others: bounded, each key known, each figure a number with a u
 from __future__ import annotations
 
 import os
-import re
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from met import units
-from met.diagnostic import Place, Problem, did_you_mean, error
+from hw.toml_file import TomlFile, quantity
+from met.diagnostic import Place, did_you_mean
 from met.frozen import frozen
-from met.host.files import read_regular
-from met.unit_parser import parse_unit
 
 MOST_BYTES = 1 << 16
 
@@ -52,7 +48,6 @@ _WORDS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "load": {"dialect": (), "endpoints": ()},
 }
 _TABLES = ("bus", *FIGURES)
-_QUANTITY = re.compile(r"\s*([\d.]+(?:[eE][+-]?\d+)?)\s*(\S.*?)\s*")
 
 
 @frozen
@@ -95,24 +90,12 @@ def two_drives(path: str | os.PathLike[str]) -> TwoDrives:
     return _BenchFile(path).bench()
 
 
-class _BenchFile:
-    """One bench file, and the places in it."""
+class _BenchFile(TomlFile):
+    """One bench file."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.name = os.fspath(path)
-        data = read_regular(path, MOST_BYTES)
-        try:
-            self.text = data.decode()
-        except UnicodeDecodeError:
-            raise Problem(error("E446", f"{self.name} is no text in UTF-8", help="a bench file is TOML")) from None
-        try:
-            self.tables = tomllib.loads(self.text)
-        except (tomllib.TOMLDecodeError, RecursionError) as reason:
-            line = re.search(r"at line (\d+), column (\d+)", str(reason))
-            message = re.sub(r" \(at .*\)$", "", str(reason))
-            at = None if line is None else Place(self.name, int(line[1]), int(line[2]), 1)
-            wrong = error("E446", f"{self.name} is no TOML: {message}", at, help="docs/drives.md shows a bench file")
-            raise Problem(wrong, {self.name: self.text}) from None
+        about = "docs/drives.md shows a bench file"
+        super().__init__(path, code="E446", most=MOST_BYTES, kind="a bench file is TOML", about=about)
 
     def bench(self) -> TwoDrives:
         for key, value in self.tables.items():
@@ -133,8 +116,8 @@ class _BenchFile:
                 f"drive and load are both node {load.node}", "each has a number of its own", "load", "node"
             )
         shaft, supply = self._figures("shaft"), self._figures("supply")
-        filter_at = self._place("shaft", "filter") if "filter" in self.tables["shaft"] else None
-        return TwoDrives(name, self._bus(), shaft, supply, drive, load, filter_at, self._place("load", "kt"), self.text)
+        filter_at = self.place("shaft", "filter") if "filter" in self.tables["shaft"] else None
+        return TwoDrives(name, self._bus(), shaft, supply, drive, load, filter_at, self.place("load", "kt"), self.text)
 
     def _bus(self) -> dict[str, Any]:
         found = self.tables["bus"]
@@ -177,18 +160,11 @@ class _BenchFile:
         value = self.tables[table].get(key)
         if value is None and default is not None:
             return default
-        match = _QUANTITY.fullmatch(value) if isinstance(value, str) else None
         try:
-            if match is None:
-                raise ValueError
-            of = parse_unit(match[2])
-            found = float(of.to_si(float(match[1]), match[1]))
-            if not units.same(of.dimension, parse_unit(unit).dimension) or not 0.0 < found < float("inf"):
-                raise ValueError
-        except (ValueError, OverflowError):
+            return quantity(value, unit)
+        except ValueError:
             message = f"`{key}` of `[{table}]` is no quantity above zero in {unit}"
             raise self.wrong(message, f'write `{key} = "1.5 {unit}"`', table, key) from None
-        return found
 
     def _word(self, table: str, key: str, default: str | None) -> str:
         found, known = self.tables[table].get(key, default), _WORDS[table][key]
@@ -196,20 +172,3 @@ class _BenchFile:
             helps = f"one of: {', '.join(known)}" if known else f'`{key} = "..."`'
             raise self.wrong(f"`{key}` of `[{table}]` is missing, or is none that there is", helps, table, key)
         return found
-
-    def wrong(self, message: str, help: str | tuple[str, ...], table: str = "", key: str = "") -> Problem:
-        """The error about a table's line, or that of a key of it."""
-        return Problem(error("E446", message, self._place(table, key), help=help), {self.name: self.text})
-
-    def _place(self, table: str, key: str) -> Place:
-        """A table's line, or that of a key of it."""
-        lines, at = self.text.split("\n"), 0
-        head = re.compile(rf"\s*\[\s*{re.escape(table)}\s*\]") if table else None
-        if head is not None:
-            at = next((line for line, text in enumerate(lines) if head.match(text)), 0)
-        if key:
-            named = re.compile(rf"\s*\[*\s*{re.escape(key)}\b")
-            at = next((line for line in range(at, len(lines)) if named.match(lines[line])), at)
-        text = lines[at]
-        column = len(text) - len(text.lstrip()) + 1
-        return Place(self.name, at + 1, column, max(1, len(text.rstrip()) - column + 1))
