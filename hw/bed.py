@@ -23,7 +23,7 @@ from typing import Self
 
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
-from met.substitution.bed import Drive
+from met.substitution.bed import DriveCommand
 
 
 class BedState(enum.IntEnum):
@@ -138,7 +138,7 @@ class About:
     deadman: float
     scales: Scales
     limits: Limits
-    drive: Drive = "voltage"
+    drive: DriveCommand = "voltage"
 
 
 @frozen

@@ -17,7 +17,7 @@ from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import Experiment
 from met.plant import bed_values
-from met.substitution.bed import Drive
+from met.substitution.bed import DriveCommand
 
 
 @frozen
@@ -62,7 +62,7 @@ class Opening:
         return self.experiment
 
     @property
-    def drive(self) -> Drive | None:
+    def drive(self) -> DriveCommand | None:
         """What the deck's bed model sends the drive; None where no deck was given."""
         if self.experiment is None:
             return None

@@ -27,7 +27,7 @@ from hw.drives import DIALECTS
 from hw.drives.arming import begin_driving, forget, prove_watchdogs, switch_off
 from hw.drives.bench_file import TwoDrives, two_drives
 from hw.drives.bus import PythonCanLine
-from hw.drives.drive import ASKS, Drive, DriveReading, DriveState, Talk
+from hw.drives.drive import ASKS, CanDrive, DriveReading, DriveState, Talk
 from hw.drives.frames import FAST, NOMINAL, CanFrame, CanLine, on_bus
 from hw.drives.side import Side, agree
 from hw.ports import Opening, PortKind
@@ -35,7 +35,7 @@ from hw.protocol import messages
 from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
 from met.plan import Experiment
 from met.substitution import butterworth
-from met.substitution.bed import Drive as DriveKind
+from met.substitution.bed import DriveCommand
 
 LONGEST_SHARE = 0.8
 """Largest share of a period that the frames of an exchange may take on the bus."""
@@ -68,11 +68,11 @@ class CanBed(BedDriver):
     def __init__(
         self,
         bench: TwoDrives,
-        drives: tuple[Drive, Drive],
+        drives: tuple[CanDrive, CanDrive],
         open_line: Callable[[], CanLine],
         *,
         period: float,
-        drive: DriveKind = "voltage",
+        drive: DriveCommand = "voltage",
     ) -> None:
         self._kind = drive
         self._bench, self._drives, self._open, self.period = bench, drives, open_line, period

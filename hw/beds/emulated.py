@@ -18,7 +18,7 @@ from hw.ports import Opening, PortKind
 from hw.protocol import messages
 from met.diagnostic import Problem, error
 from met.plant import Plant
-from met.substitution.bed import SIMULATION_PARAMETERS, Drive
+from met.substitution.bed import SIMULATION_PARAMETERS, DriveCommand
 
 FINE = 2.0**-20
 """V, A or rad/s of a count where the bed's converter has no resolution. Commands reach 2047 of the unit, and a
@@ -54,7 +54,7 @@ class SteppedPlant(Protocol):
     def shaft_angle(self) -> float: ...
 
 
-def scales(values: Mapping[str, float], drive: Drive = "voltage") -> Scales:
+def scales(values: Mapping[str, float], drive: DriveCommand = "voltage") -> Scales:
     """The counts of a bed with these parameters (met.substitution.bed): a count is a step of its converters."""
     volts, amperes, rate = (
         values.get(name, 0.0) or FINE for name in (f"converter_{drive}", "converter_current", "converter_in")
@@ -90,7 +90,7 @@ class EmulatedBed(BedDriver):
         *,
         name: str = "emulated",
         bears: float | None = None,
-        drive: Drive = "voltage",
+        drive: DriveCommand = "voltage",
     ) -> None:
         self._plant, self._name, self._scales, self._limits, self._drive = plant, name, scales, limits, drive
         self._bears = limits.current if bears is None else bears

@@ -15,7 +15,7 @@ import struct
 from collections.abc import Sequence
 
 from hw.drives.bench_file import DriveEntry
-from hw.drives.drive import Drive, DriveFacts, DriveReading, DriveState, Talk
+from hw.drives.drive import CanDrive, DriveFacts, DriveReading, DriveState, Talk
 from hw.drives.frames import CanFrame
 
 NMT, SYNC, EMERGENCY, TPDO1, RPDO1, TPDO2, SDO_ANSWER, SDO_ASK, HEARTBEAT = (
@@ -53,7 +53,7 @@ OFF, SHUT_DOWN, SWITCH_ON, ENABLE, RESET = 0x00, 0x06, 0x07, 0x0F, 0x80
 _TURN = 2.0 * math.pi
 
 
-class Cia402Drive(Drive):
+class Cia402Drive(CanDrive):
     """The host's side of a CiA 402 drive."""
 
     dialect = "cia402"

@@ -16,7 +16,7 @@ import struct
 from collections.abc import Sequence
 
 from hw.drives.bench_file import DriveEntry
-from hw.drives.drive import ASKS, Drive, DriveFacts, DriveReading, DriveState, Talk
+from hw.drives.drive import ASKS, CanDrive, DriveFacts, DriveReading, DriveState, Talk
 from hw.drives.frames import CanFrame
 from hw.drives.mit import STEPS_12, STEPS_16, count_of, packed, value_of
 
@@ -54,7 +54,7 @@ ANSWERS_HZ = 1000.0
 """Rate at which two such drives answer on a bus of 1 Mbit/s."""
 
 
-class DamiaoDrive(Drive):
+class DamiaoDrive(CanDrive):
     """The host's side of a Damiao drive."""
 
     dialect = "damiao"

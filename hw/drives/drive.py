@@ -74,7 +74,7 @@ class DriveFacts:
     supply_max: float = 0.0
 
 
-class Drive(ABC):
+class CanDrive(ABC):
     """The host's side of one drive.
 
     reading   the last answer; None before the first
@@ -155,7 +155,7 @@ class Drive(ABC):
 class Talk:
     """A line with the drives on it: what comes is given to them all."""
 
-    def __init__(self, line: CanLine, drives: Sequence[Drive]) -> None:
+    def __init__(self, line: CanLine, drives: Sequence[CanDrive]) -> None:
         self.line, self.drives = line, drives
         self.strange: dict[int, int] = {}
         """Frames that no drive has taken, by identifier: what is said where a drive does not answer."""
@@ -186,7 +186,7 @@ class Talk:
                 return True
         return False
 
-    def silent(self, drive: Drive, what: str) -> Problem:
+    def silent(self, drive: CanDrive, what: str) -> Problem:
         """The error for a drive that does not answer a question of its greeting."""
         message = f"no {drive.dialect} answers {what} as {drive.words} on the bus"
         if not self.strange:

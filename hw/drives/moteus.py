@@ -15,7 +15,7 @@ import struct
 from collections.abc import Sequence
 
 from hw.drives.bench_file import DriveEntry
-from hw.drives.drive import Drive, DriveFacts, DriveReading, DriveState, Talk
+from hw.drives.drive import CanDrive, DriveFacts, DriveReading, DriveState, Talk
 from hw.drives.frames import CanFrame
 
 ASKS_ANSWER = 0x8000
@@ -124,7 +124,7 @@ def _number(data: bytes, at: int) -> tuple[int, int]:
 _STATE = asked_for(FLOAT, MODE, 3) + asked_for(FLOAT, POWER) + asked_for(FLOAT, VOLTAGE) + asked_for(INT8, FAULT)
 
 
-class MoteusDrive(Drive):
+class MoteusDrive(CanDrive):
     """The host's side of a moteus."""
 
     dialect = "moteus"

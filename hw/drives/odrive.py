@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hw.drives.bench_file import DriveEntry
-from hw.drives.drive import ASKS, Drive, DriveFacts, DriveReading, DriveState, Talk
+from hw.drives.drive import ASKS, CanDrive, DriveFacts, DriveReading, DriveState, Talk
 from hw.drives.frames import CanFrame
 from met.host.files import read_regular
 
@@ -88,7 +88,7 @@ NEEDED = (
 )
 
 
-class OdriveDrive(Drive):
+class OdriveDrive(CanDrive):
     """The host's side of an ODrive's axis."""
 
     dialect = "odrive"

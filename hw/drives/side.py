@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from hw.drives.drive import Drive, DriveFacts, DriveReading
+from hw.drives.drive import CanDrive, DriveFacts, DriveReading
 
 LONGEST_STEP = 0.05
 """Longest time between two samples of which one is still held against the other, s."""
@@ -25,7 +25,7 @@ class Side:
     angle  rad, without jumps, from what it was at the greeting;  rate: rad/s;  time: s of the line's clock
     """
 
-    def __init__(self, drive: Drive, facts: DriveFacts) -> None:
+    def __init__(self, drive: CanDrive, facts: DriveFacts) -> None:
         self.drive, self.facts = drive, facts
         self.angle = self.rate = self.time = 0.0
         self.zero_unsure = 0.0

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from ic.editor.expansions import MacrosInTexts
 from ic.editor.structure import LETS, UNIT, DeckText, TextEntry, flattened, innermost_around
-from ic.editor.used import DEFINED, UsedDecks, uses_in
+from ic.editor.used import DEFINED, DecksUsed, uses_in
 from ic.grammar.uses import USE
 from ic.language import OF_A_RUN
 from ic.text.lexer import NAME, NUMBERS, Token
@@ -85,7 +85,7 @@ class NamesInTexts:
     def __init__(self, texts: Iterable[DeckText], made: Mapping[tuple[str, str], Sequence[str]] = NOTHING_MADE) -> None:
         self._made = made
         self.texts = tuple(texts)
-        self.used = UsedDecks(self.texts)
+        self.used = DecksUsed(self.texts)
         self.macros = MacrosInTexts(self.texts)
         self.by_name: dict[str, list[NameInText]] = {}
         for text in self.texts:

@@ -48,7 +48,7 @@ def used_files(text: str) -> set[str]:
     return {os.path.basename(quoted or angled) for quoted, angled in _USE.findall(text)}
 
 
-class UsedDecks:
+class DecksUsed:
     """Which texts a name may be of: those that includes connect, and behind roofs those that these stand for.
 
     A text that no other one is seen to include or use, for a macro names its file, counts as a part of the first.

@@ -31,7 +31,7 @@ from met.plan.channel import recordable
 from met.run import prepare, run
 from met.servos.motor import Motor
 from met.substitution import bed_scale
-from met.substitution.bed import Drive
+from met.substitution.bed import DriveCommand
 from met.substitution.bed_scale import BedScale
 
 BLOCK_BYTES = 128 << 20
@@ -157,9 +157,9 @@ def _recording(experiment: Experiment, joint: str, names: Sequence[str]) -> Expe
     return replace(experiment, structure=replace(structure, record=record, schedule=schedule))
 
 
-def drive_of(use: Substitution) -> Drive:
+def drive_of(use: Substitution) -> DriveCommand:
     """What the drive of a joint's bed is told."""
-    told: Drive = models.find("bed", use.bed, use.place).drive
+    told: DriveCommand = models.find("bed", use.bed, use.place).drive
     return told
 
 

@@ -31,17 +31,17 @@ class Wire:
         return self.drive
 
 
-Drive = Literal["voltage", "torque", "rate"]
+DriveCommand = Literal["voltage", "torque", "rate"]
 """The quantity that the drive of a bed is told: where the servo's law ends and the drive's begins."""
 
-DRIVES: Mapping[Drive, tuple[str, str]] = {
+DRIVES: Mapping[DriveCommand, tuple[str, str]] = {
     "voltage": ("V", "all of the servo's law is ours: its voltage is on the drive motor"),
     "torque": ("N*m", "the drive has a current loop of its own: it is told the torque of the motor"),
     "rate": ("rad/s", "the drive has a rate loop of its own: it is told the rate of the shaft"),
 }
 """Unit of each, and what the drive then does itself."""
 
-SENT: tuple[Drive, ...] = ("voltage", "torque")
+SENT: tuple[DriveCommand, ...] = ("voltage", "torque")
 """What laws send. They know the motor's torque by it, so a drive that is told a rate has none that they know of."""
 
 Draw = Callable[[str], Real]
@@ -85,7 +85,7 @@ MEMORY = (Memory(name="shaft_rate", unit="rad/s", doc="rate of the shaft itself"
 reads; without it the encoder stays at 0."""
 
 
-def of_bed(drive: Drive) -> tuple[tuple[str, str, str], ...]:
+def of_bed(drive: DriveCommand) -> tuple[tuple[str, str, str], ...]:
     """Name, unit and meaning of what the engine holds of a bed, besides the memory of its model."""
     meaning = "voltage that is on the drive motor" if drive == "voltage" else f"{drive} that the drive is told"
     return (f"drive_{drive}", DRIVES[drive][0], meaning), ("load_current", "A", "current that is in the load motor")
@@ -114,7 +114,7 @@ class BedModel:
     read: Callable[[Any, Any], Real]
     taken: Callable[[Any, Wire], tuple[Wire, Truth]]
     presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    drive: Drive = "voltage"
+    drive: DriveCommand = "voltage"
 
     @property
     def shown(self) -> tuple[tuple[str, str, str], ...]:

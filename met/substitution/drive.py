@@ -12,7 +12,7 @@ from __future__ import annotations
 from met.servos import motor as motors
 from met.servos.motor import Motor
 from met.substitution.balance import Balanced
-from met.substitution.bed import Drive
+from met.substitution.bed import DriveCommand
 from met.trace import Real, clip, where
 
 LEAST = 1e-8
@@ -20,14 +20,14 @@ LEAST = 1e-8
 friction a bed whose drive is told a torque has none. Rounding and error are then of that size."""
 
 
-def bed_torque(drive: Drive, motor: Motor, command: Real, w: Real) -> Real:
+def bed_torque(drive: DriveCommand, motor: Motor, command: Real, w: Real) -> Real:
     """Torque of the bed's motor that is held at a command, N m: at a voltage at w rad/s."""
     if drive == "voltage":
         return motors.torque(motor.kt, motor.resistance, motor.tau_max, command, w)
     return clip(command, -motor.tau_max, motor.tau_max)
 
 
-def bed_damping(drive: Drive, motor: Motor, inertia: Real, time: float) -> Real:
+def bed_damping(drive: DriveCommand, motor: Motor, inertia: Real, time: float) -> Real:
     """Torque that brakes the bed's shaft for each unit of its rate, N m s/rad: above 0, for closed forms over `time`
     s."""
     return motor.damping if drive == "voltage" else at_least(motor.f_v, LEAST * inertia / time)

@@ -16,7 +16,7 @@ from hw.players import PLAYED
 from hw.players.odrive import endpoints
 from hw.players.player import PlayedBench, PlayedLine
 from hw.players.shaft import InertiaShaft
-from met.substitution.bed import Drive
+from met.substitution.bed import DriveCommand
 
 KT, RESISTANCE, INERTIA = 0.06, 1.5, 1.3e-4
 
@@ -76,14 +76,14 @@ def played_bench(dialect: str = "odrive") -> PlayedBench:
 
 
 def host_on(
-    bench: TwoDrives, open_line: Callable[[], CanLine], period: float = 1e-3, drive: Drive = "voltage"
+    bench: TwoDrives, open_line: Callable[[], CanLine], period: float = 1e-3, drive: DriveCommand = "voltage"
 ) -> CanBed:
     """The host's side of a bench, on lines that `open_line` gives."""
     one, other = (DIALECTS[entry.dialect](entry) for entry in (bench.drive, bench.load))
     return CanBed(bench, (one, other), open_line, period=period, drive=drive)
 
 
-def host_of(bench: TwoDrives, line: PlayedLine, period: float = 1e-3, drive: Drive = "voltage") -> CanBed:
+def host_of(bench: TwoDrives, line: PlayedLine, period: float = 1e-3, drive: DriveCommand = "voltage") -> CanBed:
     """The host's side of a bench, on a line."""
     return host_on(bench, lambda: line, period, drive)
 
