@@ -21,7 +21,7 @@ STAND = 5
 
 @frozen(kw_only=True)
 class Interlock:
-    """What a bed's interlock goes by.
+    """The numbers that a bed's interlock goes by.
 
     key                      a person's key has to be turned before it arms
     settle                   s within which the read-back of the amplifiers' enable follows

@@ -63,7 +63,7 @@ class Opening:
 
     @property
     def drive(self) -> DriveCommand | None:
-        """What the deck's bed model sends the drive; None where no deck was given."""
+        """The quantity that the deck's bed model sends the drive; None where no deck was given."""
         if self.experiment is None:
             return None
         use = next(each for each in self.experiment.structure.substitutions if each.joint == self.joint)

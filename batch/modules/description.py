@@ -85,7 +85,7 @@ def _inputs(experiment: Experiment) -> list[dict[str, Any]]:
 
 
 def described_columns(experiment: Experiment) -> list[dict[str, Any]]:
-    """Of each number of a row its channel, the signal that it is of, its SI unit."""
+    """The channel of each number of a row, the signal that it is of, and its SI unit."""
     found = []
     for recorded in experiment.structure.record:
         count = len(recorded.channels)

@@ -51,7 +51,7 @@ SHOWN = 40
 
 @frozen
 class MeasuredSignals:
-    """What a log has of a run: by channel its times (s, rising) and its numbers in SI, nan where there is none.
+    """A log's signals of a run: by channel the times (s, rising) and the numbers in SI, nan where there is none.
 
     told    the columns that are shown, with their units; and where times count from
     unused  columns or topics that are not shown
@@ -155,7 +155,7 @@ class _Log:
                 raise self.problem(f"has more than {MOST_NUMBERS:,} numbers that are shown", "thin it out")
 
     def reading(self, channel: Any) -> Reading | None:
-        """What takes the numbers out of a channel's messages; None where they are none of the run's."""
+        """A reader of the numbers in a channel's messages; None where they are none of the run's."""
         schema = self.schemas.get(channel.schema_id)
         if channel.message_encoding == "json":
             return self.joint_states
@@ -301,7 +301,7 @@ def _uncompressed(chunk: Any) -> bytes:
 
 
 def _unpacking_errors() -> tuple[type[Exception], ...]:
-    """What the unpackers raise: lz4 a RuntimeError, zstandard its own."""
+    """The errors that the unpackers raise: lz4 a RuntimeError, zstandard its own."""
     import zstandard
 
     return zstandard.ZstdError, RuntimeError, EOFError

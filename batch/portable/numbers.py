@@ -78,7 +78,7 @@ def varied(run: GivenRun) -> VariedRun:
 
 
 def limits(run: VariedRun) -> list[dict[str, Any]]:
-    """Of each input the least and largest number that the deck's checks allow while the others are the deck's, and
+    """The least and largest number of each input that the deck's checks allow while the others are the deck's, and
     what they say beyond: SI."""
     first = {each.path: np.asarray(each.values[:1], float) for each in run.experiment.cases.coordinates}
 

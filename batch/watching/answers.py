@@ -65,7 +65,7 @@ class WatchedDeck:
 
 @frozen
 class DeckAnswer:
-    """What came of compiling a deck.
+    """The outcome of compiling a deck.
 
     messages    in the words of `met check`; "" where it has nothing to say
     experiment  the run or sweep that is shown, of the plan; None where an error stands in its way
@@ -164,7 +164,7 @@ def run_cases(
 
 
 def numbers(experiment: Experiment, run: Run) -> str:
-    """What came of the cases so far, as the page's script takes it: JSON."""
+    """The outcome of the cases so far, as the page's script takes it: JSON."""
     count, done = len(shown_rows(experiment)), len(run.case)
     status = np.full(count, NOT_YET)
     status[:done] = run.status

@@ -76,7 +76,7 @@ class Board:
         return self._chosen is not None
 
     def take_chosen(self) -> tuple[str, str | None] | None:
-        """What was chosen on the page since it was last asked for."""
+        """The choice that was made on the page since it was last asked for."""
         with self._changed:
             chosen, self._chosen = self._chosen, None
             return chosen

@@ -46,7 +46,7 @@ def follow(deck: WatchedDeck, name: str | None, *, port: int, ready: Callable[[s
 
 
 class _Loop:
-    """What is shown, and the thread that runs its cases. name, group: what was asked for, or chosen on the page."""
+    """The run that is shown, and the thread that runs its cases. name, group: asked for, or chosen on the page."""
 
     def __init__(self, deck: WatchedDeck, name: str | None, board: Board) -> None:
         self._deck, self._name, self._board = deck, name, board

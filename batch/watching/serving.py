@@ -70,7 +70,7 @@ class PageServer(ThreadingHTTPServer):
 
     @property
     def address(self) -> str:
-        """Of the page, for a browser on this machine."""
+        """The page's address, for a browser on this machine."""
         return f"http://{HOST}:{self.server_port}/{self.token}/"
 
     def begin(self) -> None:
@@ -142,7 +142,7 @@ class _Request(BaseHTTPRequestHandler):
             self._refuse(HTTPStatus.BAD_REQUEST)
 
     def _asked(self, posted: bool = False) -> tuple[str | None, int]:
-        """What is asked for, behind the token, and of which number; None where it was refused."""
+        """The thing that is asked for behind the token, and its number; None where it was refused."""
         hosts = self.headers.get_all("Host") or []
         if len(hosts) != 1 or hosts[0] not in self.server.hosts:
             return self._refuse(HTTPStatus.MISDIRECTED_REQUEST)

@@ -359,7 +359,7 @@ class CanBed(BedDriver):
         raise Problem(error("E406", f"bed `{about.name}`: {refusals.words(what)}", help=refusals.remedies(what)))
 
     def _answered(self, since: float) -> bool:
-        """Whether both drives have answered since a time, s."""
+        """True where both drives have answered since a time, s."""
         return all(drive.reading is not None and drive.reading.time >= since for drive in self._drives)
 
     def _follow(self) -> None:

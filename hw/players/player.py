@@ -38,11 +38,11 @@ class PlayedDrive(ABC):
     @property
     @abstractmethod
     def bridge(self) -> Output:
-        """What its bridge does, in its own sense."""
+        """The work of its bridge, in its own sense."""
 
     @property
     def output(self) -> Output:
-        """What its bridge does, in the shaft's sense."""
+        """The work of its bridge, in the shaft's sense."""
         out = self.bridge
         return Output(out.kind, self.sense * out.value) if out.value else out
 
@@ -82,7 +82,7 @@ class PlayedBench:
 
     @property
     def off(self) -> bool:
-        """Whether no drive drives."""
+        """True where no drive drives."""
         return all(drive.output == OFF or drive.output.kind == "short" for drive in self.drives)
 
 

@@ -10,7 +10,7 @@ from met.frozen import frozen
 
 @frozen
 class Output:
-    """What a drive's bridge does: `off`, a `torque` (N m), or `short`, its windings shorted."""
+    """The work of a drive's bridge: `off`, a `torque` (N m), or `short`, its windings shorted."""
 
     kind: str = "off"
     value: float = 0.0

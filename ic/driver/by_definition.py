@@ -91,7 +91,7 @@ class DefinitionChecks:
 
     @property
     def findings(self) -> Known:
-        """What is to be brought along next time. Nothing where files are looked for whose texts no key has."""
+        """The findings to be brought along next time. Nothing where files are looked for whose texts no key has."""
         if self._definitions.csv_files.asked or self._definitions.robot_files.asked:
             return {}
         return {key: self._found[n] for n, key in enumerate(self._keys) if key is not None and n in self._found}

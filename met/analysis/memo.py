@@ -44,7 +44,7 @@ class AnalysisMemo:
 
     @property
     def so_far(self) -> dict[bytes, Any]:
-        """What was asked for, and before it what was brought along and may be asked for yet: no more than `MOST`, of
-        whom the first leave."""
+        """The answers that were asked for, and before them those that were brought along and may be asked for yet: no
+        more than `MOST`, of which the first leave."""
         found = {**{key: each for key, each in self._known.items() if key not in self.asked}, **self.asked}
         return dict(list(found.items())[-MOST:])

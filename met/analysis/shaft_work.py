@@ -158,7 +158,7 @@ def _recording(experiment: Experiment, joint: str, names: Sequence[str]) -> Expe
 
 
 def drive_of(use: Substitution) -> DriveCommand:
-    """What the drive of a joint's bed is told."""
+    """The quantity that the drive of a joint's bed is told."""
     told: DriveCommand = models.find("bed", use.bed, use.place).drive
     return told
 

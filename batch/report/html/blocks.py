@@ -181,7 +181,7 @@ def _flows(found: Sequence[RequirementFlow]) -> Html | None:
 
 
 def _moves(found: Sequence[RequirementFlow], *, better: bool) -> Html:
-    """What came out better now, or what came out worse: a row for each requirement by which any case did."""
+    """The requirements that come out better now, or worse, in any case: a row for each."""
     rows = []
     for each in found:
         crossed, moved = (each.gained, each.better) if better else (each.lost, each.worse)

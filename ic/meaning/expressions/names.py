@@ -38,7 +38,7 @@ def _if_a_unit(help: str) -> Help:
 
 @frozen
 class FoundNames:
-    """What names were found to be worth: `let`s, cells of tables by the paths that asked for them, and the numbers of
+    """The values that names were found to have: `let`s, cells of tables by the paths that asked for them, and the numbers of
     such cells by identity."""
 
     worth: Mapping[str, Value | ValueList | Problem]
@@ -75,7 +75,7 @@ class Names:
 
     @property
     def found(self) -> FoundNames:
-        """What was found so far."""
+        """The values that were found so far."""
         return FoundNames(self._worth, self.cells, self._read)
 
     def take_over(self, found: FoundNames) -> None:
