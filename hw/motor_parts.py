@@ -67,7 +67,7 @@ class Bench:
 
 @frozen
 class BenchPart:
-    """A part that a bench needs besides motors, in words. kind: amplifier, drive, supply, brake resistor, encoder ..."""
+    """A part that a bench needs besides motors, in words. kind: amplifier, supply, brake resistor, encoder ..."""
 
     name: str
     kind: str

@@ -76,7 +76,7 @@ class Side:
         )
 
     def goes_on(self, reading: DriveReading, acceleration: float) -> bool:
-        """True where an answer goes on from the one before: neither angle nor rate has jumped by more than twice of what
+        """True where an answer goes on from the one before: neither angle nor rate has jumped by more than twice what
         the largest acceleration (rad/s^2) makes of the time between. After a pause anything does."""
         time = reading.time - self.time
         if not 0.0 <= time <= LONGEST_STEP:
@@ -89,7 +89,7 @@ class Side:
 
 
 def agree(sides: tuple[Side, Side], readings: tuple[DriveReading, DriveReading], acceleration: float) -> bool:
-    """True where two drives on one shaft say the same of it, at once, and what goes on from before: their angles and rates
+    """True where two drives on one shaft say the same of it, at once, and go on from before: their angles and rates
     differ by no more than the largest acceleration (rad/s^2) makes of the time between their samples, and by the steps
     in which they are told."""
     (one, other), (first, second) = sides, readings

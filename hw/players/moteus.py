@@ -14,8 +14,8 @@ _KINDS = {0: ("b", 1), 1: ("h", 2), 2: ("i", 4), 3: ("f", 4)}
 
 
 def _subframes(data: bytes) -> tuple[dict[int, float], list[tuple[int, int, int]]]:
-    """The values that a frame writes, by register, and its questions: head, first register, how many. IndexError, KeyError and
-    struct.error where it breaks off or is none."""
+    """The values that a frame writes, by register, and its questions: head, first register, how many. IndexError,
+    KeyError and struct.error where it breaks off or is none."""
     told: dict[int, float] = {}
     asked = []
     at = 0

@@ -38,8 +38,8 @@ def _if_a_unit(help: str) -> Help:
 
 @frozen
 class FoundNames:
-    """The values that names were found to have: `let`s, cells of tables by the paths that asked for them, and the numbers of
-    such cells by identity."""
+    """The values that names were found to have: `let`s, cells of tables by the paths that asked for them, and the
+    numbers of such cells by identity."""
 
     worth: Mapping[str, Value | ValueList | Problem]
     cells: Mapping[str, tuple[CsvCell, ...]]
