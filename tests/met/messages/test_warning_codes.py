@@ -15,8 +15,8 @@ SPOKEN = ("warn", "remark", "_warning")
 ELSEWHERE = {"D003", "D015", "D317", "D318", "D319", "D320", "D322"}
 """Given by a function that is chosen, `tell`, an error or a warning; or by a code that is chosen, of a step or loop."""
 
-OF_NO_RUN = {"D333", "E405"}
-"""Of an `allow` that silences nothing, and of a computer's serial line."""
+OF_NO_RUN = {"D333", "E405", "E444"}
+"""Of an `allow` that silences nothing, of a computer's serial line, and of a bench's file."""
 
 
 def in_the_source() -> Iterator[str]:
