@@ -442,7 +442,7 @@ def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
 
 
 def _sources(kind: Kind, *, plant: bool) -> list[Path]:
-    folders = ["core", *(["plant"] if plant else []), *([kind] if kind in _CROSS else [])]
+    folders = ["core", *(["plant"] if plant else []), *(["bare", kind] if kind in _CROSS else [])]
     found = [path for folder in folders for path in sorted((FIRMWARE / folder).glob("*.c"))]
     if kind == "pico":
         found.remove(FIRMWARE / "pico" / ("port.c" if plant else "simulated.c"))

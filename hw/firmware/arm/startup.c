@@ -1,5 +1,4 @@
-/* From reset to main on a Cortex-M3, and the three functions that a compiler may call unasked. No library behind it. */
-#include <stddef.h>
+/* From reset to main on a Cortex-M3. */
 #include <stdint.h>
 
 #include "lm3s6965.h"
@@ -7,9 +6,6 @@
 extern uint32_t stack_top, data_start, data_end, data_load, bss_start, bss_end;
 
 void reset(void);
-void *memcpy(void *to, const void *from, size_t count);
-void *memmove(void *to, const void *from, size_t count);
-void *memset(void *to, int value, size_t count);
 
 /* A fault of the processor, or an interrupt that nobody asked for: nothing more goes out to an amplifier but zeros. It
    takes the stack from its beginning, since a stack that was too deep is what it may have come from. */
@@ -47,37 +43,3 @@ __attribute__((section(".vectors"), used)) static const vector_table vectors = {
     .handlers = {reset, halt, halt, halt, halt, halt, halt, halt, halt, halt, halt, halt, halt, halt, lm3s6965_timer,
                  halt, halt, halt, halt, halt, lm3s6965_line},
 };
-
-/* Byte by byte: gcc turns some loops and assignments of structures into calls of these. */
-
-void *memcpy(void *to, const void *from, size_t count)
-{
-    uint8_t *target = to;
-    const uint8_t *source = from;
-    for (size_t k = 0u; k < count; k++) {
-        target[k] = source[k];
-    }
-    return to;
-}
-
-void *memmove(void *to, const void *from, size_t count)
-{
-    uint8_t *target = to;
-    const uint8_t *source = from;
-    if ((uintptr_t)to <= (uintptr_t)from) {
-        return memcpy(to, from, count);
-    }
-    for (size_t k = count; k > 0u; k--) {
-        target[k - 1u] = source[k - 1u];
-    }
-    return to;
-}
-
-void *memset(void *to, int value, size_t count)
-{
-    uint8_t *target = to;
-    for (size_t k = 0u; k < count; k++) {
-        target[k] = (uint8_t)value;
-    }
-    return to;
-}

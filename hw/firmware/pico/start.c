@@ -4,7 +4,6 @@
    takes as long each time. Until the program drives its first pin all pins are inputs that are pulled down, which is
    the safe state (docs/pico.md). So whatever the loader finds wrong, it stands still. */
 #include <stdbool.h>
-#include <stddef.h>
 #include <stdint.h>
 
 #include "pico.h"
@@ -15,9 +14,6 @@ extern uint32_t stack_top, ram_end, image_load, image_start, image_end, bss_star
 
 void reset(void);
 void load(void);
-void *memcpy(void *to, const void *from, size_t count);
-void *memmove(void *to, const void *from, size_t count);
-void *memset(void *to, int value, size_t count);
 
 /* What boot2 and the loader go by, at 0x10000100. `crc` is that of all that follows, which hw/pico.py writes, as it
    does how many words these are; so what the compiler sees here is not what is read. */
@@ -145,37 +141,3 @@ __attribute__((section(".vectors"), used)) static const vector_table vectors = {
     .interrupts = {halt, halt, halt, halt, halt, halt,      halt, halt, halt, halt, halt, halt, halt,
                    halt, halt, halt, halt, halt, halt,      halt, pico_line, halt, halt, halt, halt, halt},
 };
-
-/* Byte by byte: gcc turns some loops and assignments of structures into calls of these. */
-
-void *memcpy(void *to, const void *from, size_t count)
-{
-    uint8_t *target = to;
-    const uint8_t *source = from;
-    for (size_t k = 0u; k < count; k++) {
-        target[k] = source[k];
-    }
-    return to;
-}
-
-void *memmove(void *to, const void *from, size_t count)
-{
-    uint8_t *target = to;
-    const uint8_t *source = from;
-    if ((uintptr_t)to <= (uintptr_t)from) {
-        return memcpy(to, from, count);
-    }
-    for (size_t k = count; k > 0u; k--) {
-        target[k - 1u] = source[k - 1u];
-    }
-    return to;
-}
-
-void *memset(void *to, int value, size_t count)
-{
-    uint8_t *target = to;
-    for (size_t k = 0u; k < count; k++) {
-        target[k] = (uint8_t)value;
-    }
-    return to;
-}
