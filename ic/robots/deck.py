@@ -15,6 +15,7 @@ from ic.robots.attributes import shown
 from ic.robots.entries import LIMITS, ArmEntries, RobotEntry, limits, spelled
 from ic.robots.names import word
 from ic.robots.robot import MOVING, Inertial, Joint
+from ic.text.edition import EDITION_WORD, LATEST
 
 WIDE = 100  # columns of a block on one line
 WIDEST = 120  # with what is said of it behind
@@ -27,6 +28,7 @@ def print_deck(body: ArmEntries, title: str) -> Iterator[str]:
     arm = arm_name(body)
     yield f"// {_safe(title)}"
     yield from _about(body)
+    yield f"{EDITION_WORD} {LATEST};"
     yield ""
     yield f"arm {arm} {{"
     changed = {(each.kind, each.name): each.written.text for each in body.names.changed}

@@ -47,6 +47,7 @@ PRINTED = """\
 // made by `met import arm.urdf --mimic fixed` from a file with the SHA-256 HASH...
 // `base` is the file's link `floor`.
 // Not in this deck: 1 visual.
+deck 2;
 
 arm pick_up {
     // inertia turned from axes at rpy 0 0 1.5707963267948966
