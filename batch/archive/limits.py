@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 from met import units
-from met.plan import Requirement
+from met.plan.judged import Requirement
 from met.unit_parser import parse_unit
 
 # what a unit may stand behind: a number, or the end of a sum in parentheses

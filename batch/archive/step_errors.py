@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 
 from batch.archive.stored import StoredGroup, Unlike
 from met.host.files import parse_json
-from met.plan import StepErrorLimit
+from met.plan.judged import StepErrorLimit
 
 ATTRIBUTE = "step_errors"
 

@@ -10,7 +10,8 @@ import numpy as np
 from batch.campaigns.points import with_cases
 from met.analysis.linear.gradient import FAILED, GradientProgram
 from met.diagnostic import Problem
-from met.plan import Experiment, Requirement
+from met.plan import Experiment
+from met.plan.judged import Requirement
 from met.searches.slopes import CaseSlopes
 
 

@@ -12,8 +12,9 @@ from ic.sweeps.axes import Sweep, SweepAxis
 from ic.sweeps.reach import without_effect
 from ic.text.complaints import Complaints
 from met.diagnostic import Label
-from met.plan import SEED, Experiment, Requirement
+from met.plan import SEED, Experiment
 from met.plan.columns import AxisColumn
+from met.plan.judged import Requirement
 from met.plan.swept import blocks
 from met.statistics import confidence, sequential
 from met.statistics.design_points import design_points

@@ -17,14 +17,7 @@ import numpy as np
 
 from met import models, units
 from met.parameter import Parameter
-from met.plan import (
-    BASE,
-    Coordinate,
-    Experiment,
-    Formula,
-    Quantity,
-    Requirement,
-)
+from met.plan import BASE, Coordinate, Experiment, Formula, Quantity
 from met.plan import guides as guides
 from met.plan import relations as relations
 from met.plan import rest as rest
@@ -34,6 +27,7 @@ from met.plan.checked_searches import check_search
 from met.plan.codec import Damaged
 from met.plan.columns import CaseValues
 from met.plan.defaults import INERTIA, declared, heads_of_models, related
+from met.plan.judged import Requirement
 from met.plan.outputs import tolerable
 from met.plan.swept import blocks
 from met.statistics.confidence import can_be_shown

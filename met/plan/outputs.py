@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from met import models
-from met.plan import MetricUse, Recorded, Structure
+from met.plan import Recorded, Structure
 from met.plan.channel import channel_paths, channels_beside, watched_unit
+from met.plan.judged import MetricUse
 from met.plan.linear_uses import FIGURES
 
 OF_ALL = {"rel": "1", "time": "s"}

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from met.plan import CHANNEL_INPUT, Experiment
+from met.plan import Experiment
 from met.plan.channel import Channel
+from met.plan.judged import CHANNEL_INPUT
 from met.program import balancing, cell_names, holding, orientations, plausible
 from met.program.control import failing, guiding, link_sensors, sensing, setpoints
 from met.program.control.substituted import LIMITED

@@ -18,17 +18,16 @@ from met.plan import (
     Formula,
     Joint,
     Link,
-    MetricUse,
     Origin,
     Plan,
     Quantity,
     Recorded,
-    Requirement,
     Schedule,
     ServoUse,
     Source,
     Structure,
 )
+from met.plan.judged import MetricUse, Requirement
 from met.trace.graph import Formulas, Graph
 
 COMPARE = {"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal}

@@ -9,7 +9,7 @@ from batch.queries.signals import deck_unit
 from batch.queries.step_errors.figures import CaseError, Verification
 from batch.queries.step_errors.words import rounded
 from met.frozen import frozen
-from met.plan import StepErrorLimit
+from met.plan.judged import StepErrorLimit
 
 if TYPE_CHECKING:
     from batch.archive.read import ArchiveGroup

@@ -14,7 +14,8 @@ from met import models
 from met.diagnostic import Label, Place, leave_out
 from met.metrics.metric import Metric
 from met.metrics.window import ROUNDING
-from met.plan import MetricUse, Requirement, Structure
+from met.plan import Structure
+from met.plan.judged import MetricUse, Requirement
 from met.plan.linear_uses import FIGURES, LinearFigure
 from met.trace import Scalar
 

@@ -23,8 +23,9 @@ from met import models, units
 from met.diagnostic import Help, Label, Place, Problem, error, write
 from met.frozen import frozen
 from met.metrics.metric import Metric
-from met.plan import CHANNEL_INPUT, SignalExpression, Structure
+from met.plan import Structure
 from met.plan.channel import Channel, channels, recordable
+from met.plan.judged import CHANNEL_INPUT, SignalExpression
 from met.trace import Formulas, Real, Scalar, maximum, minimum, where
 from met.unit_parser import parse_unit
 from met.units import PURE, Dimension

@@ -19,8 +19,9 @@ from ic.meaning.runs.record import nearest_channels, of_lost
 from ic.text.complaints import known_words
 from met.diagnostic import Place, Problem, did_you_mean, error, write
 from met.parameter import Parameter
-from met.plan import Joint, MetricUse, Structure
+from met.plan import Joint, Structure
 from met.plan.channel import recordable
+from met.plan.judged import MetricUse
 from met.plan.linear_signals import InputSignal, input_signals
 from met.plan.linear_uses import FIGURES, LinearUse
 from met.trace import Scalar

@@ -17,8 +17,8 @@ from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import did_you_mean
 from met.metrics.metric import Metric
-from met.plan import MetricUse, SignalExpression
 from met.plan.channel import Channel
+from met.plan.judged import MetricUse, SignalExpression
 from met.plan.linear_uses import FIGURES
 
 

@@ -22,7 +22,8 @@ from met import models
 from met.diagnostic import Help, did_you_mean, write
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import MetricUse, Requirement, Structure
+from met.plan import Structure
+from met.plan.judged import MetricUse, Requirement
 from met.plan.outputs import metric_units
 from met.statistics.confidence import can_be_shown
 from met.trace import Scalar

@@ -52,7 +52,8 @@ from ic.text.complaints import known_words, where_it_belongs
 from met import models
 from met.diagnostic import Place, did_you_mean, write
 from met.frozen import frozen
-from met.plan import Experiment, MetricUse, Requirement, Schedule, ServoUse, StepErrorLimit, Structure, Tolerance
+from met.plan import Experiment, Schedule, ServoUse, Structure
+from met.plan.judged import MetricUse, Requirement, StepErrorLimit, Tolerance
 from met.plan.linear_uses import LinearUse
 
 BLOCKS = ("servos", *(block.name for block in (INITIAL, ENVIRONMENT, RATES, TOLERANCES)))

@@ -14,7 +14,8 @@ from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met.diagnostic import did_you_mean
 from met.parameter import Parameter
-from met.plan import MetricUse, StepErrorLimit, Structure
+from met.plan import Structure
+from met.plan.judged import MetricUse, StepErrorLimit
 from met.plan.outputs import metric_units
 from met.trace import Scalar
 from met.units import PURE

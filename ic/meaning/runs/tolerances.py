@@ -13,8 +13,9 @@ from ic.meaning.runs.requirements import share_metrics
 from ic.text.complaints import known_words
 from met.diagnostic import did_you_mean
 from met.parameter import Parameter
-from met.plan import MetricUse, Structure, Tolerance
+from met.plan import Structure
 from met.plan.channel import recordable
+from met.plan.judged import MetricUse, Tolerance
 from met.plan.outputs import OF_ALL, joint_parts, tolerable
 from met.trace import Scalar
 

@@ -19,7 +19,7 @@ from met.analysis.linear.flow import Flow
 from met.analysis.linear.standing import settled
 from met.diagnostic import Problem
 from met.passing import Memories
-from met.plan import MetricUse
+from met.plan.judged import MetricUse
 from met.plan.linear_uses import (
     ANSWERED,
     AT_LIMIT,

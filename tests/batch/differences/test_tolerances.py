@@ -18,7 +18,8 @@ from batch.differences.result import Diff, SignalDiff
 from batch.differences.text import diff_lines
 from batch.differences.tolerance import Tolerances, check, tolerances
 from met.diagnostic import Problem
-from met.plan import Experiment, Tolerance
+from met.plan import Experiment
+from met.plan.judged import Tolerance
 from met.run import Run
 from tests.batch.differences.planted import order, two
 

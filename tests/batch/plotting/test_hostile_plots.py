@@ -19,7 +19,8 @@ from batch.plotting.maps import DOTTED, STRIPES
 from met import run as engine
 from met.diagnostic import Problem
 from met.messages.render import render
-from met.plan import Experiment, Requirement
+from met.plan import Experiment
+from met.plan.judged import Requirement
 from tests.batch import plans
 from tests.batch.plotting.pictures import cells, shown
 from tests.batch.report import archives

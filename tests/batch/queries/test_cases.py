@@ -17,8 +17,9 @@ from batch.terminal.running import run_and_tell
 from batch.terminal.show import as_json, show
 from met.cli import main
 from met.diagnostic import Problem
-from met.plan import Experiment, Requirement, keys
+from met.plan import Experiment, keys
 from met.plan import file as plan_file
+from met.plan.judged import Requirement
 from tests.batch import plans
 
 pytestmark = pytest.mark.usefixtures("engine")

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from met.diagnostic import Problem
-from met.plan import MetricUse, Plan
+from met.plan import Plan
 from met.plan import file as plan_file
+from met.plan.judged import MetricUse
 from tests.ic.small_decks import ARM, RUN, SERVO, check, experiment, messages
 
 LOOP = (

@@ -11,8 +11,9 @@ import pytest
 from met import run as engine
 from met.backends.reference.plain import execute
 from met.diagnostic import Problem
-from met.plan import CHANNEL_INPUT, Experiment, Plan
+from met.plan import Experiment, Plan
 from met.plan import file as plan_file
+from met.plan.judged import CHANNEL_INPUT
 from met.plan.outputs import metric_units
 from met.program import build
 from met.program.build import METRIC

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from ic.meaning.runs.requirements import SHARE
-from met.plan import Requirement
 from met.plan import file as plan_file
+from met.plan.judged import Requirement
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, experiment, messages
 
 METRICS = "metric top = max { of = hinge.qd; } metric far = max { of = hinge.q; }"

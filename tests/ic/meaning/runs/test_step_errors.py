@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from met.diagnostic import Problem
-from met.plan import Plan, StepErrorLimit
+from met.plan import Plan
 from met.plan import file as plan_file
+from met.plan.judged import StepErrorLimit
 from met.plan.keys import case_ids, structure_key
 from tests.ic import small_decks
 
