@@ -139,6 +139,8 @@ def suggest(name: str) -> str | None:
         return unit if power == 0 else None
     if name[0] == "K" and is_unit(f"k{name[1:]}"):
         return f"k{name[1:]}"
+    if len(name) > 2 and name[-1] == name[-2] and is_unit(name[:-1]):
+        return name[:-1]  # `kgg`: a key that was hit twice
     splits = _splits(name)
     if splits:
         return "*".join(splits[0]) if len(splits) == 1 else None

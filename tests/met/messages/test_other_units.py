@@ -145,3 +145,7 @@ def test_the_digits_stay_as_they_are_written(number: str, told: str) -> None:
 )
 def test_a_word_that_is_no_unit_gets_the_unit_that_was_meant(wrong: str, right: str | None) -> None:
     assert suggest(wrong) == right
+
+
+def test_a_key_that_was_hit_twice_is_no_product_of_units() -> None:
+    assert [suggest(word) for word in ("kgg", "radd", "Nmm", "mss")] == ["kg", "rad", "N*mm", "ms"]
