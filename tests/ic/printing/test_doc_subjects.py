@@ -184,7 +184,10 @@ def test_the_page_of_this_checkout_is_found(capsys: pytest.CaptureFixture[str]) 
 
 
 def test_a_word_of_the_glossary_is_explained(capsys: pytest.CaptureFixture[str]) -> None:
-    assert printed(capsys, "shard") == "task, shard: some cases that are run in one go; the file of what they gave\n"
+    assert (
+        printed(capsys, "shard")
+        == "task, shard: a group of cases that a worker runs together; the file of their results\n"
+    )
 
 
 def test_an_entry_of_a_block_is_explained(capsys: pytest.CaptureFixture[str]) -> None:
