@@ -54,13 +54,14 @@ def view(
     The page of a deck is served on 127.0.0.1, to who has the address that is printed, until Ctrl-C or until the
     terminal is closed. A mistake in the deck is shown beside the last run without one.
     """
-    check_options(source, () if name is None else (name,), False, defines, include_dirs, settings)
+    of_archive = () if numbers is not None else include_dirs
+    check_options(source, () if name is None else (name,), False, defines, of_archive, settings)
     if names_plan(source):
         raise click.UsageError(f"`{source}` is a plan: `met run {source}` runs it, and `met view` takes the archive")
     if names_archive(source):
         if port is not None:
             raise click.UsageError(f"--port is for decks: the page of the archive `{source}` is a file")
-        return _write(source, name, output, against, numbers, quiet)
+        return _write(source, name, output, against, numbers, include_dirs, quiet)
     if output is not None:
         raise click.UsageError(
             f"-o is for archives: the page of the deck `{source}` is served; `met run` makes an archive of it"
@@ -73,7 +74,13 @@ def view(
 
 
 def _write(
-    archive: str, name: str | None, output: str | None, against: str | None, numbers: str | None, quiet: bool
+    archive: str,
+    name: str | None,
+    output: str | None,
+    against: str | None,
+    numbers: str | None,
+    include_dirs: tuple[str, ...],
+    quiet: bool,
 ) -> int:
     from batch.portable import files
     from batch.portable.page import view as page
@@ -81,7 +88,7 @@ def _write(
 
     target = Path(archive).with_suffix(".view.html") if output is None else Path(output)
     files.check_page(target)
-    files.write_page(page(archive, () if name is None else (name,), against, numbers), target)
+    files.write_page(page(archive, () if name is None else (name,), against, numbers, include_dirs), target)
     if not quiet:
         say(f"{target}  ({size(target.stat().st_size)})")
     return YES
