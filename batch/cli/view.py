@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
+from functools import partial
 from pathlib import Path
 
 import click
 
-from met.cli import YES, check_options, deck_options, loudness_options
+from met.cli import YES, check_options, confess, deck_options, loudness_options
 from met.host.sources import names_archive, names_plan
 from met.messages.visible import say
 
@@ -70,7 +71,7 @@ def view(
         raise click.UsageError(f"--against is for archives: `met run {source}` makes one of the deck")
     if numbers is not None:
         raise click.UsageError(f"--numbers is for archives: `met run {source}` makes one of the deck")
-    return _watch(source, name, port or 0, defines, include_dirs, settings, quiet)
+    return _watch(source, name, port or 0, defines, include_dirs, settings, quiet=quiet, verbose=verbose)
 
 
 def _write(
@@ -101,7 +102,9 @@ def _watch(
     defines: tuple[str, ...],
     include_dirs: tuple[str, ...],
     settings: tuple[str, ...],
+    *,
     quiet: bool,
+    verbose: bool,
 ) -> int:
     from batch.executors.termination import TERMINATED, Terminated, terminable
     from batch.watching.answers import WatchedDeck
@@ -114,10 +117,13 @@ def _watch(
             end = "Ctrl-C ends it" if sys.stdin is not None and sys.stdin.isatty() else f"`kill {os.getpid()}` ends it"
             say(f"The page of {deck}, for a browser on this machine. Who has the address can read it. {end}.", err=True)
 
+    words = ["view", deck, *([] if name is None else [name])]
+    told = partial(confess, arguments=words, verbose=verbose)
     path = find(deck, include_dirs)
     try:
         with terminable():
-            follow(WatchedDeck(deck, path, include_dirs, defines, settings), name, port=port, ready=ready)
+            watched = WatchedDeck(deck, path, include_dirs, defines, settings)
+            follow(watched, name, port=port, ready=ready, confess=told)
     except Terminated:
         return TERMINATED
     except KeyboardInterrupt:
