@@ -276,19 +276,23 @@ def _run(arguments: list[str]) -> int:
         return INTERRUPTED
     except BrokenPipeError:
         raise
-    except MemoryError:
-        message = "there is not enough memory for this"
-        complain([error("E337", message, help="run fewer cases at once, or record less")], {}, form=form)
-        return BAD_INPUT
-    except OSError as mistake:
+    except (MemoryError, OSError) as lacking:
         if verbose:
             _show_traceback()
-        about = f"`{os.fsdecode(mistake.filename)}`: " if isinstance(mistake.filename, str | bytes) else ""
-        complain([error("E338", f"{about}{mistake.strerror or mistake}")], {}, form=form)
+        complain([of_machine(lacking)], {}, form=form)
         return BAD_INPUT
     except Exception as defect:
-        _confess(defect, arguments, verbose)
+        confess(defect, arguments, verbose=verbose)
         return DEFECT
+
+
+def of_machine(lacking: MemoryError | OSError) -> Diagnostic:
+    """What the machine has not: memory, E337, or what a file or device would be, E338."""
+    if isinstance(lacking, MemoryError):
+        message = "there is not enough memory for this"
+        return error("E337", message, help="run fewer cases at once, or record less")
+    about = f"`{os.fsdecode(lacking.filename)}`: " if isinstance(lacking.filename, str | bytes) else ""
+    return error("E338", f"{about}{lacking.strerror or lacking}")
 
 
 def complain(
@@ -318,8 +322,9 @@ def complain(
     print(render.render(diagnostics, sources, colour=render.wants_colour(sys.stderr)), end="", file=sys.stderr)
 
 
-def _confess(defect: Exception, arguments: Sequence[str], verbose: bool) -> None:
-    """Say that MET has a defect, in a paragraph; the traceback goes into a file, or with -v to the terminal."""
+def confess(defect: Exception, arguments: Sequence[str], *, verbose: bool) -> str:
+    """Say that MET has a defect, in a paragraph, which is given back; the traceback goes into a file, or with -v to the
+    terminal. To be called while it is handled."""
     import platform
     import shlex
     import tempfile
@@ -335,11 +340,12 @@ def _confess(defect: Exception, arguments: Sequence[str], verbose: bool) -> None
             file.write(f"{command}\nmet {VERSION}, Python {platform.python_version()}, {platform.platform()}\n\n")
             traceback.print_exception(defect, file=file)
         where = f"The traceback is in {path}."
-    say(
+    words = (
         f"met: this is a defect of MET, not of what you gave it: {type(defect).__name__}: {defect}. {where} "
-        f"Please report it together with the deck and the command, `{command}`.",
-        err=True,
+        f"Please report it together with the deck and the command, `{command}`."
     )
+    say(words, err=True)
+    return words
 
 
 def _show_traceback() -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
+from functools import partial
 from pathlib import Path
 
 import click
 
-from met.cli import YES, check_options, deck_options, loudness_options
+from met.cli import YES, check_options, confess, deck_options, loudness_options
 from met.host.sources import names_archive, names_plan
 from met.messages.visible import say
 
@@ -54,13 +55,14 @@ def view(
     The page of a deck is served on 127.0.0.1, to who has the address that is printed, until Ctrl-C or until the
     terminal is closed. A mistake in the deck is shown beside the last run without one.
     """
-    check_options(source, () if name is None else (name,), False, defines, include_dirs, settings)
+    of_archive = () if numbers is not None else include_dirs
+    check_options(source, () if name is None else (name,), False, defines, of_archive, settings)
     if names_plan(source):
         raise click.UsageError(f"`{source}` is a plan: `met run {source}` runs it, and `met view` takes the archive")
     if names_archive(source):
         if port is not None:
             raise click.UsageError(f"--port is for decks: the page of the archive `{source}` is a file")
-        return _write(source, name, output, against, numbers, quiet)
+        return _write(source, name, output, against, numbers, include_dirs, quiet)
     if output is not None:
         raise click.UsageError(
             f"-o is for archives: the page of the deck `{source}` is served; `met run` makes an archive of it"
@@ -69,11 +71,17 @@ def view(
         raise click.UsageError(f"--against is for archives: `met run {source}` makes one of the deck")
     if numbers is not None:
         raise click.UsageError(f"--numbers is for archives: `met run {source}` makes one of the deck")
-    return _watch(source, name, port or 0, defines, include_dirs, settings, quiet)
+    return _watch(source, name, port or 0, defines, include_dirs, settings, quiet=quiet, verbose=verbose)
 
 
 def _write(
-    archive: str, name: str | None, output: str | None, against: str | None, numbers: str | None, quiet: bool
+    archive: str,
+    name: str | None,
+    output: str | None,
+    against: str | None,
+    numbers: str | None,
+    include_dirs: tuple[str, ...],
+    quiet: bool,
 ) -> int:
     from batch.portable import files
     from batch.portable.page import view as page
@@ -81,7 +89,7 @@ def _write(
 
     target = Path(archive).with_suffix(".view.html") if output is None else Path(output)
     files.check_page(target)
-    files.write_page(page(archive, () if name is None else (name,), against, numbers), target)
+    files.write_page(page(archive, () if name is None else (name,), against, numbers, include_dirs), target)
     if not quiet:
         say(f"{target}  ({size(target.stat().st_size)})")
     return YES
@@ -94,7 +102,9 @@ def _watch(
     defines: tuple[str, ...],
     include_dirs: tuple[str, ...],
     settings: tuple[str, ...],
+    *,
     quiet: bool,
+    verbose: bool,
 ) -> int:
     from batch.executors.termination import TERMINATED, Terminated, terminable
     from batch.watching.answers import WatchedDeck
@@ -107,10 +117,13 @@ def _watch(
             end = "Ctrl-C ends it" if sys.stdin is not None and sys.stdin.isatty() else f"`kill {os.getpid()}` ends it"
             say(f"The page of {deck}, for a browser on this machine. Who has the address can read it. {end}.", err=True)
 
+    words = ["view", deck, *([] if name is None else [name])]
+    told = partial(confess, arguments=words, verbose=verbose)
     path = find(deck, include_dirs)
     try:
         with terminable():
-            follow(WatchedDeck(deck, path, include_dirs, defines, settings), name, port=port, ready=ready)
+            watched = WatchedDeck(deck, path, include_dirs, defines, settings)
+            follow(watched, name, port=port, ready=ready, confess=told)
     except Terminated:
         return TERMINATED
     except KeyboardInterrupt:

@@ -5,6 +5,8 @@ It computes what `met run --vary` of these numbers computes, and is another stru
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +15,15 @@ import numpy as np
 from batch.archive.read import ArchiveFile
 from ic.driver.given_values import GivenRun, VariedRun, given_run
 from ic.meaning.definitions.resolve import Definitions
+from ic.read import read
 from ic.text.complaints import Complaints
 from ic.text.lexer import COMMAND_LINE
 from met.diagnostic import Problem, error
+from met.frozen import frozen
 from met.messages.visible import visible
-from met.plan import Experiment
+from met.plan import Experiment, Plan
+from met.settings import varied_run, varies
+from met.units import Measure
 
 MOST = 200
 """Numbers that are inputs; of more, the first ones are."""
@@ -28,25 +34,58 @@ FAR = 1e3
 HALVINGS = 60
 """Halvings by which the last number is found that the deck's checks allow."""
 
+MACRO = "macro "
+"""What stands before a macro's name where a sweep chooses its text."""
 
-def deck_of(archive: ArchiveFile, experiment: Experiment, deck: str | Path) -> VariedRun:
-    """The archive's run with the deck's numbers as inputs. Raises Problem E479 where the deck is not the archive's, or
-    nothing can vary."""
+
+@frozen
+class OtherNumbers:
+    """A run with the deck's numbers as inputs.
+
+    of        the run's name in the deck
+    plan      of the run as the deck has it, by which one sees in which units its signals are thought of
+    fixed     what decides the program and is as the archive's group has it, as `integrator = rk4`
+    measures  of each input the unit in which the deck writes it
+    left_out  numbers of the deck that are no inputs: they have no effect, decide the program, or are too many
+    """
+
+    of: str
+    plan: Plan
+    fixed: tuple[str, ...]
+    run: VariedRun
+    measures: tuple[Measure, ...]
+    left_out: tuple[str, ...]
+
+
+def deck_of(
+    archive: ArchiveFile, experiment: Experiment, deck: str | Path, include_dirs: Sequence[str | Path] = ()
+) -> OtherNumbers:
+    """The archive's run with the deck's numbers as inputs; of a sweep the run that it varies, with what the group has
+    chosen of its structure. Raises Problem E479 where the deck is not the archive's, or nothing can vary."""
     plan = archive.plan(as_written=True)
+    choices = experiment.cases.choices
+    macros = [f"{each.path.removeprefix(MACRO)}={each.value}" for each in choices if each.path.startswith(MACRO)]
+    words = [f"{each.path}={each.value}" for each in choices if not each.path.startswith(MACRO)]
+    defines = (*plan.defines, *macros)
+    settings = (*(each for each in plan.settings if not varies(each)), *words)
     name = experiment.name_in_deck
-    options: dict[str, Any] = {"defines": plan.defines, "settings": plan.settings}
-    run = given_run(deck, _run_of(deck, name, plan.defines) if experiment.varies else name, **options)
+    if experiment.varies:
+        name = (
+            varied_run(name)
+            if len(settings) - len(words) < len(plan.settings)
+            else _run_of(deck, name, defines, include_dirs)
+        )
+    run = given_run(deck, name, include_dirs=include_dirs, defines=defines, settings=settings)
     texts = set(archive.sources().values())
-    if any(text not in texts for text in [each.text for each in run.deck.sources if each.name != COMMAND_LINE]):
+    if any(text not in texts for source, text in run.compiled.sources.items() if source != COMMAND_LINE):
         message = f"{deck} is not the deck that the archive was made with, or includes other files"
         raise Problem(error("E479", message, help="run it again, and view the new archive"))
-    return varied(run)
+    return varied(run, tuple(f"{each.path} = {each.value}" for each in choices))
 
 
-def _run_of(deck: str | Path, sweep: str, defines: tuple[str, ...]) -> str:
-    from ic.read import read
-
-    found = Definitions(read(Path(deck), (), defines), Complaints()).of_kind("sweep").get(sweep)
+def _run_of(deck: str | Path, sweep: str, defines: Sequence[str], include_dirs: Sequence[str | Path]) -> str:
+    tree = read(Path(deck), tuple(map(Path, include_dirs)), tuple(defines))
+    found = Definitions(tree, Complaints()).of_kind("sweep").get(sweep)
     of = found.group.of if found is not None else None
     if of is None:
         message = f"{deck} has no sweep `{sweep}` of one run"
@@ -54,60 +93,72 @@ def _run_of(deck: str | Path, sweep: str, defines: tuple[str, ...]) -> str:
     return of.text
 
 
-def varied(run: GivenRun) -> VariedRun:
-    """The run with the numbers that its deck writes as inputs, without those that cannot vary. Raises Problem E479."""
+def varied(run: GivenRun, fixed: tuple[str, ...] = ()) -> OtherNumbers:
+    """The run with the numbers that its deck writes as inputs, in the deck's units, without those that cannot vary.
+    Raises Problem E479 where there is none."""
     there = run.experiment.parameters
-    paths = [
-        path for path, each in there.items() if isinstance(each.value, float) and each.origin.kind == "deck"
-    ][:MOST]  # fmt: skip
-    numbers: dict[str, tuple[float | str, str]] = {}
-    try:
-        return run.vary({path: (float(there[path].value), there[path].unit) for path in paths})  # type: ignore[arg-type]
-    except Problem:
-        pass
-    for path in paths:  # one that cannot vary is left out
-        one = {path: (float(there[path].value), there[path].unit)}  # type: ignore[arg-type]
-        try:
-            run.vary(one)
-        except Problem:
-            continue
-        numbers.update(one)
-    if not numbers:
+    numbers = {
+        path: (each.value, each.unit)
+        for path, each in there.items()
+        if isinstance(each.value, float) and each.origin.kind == "deck"
+    }
+    made, left_out = run.vary_most(numbers)
+    paths = [each.path for each in made.experiment.cases.coordinates]
+    if len(paths) > MOST:
+        left_out = tuple(path for path in numbers if path not in paths[:MOST])
+        made = run.vary({path: numbers[path] for path in paths[:MOST]})
+    coordinates = made.experiment.cases.coordinates
+    if not coordinates:
         raise Problem(error("E479", f"no number of `{run.name}` can vary", help="leave `--numbers` out"))
-    return run.vary(numbers)
+    units = [run.written_in(each.path) for each in coordinates]
+    shown = tuple(
+        replace(each, unit=unit, scale=measure.scale)
+        for each, (unit, measure) in zip(coordinates, units, strict=True)
+    )  # fmt: skip
+    cases = replace(made.experiment.cases, coordinates=shown)
+    made = replace(made, experiment=replace(made.experiment, cases=cases))
+    assert run.compiled.plan is not None
+    return OtherNumbers(run.name, run.compiled.plan, fixed, made, tuple(measure for _, measure in units), left_out)
 
 
 def limits(run: VariedRun) -> list[dict[str, Any]]:
     """The least and largest number of each input that the deck's checks allow while the others are the deck's, and
     what they say beyond: SI."""
-    first = {each.path: np.asarray(each.values[:1], float) for each in run.experiment.cases.coordinates}
+    paths = [each.path for each in run.experiment.cases.coordinates]
+    own = np.array([float(each.values[0]) for each in run.experiment.cases.coordinates])
+    count = len(paths)
 
-    def refused(path: str, value: float) -> str:
+    def broken(ends: np.ndarray) -> np.ndarray:
+        """Of cases in each of which one number is at an end, first all least and then all largest ones."""
+        cases = np.repeat(own[:, None], 2 * count, axis=1)
+        for n in range(count):
+            cases[n, [n, count + n]] = ends[[n, count + n]]
+        return run.broken(dict(zip(paths, cases, strict=True)), 2 * count)
+
+    twice = np.concatenate([own, own])
+    way = np.repeat([-1.0, 1.0], count)
+    far = twice + way * FAR * np.where(twice == 0.0, 1.0, np.abs(twice))
+    refused = broken(far)
+    through_zero = ~broken(np.zeros(2 * count)) & (way * twice < 0.0)
+    good, bad = np.where(through_zero, 0.0, twice), far.copy()
+    for _ in range(HALVINGS):
+        middle = 0.5 * (good + bad)
+        wrong = broken(middle)
+        good, bad = np.where(wrong, good, middle), np.where(wrong, middle, bad)
+    ends = np.where(refused, good, far)
+
+    def said(n: int) -> str:
+        if not refused[n]:
+            return f"it is more than {FAR:g} times as far as the deck's"
+        path = paths[n % count]
+        columns = {each: np.array([bad[n] if each == path else value]) for each, value in zip(paths, own, strict=True)}
         try:
-            run.check({**first, path: np.array([value])}, 1)
+            run.check(columns, 1)
         except Problem as problem:
             return visible(problem.diagnostics[0].message.removesuffix("; case #0 breaks it"))
         return ""
 
-    def end(path: str, way: float) -> tuple[float, str]:
-        own = float(first[path][0])
-        good, bad = own, own + way * FAR * (abs(own) or 1.0)
-        why = refused(path, bad)
-        if not why:
-            return bad, f"it is more than {FAR:g} times as far as the deck's"
-        if not refused(path, 0.0) and (own - bad) * np.sign(own) > 0.0 and (own > 0) == (way < 0):
-            good = 0.0
-        for _ in range(HALVINGS):
-            middle = 0.5 * (good + bad)
-            said = refused(path, middle)
-            if said:
-                bad, why = middle, said
-            else:
-                good = middle
-        return good, why
-
-    found = []
-    for path in first:
-        (low, below), (high, above) = end(path, -1.0), end(path, 1.0)
-        found.append({"low": low, "high": high, "below": below, "above": above})
-    return found
+    return [
+        {"low": float(ends[n]), "high": float(ends[count + n]), "below": said(n), "above": said(count + n)}
+        for n in range(count)
+    ]

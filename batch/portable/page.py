@@ -20,7 +20,7 @@ from batch.arms.scene import arm_scene, lacking, scene_json
 from batch.arms.scripts import arm_scripts, arm_style
 from batch.modules.description import MOST_CASES, described, described_columns
 from batch.portable import beside
-from batch.portable.numbers import deck_of, limits
+from batch.portable.numbers import OtherNumbers, deck_of, limits
 from batch.queries.deck_units import DeckUnits
 from batch.queries.groups import groups_named
 from batch.queries.signals import Panel, deck_unit, pretty_unit
@@ -28,7 +28,6 @@ from batch.report.html import inlined
 from batch.report.html.head import page_head
 from batch.report.html.markup import Html, el, lines
 from batch.report.html.payload import script_json
-from ic.driver.given_values import VariedRun
 from met.backends.wasm.module import KERNEL_JS, compiled
 from met.diagnostic import Problem, error
 from met.messages.visible import visible
@@ -38,6 +37,12 @@ from met.version import VERSION
 
 GENERATOR = "MET view"
 """The name in a page's `generator`, by which it is known as one of ours, which may be written over."""
+
+KICKER = "A page that simulates"
+"""What stands above the name of a page about an archive."""
+
+SHOWN_KEY = 8
+"""Letters of a program's key that a page shows."""
 
 OTHER_CODE = "by other code than the archive was made with, so that numbers may differ"
 
@@ -50,10 +55,12 @@ def view(
     names: tuple[str, ...] = (),
     against: str | Path | None = None,
     numbers: str | Path | None = None,
+    include_dirs: Sequence[str | Path] = (),
 ) -> str:
     """The page of the archive's only run or sweep, or of the one that is named. against: another archive, or a log of
-    measured signals, that is shown beside it. numbers: the archive's deck, whose numbers can be others there. Raises
-    Problem E473 where several runs are meant, and those of `batch.portable.beside` and `batch.portable.numbers`."""
+    measured signals, that is shown beside it. numbers: the archive's deck, whose numbers can be others there, with
+    further folders of what it includes. Raises Problem E473 where several runs are meant, and those of
+    `batch.portable.beside` and `batch.portable.numbers`."""
     with ArchiveFile(archive) as file:
         file.need_every_row("a page that simulates")
         groups = groups_named(file, names)
@@ -68,16 +75,38 @@ def view(
         if against is not None:
             data["beside"] = _beside(against, file, group, experiment)
         if numbers is not None:
-            data["numbers"] = _numbers(deck_of(file, experiment, numbers), file.plan())
+            data["numbers"] = _numbers(deck_of(file, experiment, numbers, include_dirs), experiment)
+            program = f" ({_program(data)})"
+            data["head"] = _head(experiment, data, KICKER, _by(data) + program)
         return page_of(experiment, data)
 
 
-def _numbers(run: VariedRun, plan: Plan) -> dict[str, Any]:
-    """Data of the second module, whose inputs are the deck's numbers, as those of a page of one case."""
-    experiment, status = run.experiment, np.full(1, -1, np.int8)
+def _numbers(numbers: OtherNumbers, of: Experiment) -> dict[str, Any]:
+    """Data of the second module, whose inputs are the deck's numbers, as those of a page of one case. of: what the
+    archive has."""
+    experiment, status = numbers.run.experiment, np.full(1, -1, np.int8)
     empty = {use.name: np.full(1, np.nan) for use in experiment.metrics}
     group = GroupInMemory.of_metrics(experiment, np.arange(1), status, empty)
-    return data_of(experiment, plan, group, source="deck") | {"limits": limits(run)}
+    data = data_of(experiment, numbers.plan, group, source="deck")
+    exact = {
+        each.unit: [str(measure.exact.numerator), str(measure.exact.denominator)]
+        for each, measure in zip(experiment.cases.coordinates, numbers.measures, strict=True)
+    }
+    data["exact"] = [exact[each.unit] for each in experiment.cases.coordinates]
+    data["limits"] = limits(numbers.run)
+    data["leftOut"] = [visible(path) for path in numbers.left_out]
+    words = [
+        f"Any number that the deck writes can be moved here, one at a time; the others are those of `{numbers.of}`"
+    ]
+    if of.varies:
+        words.append(f", which `{of.name_in_deck}` varies")
+    if numbers.fixed:
+        words.append(f", with {', '.join(numbers.fixed)}")
+    words.append(". The run is computed here by another program than the archive's, for numbers are its inputs ")
+    words.append(f"({_program(data)}): last digits may differ. What the archive has is behind the switch.")
+    head = {"kicker": "Other numbers than the archive's", "name": numbers.of, "lede": "".join(words)}
+    data["head"] = _visible(head)
+    return data
 
 
 def _beside(against: str | Path, file: ArchiveFile, group: ArchiveGroup, experiment: Experiment) -> dict[str, Any]:
@@ -187,8 +216,23 @@ def doubles(values: np.ndarray) -> str:
 
 def page_of(experiment: Experiment, data: dict[str, Any]) -> str:
     """The whole file of a page about an archive. The same data give the same text."""
-    by = "by the code that the archive was made with" if data["same_code"] else f"{OTHER_CODE} (MET {VERSION})"
-    return page_text(experiment, data, kicker="A page that simulates", by=by)
+    return page_text(experiment, data, kicker=KICKER, by=_by(data))
+
+
+def _by(data: Mapping[str, Any]) -> str:
+    """The code that computes the numbers of a page about an archive, in words."""
+    return "by the code that the archive was made with" if data["same_code"] else f"{OTHER_CODE} (MET {VERSION})"
+
+
+def _program(data: Mapping[str, Any]) -> str:
+    """The program of a page's module, by the first letters of its key without the version of the lowering."""
+    return f"program {data['description']['code_key'].rpartition(':')[2][:SHOWN_KEY]}"
+
+
+def _head(experiment: Experiment, data: Mapping[str, Any], kicker: str, by: str) -> dict[str, str]:
+    """What stands at the top of a page."""
+    when = "Move a slider, and the run is computed again, here," if data["count"] > 1 else "The run is computed here,"
+    return {"kicker": kicker, "name": visible(experiment.name), "lede": f"{when} {by}."}
 
 
 def page_text(
@@ -207,22 +251,21 @@ def page_text(
     before, after  further scripts: names of the report's, before the page's own; and texts after it
     style          a further one
     """
+    numbers = ["numbers.js"] if "numbers" in data else []
     script = "\n".join(
         [
             inlined.licensed("uPlot.iife.min.js", "core.js", *before),
             arm_scripts(),
             KERNEL_JS.read_text(encoding="utf-8"),
             f"const MET_PAGE = {script_json(data)};",
-            *((_ASSETS / name).read_text(encoding="utf-8") for name in ("beside.js", "view.js")),
+            *((_ASSETS / name).read_text(encoding="utf-8") for name in ("beside.js", *numbers, "view.js")),
             *after,
         ]
     )
     style = "\n".join([inlined.style(), arm_style(), (_ASSETS / "view.css").read_text(encoding="utf-8"), style])
     head = page_head(experiment.name, generator=GENERATOR, style=style, script=script, allowed=_CODE)
-    when = "Move a slider, and the run is computed again, here," if data["count"] > 1 else "The run is computed here,"
-    header = el(
-        "header", el("p", kicker, cls="kicker"), el("h1", experiment.name), el("p", f"{when} {by}.", cls="lede")
-    )
+    top = data.get("head") or _head(experiment, data, kicker, by)
+    header = el("header", el("p", top["kicker"], cls="kicker"), el("h1", top["name"]), el("p", top["lede"], cls="lede"))
     none = el("p", "This page needs scripts and WebAssembly, which this reader does not run.")
     body = lines([header, el("main", none), Html(f"<script>{script}</script>")])
     return f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{head}\n</head>\n<body>\n{body}\n</body>\n</html>\n'

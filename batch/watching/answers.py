@@ -141,11 +141,20 @@ def shown_rows(experiment: Experiment) -> np.ndarray:
     return np.arange(min(experiment.cases.count, MOST_CASES))
 
 
+class _GivenUp(Exception):
+    """The cases that are being run are no longer wanted."""
+
+
 def run_cases(
     prepared: Prepared, stop: Callable[[], bool], progress: Callable[[int], None] = lambda _: None
 ) -> Iterator[Run]:
     """Run the cases that the page has: what there is of them so far, now and then, and in the end; nothing more once
-    they are to stop. Raises Problem, as `met run` does."""
+    they are to stop, which ends a long case, too. Raises Problem, as `met run` does."""
+
+    def working(_: int) -> None:
+        if stop():
+            raise _GivenUp
+
     linear_metrics.check(prepared)
     rows = shown_rows(prepared.experiment)
     prepared.kernel  # noqa: B018 - compiling is not running
@@ -153,7 +162,10 @@ def run_cases(
     while done < len(rows) and not stop():
         began = time.monotonic()
         here = rows[done : done + count]
-        found.append(linear_metrics.compute(prepared, here, record=False)[1])
+        try:
+            found.append(linear_metrics.compute(prepared, here, record=False, progress=working)[1])
+        except _GivenUp:
+            return
         done += len(here)
         took = time.monotonic() - began
         count = max(1, min(4 * count, round(count * SHARE / max(took, 1e-6))))

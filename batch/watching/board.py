@@ -16,6 +16,7 @@ class Board:
 
     name      the deck;  names, groups: what can be chosen;  run, group: what is shown of these
     messages  of `met check`;  broken: whether an error is among them, so that the page is that of an earlier deck
+    fault     whether what is broken is MET, so that the messages are no mistakes of the deck
     page      number of the page that is shown, 0 of none;  numbers: of its cases' numbers, 0 of none
     doing     what is being done, in words; "" where all is done
     saved     when the deck was saved that is shown, and broken: when the one was that is not; s since 1970
@@ -25,6 +26,7 @@ class Board:
         self._changed = threading.Condition(threading.RLock())
         self._state: dict[str, Any] = {
             "name": name, "names": [], "groups": [], "run": "", "group": "", "messages": "", "broken": False,
+            "fault": False,
             "page": 0, "numbers": 0, "doing": "compiling", "saved": 0.0, "tried": 0.0,
         }  # fmt: skip
         self._number = 1

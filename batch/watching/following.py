@@ -1,12 +1,14 @@
 """`met view DECK`: wait until a deck is saved, compile it, show its run, run its cases; until the terminal is closed.
 
-The cases are run in a thread of their own, and given up when the deck is saved again. Nothing is written but into the
-cache of compiled objects, so that whoever is killed in the middle leaves nothing.
+The cases are run in a thread of their own, and given up when the deck is saved again, in the middle of one. A defect
+of MET ends neither: it is told in the terminal and on the page, and the next save is shown. Nothing is written but into
+the cache of compiled objects, so that whoever is killed in the middle leaves nothing.
 """
 
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -15,6 +17,7 @@ from batch.watching.answers import DeckAnswer, WatchedDeck
 from batch.watching.board import Board
 from batch.watching.deck_files import DeckFiles
 from batch.watching.serving import PageServer
+from met.cli import of_machine
 from met.diagnostic import Problem
 from met.messages.render import render
 from met.messages.visible import visible
@@ -27,17 +30,20 @@ PATIENCE_SECONDS = 2.0
 """For cases that are given up, when all ends: a compiler is not to be left in the middle."""
 
 
-def follow(deck: WatchedDeck, name: str | None, *, port: int, ready: Callable[[str], None]) -> None:
+def follow(
+    deck: WatchedDeck, name: str | None, *, port: int, ready: Callable[[str], None], confess: Callable[[Exception], str]
+) -> None:
     """Show the deck's run until an interrupt. Raises Problem E477 where the port cannot be had.
 
-    name   of the run or sweep; None: the one that `met run` would take, or that is chosen on the page
-    ready  told the address of the page, when it can be opened
+    name     of the run or sweep; None: the one that `met run` would take, or that is chosen on the page
+    ready    told the address of the page, when it can be opened
+    confess  tells in the terminal that MET has a defect, and gives back in which words
     """
     board = Board(visible(deck.name))
     server = PageServer(board, port)
     server.begin()
     ready(server.address)
-    loop = _Loop(deck, name, board)
+    loop = _Loop(deck, name, board, confess)
     try:
         loop.run()
     finally:
@@ -46,10 +52,11 @@ def follow(deck: WatchedDeck, name: str | None, *, port: int, ready: Callable[[s
 
 
 class _Loop:
-    """The run that is shown, and the thread that runs its cases. name, group: asked for, or chosen on the page."""
+    """The run that is shown, and the thread that runs its cases. name, group: asked for, or chosen on the page.
+    confess: as `follow` has it."""
 
-    def __init__(self, deck: WatchedDeck, name: str | None, board: Board) -> None:
-        self._deck, self._name, self._board = deck, name, board
+    def __init__(self, deck: WatchedDeck, name: str | None, board: Board, confess: Callable[[Exception], str]) -> None:
+        self._deck, self._name, self._board, self._confess = deck, name, board, confess
         self._group: str | None = None
         self._files = DeckFiles(deck.file, deck.include_dirs)
         self._page = self._work = ""
@@ -57,11 +64,12 @@ class _Loop:
         self._cases: threading.Thread | None = None
         self._stop = threading.Event()
         self._running = threading.Lock()
+        self._telling = threading.Lock()
 
     def run(self) -> None:
         """Compile, show, wait; for ever."""
         while True:
-            again = self._once()
+            again = self._sound()
             if not again:
                 self._files.wait(around=self._is_broken, until=self._board.is_chosen)
             if (chosen := self._board.take_chosen()) is not None:
@@ -74,6 +82,24 @@ class _Loop:
         if self._cases is not None:
             self._cases.join(seconds)
 
+    def _sound(self) -> bool:
+        """What `_once` does; what nobody expected is told, and the deck is watched on."""
+        try:
+            return self._once()
+        except Exception as mishap:
+            self._is_broken, self._page = True, ""
+            self._board.tell(**self._of(mishap), doing="")
+            return False
+
+    def _of(self, mishap: Exception) -> dict[str, Any]:
+        """What is shown of an error that is no mistake of the deck: of the machine's, or of MET's own, which stands in
+        the terminal too. To be called while it is handled."""
+        told: dict[str, Any] = {"broken": True, "tried": time.time()}
+        if isinstance(mishap, MemoryError | OSError):
+            return told | {"messages": _words(Problem(of_machine(mishap)))}
+        with self._telling:
+            return told | {"messages": visible(self._confess(mishap)), "fault": True}
+
     def _once(self) -> bool:
         """Compile what is on the disk, and show it. True where that has changed meanwhile."""
         begun = self._files.begin()
@@ -82,6 +108,7 @@ class _Loop:
             return True
         self._is_broken = answer.experiment is None
         told: dict[str, Any] = {"names": list(answer.names), "groups": list(answer.groups), "messages": answer.messages}
+        told["fault"] = False
         if answer.experiment is None:
             self._board.tell(**told, broken=True, tried=begun, doing="")
             return False
@@ -118,16 +145,18 @@ class _Loop:
 
         if stop.wait(HEAD_START_SECONDS):
             return
-        while not self._running.acquire(timeout=HEAD_START_SECONDS):  # a long case of an earlier deck is not cut short
+        while not self._running.acquire(timeout=HEAD_START_SECONDS):  # its compiler is not
             if stop.is_set():
                 return
-            board.tell(page, doing="waiting for the end of a case of an earlier deck")
+            board.tell(page, doing="waiting for the end of what an earlier deck began")
         try:
             for run in answers.run_cases(prepared, stop.is_set, progress):
                 board.show("numbers", answers.numbers(experiment, run), page)
             board.tell(page, doing="")
         except Problem as problem:
             board.tell(page, messages=_words(problem), doing="the cases were not run")
+        except Exception as mishap:
+            board.tell(page, **self._of(mishap), doing="the cases were not run")
         finally:
             self._running.release()
 

@@ -9,10 +9,12 @@ served: what can be asked for is four names.
 from __future__ import annotations
 
 import hmac
+import io
 import json
 import secrets
 import sys
 import threading
+import time
 from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -29,10 +31,14 @@ HOST = "127.0.0.1"
 TOKEN_BYTES = 24
 
 MOST_OPEN = 64
-"""Connections at a time: a page has two. More are closed at once, so that nobody fills the memory with them."""
+"""Connections at a time: a browser has two for all its pages. More are told to come again, so that nobody fills the
+memory with them."""
+
+FULL = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 1\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+"""The answer to one who comes when all connections are taken."""
 
 IDLE_SECONDS = 10.0
-"""A request that takes longer to come is given up."""
+"""A request that takes longer to come, as a whole, is given up; and so is one who takes longer to be answered."""
 
 ALIVE_SECONDS = 15.0
 """Between two signs of life to a page that waits, by which one that has gone is noticed."""
@@ -56,6 +62,7 @@ class PageServer(ThreadingHTTPServer):
 
     daemon_threads = True
     block_on_close = False
+    request_queue_size = MOST_OPEN
 
     def __init__(self, board: Board, port: int = 0) -> None:
         self.board, self.token = board, secrets.token_urlsafe(TOKEN_BYTES)
@@ -87,6 +94,9 @@ class PageServer(ThreadingHTTPServer):
         if self._open.acquire(blocking=False):
             super().process_request(request, client_address)
         else:
+            with suppress(OSError):  # nothing waits here: so little goes at once or not at all
+                request.setblocking(False)
+                request.send(FULL)
             self.shutdown_request(request)
 
     def process_request_thread(self, request: socket | Any, client_address: Any) -> None:
@@ -106,12 +116,36 @@ class PageServer(ThreadingHTTPServer):
             super().handle_error(request, client_address)
 
 
+class _InTime(io.RawIOBase):
+    """What comes over a connection within so many seconds, as a whole; afterwards reading raises TimeoutError."""
+
+    def __init__(self, connection: socket, seconds: float) -> None:
+        self._connection, self._seconds, self._end = connection, seconds, time.monotonic() + seconds
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        left = self._end - time.monotonic()
+        if left <= 0.0:
+            raise TimeoutError
+        self._connection.settimeout(left)
+        try:
+            return self._connection.recv_into(buffer)
+        finally:
+            self._connection.settimeout(self._seconds)
+
+
 class _Request(BaseHTTPRequestHandler):
     """One request: GET of the frame, the page in it, its numbers, events; POST of a choice."""
 
     server: PageServer
     server_version, sys_version = "met", ""
     timeout = IDLE_SECONDS
+
+    def setup(self) -> None:
+        super().setup()
+        self.rfile = io.BufferedReader(_InTime(self.connection, self.timeout))
 
     def do_GET(self) -> None:
         what, number = self._asked()

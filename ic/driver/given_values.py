@@ -12,13 +12,16 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
+
 from ic.driver.compile import Compiled, compile_deck
 from ic.driver.explain import explanations_of
 from ic.grammar.parse import parse
 from ic.grammar.roofs import with_full_names
-from ic.grammar.syntax import Deck, Entry
+from ic.grammar.syntax import Deck, Entry, Name, Number, WithUnit, children
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import Checks
+from ic.meaning.expressions.quantity import measure_of
 from ic.read import read
 from ic.text.complaints import Complaints, known_words
 from ic.text.lexer import END, SPACE, Text, Token, logical_lines
@@ -27,6 +30,8 @@ from met.diagnostic import Diagnostic, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan import Experiment
 from met.plan.columns import CaseValues
+from met.unit_parser import parse_unit
+from met.units import Measure, same
 
 GIVEN = "(given)"
 """The name of the text, in messages, that varies what is given."""
@@ -53,6 +58,10 @@ class VariedRun:
         if found:
             raise Problem(found, self.sources)
 
+    def broken(self, columns: Mapping[str, np.ndarray], count: int) -> np.ndarray:
+        """For each of so many cases whether `check` refuses it, [n]."""
+        return np.zeros(count, bool) if self.checks is None else self.checks.broken(columns, count)
+
 
 @frozen
 class GivenRun:
@@ -77,6 +86,50 @@ class GivenRun:
         """The SI unit of what a path sets, `gearbox.kp` or a `let`; None where it sets nothing, "" for a word."""
         found = next(explanations_of(self.compiled, path), None)
         return None if found is None else found.unit if not isinstance(found.value, str) else ""
+
+    def written_in(self, path: str) -> tuple[str, Measure]:
+        """The unit in which the deck writes a parameter, the first of its dimension in its value or in the `let`s that
+        stand there; its SI unit where there is none."""
+        (scope,) = self.compiled.scopes
+        settled = scope.settled(path)
+        si = "1" if settled is None else settled.unit
+        wanted = parse_unit(si)
+        waiting = [] if settled is None or settled.expression is None else [settled.expression]
+        seen: set[str] = set()
+        while waiting:
+            part = waiting.pop()
+            unit = part.unit if isinstance(part, Number | WithUnit) else None
+            if unit is not None and same(measure_of(unit).dimension, wanted.dimension):
+                return unit.text, measure_of(unit)
+            if isinstance(part, Name) and part.text in scope.definitions.lets and part.text not in seen:
+                seen.add(part.text)
+                waiting.append(scope.definitions.lets[part.text].value)
+            waiting.extend(reversed(children(part)))
+        return si, wanted
+
+    def vary_most(self, values: Mapping[str, tuple[float | str, str]]) -> tuple[VariedRun, tuple[str, ...]]:
+        """The run over as many of these paths as can vary together, and those that are left out, for they have no
+        effect, or decide the program. Raises Problem where the deck has a mistake."""
+        kept: dict[str, tuple[float | str, str]] = {}
+        run = VariedRun(self.experiment, None, self.compiled.sources)
+        waiting = [dict(values)]
+        while waiting:
+            more = waiting.pop()
+            if not more:
+                continue
+            try:
+                run = self.vary({**kept, **more})
+            except Problem as problem:
+                blamed = _given_paths(problem.diagnostics, {**kept, **more}) & more.keys()
+                if blamed:
+                    waiting.append({path: each for path, each in more.items() if path not in blamed})
+                elif len(more) > 1:
+                    paths = list(more)
+                    halves = paths[: len(paths) // 2], paths[len(paths) // 2 :]
+                    waiting += [{path: more[path] for path in half} for half in reversed(halves)]
+                continue
+            kept.update(more)
+        return run, tuple(path for path in values if path not in kept)
 
     def sets(self, path: str) -> bool:
         """True where the settings have just this path."""
@@ -232,6 +285,13 @@ def _without_parts(errors: Sequence[Diagnostic], words: Mapping[str, str], text:
 
     wrong = tuple(f"{path}." for path, word in words.items() if any(line(each) == word for each in errors))
     return [each for each in errors if not line(each).startswith(wrong)]
+
+
+def _given_paths(errors: Iterable[Diagnostic], values: Mapping[str, tuple[float | str, str]]) -> set[str]:
+    """The paths in whose lines of `_sweep` these errors stand."""
+    lines = _shown(_sweep("", ((path, *each) for path, each in values.items()), 1)).split("\n")
+    places = [found.at.place for found in errors if found.at is not None and found.at.place.file == GIVEN]
+    return {lines[place.line - 1].strip() for place in places if place.line <= len(lines)} & values.keys()
 
 
 def _entries(text: str) -> tuple[Entry, ...]:

@@ -291,6 +291,7 @@ MET.stage = (() => {
       redraw();
     }
 
+    const ending = new AbortController();
     addEventListener("beforeprint", () => {
       if (!chosen) return;
       const { distance, target, aspect } = camera;
@@ -299,9 +300,20 @@ MET.stage = (() => {
       film.replaceChildren(...Array.from({ length: FILM }, (_, n) => (end * n) / (FILM - 1)).map((at) =>
         node("figure", null, MET.painter.draw(picture(at, false), 400, 300), node("figcaption", null, `${number(at)} s`))));
       Object.assign(camera, { distance, target, aspect });
-    });
-    new ResizeObserver(redraw).observe(view);
-    MET.drawn.push(() => { inks = null; redraw(); });
+    }, { signal: ending.signal });
+    const sides = new ResizeObserver(redraw);
+    sides.observe(view);
+    const anew = () => { inks = null; redraw(); };
+    MET.drawn.push(anew);
+
+    // Another view takes this one's place: it stops, and holds nothing.
+    function close() {
+      [playing, chosen] = [false, null];
+      ending.abort();
+      sides.disconnect();
+      MET.drawn.splice(MET.drawn.indexOf(anew), 1);
+      if (renderer) renderer.close();
+    }
 
     // Where it is seen from and at which instant; and back there, on a page that takes another's place.
     const seenFrom = ({ azimuth, elevation, distance, target }) => ({ azimuth, elevation, distance, target });
@@ -331,7 +343,7 @@ MET.stage = (() => {
       }
       return (performance.now() - begun) / count;
     }
-    return { take: arm.take, forces: () => forces, show, haunt, accompany, settle, seek, kept, resume, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
+    return { take: arm.take, forces: () => forces, show, haunt, accompany, settle, seek, kept, resume, close, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
   }
 
   return { make };

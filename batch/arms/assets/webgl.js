@@ -382,7 +382,7 @@ MET.webgl = (() => {
       gl.disable(gl.CULL_FACE);
     }
 
-    return { software, draw, finish: () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)) };
+    return { software, draw, finish: () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)), close: () => gl.getExtension("WEBGL_lose_context")?.loseContext() };
   }
 
   // A path as thin pills.

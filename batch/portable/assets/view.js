@@ -3,7 +3,8 @@
 // Texts of a deck come into the page as text nodes alone.
 "use strict";
 
-MET.simulate = (data, back) => {
+// data: as `batch.portable.page` wrote it; back: of a second module, the archive's; seen: where the arm was looked at from.
+MET.simulate = (data, back, seen) => {
   const { node, number, ticks, palette } = MET;
   const { description: told } = data;
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -22,14 +23,16 @@ MET.simulate = (data, back) => {
   const SLICE = 24;  // ms of work between which the page answers
   const others = [];
   let turn = 0;  // of computing them
-  let values = cases[0].slice();
+  let values = (data.stood || cases[0]).slice();
   let plots = [];
   let lines = [];
   let pale = [];  // of what stands beside, under them
   const other = data.beside ? MET.beside.make(data.beside, data, time) : null;
+  const free = data.limits ? data.free || (data.free = MET.numbers.make(data, (found) => data.give(found))) : null;
+  data.give = (found) => { values = found; update(); };
 
   // Sliders, and which case of the archive they stand at.
-  const knobs = data.limits ? [free()] : told.inputs.map((input, n) => {
+  const knobs = free ? [] : told.inputs.map((input, n) => {
     const own = [...new Set(cases.map((each) => each[n]))].sort((a, b) => a - b);
     if (input.is !== "coordinate" || own.length < 2) return null;
     const [low, high] = [own[0], own[own.length - 1]];
@@ -47,41 +50,6 @@ MET.simulate = (data, back) => {
     return { put, shown, input, n, box: node("label", { class: "knob" }, node("code", null, data.labels[n]), slider, shown) };
   }).filter(Boolean);
 
-  // Other numbers: one of the deck's at a time, by a slider about the deck's value or typed; the others are the deck's.
-  function free() {
-    const own = cases[0];
-    let n = 0;
-    const kept = (value) => Math.min(data.limits[n].high, Math.max(data.limits[n].low, value));
-    const ends = () => (own[n] === 0 ? [kept(-told.inputs[n].scale), kept(told.inputs[n].scale)] : [kept(Math.min(0, 2 * own[n])), kept(Math.max(0, 2 * own[n]))]);
-    const slider = node("input", { type: "range", min: 0, max: 1, step: 0.001, "aria-label": "value", input: () => {
-      const [low, high] = ends();
-      give(low + Number(slider.value) * (high - low));
-    } });
-    const typed = node("input", { type: "number", step: "any", "aria-label": "value, typed", change: () => { if (typed.value !== "") give(Number(typed.value) * told.inputs[n].scale); } });
-    const shown = node("output");
-    const refused = node("p", { class: "refused", role: "alert" });
-    const which = node("select", { "aria-label": "Number of the deck", change: () => {
-      n = Number(which.value);
-      give(own[n]);
-    } }, data.labels.map((label, i) => node("option", { value: i }, label)));
-    function put() {
-      const [low, high] = ends();
-      slider.value = high > low ? (values[n] - low) / (high - low) : 0;
-      typed.value = String(Number((values[n] / told.inputs[n].scale).toPrecision(12)));
-    }
-    function give(value) {
-      const { low, high, below, above } = data.limits[n];
-      const why = value < low ? below : value > high ? above : "";
-      refused.textContent = why ? `${number(value / told.inputs[n].scale)} ${data.units[n]} is refused: ${why}` : "";
-      if (why) return;
-      values = own.slice();
-      values[n] = value;
-      put();
-      update();
-    }
-    return { put, shown, get input() { return told.inputs[n]; }, get n() { return n; },
-      box: node("div", null, node("label", { class: "knob" }, which, slider, node("span", null, typed, " ", shown)), refused) };
-  }
   const chosen = node("select", { "aria-label": `Case of the ${source}`, change: () => {
     place(cases[chosen.value].slice());
   } }, node("option", { value: "", disabled: true }, `none of the ${source}'s`), ...cases.map((_, n) => node("option", { value: n }, `#${data.positions[n]}`)));
@@ -103,7 +71,7 @@ MET.simulate = (data, back) => {
     knobs.forEach(({ shown, input, n }) => { shown.textContent = `${number(values[n] / input.scale)} ${data.units[n]}`; });
     const measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
     tell(which, measured, failed, tick, took);
-    if (stage && rows) stage.show(taken(values, found.rows, rows), which < 0 ? `not in the ${source}` : `case #${data.positions[which]}`, acting(found.rows, rows));
+    if (stage && rows) stage.show(taken(values, found.rows, rows), free ? (free.isOwn() ? "the deck's numbers" : "other numbers") : which < 0 ? `not in the ${source}` : `case #${data.positions[which]}`, acting(found.rows, rows));
     if (stage) stage.haunt(others.filter((each) => each.n !== which));
   }
 
@@ -200,7 +168,7 @@ MET.simulate = (data, back) => {
     const wrong = which < 0 || data.status[which] !== 0 ? [] : told.metrics.filter((_, m) => !Object.is(measured[m], archived[m][which]));
     const bad = wrong.length > 0 || (which >= 0 && !awaited && failed !== (data.status[which] !== 0));
     let words = `Not in the ${source}: `;
-    if (data.limits) words = "Another structure than the archive's, whose bits may differ in the last digits: ";
+    if (free) words = "Another structure than the archive's, whose bits may differ in the last digits: ";
     else if (awaited) words = `Case #${data.positions[which]}, before it is compared: `;
     else if (bad) words = `Other numbers than the ${source} has for case #${data.positions[which]}${wrong.length ? ` (${wrong.map((metric) => metric.name).join(", ")})` : ""}: `;
     else if (which >= 0 && failed) words = `Case #${data.positions[which]} fails, as in the ${source}: `;
@@ -266,11 +234,13 @@ MET.simulate = (data, back) => {
 
   main.replaceChildren(room,
     ...(back || data.numbers ? [node("p", null, node("label", null, node("input", { type: "checkbox", class: "other-numbers", checked: Boolean(back), change: () => leave() }), " other numbers"))] : []),
-    ...(data.limits ? [node("div", { class: "knobs" }, knobs[0].box)] : []),
+    ...(free ? [node("div", { class: "knobs" }, free.box)] : []),
     ...(cases.length > 1 ? [node("div", { class: "knobs" }, node("label", { class: "knob" }, "Case", chosen, node("output", null, `of ${data.count}`)), knobs.map((knob) => knob.box))] : []),
     came, ...(other ? [node("p", { class: "note" }, "Beside it, wide and pale: ", node("b", null, other.name), `, ${other.note}.`)] : []), node("table", { class: "answers" }, answers), panels);
+  if (data.head) entitle(data.head);
   knobs.forEach((knob) => knob.put());
   update();
+  if (stage && seen) stage.resume(seen);
   if (stage && cases.length > 1) requestAnimationFrame(() => setTimeout(haunt));
   else document.documentElement.dataset.haunted = "yes";
   MET.shown = stage;
@@ -294,10 +264,19 @@ MET.simulate = (data, back) => {
     turn++;
     ending.abort();
     plots.forEach((plot) => plot.destroy());
-    MET.simulate(back || data.numbers, back ? null : data);
+    plots = [];
+    data.stood = values;
+    const from = stage && stage.kept();
+    if (stage) stage.close();
+    MET.simulate(back || data.numbers, back ? null : data, from);
+  }
+
+  function entitle({ kicker, name, lede }) {
+    document.title = name;
+    [[".kicker", kicker], ["h1", name], [".lede", lede]].forEach(([which, text]) => { document.querySelector(`header ${which}`).textContent = text; });
   }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", make, { signal: ending.signal });
   addEventListener("resize", make, { signal: ending.signal });
 };
 
-MET.simulate(MET_PAGE, null);
+MET.simulate(MET_PAGE, null, null);

@@ -51,13 +51,15 @@
     name.textContent = state.name;
     options(runs, ofRun, state.names, state.run);
     options(groups, ofGroup, state.groups, state.group);
-    const broken = state.broken ? `a mistake since ${clock(state.tried)}` : "";
+    const mistake = state.fault ? "a defect of MET" : "a mistake";
+    const broken = state.broken ? `${mistake} since ${clock(state.tried)}` : "";
     const standing = state.page && !state.broken ? `as saved at ${clock(state.saved)}` : "";
     doing.textContent = gone ? "met view has ended: nothing is watched any more" : [broken, state.doing || standing].filter(Boolean).join(" · ");
     doing.classList.toggle("bad", gone || state.broken);
     messages.hidden = !state.messages;
     messages.classList.toggle("bad", state.broken);
-    head.textContent = state.broken ? (state.page ? `A mistake: shown is the run as saved at ${clock(state.saved)}` : "A mistake: there is no run to show yet") : "Warnings";
+    const beside = state.page ? `shown is the run as saved at ${clock(state.saved)}` : "there is no run to show yet";
+    head.textContent = state.broken ? `A${mistake.slice(1)}: ${beside}` : "Warnings";
     say(state.messages);
   }
 
@@ -114,7 +116,27 @@
     }
   }
 
-  const events = new EventSource("events");
-  events.onmessage = (event) => { gone = false; take(JSON.parse(event.data)); };
-  events.onerror = () => { gone = true; if (state.name) tell(); };
+  // A browser opens six connections to a server: so of all its tabs one hears what is new, and tells the others. When that
+  // one is closed, another takes its place.
+  const mine = location.pathname;
+  const others = new BroadcastChannel(mine);
+  let [news, hears] = [null, false];
+  const heard = (found) => { [news, gone] = [found, false]; take(found); };
+  const lost = () => { gone = true; if (state.name) tell(); };
+
+  function hear() {
+    hears = true;
+    const events = new EventSource("events");
+    events.onmessage = (event) => { heard(JSON.parse(event.data)); others.postMessage({ news }); };
+    events.onerror = () => { lost(); others.postMessage({ lost: true }); };
+  }
+
+  others.onmessage = ({ data }) => {
+    if (data.asks && hears && news) others.postMessage(gone ? { lost: true } : { news });
+    else if (data.news) heard(data.news);
+    else if (data.lost) lost();
+  };
+  others.postMessage({ asks: true });
+  if (navigator.locks) navigator.locks.request(mine, () => new Promise(hear));
+  else hear();
 })();

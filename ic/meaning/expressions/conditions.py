@@ -110,6 +110,13 @@ class Checks:
         asked.run(cases, count)
         return asked.complaints.errors
 
+    def broken(self, cases: Mapping[str, np.ndarray], count: int) -> np.ndarray:
+        """For each of so many cases with these values whether `errors` would have something to say of it, [n]."""
+        bad = np.zeros(count, bool)
+        for check, table in self._tables(cases, count):
+            bad |= check.test(table)[0]
+        return bad
+
     def _formulas(self) -> Formulas:
         """The values of all checks that wait, one after the other."""
         return self._tested or Formulas.of(self.graph, [x for check in self._waiting for x in check.values])

@@ -37,6 +37,8 @@ _SMALL = 400
 # blocks, and blocks times ticks, that one call into machine code runs at most: calls cannot be interrupted, and
 # progress is told between them; a tenth of a second or so
 _CHUNK, _CALL = 256, 1 << 16
+# s between two tidings of progress while several threads are at work
+_TELLING_SECONDS = 0.2
 
 _SIGNATURE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4, *[ctypes.c_int64] * 6)
 
@@ -164,7 +166,8 @@ class LlvmKernel:
         """Runs cases from tick 0 to tick `ticks`, both done.
 
         inputs    [case, input], in the order of `program.inputs`
-        progress  told how many cases are done, from the thread that called
+        progress  told how many cases are done, from the thread that called, again and again while a case takes long;
+                  what it raises ends them all
         Returns rows [case, row, column], or None without `record`, and outputs [case, output].
         """
         program = self.program
@@ -180,27 +183,30 @@ class LlvmKernel:
         starts = range(0, cases, chunk)
         ended = threading.Event()
 
-        def work(start: int) -> int:
+        done = 0
+
+        def tell() -> None:
+            if progress is not None:
+                progress(done)
+
+        def work(start: int, between: Callable[[], None] = lambda: None) -> int:
             stop = min(start + chunk, cases)
             kept = None if rows is None else rows[start:stop]
-            self._run_chunk(inputs[start:stop], ticks, kept, outputs[start:stop], ended)
+            self._run_chunk(inputs[start:stop], ticks, kept, outputs[start:stop], ended, between)
             return stop - start
 
-        done = 0
         if threads == 1 or len(starts) <= 1:
             for start in starts:
-                done += work(start)
-                if progress is not None:
-                    progress(done)
+                done += work(start, tell)
+                tell()
             return rows, outputs
         with ThreadPoolExecutor(threads) as pool:
             waiting = {pool.submit(work, start) for start in starts}
             try:
                 while waiting:
-                    finished, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                    finished, waiting = wait(waiting, _TELLING_SECONDS, return_when=FIRST_COMPLETED)
                     done += sum(future.result() for future in finished)
-                    if progress is not None:
-                        progress(done)
+                    tell()
             except BaseException:
                 ended.set()
                 pool.shutdown(wait=False, cancel_futures=True)
@@ -208,9 +214,16 @@ class LlvmKernel:
         return rows, outputs
 
     def _run_chunk(
-        self, inputs: np.ndarray, ticks: int, rows: np.ndarray | None, outputs: np.ndarray, ended: threading.Event
+        self,
+        inputs: np.ndarray,
+        ticks: int,
+        rows: np.ndarray | None,
+        outputs: np.ndarray,
+        ended: threading.Event,
+        between: Callable[[], None],
     ) -> None:
-        """Some cases, in this thread; all blocks use one state in turn. A long run of one block goes by stretches."""
+        """Some cases, in this thread; all blocks use one state in turn. A long run of one block goes by stretches,
+        between which it is looked whether all has ended, and `between` is called."""
         cases, lanes = len(inputs), self.lanes
         blocks = -(-cases // lanes)
         packed = _aligned((blocks, inputs.shape[1], lanes))
@@ -222,6 +235,8 @@ class LlvmKernel:
         for first in range(0, ticks + 1, stretch):
             if ended.is_set():
                 return
+            if first:
+                between()
             at = None
             if record and rows is not None:
                 at = rows.ctypes.data + self.rows(0, first - 1) * rows.strides[1] if first else rows.ctypes.data

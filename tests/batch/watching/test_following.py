@@ -12,7 +12,9 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +40,10 @@ def page_data(view: View) -> dict[str, object]:
     assert found is not None
     data: dict[str, object] = json.loads(found[1])
     return data
+
+
+def unexpected(defect: Exception) -> str:
+    raise AssertionError from defect
 
 
 def doubles(text: object) -> list[float]:
@@ -214,7 +220,7 @@ def test_of_a_deck_that_is_saved_again_and_again_the_cases_of_one_are_run_at_a_t
 
     monkeypatch.setattr(answers, "run_cases", endless)
     board = Board("deck.ic")
-    loop = _Loop(WatchedDeck(str(deck), deck), "brief", board)
+    loop = _Loop(WatchedDeck(str(deck), deck), "brief", board, unexpected)
     loop._once()
     assert begun.acquire(timeout=60)
     for limit in ("3.5", "3.4", "3.3"):
@@ -223,6 +229,74 @@ def test_of_a_deck_that_is_saved_again_and_again_the_cases_of_one_are_run_at_a_t
     assert not begun.acquire(timeout=1)
     let.set()
     assert begun.acquire(timeout=60) and not begun.acquire(timeout=1)  # of the last one alone
+    loop.give_up(60)
+
+
+LONG = """\
+arm wheel { link disk { mass = 1 kg; shape = cylinder(radius = 0.1 m, length = 0.1 m, along = z); }
+    joint turn revolute { parent = base; child = disk; axis = z; } }
+run spun {
+    arm = wheel;  initial { turn.qd = 1 rad/s; }  rates { dynamics = 10 kHz; record = 1 Hz; }
+    duration = 100000 s;  record = [qd];  metric late = final { of = turn.qd; }
+}
+"""
+
+
+@pytest.mark.parametrize("count", [1, 12])
+def test_a_save_ends_a_long_case_of_the_deck_before_it(tmp_path: Path, count: int) -> None:
+    (tmp_path / "deck.ic").write_text(
+        LONG + "sweep many of spun { vary initial.turn.qd = linspace(1, 2, 12) rad/s; }\n"
+    )
+    prepared = prepare(ic.compile(tmp_path / "deck.ic", select=["spun" if count == 1 else "many"]).experiments[0])
+    prepared.kernel  # noqa: B018 - compiled before the clock runs
+    asked = threading.Event()
+    threading.Timer(0.5, asked.set).start()
+    began = time.process_time()
+    assert list(answers.run_cases(prepared, asked.is_set)) == []  # a billion steps, which would take a minute or more
+    assert time.process_time() - began < 20
+
+
+def test_a_defect_is_told_in_terminal_and_page_and_the_next_save_is_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    deck = write_deck(tmp_path)
+    board = Board("deck.ic")
+    told = partial(cli.confess, arguments=["view", "deck.ic"], verbose=False)
+    loop = _Loop(WatchedDeck(str(deck), deck), "brief", board, told)
+    assert not loop._sound() and board.after(0, 0.0)[1]["page"] == 1  # type: ignore[index]
+
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("of all things")
+
+    compiled = answers.compiled
+    monkeypatch.setattr(answers, "compiled", broken)
+    assert not loop._sound()
+    state = board.after(0, 0.0)[1]
+    assert state is not None and (state["page"], state["broken"], state["fault"]) == (1, True, True)
+    words = state["messages"]
+    assert re.fullmatch(
+        r"met: this is a defect of MET, not of what you gave it: ZeroDivisionError: of all things\. "
+        r"The traceback is in (\S+)\. Please report it together with the deck and the command, `met view deck\.ic`\.",
+        words,
+    )  # fmt: skip
+    assert capsys.readouterr().err == f"{words}\n"
+    monkeypatch.setattr(answers, "compiled", compiled)
+    assert not loop._sound()
+    state = board.after(0, 0.0)[1]
+    assert state is not None and (state["broken"], state["fault"], state["messages"]) == (False, False, "")
+
+    monkeypatch.setattr(answers, "run_cases", broken)  # and in the thread that runs the cases
+    deck.write_text(DECK.replace("3.55", "3.5"))
+    assert not loop._sound()
+    assert loop._cases is not None
+    loop._cases.join(60)
+    state = board.after(0, 0.0)[1]
+    assert state is not None and state["fault"] and "ZeroDivisionError" in state["messages"]
+    assert "ZeroDivisionError" in capsys.readouterr().err
+    monkeypatch.setattr(answers, "compiled", lambda *_: (_ for _ in ()).throw(PermissionError(13, "no", "deck.ic")))
+    assert not loop._sound()  # what is the machine's is none of MET's
+    state = board.after(0, 0.0)[1]
+    assert state is not None and "error[E338]: `deck.ic`: no" in state["messages"]
     loop.give_up(60)
 
 

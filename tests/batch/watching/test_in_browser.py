@@ -264,3 +264,24 @@ def test_a_margin_comes_with_the_cases_and_is_not_known_between_them(chromium: C
         )
         silent(page, view)
         page.close()
+
+
+@pytest.mark.browser
+def test_of_eight_tabs_each_is_new_and_the_next_hears_when_the_first_is_closed(
+    chromium: Chromium, tmp_path: Path
+) -> None:
+    deck = write_deck(tmp_path)
+    with viewing(deck, "brief", "-q") as view:
+        tabs = [opened(chromium, view) for _ in range(8)]  # a browser opens six connections to one server
+        replace(deck, "3.55", "3.5")
+        for tab in tabs:
+            shown(tab, 2)
+        tabs.pop(0).close()  # it was the one that heard
+        replace(deck, "3.5 V", "3.45 V")
+        for tab in tabs:
+            shown(tab, 3)
+        view.process.kill()
+        for tab in tabs:
+            until(tab, "document.querySelector('.doing').textContent.startsWith('met view has ended')")
+            assert [said for said in tab.said if "ERR_" not in said] == []
+            tab.close()
