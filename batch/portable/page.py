@@ -16,6 +16,7 @@ import numpy as np
 from batch.archive.in_memory import GroupInMemory
 from batch.archive.read import ArchiveFile, ArchiveGroup, reading
 from batch.archive.stored import Unlike
+from batch.arms.acting import acting_json, acting_on
 from batch.arms.scene import arm_scene, lacking, scene_json
 from batch.arms.scripts import arm_scripts, arm_style
 from batch.modules.description import MOST_CASES, described, described_columns
@@ -163,7 +164,13 @@ def _arm(experiment: Experiment) -> dict[str, Any]:
     recorded = [channel for each in experiment.structure.record for channel in each.channels]
     scene = arm_scene(experiment, recorded)
     missing = lacking(scene, recorded)
-    return {"lacking": [visible(name) for name in missing]} if missing else {"scene": scene_json(scene)}
+    if missing:
+        return {"lacking": [visible(name) for name in missing]}
+    acting = acting_on(experiment, scene, recorded)
+    found: dict[str, Any] = {"scene": scene_json(scene)}
+    if acting.arrows or acting.payloads or acting.not_drawn:
+        found["acting"] = _visible(acting_json(acting))
+    return found
 
 
 def _unit(unit: str) -> str:
