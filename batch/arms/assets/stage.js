@@ -335,7 +335,7 @@ MET.stage = (() => {
       }
       return (performance.now() - begun) / count;
     }
-    return { take: arm.take, takeActing: acts && acts.take, legend, around: () => { const { solids, clear } = legend.solids(time, chosen.at(time)); return [...solids, ...clear]; }, show, haunt, accompany, settle, seek, kept, resume, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
+    return { take: arm.take, takeActing: acts && acts.take, legend, around: () => { const { solids, clear } = legend.solids(time, chosen.at(time)); return [...solids, ...clear]; }, show, haunt, accompany, settle, seek, kept, resume, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, finish: () => renderer && renderer.finish(), ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
   }
 
   return { make };

@@ -14,7 +14,7 @@ from batch.archive.read import ArchiveFile
 from batch.portable import page as portable_page
 from met import cli
 from tests.batch.arms.decks import about
-from tests.batch.portable.test_arm_on_page import changed, opened, pixels
+from tests.batch.portable.test_arm_on_page import becomes, changed, opened, pixels
 from tests.batch.report.browser import PACKAGE, Chromium, Page, browser, program, quiet
 
 DECK = """\
@@ -71,7 +71,7 @@ def test_an_arrow_is_the_recorded_force_in_the_world_and_its_scale_is_told(chrom
     before = pixels(page, tmp_path)
     page.run("document.querySelector('.stage .view').focus()")
     page.key("a")
-    assert changed(before, pixels(page, tmp_path)) > 0.001
+    assert changed(before, becomes(page, tmp_path, lambda shown: changed(before, shown) > 0.001)) > 0.001
     quiet(page)
     page.close()
 
@@ -157,7 +157,8 @@ def test_each_kind_is_drawn_while_it_acts_and_its_switch_takes_it_away(
         before = pixels(page, tmp_path)
         page.run("document.querySelector('.stage .view').focus()")
         page.key(key)
-        assert changed(before, pixels(page, tmp_path)) > 0.0005, key
+        new = becomes(page, tmp_path, lambda shown, old=before: changed(old, shown) > 0.0005)  # type: ignore[misc]
+        assert changed(before, new) > 0.0005, key
         kinds = {"l": "load", "p": "plume", "o": "grip"}
         assert kinds[key] not in page.run("MET.shown.around().map(each => each.role)")
         pressed = page.run(
