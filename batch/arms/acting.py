@@ -149,7 +149,7 @@ def acting_on(experiment: Experiment, scene: ArmScene, recorded: Collection[str]
             jets += gas
 
     number = {body.name: place for place, body in enumerate(scene.bodies)}
-    payloads = []
+    payloads: list[tuple[PayloadInHand, list[Real]]] = []
     for payload in system.flying:
         held = world.position(payload.link, _three(values, f"payloads.{payload.name}.at"))
         stage = _stage(payload, graph.input(TIME), values, INSTANT * step)
@@ -158,13 +158,15 @@ def acting_on(experiment: Experiment, scene: ArmScene, recorded: Collection[str]
             signals = (f"payloads.{payload.name}.position", f"payloads.{payload.name}.orientation")
             not_drawn.append(NotDrawn("payload", payload.name, signals))
 
-    groups: tuple[Sequence[tuple[Any, list[Real]]], ...] = (arrows, jets, payloads)
-    formulas = Formulas.of(graph, [x for group in groups for _, numbers in group for x in numbers])
+    own = [x for _, numbers in (*arrows, *jets, *payloads) for x in numbers]
+    formulas = Formulas.of(graph, own)
     return ActingOnArm(
-        formulas,
-        tuple(name for name in formulas.inputs if name != TIME and name not in varied),
-        *(tuple(each for each, _ in group) for group in groups),  # type: ignore[arg-type]
-        tuple(not_drawn),
+        formulas=formulas,
+        channels=tuple(name for name in formulas.inputs if name != TIME and name not in varied),
+        arrows=tuple(arrow for arrow, _ in arrows),
+        jets=tuple(name for name, _ in jets),
+        payloads=tuple(payload for payload, _ in payloads),
+        not_drawn=tuple(not_drawn),
     )
 
 

@@ -63,8 +63,8 @@ def opened(chromium: Chromium, path: Path, **words: object) -> Page:
 
 
 def pixels(page: Page, folder: Path) -> np.ndarray:
-    """The view as the browser shows it, without its edge, (row, column, rgb) from 0 to 1, once its fine picture is drawn:
-    by the process that draws, too."""
+    """The view as the browser shows it, without its edge, (row, column, rgb) from 0 to 1, once its fine picture is
+    drawn: by the process that draws, too."""
     page.run("new Promise(d => { const f = () => MET.shown.isStill() ? d() : setTimeout(f, 20); f(); })")
     page.run("MET.shown.finish()")
     page.settle()
