@@ -67,9 +67,10 @@ class ActingOnArm:
     """What acts on an arm.
 
     formulas  of each arrow the point where it acts and its components (N, N m); of each jet the nozzle, its direction,
-              the share of the step in which it fires, and its exponent (`met.environments.environment.Jet`); of each
-              payload its stage (0 it flies and waits, 1 its link carries it, 2 it is released) and the place where its
-              link holds it. All in the world, m. Inputs are channels by path, `time` and varied parameters by path
+              the share of the step in which it fires, its exponent, and middle and sides of the plate that it meets
+              (`met.environments.environment.Jet`); of each payload its stage (0 it flies and waits, 1 its link carries
+              it, 2 it is released) and the place where its link holds it. All in the world, m. Inputs are channels by
+              path, `time` and varied parameters by path
     channels  inputs that the run records
     jets      the deck's names of their models
     """
@@ -158,8 +159,8 @@ def acting_on(experiment: Experiment, scene: ArmScene, recorded: Collection[str]
             signals = (f"payloads.{payload.name}.position", f"payloads.{payload.name}.orientation")
             not_drawn.append(NotDrawn("payload", payload.name, signals))
 
-    own = [x for _, numbers in (*arrows, *jets, *payloads) for x in numbers]
-    formulas = Formulas.of(graph, own)
+    outputs = [x for group in (arrows, jets, payloads) for _, numbers in group for x in numbers]
+    formulas = Formulas.of(graph, outputs)
     return ActingOnArm(
         formulas=formulas,
         channels=tuple(name for name in formulas.inputs if name != TIME and name not in varied),
@@ -213,7 +214,9 @@ def _arrows(
 
 def _jet(jet: Jet, world: ArmWorld) -> list[Real]:
     at, axis = world.position(jet.link, jet.point), world.to_world(jet.link, jet.axis)
-    return [*at, *axis, jet.fires, jet.exponent]
+    sides = [world.to_world(jet.plate.link, side) for side in (jet.plate.width, jet.plate.height)]
+    middle = world.position(jet.plate.link, jet.plate.middle)
+    return [*at, *axis, jet.fires, jet.exponent, *middle, *(x for side in sides for x in side)]
 
 
 def _stage(payload: Payload, time: Real, values: Mapping[str, Any], early: float) -> Real:

@@ -90,7 +90,9 @@ def _beside(against: str | Path, file: ArchiveFile, group: ArchiveGroup, experim
             other.need_every_row("a page that simulates")
             theirs, of = beside.other_group(file, group, other)
             units = [each["unit"] for each in described_columns(experiment)]
-            return {"name": name, "page": data_of(of, other, theirs) | {"own": units}}
+            found = data_of(of, other, theirs)
+            found["arm"].pop("acting", None)  # of a second arm no more is drawn than where it is
+            return {"name": name, "page": found | {"own": units}}
     schedule = experiment.structure.schedule
     rows = np.arange(schedule.rows) * schedule.record / schedule.base_hz
     found = beside.log_data(against, described_columns(experiment), rows)

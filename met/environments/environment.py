@@ -88,6 +88,16 @@ class Loads:
 
 
 @frozen
+class Plate:
+    """A rectangle that is fixed to a link: its middle, m, and its sides as vectors, m, in the link's frame."""
+
+    link: str
+    middle: Vector
+    width: Vector
+    height: Vector
+
+
+@frozen
 class Jet:
     """Gas that leaves a nozzle, as pictures draw it.
 
@@ -96,6 +106,7 @@ class Jet:
     axis      where the gas goes to, in that link's axes; its length counts for nothing
     fires     share of the step in which it flows
     exponent  n of a density that falls with the angle from the axis as cos^n
+    plate     that the gas meets
     """
 
     link: str
@@ -103,6 +114,7 @@ class Jet:
     axis: Vector
     fires: Real
     exponent: Real
+    plate: Plate
 
 
 FILE = Parameter(name="file", shape="text", default="none", doc="CSV file whose columns the lists are, in their stead")

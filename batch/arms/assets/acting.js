@@ -4,8 +4,8 @@
 
 MET.acting = (() => {
   const { node, number } = MET;
-  const { plus, along, unit, length } = MET.arm;
-  const [ARROW, JET, PAYLOAD] = [6, 8, 4];  // numbers of each
+  const { plus, cross, along, unit, length } = MET.arm;
+  const [ARROW, JET, PAYLOAD] = [6, 17, 4];  // numbers of each
   const LONGEST = 0.35;  // of the reach: the longest arrow of a kind and unit
   const [PLUME, WIDEST] = [0.4, 1.05];  // of the reach: the length of a cone of gas; rad: half its angle at most
   const SLICE = 24;  // ms of work between which the page answers
@@ -47,7 +47,10 @@ MET.acting = (() => {
     }
 
     const acts = (numbers) => arrows.map(([kind, name, of], n) => ({ kind, name, unit: of, at: three(numbers, ARROW * n), vector: three(numbers, ARROW * n + 3) }));
-    const gas = (numbers) => jets.map((name, n) => ({ name, at: three(numbers, jet + JET * n), axis: three(numbers, jet + JET * n + 3), fires: numbers[jet + JET * n + 6], exponent: numbers[jet + JET * n + 7] }));
+    const gas = (numbers) => jets.map((name, n) => {
+      const at = jet + JET * n;
+      return { name, at: three(numbers, at), axis: three(numbers, at + 3), fires: numbers[at + 6], exponent: numbers[at + 7], plate: [8, 11, 14].map((of) => three(numbers, at + of)) };
+    });
     const held = (numbers) => payloads.map(([name, link, body], n) => ({ name, link, body, stage: numbers[payload + PAYLOAD * n], at: three(numbers, payload + PAYLOAD * n + 1) }));
 
     return { take, acts, gas, held, payloads: payloads.length, jets: jets.length };
@@ -121,6 +124,11 @@ MET.acting = (() => {
         out.push(...arm.arrow(begin, way, (far * size) / most(kind, of), kind, of === "N" ? 1 : 2));
         if (kind === "contact") out.push({ mesh: "can", role: kind, joint: -1, at: begin, axes: along(way), size: [3 * limb, 3 * limb, 0.2 * limb, 0.6 * limb] });
       });
+      if (on.plume) made.gas(own).forEach(({ plate }) => {
+        const [middle, width, height] = plate.map(arm.up);
+        const [x, y] = [unit(width), unit(height)];
+        clear.push({ mesh: "block", role: "plume", joint: -1, at: middle, axes: [x, y, cross(x, y)], size: [length(width), length(height), 0.3 * limb, 0] });
+      });
       if (on.plume) made.gas(own).filter(({ fires }) => fires > 0).forEach(({ at, axis, exponent }) => {
         const [begin, way] = [arm.up(at), unit(arm.up(axis))];
         const long = PLUME * arm.reach;
@@ -130,19 +138,23 @@ MET.acting = (() => {
       });
       const carried = made.held(own);
       const words = carried.map(({ name, link, stage }) => STAGES[stage](name, link)).join(", ");
-      if (chips.payload.said.textContent !== words) chips.payload.said.textContent = words;
       if (on.payload) carried.filter(({ stage, body }) => stage === 1 && body >= 0).forEach(({ at, body }) => {
         const [begin, end] = [arm.up(at), arm.at(numbers, body)];
         const way = plus(end, begin, -1);
         out.push({ mesh: "pill", role: "grip", joint: -1, at: plus(begin, way, 0.5), axes: along(way), size: [0.6 * limb, 0.6 * limb, 0.6 * limb, length(way)] });
       });
-      return { solids: out, clear, flying: new Set(carried.filter(({ stage }) => stage !== 1).map(({ body }) => body)) };
+      return { solids: out, clear, words, flying: new Set(carried.filter(({ stage }) => stage !== 1).map(({ body }) => body)) };
+    }
+
+    // What becomes of payloads at the instant that is shown, as `solids` words it.
+    function say(words = "") {
+      if (chips.payload.said.textContent !== words) chips.payload.said.textContent = words;
     }
 
     // Nozzles, firing or not, which come into view with the arm.
     const nozzles = (t) => (taken ? made.gas(taken.at(t)) : []).map(({ at }) => ball(arm.up(at)));
 
-    return { box, show, tell, solids, nozzles, shown: (kind) => on[kind],
+    return { box, show, tell, say, solids, nozzles, shown: (kind) => on[kind],
       key: (key) => Object.keys(KINDS).find((kind) => KINDS[kind][2] === key && !chips[kind].box.hidden && (press(kind), true)) !== undefined,
       kept: () => ({ ...on }), resume: (before) => Object.keys(on).forEach((kind) => { if (before && before[kind] !== undefined && before[kind] !== on[kind]) press(kind); }),
       reactions: (t) => (forces ? forces.at(t) : []), looked: () => !taken || taken.look(0), now: (t) => (taken ? made.acts(taken.at(t)) : []), most };

@@ -99,7 +99,7 @@ MET.stage = (() => {
       const solids = [...own, ...(frames ? arm.frames(numbers) : []), ...around.solids];
       const shown = all && ghostly ? others : [];
       const second = twin && twinned ? twin(at) : [];
-      return { camera, solids, clear: around.clear, arm, ghosts: shown.map((each) => each.at(at)), twin: second, trace: path, floor, step, reach: arm.reach, limb: arm.limb, colours: (inks ||= inksOf()), fine, shadow: !scene.moves };
+      return { camera, solids, clear: around.clear, words: around.words, arm, ghosts: shown.map((each) => each.at(at)), twin: second, trace: path, floor, step, reach: arm.reach, limb: arm.limb, colours: (inks ||= inksOf()), fine, shadow: !scene.moves };
     }
 
     // Everything that a case comes to, as pills. What has run away is left out, and a payload or a nozzle that is more than a
@@ -144,10 +144,12 @@ MET.stage = (() => {
       if (!wide) return;
       camera.aspect = wide / high;
       if (fresh && !(fresh = false)) home();
+      const shown = picture(time);
       if (renderer) {
         sized(still);
-        renderer.draw(picture(time));
-      } else paper.replaceChildren(MET.painter.draw(picture(time), wide, high));
+        renderer.draw(shown);
+      } else paper.replaceChildren(MET.painter.draw(shown, wide, high));
+      legend.say(shown.words);
       scrub.value = end ? time / end : 0;
       clock.textContent = `${time.toFixed(end < 10 ? 2 : 1)} s`;
     }

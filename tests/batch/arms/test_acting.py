@@ -16,9 +16,12 @@ from batch.arms import acting
 from batch.arms.acting import ActingOnArm, NotDrawn, acting_json, acting_on
 from batch.arms.scene import arm_scene
 from batch.arms.scripts import FOLDER
+from met import models
 from met.plan import Experiment
 from tests.batch.arms.decks import about
 from tests.batch.arms.test_scene import recorded
+from tests.ic.small_decks import experiment as small_deck
+from tests.met.small_models import EVERY, smallest
 
 LEVER = """\
 arm lever {
@@ -107,6 +110,13 @@ def test_arrows_and_cones_are_where_the_deck_has_them(tmp_path: Path) -> None:
     jet = 6 * len(names)
     for t, fires in ((0.1, 1.0), (0.29, 0.0)):
         assert at[t][jet : jet + 8] == pytest.approx([0.8, -0.7, 0.2, -0.1, 1.0, 0.0, fires, 8.0], abs=1e-15)
+    tilt = turn @ about([0, 0, 1], np.radians(20.0)) @ about([1, 0, 0], np.pi / 2)
+    middle, width, height = at[1.0][jet + 8 :].reshape(3, 3)
+    assert middle == pytest.approx(hinge + turn @ [0.6, 0, 0], abs=1e-14)
+    assert [width, height] == [
+        pytest.approx(tilt @ [0.8, 0, 0], abs=1e-14),
+        pytest.approx(tilt @ [0, 0.5, 0], abs=1e-14),
+    ]
 
 
 PARCELS = """
@@ -129,7 +139,7 @@ def test_payloads_are_carried_while_the_run_says_so_and_what_is_not_recorded_is_
     with batch.open(tmp_path / "a.h5") as data:
         time = data["time"].values
         carried = [data[f"payloads.{name}.carried"].values.reshape(-1) for name in ("tool", "parcel")]
-    first = 6 * len(found.arrows) + 8 * len(found.jets)
+    first = 6 * len(found.arrows) + 17 * len(found.jets)
     stages = []
     for row, t in enumerate(time):
         numbers = found.formulas.replay({"time": t, "hinge.q": 0.0, "hinge.qd": 0.0})
@@ -195,6 +205,17 @@ def test_loads_with_more_formulas_than_a_page_should_hold_are_named(
     found = drawn(compiled(tmp_path, LEVER, "pushed"))
     assert found.not_drawn == (NotDrawn("load", "mount"), NotDrawn("load", "jet")) and found.jets == ()
     assert {each.name for each in found.arrows} == {"shove", "gust", "line", "stop", "drag"}
+
+
+@pytest.mark.parametrize("name", [name for kind, name in EVERY if kind == "environment"])
+def test_every_environment_model_is_drawn_or_told_unless_it_is_no_load_or_gravitation(
+    name: str, tmp_path: Path
+) -> None:
+    deck = small_deck(tmp_path, smallest("environment", name).put(tmp_path).deck(), select=["cases"])
+    found, model = drawn(deck), models.find("environment", name)
+    shown = {each.name for each in (*found.arrows, *found.not_drawn)}
+    loads = model.loads is not None and model.free_fall is None and name not in ("gravity", "brake")
+    assert shown == ({"used"} if loads else set())
 
 
 REPLAY = """

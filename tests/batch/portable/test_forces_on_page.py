@@ -24,6 +24,7 @@ run brief like nominal { duration = 0.2 s;  remove settle;  record += [reaction.
 
 
 LEGEND = "Array.from(document.querySelectorAll('.stage .legend .chip:not([hidden])'), e => e.textContent)"
+AROUND = "MET.shown.around().filter(each => each.mesh !== 'block').map(each => each.role)"
 LOOKED = "new Promise(d => { const f = () => MET.shown.legend.looked() ? d() : setTimeout(f, 20); f(); })"
 
 
@@ -119,7 +120,7 @@ def shown_at(page: Page, time: float) -> list[str]:
     """The roles of what is drawn around the arm at a time."""
     page.run(f"MET.shown.seek({time})")
     page.run("new Promise(d => { const f = () => MET.shown.isStill() ? d() : setTimeout(f, 20); f(); })")
-    return page.run("MET.shown.around().map(each => each.role)")  # type: ignore[no-any-return]
+    return page.run(AROUND)  # type: ignore[no-any-return]
 
 
 @pytest.mark.browser
@@ -160,7 +161,7 @@ def test_each_kind_is_drawn_while_it_acts_and_its_switch_takes_it_away(
         new = becomes(page, tmp_path, lambda shown, old=before: changed(old, shown) > 0.0005)  # type: ignore[misc]
         assert changed(before, new) > 0.0005, key
         kinds = {"l": "load", "p": "plume", "o": "grip"}
-        assert kinds[key] not in page.run("MET.shown.around().map(each => each.role)")
+        assert kinds[key] not in page.run(AROUND)
         pressed = page.run(
             "Array.from(document.querySelectorAll('.stage .legend .chip:not([hidden])'), e => e.ariaPressed)"
         )
@@ -168,7 +169,17 @@ def test_each_kind_is_drawn_while_it_acts_and_its_switch_takes_it_away(
     kept = page.run("MET.shown.kept().legend")
     assert kept == {"force": True, "load": False, "contact": True, "plume": False, "payload": False}
     page.run("MET.shown.resume({ ...MET.shown.kept(), legend: { load: true } })")
-    assert "load" in page.run("MET.shown.around().map(each => each.role)")
+    assert "load" in page.run(AROUND)
+    words = page.run(LEGEND)
+    page.run(
+        "MET.shown.resume({ ...MET.shown.kept(), legend: { plume: true } }); dispatchEvent(new Event('beforeprint'))"
+    )
+    assert page.run("document.querySelectorAll('.stage .film svg').length") >= 6
+    inks = page.run(
+        "Array.from(document.querySelectorAll('.stage .film path'), e => Number(e.getAttribute('opacity')))"
+    )
+    assert inks.count(0.3) >= 6  # plates, and cones of gas
+    assert page.run(LEGEND) == words  # of the instant that is shown, not of the last picture on paper
     quiet(page)
     page.close()
 
