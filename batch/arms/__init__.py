@@ -4,4 +4,5 @@ placing   the links' frames in the world, from the numbers of a case
 shapes    simple solids and lines, fixed to the links' frames
 look      sizes, colours and the viewpoint
 scene     both as formulas of what a case records and a sweep varies, which a page replays
+acting    what acts on it: loads, contact, gas of thrusters, payloads; as such formulas too
 """

@@ -16,6 +16,7 @@ import numpy as np
 from batch.archive.in_memory import GroupInMemory
 from batch.archive.read import ArchiveFile, ArchiveGroup, reading
 from batch.archive.stored import Unlike
+from batch.arms.acting import acting_json, acting_on
 from batch.arms.scene import arm_scene, lacking, scene_json
 from batch.arms.scripts import arm_scripts, arm_style
 from batch.modules.description import MOST_CASES, described, described_columns
@@ -118,7 +119,9 @@ def _beside(against: str | Path, file: ArchiveFile, group: ArchiveGroup, experim
             other.need_every_row("a page that simulates")
             theirs, of = beside.other_group(file, group, other)
             units = [each["unit"] for each in described_columns(experiment)]
-            return {"name": name, "page": data_of(of, other, theirs) | {"own": units}}
+            found = data_of(of, other, theirs)
+            found["arm"].pop("acting", None)  # of a second arm no more is drawn than where it is
+            return {"name": name, "page": found | {"own": units}}
     schedule = experiment.structure.schedule
     rows = np.arange(schedule.rows) * schedule.record / schedule.base_hz
     found = beside.log_data(against, described_columns(experiment), rows)
@@ -192,7 +195,13 @@ def _arm(experiment: Experiment) -> dict[str, Any]:
     recorded = [channel for each in experiment.structure.record for channel in each.channels]
     scene = arm_scene(experiment, recorded)
     missing = lacking(scene, recorded)
-    return {"lacking": [visible(name) for name in missing]} if missing else {"scene": scene_json(scene)}
+    if missing:
+        return {"lacking": [visible(name) for name in missing]}
+    acting = acting_on(experiment, scene, recorded)
+    found: dict[str, Any] = {"scene": scene_json(scene)}
+    if acting.arrows or acting.payloads or acting.not_drawn:
+        found["acting"] = _visible(acting_json(acting))
+    return found
 
 
 def _unit(unit: str) -> str:

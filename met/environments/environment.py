@@ -87,6 +87,36 @@ class Loads:
     dry: Mapping[str, Real] = field(default_factory=dict)
 
 
+@frozen
+class Plate:
+    """A rectangle that is fixed to a link: its middle, m, and its sides as vectors, m, in the link's frame."""
+
+    link: str
+    middle: Vector
+    width: Vector
+    height: Vector
+
+
+@frozen
+class Jet:
+    """Gas that leaves a nozzle, as pictures draw it.
+
+    link      that the nozzle is on, or `WORLD` of `met.parameter`
+    point     the nozzle in that link's frame, m
+    axis      where the gas goes to, in that link's axes; its length counts for nothing
+    fires     share of the step in which it flows
+    exponent  n of a density that falls with the angle from the axis as cos^n
+    plate     that the gas meets
+    """
+
+    link: str
+    point: Vector
+    axis: Vector
+    fires: Real
+    exponent: Real
+    plate: Plate
+
+
 FILE = Parameter(name="file", shape="text", default="none", doc="CSV file whose columns the lists are, in their stead")
 
 
@@ -123,6 +153,7 @@ class Environment:
     springs  the parameters that name a joint, and are the stiffness with which it is pushed back where it touches: a
            deck is warned where the dynamics' step is long for that (met/analysis/contact.py). (): there is none
     limits  those that it has: how much of a run is spent at each is kept of every case. (): there are none
+    jet  (p, world) -> the gas of which its loads come, which pictures show. None: they come of none
     friction_joint  the parameter that names the one joint on which it puts dry friction. "": none does
 
     What it may do to the servo of one joint, such as to let it fail:
@@ -159,6 +190,7 @@ class Environment:
     may_be_load: bool = False
     springs: tuple[str, ...] = ()
     limits: tuple[Limit, ...] = ()
+    jet: Callable[[Any, World], Jet] | None = None
     friction_joint: str = ""
     servo_of: str = ""
     decoupling: Callable[[Any, Any], Real] | None = None

@@ -38,7 +38,7 @@ import math
 from typing import Any
 
 from met.environments import firing
-from met.environments.environment import Environment, Force, Loads, World
+from met.environments.environment import Environment, Force, Jet, Loads, Plate, World
 from met.environments.gauss import gauss
 from met.parameter import WORLD, ZEROS, Parameter
 from met.trace import Real, absolute, atan2, clip, cos, exp, log, maximum, minimum, sin, sqrt, where
@@ -70,6 +70,13 @@ def loads(p: Any, world: World) -> Loads:
     if p.reaction == "off":
         return Loads(forces=(felt,))
     return Loads(forces=(felt, Force(p.nozzle_link, scale(-fires * p.thrust, axis), point=p.nozzle)))
+
+
+def jet(p: Any, world: World) -> Jet:
+    R = rotation_rpy(*p.rpy)
+    width, height = turn_vector(R, (p.width, 0.0, 0.0)), turn_vector(R, (0.0, p.height, 0.0))
+    plate = Plate(p.link, p.at, width, height)
+    return Jet(p.nozzle_link, p.nozzle, p.axis, firing.share(p, world), p.exponent, plate)
 
 
 def on_plate(p: Any, nozzle: Vector, axis: Vector) -> tuple[Vector, Vector]:
@@ -245,6 +252,7 @@ ENVIRONMENT = Environment(
         *firing.FIRING,
     ),
     loads=loads,
+    jet=jet,
     idle=idle,
     pushed_links=lambda p: ("link",) if p.reaction == "off" else ("link", "nozzle_link"),
 )

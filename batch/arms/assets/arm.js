@@ -20,6 +20,18 @@ MET.arm = (() => {
     return [x, cross(z, x), z];
   }
 
+  // Numbers at a time into `inputs`: the time, then those of the columns; between rows along a straight line.
+  function between(time, columns, t, inputs) {
+    const last = time.length - 1;
+    const [first, step] = [time[0], last > 0 ? (time[last] - time[0]) / last : 1];
+    const place = Math.min(Math.max((t - first) / step, 0), last);
+    const row = Math.min(Math.floor(place + 1e-9), Math.max(last - 1, 0));
+    const share = last > 0 ? Math.min(Math.max(place - row, 0), 1) : 0;
+    inputs[0] = Math.min(t, time[last]);
+    columns.forEach((rows, n) => { inputs[n + 1] = share < 1e-9 ? rows[row] : rows[row] + share * (rows[row + 1] - rows[row]); });
+    return inputs;
+  }
+
   // scene: as `batch.arms.scene.scene_json` has it.
   function make(scene) {
     const moving = new Set(["time", ...scene.channels]);
@@ -40,20 +52,9 @@ MET.arm = (() => {
       const state = formulas.begin({ ...values, ...ends });
       const out = new Float64Array(scene.outputs.length);
       const inputs = new Float64Array(scene.channels.length + 1);
-      const last = time.length - 1;
-
-      // Its numbers at a time; between rows along a straight line.
-      function at(t) {
-        const [first, step] = [time[0], last > 0 ? (time[last] - time[0]) / last : 1];
-        const place = Math.min(Math.max((t - first) / step, 0), last);
-        const row = Math.min(Math.floor(place + 1e-9), Math.max(last - 1, 0));
-        const share = last > 0 ? Math.min(Math.max(place - row, 0), 1) : 0;
-        inputs[0] = Math.min(t, time[last]);
-        columns.forEach((rows, n) => { inputs[n + 1] = share < 1e-9 ? rows[row] : rows[row] + share * (rows[row + 1] - rows[row]); });
-        return formulas.at(state, inputs, out);
-      }
+      const at = (t) => formulas.at(state, between(time, columns, t, inputs), out);
       const tip = (t) => up(vector(at(t), out.length - 3));
-      return { at, tip, end: time[last] };
+      return { at, tip, end: time[time.length - 1] };
     }
 
     const vector = (numbers, at) => [numbers[at], numbers[at + 1], numbers[at + 2]];
@@ -109,7 +110,7 @@ MET.arm = (() => {
     function solids(numbers) {
       const out = scene.shapes.map(([, , role, joint], n) => {
         write(numbers, n, own, 0);
-        return { mesh: meshes[n], role, joint, at: vector(own, 0), axes: [3, 6, 9].map((at) => vector(own, at)), size: [...vector(own, 12), own[15]] };
+        return { mesh: meshes[n], role, joint, body: scene.shapes[n][0], at: vector(own, 0), axes: [3, 6, 9].map((at) => vector(own, at)), size: [...vector(own, 12), own[15]] };
       });
       if (!scene.moves) out.push({ mesh: "can", role: "base", joint: -1, at: [0, 0, FOOT[1] * limb / 2], axes: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], size: [FOOT[0] * limb, FOOT[0] * limb, 0.4 * limb, FOOT[1] * limb] });
       return out;
@@ -122,20 +123,22 @@ MET.arm = (() => {
       return { mesh: "can", role: "xyz"[which], joint: -1, at: plus(up(origin(numbers, body)), axis, far / 2), axes: along(axis), size: [0.2 * limb, 0.2 * limb, 0.2 * limb, far] };
     }));
 
+    // An arrow of a role from a point along a vector, both seen with z up, far m long; a moment has two heads.
+    const [SHAFT, HEAD] = [[0.22], [0.6, 1.9]];  // radius and, of the head, length, in limbs
+    function arrow(begin, vector, far, role, heads = 1) {
+      if (!(far > 0.2 * limb)) return [];
+      const axes = along(vector);
+      const head = Math.min(HEAD[1] * limb, (0.6 * far) / heads);
+      const part = (mesh, radius, at, length) => ({ mesh, role, joint: -1, at: plus(begin, axes[2], at), axes, size: [radius * limb, radius * limb, mesh === "can" ? 0.1 * limb : 0, length] });
+      return [part("can", SHAFT[0], (far - head) / 2, far - head), ...Array.from({ length: heads }, (_, n) => part("cone", HEAD[0], far - (n + 0.5) * head, head))];
+    }
+
     // Forces as arrows from the origins of their bodies' frames. forces: [body, x, y, z], in the body's axes, N; metres: of
     // a newton.
-    const [SHAFT, HEAD] = [[0.22], [0.6, 1.9]];  // radius and, of the head, length, in limbs
-    const arrows = (numbers, forces, metres) => forces.flatMap(([body, ...force]) => {
-      const far = metres * size(force);
-      if (!(far > 0.2 * limb)) return [];
-      const R = rows(numbers, body);
-      const axes = along(up(R.map((row) => dot(row, force))));
-      const [head, begin] = [Math.min(HEAD[1] * limb, 0.6 * far), up(origin(numbers, body))];
-      const part = (mesh, radius, at, length) => ({ mesh, role: "force", joint: -1, at: plus(begin, axes[2], at), axes, size: [radius * limb, radius * limb, mesh === "can" ? 0.1 * limb : 0, length] });
-      return [part("can", SHAFT[0], (far - head) / 2, far - head), part("cone", HEAD[0], far - head / 2, head)];
-    });
+    const arrows = (numbers, forces, metres) => forces.flatMap(([body, ...force]) =>
+      arrow(up(origin(numbers, body)), up(rows(numbers, body).map((row) => dot(row, force))), metres * size(force), "force"));
 
-    return { take, solids, arrows, write, meshes, frames, scene, limb, reach: scene.reach };
+    return { take, solids, arrow, arrows, up, at: (numbers, body) => up(origin(numbers, body)), write, meshes, frames, scene, limb, reach: scene.reach };
   }
 
   // Ends and radius of a solid as if it were a pill, by which it is fitted into a picture.
@@ -144,5 +147,5 @@ MET.arm = (() => {
     return { ends: [plus(at, axes[2], -half), plus(at, axes[2], half)], radius: mesh === "block" ? Math.hypot(x, y) / 2 : x };
   }
 
-  return { make, ends, dot, cross, plus, unit, along, length: size, SOLID };
+  return { make, between, ends, dot, cross, plus, unit, along, length: size, SOLID };
 })();

@@ -75,6 +75,7 @@ MET.painter = (() => {
     }
     ghosts.forEach((numbers, n) => arm.solids(numbers).forEach((one) => solid(one, colours.ghost(n), Math.min(1, 1.5 * colours.ghost(n)[3]))));
     picture.twin.filter(({ role }) => role !== "base").forEach((each) => solid(each, colours.twin, colours.twin[3]));
+    picture.clear.forEach((each) => solid(each, colours.clear(each), colours.clear(each)[3]));
     if (trace.length > 1) path(1e9, { d: d(trace.map(seen), false), stroke: css(colours.trace), "stroke-width": 1.6 });  // under the arm
     solids.forEach((each) => solid(each, colours.solid(each), 1));
     items.sort((a, b) => b[0] - a[0]);

@@ -9,7 +9,6 @@ MET.stage = (() => {
   const FAR = 1e4;  // reaches, farther than which nothing is fitted
   const [REST, SLOW] = [120, 45];  // ms after which a picture that stands is drawn fine; of a picture, more than which is slow
   const PAUSE = 100;  // ms between which plots follow an arm that plays, where a processor draws
-  const LONGEST = 0.35;  // of the reach: the arrow of the largest force
   const TRACED = 240;  // points of the tip's path
   const FILM = 6;  // pictures on paper
   const rgb = (hex, alpha = 1) => [...[1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255), alpha];
@@ -24,8 +23,9 @@ MET.stage = (() => {
     return power * [1, 2, 5, 10].reduce((a, b) => (Math.abs(b * power - wanted) < Math.abs(a * power - wanted) ? b : a));
   }
 
-  // scene: as `batch.arms.scene.scene_json` has it. seen: is told of each instant that is shown.
-  function make(root, scene, { seen = () => {} } = {}) {
+  // scene: as `batch.arms.scene.scene_json` has it. seen: is told of each instant that is shown. acting: as
+  // `batch.arms.acting.acting_json` has it.
+  function make(root, scene, { seen = () => {}, acting = null } = {}) {
     const arm = MET.arm.make(scene);
     const camera = MET.camera.make();
     const step = stepOf(arm.reach);
@@ -33,7 +33,8 @@ MET.stage = (() => {
     let [frames, ghostly, fresh, asked, touched, moved, before] = [false, true, true, false, false, false, 0];
     let [path, still, rest, pace, coarse, inks, saidAt] = [[], true, 0, 0, 1, null, 0];
     let [twin, twinned] = [null, true];  // another arm beside the chosen case: its solids at a time
-    let [forces, forceful] = [null, true];  // {at: of a time, most: the largest of the case, N}
+    const legend = MET.acting.legend(arm, () => redraw());
+    const acts = acting ? MET.acting.make(acting, arm) : null;
     const fingers = new Map();  // and mice: places where the view is held, by pointer
 
     const canvas = node("canvas");
@@ -49,20 +50,18 @@ MET.stage = (() => {
     };
     const withFrames = toggle("frames", "Axes of the links' frames: x red, y green, z blue", frames, () => (frames = !frames));
     const withOthers = toggle("", "The other cases, as ghosts", ghostly, () => (ghostly = !ghostly));
-    const withForces = toggle("forces", "Forces of the joints on their links, as arrows", true, () => (forceful = !forceful));
-    withForces.hidden = true;
     const withTwin = toggle("", "What stands beside the run", true, () => (twinned = !twinned));
     withTwin.hidden = true;
     const whole = node("button", { type: "button", class: "chip", title: "Everything in view (0)", click: () => { home(); redraw(); } }, "fit");
     const view = node("div", { class: "view", tabindex: 0, role: "application", "aria-label": "The arm in 3D. Space plays, comma and full stop step, arrows turn, with shift they move, plus and minus zoom, 0 shows all." },
-      canvas, paper, told, scaled, node("div", { class: "tools" }, withTwin, withOthers, withForces, withFrames, whole));
+      canvas, paper, told, scaled, node("div", { class: "tools" }, withTwin, withOthers, withFrames, whole));
     const sign = node("path", { d: "M3 1.5 L14 8 L3 14.5 Z" });
     const play = node("button", { type: "button", class: "play", "aria-label": "Play", click: () => run(!playing) }, node("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, sign));
     const scrub = node("input", { type: "range", min: 0, max: 1, step: "any", "aria-label": "Time", input: () => { run(false); seek(Number(scrub.value) * end); } });
     const clock = node("output", { class: "clock" });
     const speed = node("select", { "aria-label": "Speed", change: () => { rate = Number(speed.value); } }, SPEEDS.map((each) => node("option", { value: each }, `${number(each)} ×`)));
     const film = node("div", { class: "film printed" });
-    root.append(node("div", { class: "stage" }, view, node("div", { class: "transport" }, play, scrub, clock, speed), film));
+    root.append(node("div", { class: "stage" }, view, node("div", { class: "transport" }, play, scrub, clock, speed), legend.box, ...[MET.acting.note(acting)].filter(Boolean), film));
     let renderer = null;
     try {
       renderer = MET.webgl.make(canvas);
@@ -76,7 +75,9 @@ MET.stage = (() => {
     function inksOf() {
       const mine = palette();
       const [link, base, payload] = BODY[MET.dark() ? "dark" : "light"];
-      const by = { force: rgb(MET.dark() ? "#ff7ad1" : "#b5127f"), link: rgb(link), base: rgb(base), rail: rgb(base), payload: rgb(payload), joint: rgb(base) };
+      const by = { link: rgb(link), base: rgb(base), rail: rgb(base), joint: rgb(base) };
+      Object.entries(MET.acting.inks()).forEach(([kind, colour]) => { by[kind] = rgb(colour); });
+      [by.payload, by.flying, by.grip] = [payload, MET.dark() ? "#8d7c55" : "#f0d9a6", payload].map((each) => rgb(each));
       Object.entries(AXES).forEach(([axis, colour]) => { by[axis] = rgb(colour); });
       const joints = mine.lines.map((each) => rgb(each));
       const faint = Math.min(0.2, Math.max(0.06, 2 / Math.max(1, others.length)));
@@ -84,6 +85,7 @@ MET.stage = (() => {
       return {
         solid: (each) => (each.role === "joint" && each.joint >= 0 ? joints[each.joint % joints.length] : by[each.role]),
         ghost: (n) => (others[n] && others[n].bad ? bad : plain),
+        clear: (each) => [...by[each.role].slice(0, 3), 0.3],
         trace: rgb(mine.accent), twin: rgb(mine.accent, 0.5), grid: rgb(MET.dark() ? "#5d6873" : "#aab3bc", 0.9), ground: rgb(mine.paper, MET.dark() ? 0.16 : 0.55),
         shade: MET.dark() ? [0, 0, 0, 0.42] : [0.02, 0.028, 0.036, 0.17],
       };
@@ -91,20 +93,23 @@ MET.stage = (() => {
 
     function picture(at, all = true, fine = still) {
       const numbers = chosen.at(at);
-      const solids = [...arm.solids(numbers), ...(frames ? arm.frames(numbers) : [])];
+      const around = legend.solids(at, numbers);
+      const own = arm.solids(numbers).filter(({ role }) => role !== "payload" || legend.shown("payload"))
+        .map((each) => (each.role === "payload" && around.flying?.has(each.body) ? { ...each, role: "flying" } : each));
+      const solids = [...own, ...(frames ? arm.frames(numbers) : []), ...around.solids];
       const shown = all && ghostly ? others : [];
-      if (forces && forceful) solids.push(...arm.arrows(numbers, forces.at(at), (LONGEST * arm.reach) / forces.most));
       const second = twin && twinned ? twin(at) : [];
-      return { camera, solids, arm, ghosts: shown.map((each) => each.at(at)), twin: second, trace: path, floor, step, reach: arm.reach, limb: arm.limb, colours: (inks ||= inksOf()), fine, shadow: !scene.moves };
+      return { camera, solids, clear: around.clear, words: around.words, arm, ghosts: shown.map((each) => each.at(at)), twin: second, trace: path, floor, step, reach: arm.reach, limb: arm.limb, colours: (inks ||= inksOf()), fine, shadow: !scene.moves };
     }
 
-    // Everything that a case comes to, as pills. What has run away is left out, and a payload that is more than a reach from
-    // the box round all that the arm comes to: it comes into view.
+    // Everything that a case comes to, as pills. What has run away is left out, and a payload or a nozzle that is more than a
+    // reach from the box round all that the arm comes to: it comes into view.
     const near = ({ ends }) => ends.flat().every((x) => Math.abs(x) < FAR * arm.reach);
     const pills = (each, count) => inView((at) => arm.solids(each.at(at)), count);
+    const chosenPills = () => inView((at) => [...arm.solids(chosen.at(at)), ...legend.nozzles(at)], FITTED);
     const inView = (solids, count) => {
       const all = Array.from({ length: count }, (_, n) => solids((end * n) / (count - 1))).flat()
-        .map((one) => ({ ...MET.arm.ends(one), own: one.role !== "payload" })).filter(near);
+        .map((one) => ({ ...MET.arm.ends(one), own: one.role !== "payload" && one.role !== "plume" })).filter(near);
       const box = [0, 1, 2].map((axis) => all.filter((one) => one.own).flatMap(({ ends }) => ends.map((p) => p[axis])))
         .map((places) => [places.reduce((a, b) => Math.min(a, b), Infinity), places.reduce((a, b) => Math.max(a, b), -Infinity)]);
       const close = (p) => Math.hypot(...box.map(([low, high], axis) => Math.max(low - p[axis], p[axis] - high, 0))) <= arm.reach;
@@ -118,7 +123,7 @@ MET.stage = (() => {
 
     // Everything in view, seen from where most is seen of the chosen case.
     function home() {
-      const all = pills(chosen, FITTED);
+      const all = chosenPills();
       if (!all.length) return;
       ground(all);
       camera.choose(all.flatMap(({ ends }) => ends));
@@ -139,10 +144,12 @@ MET.stage = (() => {
       if (!wide) return;
       camera.aspect = wide / high;
       if (fresh && !(fresh = false)) home();
+      const shown = picture(time);
       if (renderer) {
         sized(still);
-        renderer.draw(picture(time));
-      } else paper.replaceChildren(MET.painter.draw(picture(time), wide, high));
+        renderer.draw(shown);
+      } else paper.replaceChildren(MET.painter.draw(shown, wide, high));
+      legend.say(shown.words);
       scrub.value = end ? time / end : 0;
       clock.textContent = `${time.toFixed(end < 10 ? 2 : 1)} s`;
     }
@@ -240,7 +247,7 @@ MET.stage = (() => {
       else if (event.key === "-") zoom(1 / 0.85);
       else if (event.key === "0" || event.key === "Home") home();
       else if (event.key === "b" && !withTwin.hidden) withTwin.click();
-      else if (event.key === "a" && !withForces.hidden) withForces.click();
+      else if (legend.key(event.key)) return;
       else if (event.key === "f") withFrames.click();
       else if (event.key === "g" && !withOthers.hidden) withOthers.click();
       else return;
@@ -248,11 +255,10 @@ MET.stage = (() => {
       redraw();
     });
 
-    // The case that is solid, taken by `take`; label: what it is called; acting: its forces.
-    function show(taken, label, acting = null) {
-      forces = acting && acting.most > 0 ? acting : null;
-      withForces.hidden = !forces;
-      scaled.textContent = `grid ${number(step)} m${forces ? ` · longest arrow ${number(forces.most)} N` : ""}`;
+    // The case that is solid, taken by `take`; label: what it is called; reactions: forces of its joints; around: what
+    // else acts on it, taken by `takeActing`.
+    function show(taken, label, { reactions = null, around = null } = {}) {
+      legend.show(around, around && acts, reactions);
       const first = !chosen;
       chosen = taken;
       end = taken.end;
@@ -296,14 +302,14 @@ MET.stage = (() => {
       if (!chosen) return;
       const { distance, target, aspect } = camera;
       camera.aspect = 4 / 3;
-      camera.fit(pills(chosen, FITTED));
+      camera.fit(chosenPills());
       film.replaceChildren(...Array.from({ length: FILM }, (_, n) => (end * n) / (FILM - 1)).map((at) =>
         node("figure", null, MET.painter.draw(picture(at, false), 400, 300), node("figcaption", null, `${number(at)} s`))));
       Object.assign(camera, { distance, target, aspect });
     }, { signal: ending.signal });
     const sides = new ResizeObserver(redraw);
     sides.observe(view);
-    const anew = () => { inks = null; redraw(); };
+    const anew = () => { inks = null; legend.tell(); redraw(); };
     MET.drawn.push(anew);
 
     // Another view takes this one's place: it stops, and holds nothing.
@@ -317,17 +323,17 @@ MET.stage = (() => {
 
     // Where it is seen from and at which instant; and back there, on a page that takes another's place.
     const seenFrom = ({ azimuth, elevation, distance, target }) => ({ azimuth, elevation, distance, target });
-    const kept = () => ({ camera: seenFrom(camera), time, playing, rate, frames, ghostly, forceful, twinned });
+    const kept = () => ({ camera: seenFrom(camera), time, playing, rate, frames, ghostly, legend: legend.kept(), twinned });
 
     function resume(before) {
-      const all = chosen ? pills(chosen, FITTED) : [];
+      const all = chosen ? chosenPills() : [];
       if (all.length) ground(all);
       [fresh, moved, rate] = [false, true, before.rate];
       Object.assign(camera, seenFrom(before.camera));
       speed.value = rate;
       if (before.frames !== frames) withFrames.click();
       if (before.ghostly !== ghostly) withOthers.click();
-      if (before.forceful !== forceful) withForces.click();
+      legend.resume(before.legend);
       if (before.twinned !== twinned) withTwin.click();
       seek(before.time);
       if (before.playing) run(true);
@@ -343,7 +349,7 @@ MET.stage = (() => {
       }
       return (performance.now() - begun) / count;
     }
-    return { take: arm.take, forces: () => forces, show, haunt, accompany, settle, seek, kept, resume, close, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
+    return { take: arm.take, takeActing: acts && acts.take, legend, around: () => { const { solids, clear } = legend.solids(time, chosen.at(time)); return [...solids, ...clear]; }, show, haunt, accompany, settle, seek, kept, resume, close, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, finish: () => renderer && renderer.finish(), ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
   }
 
   return { make };

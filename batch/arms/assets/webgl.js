@@ -1,6 +1,6 @@
 // Draws a picture of an arm by WebGL 2: meshes of unit size, stretched and turned by what a texture lists of each solid; a
 // floor with a grid and shadows on it. `make` gives null where there is no WebGL.
-//   picture  {camera, solids, twin: the solids of a second arm, arm, ghosts: of each the arm's numbers, trace: [points], floor (its height, or null), step (of the grid, m), colours,
+//   picture  {camera, solids, clear: those that one sees through, twin: the solids of a second arm, arm, ghosts: of each the arm's numbers, trace: [points], floor (its height, or null), step (of the grid, m), colours,
 //            fine: it stands, and may take longer; shadow: whether the arm casts one}
 // All solids of a mesh are one call, a copy of the mesh each: where a processor draws, each instance of an instanced call
 // costs as much as a call, some 40 us, by which a hundred ghosts take ten times as long.
@@ -224,7 +224,7 @@ MET.webgl = (() => {
 
     // Solids as a texture has them, those of a mesh one after another.
     const list = () => ({ texture: gl.createTexture(), numbers: new Float32Array(0), rows: 0, runs: [] });
-    const [own, way, crowd, second] = [list(), list(), list(), list()];
+    const [own, way, crowd, second, glass] = [list(), list(), list(), list(), list()];
     function room(into, count) {
       const rows = Math.max(1, Math.ceil(count / ROW));
       if (into.numbers.length < rows * ROW * NUMBERS) into.numbers = new Float32Array(rows * ROW * NUMBERS);
@@ -367,6 +367,12 @@ MET.webgl = (() => {
         fill(second, picture.twin.filter(({ role }) => role !== "base"), () => colours.twin);
         put(picture.fine ? fine : quick, second, ghost);
         gl.disable(gl.POLYGON_OFFSET_FILL);
+        gl.depthMask(true);
+      }
+      if (picture.clear.length) {
+        gl.depthMask(false);
+        fill(glass, picture.clear, colours.clear);
+        put(picture.fine ? fine : quick, glass, ghost);
         gl.depthMask(true);
       }
       if (ghosts.length) {

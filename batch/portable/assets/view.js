@@ -71,7 +71,7 @@ MET.simulate = (data, back, seen) => {
     knobs.forEach(({ shown, input, n }) => { shown.textContent = `${number(values[n] / input.scale)} ${data.units[n]}`; });
     const measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
     tell(which, measured, failed, tick, took);
-    if (stage && rows) stage.show(taken(values, found.rows, rows), free ? (free.isOwn() ? "the deck's numbers" : "other numbers") : which < 0 ? `not in the ${source}` : `case #${data.positions[which]}`, acting(found.rows, rows));
+    if (stage && rows) stage.show(taken(values, found.rows, rows), free ? (free.isOwn() ? "the deck's numbers" : "other numbers") : which < 0 ? `not in the ${source}` : `case #${data.positions[which]}`, { reactions: reactions(found.rows, rows), around: around(values, found.rows, rows) });
     if (stage) stage.haunt(others.filter((each) => each.n !== which));
   }
 
@@ -89,22 +89,25 @@ MET.simulate = (data, back, seen) => {
   }
 
   // The arm: the case that is shown, and the archive's others, which are computed here one after another.
-  const channels = data.arm.scene ? data.arm.scene.channels.map((name) => told.columns.findIndex((column) => column.channel === name)) : [];
-  const stage = data.arm.scene ? MET.stage.make(room, data.arm.scene, { seen: point }) : null;
+  const stage = data.arm.scene ? MET.stage.make(room, data.arm.scene, { seen: point, acting: data.arm.acting }) : null;
   if (!stage) room.append(node("p", { class: "note" }, `The arm is not shown, for the run does not record ${data.arm.lacking.join(", ")}: `, node("code", null, `record += [${data.arm.lacking.join(", ")}];`)));
 
-  function taken(inputs, numbers, rows) {
+  // What is drawn of a case: a function of its inputs, its time and columns, given these.
+  const drawnOf = (take, places) => (inputs, numbers, rows) => {
     const width = told.columns.length;
-    const columns = channels.map((c) => Float64Array.from({ length: rows }, (_, row) => numbers[row * width + c]));
-    return stage.take(Object.fromEntries(told.inputs.map((input, n) => [input.name, inputs[n]])), time.subarray(0, rows), columns);
-  }
+    const columns = places.map((c) => Float64Array.from({ length: rows }, (_, row) => numbers[row * width + c]));
+    return take(Object.fromEntries(told.inputs.map((input, n) => [input.name, inputs[n]])), time.subarray(0, rows), columns);
+  };
+  const placesOf = (names) => names.map((name) => told.columns.findIndex((column) => column.channel === name));
+  const taken = stage && drawnOf(stage.take, placesOf(data.arm.scene.channels));
+  const around = stage?.takeActing ? drawnOf(stage.takeActing, placesOf(data.arm.acting.channels)) : () => null;
 
   // The forces of joints on their links, where all three of their numbers are recorded: of a time, and the largest, N.
   const recorded = data.arm.scene ? data.arm.scene.joints.map((joint, n) => [
     data.arm.scene.shapes.find(([, , role, of]) => role === "joint" && of === n)?.[0],
     ...["x", "y", "z"].map((axis) => told.columns.findIndex(({ channel }) => channel === `${joint}.reaction.force.${axis}`)),
   ]).filter((places) => places.every((place) => place >= 0)) : [];
-  function acting(numbers, rows) {
+  function reactions(numbers, rows) {
     if (!recorded.length) return null;
     const width = told.columns.length;
     const of = (row) => recorded.map(([body, ...columns]) => [body, ...columns.map((column) => numbers[row * width + column])]);

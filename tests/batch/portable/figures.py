@@ -4,6 +4,7 @@ python -m tests.batch.portable.figures          writes docs/figures/view_*.png
 
 view_arm.png      the Panda with an upper arm of seven lengths, one of them solid
 view_narrow.png   the same page on a telephone, dark
+view_acting.png   all that acts on it: joint forces, loads, a stop, the gas of a thruster, a payload
 view_film.png     six instants, as the page prints them
 view_beside.png   the arm with the forces of its joints, beside a log of which one joint lags
 
@@ -30,8 +31,23 @@ HUNDRED = "#include <panda.ic>\nsweep hundred of reach { vary links.load.mass = 
 
 FORCES = "#include <panda.ic>\nrun forces like reach { record += [reaction.force]; }\n"
 
-READY = """new Promise(done => { const look = () =>
-    document.documentElement.dataset.haunted && MET.shown.isStill() ? done() : setTimeout(look, 30); look(); })"""
+ACTING = """#include <panda.ic>
+run acted like reach {
+    environment {
+        push = wrench { link = link4;  force = [0, 40, 0] N;  from = 0.5 s; }
+        turn = wrench { link = link6;  moment = [0, 0, 4] N*m;  from = 0.5 s; }
+        jet  = plume { link = link7;  at = [0, 0, 0.2] m;  width = 0.3 m;  height = 0.3 m;  cells = 2;  sides = both;
+                       nozzle = [0.9, -0.1, 0.9] m;  axis = [-0.4, 0.6, -0.3];  thrust = 10 N;  exponent = 10; }
+        stop = joint_stop { joint = joint4;  upper = -95 deg;  stiffness = 100 N*m/rad; }
+    }
+    payload parcel { mass = 0.5 kg;  shape = box(size = [0.12, 0.12, 0.12] m);  on = load;  at = [0, 0, 0.1] m;
+                     release = 4.95 s; }
+    record += [reaction.force, payloads.parcel.position, payloads.parcel.orientation];
+}
+"""
+
+READY = """new Promise(done => { const ready = () => document.documentElement.dataset.haunted && MET.shown.isStill() &&
+    MET.shown.legend.looked(); const look = () => ready() ? done() : setTimeout(look, 30); look(); })"""
 
 
 CHOOSE = """(() => { const chosen = document.querySelector(".knob select"); chosen.value = 3;
@@ -57,6 +73,11 @@ def draw(folder: Path) -> list[Path]:
         written[-1].write_bytes(base64.b64decode(picture))
 
         written.append(beside(chromium, home, folder))
+
+        (home / "acting.ic").write_text(ACTING, encoding="utf-8")
+        batch.run(ic.compile(home / "acting.ic", select=["acted"]), output=home / "acting.h5")
+        shown = chromium.open(_page(home / "acting.h5"), width=1180, scale=1.5)
+        written.append(_at(shown, 4.0).picture(folder / "view_acting.png", ".stage"))
 
         (home / "hundred.ic").write_text(HUNDRED, encoding="utf-8")
         batch.run(ic.compile(home / "hundred.ic", select=["hundred"]), output=home / "hundred.h5", histories="none")

@@ -7,23 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks import decks
-from benchmarks.arms import GENERAL, SEVEN, THIRTY, TWO, Arm
-from benchmarks.ladder import OTHERS, SERVOS
+from benchmarks.arms import Arm
 
-import ic
 from met import backends, models
 from met.backends.llvm import machine
 from met.backends.wasm import link, module, node
-from met.plan import Experiment
-from met.program.build import build
-from met.run import inputs
 from met.trace import fma
 from met.trace.primitives import fused
 from met.trace.program import Phase, Program, RecordPhase, RunPhase, Tape
 from met.trace.recorder import record
 from met.trace.recording import Recording
 from tests.ic.small_decks import experiment
+from tests.met.backends import whole_runs
+from tests.met.backends.whole_runs import WholeRun, differing, whole_run
 from tests.met.small_models import EVERY, smallest
 
 MACHINE = pytest.mark.parametrize("machine", [pytest.param(False, id="own fma"), pytest.param(None, id="found out")])
@@ -87,16 +83,11 @@ def test_a_multiply_add_is_rounded_once_for_operands_of_any_size(machine: bool |
     assert (np.abs(native) < 2.0**-1022).sum() > 30_000  # so many have few bits
 
 
-def differing(experiment: Experiment, machine: bool | None, *, cases: int, ticks: int | None = None) -> tuple[int, int]:
-    """Numbers of some cases' rows and outputs that node and the native kernel computed, and how many differ."""
-    recording = record(build(experiment))
-    rows = np.linspace(0, experiment.cases.count - 1, min(cases, experiment.cases.count)).astype(np.int64)
-    given, last = inputs(experiment, rows), experiment.structure.schedule.ticks if ticks is None else ticks
-    found = node.ask(module.compiled(recording), given, 0, last, machine=machine)
-    pairs = list(zip(backends.load(recording).run(given, last), (found.rows, found.outputs), strict=True))
-    assert all(a is not None and a.shape == b.shape for a, b in pairs)
-    assert pairs[0][0].std() > 0.0
-    return sum(a.size for a, _ in pairs), sum(int((a.view(np.int64) != b.view(np.int64)).sum()) for a, b in pairs)
+def counted(run: WholeRun, machine: bool | None) -> tuple[int, int]:
+    """Numbers of a run's rows and outputs that node and the native kernel computed, and how many differ."""
+    found = node.ask(module.compiled(run.recording), run.inputs, 0, run.last, machine=machine)
+    pairs = list(zip(run.native(), (found.rows, found.outputs), strict=True))
+    return sum(a.size for a, _ in pairs), sum(differing(a, b) for a, b in pairs)
 
 
 @pytest.mark.node
@@ -104,53 +95,27 @@ def differing(experiment: Experiment, machine: bool | None, *, cases: int, ticks
 @pytest.mark.parametrize(("kind", "name"), EVERY)
 def test_every_model_has_the_native_bits(kind: models.Kind, name: str, machine: bool | None, tmp_path: Path) -> None:
     deck = experiment(tmp_path, smallest(kind, name).put(tmp_path).deck(), select=["cases"])
-    assert differing(deck, machine, cases=7)[1] == 0
+    assert counted(whole_run(name, deck, cases=7), machine)[1] == 0
 
 
 @pytest.mark.node
 @MACHINE
 @pytest.mark.parametrize(
     ("deck", "run"),
-    [
-        ("two_link", "gains"),
-        ("two_link", "hybrid"),  # a motor on an emulated bed, with its noise
-        ("panda", "swing"),
-        ("free_flyer", "flyer_felt"),
-        ("station_arm", "station_arm_afloat"),
-        pytest.param("shuttle_arm", "shuttle_arm_payloads", marks=pytest.mark.slow),
-        pytest.param("manutec_r3", "manutec_r3_driven", marks=pytest.mark.slow),
-        pytest.param("ets_vii", "ets_vii_afloat", marks=pytest.mark.slow),
-    ],
+    [pytest.param(*each, marks=[pytest.mark.slow] if each in whole_runs.LONG else []) for each in whole_runs.PUBLISHED],
 )
 def test_whole_runs_of_published_arms_have_the_native_bits(deck: str, run: str, machine: bool | None) -> None:
-    (found,) = ic.compile(f"{deck}.ic", select=[run]).experiments
-    count, wrong = differing(found, machine, cases=2)
+    count, wrong = counted(whole_runs.published(deck, run), machine)
     assert wrong == 0 and count > 4_000
 
 
 @pytest.mark.node
 @MACHINE
-@pytest.mark.parametrize(
-    ("arm", "model"),
-    [
-        (TWO, "lugre"),
-        (SEVEN, "lugre"),
-        (SEVEN, "plume, 36 cells"),
-        (SEVEN, "wrench_table"),
-        (SEVEN, "payload grappled, base free"),
-        (THIRTY, "lugre"),
-        (GENERAL, "rigid_gearbox"),
-        (THIRTY, "tachometer with noise"),
-        (THIRTY, "base free"),
-    ],
-    ids=lambda of: of.name if isinstance(of, Arm) else of,
-)
+@pytest.mark.parametrize(("arm", "model"), whole_runs.REVERSING, ids=lambda of: of.name if isinstance(of, Arm) else of)
 def test_arms_of_2_7_and_30_joints_that_reverse_have_the_native_bits(
     arm: Arm, model: str, machine: bool | None
 ) -> None:
-    variant = {**SERVOS, **OTHERS}[model]
-    deck = decks.experiment(arm, "reversing", record=True, variant=variant)
-    count, wrong = differing(deck, machine, cases=3, ticks=100)
+    count, wrong = counted(whole_runs.reversing(arm, model), machine)
     assert wrong == 0 and count > 1_000
 
 
