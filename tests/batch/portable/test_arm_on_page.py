@@ -13,6 +13,9 @@ from matplotlib import image
 from met import cli
 from tests.batch.report.browser import PACKAGE, PATIENCE_SECONDS, Chromium, Page, browser, program, quiet
 
+PICTURES = 12
+"""Pictures that are taken at most until two in a row are alike."""
+
 DECK = """\
 #include <two_link.ic>
 run brief like nominal {
@@ -64,11 +67,17 @@ def opened(chromium: Chromium, path: Path, **words: object) -> Page:
 
 def pixels(page: Page, folder: Path) -> np.ndarray:
     """The view as the browser shows it, without its edge, (row, column, rgb) from 0 to 1, once its fine picture is
-    drawn: by the process that draws, too."""
+    drawn: by the process that draws, too, and shown, which a busy machine does later: two pictures are alike then."""
     page.run("new Promise(d => { const f = () => MET.shown.isStill() ? d() : setTimeout(f, 20); f(); })")
     page.run("MET.shown.finish()")
-    page.settle()
-    return image.imread(page.picture(folder / "view.png", ".stage .view", margin=0))[4:-4, 4:-4, :3]
+    before = None
+    for _ in range(PICTURES):
+        page.settle()
+        found = image.imread(page.picture(folder / "view.png", ".stage .view", margin=0))[4:-4, 4:-4, :3]
+        if before is not None and np.array_equal(before, found):
+            break
+        before = found
+    return found
 
 
 def coloured(shown: np.ndarray) -> float:
