@@ -29,7 +29,7 @@ from met.vectors import Vector, scale
 
 RATE = "qd"
 MOST_NODES = 20_000
-"""Operations and entries of tables that the formulas of all models may have: a page holds them all, 20 bytes each."""
+"""Operations and entries of tables that the formulas of all models may have: a page holds them, some 25 bytes each."""
 
 Kind = Literal["load", "contact", "plume"]
 
