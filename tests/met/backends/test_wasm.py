@@ -87,12 +87,14 @@ def test_a_multiply_add_is_rounded_once_for_operands_of_any_size(machine: bool |
     assert (np.abs(native) < 2.0**-1022).sum() > 30_000  # so many have few bits
 
 
-def differing(experiment: Experiment, machine: bool | None, *, cases: int, ticks: int | None = None) -> tuple[int, int]:
+def differing(
+    experiment: Experiment, machine: bool | None, *, cases: int, ticks: int | None = None, quick: bool = False
+) -> tuple[int, int]:
     """Numbers of some cases' rows and outputs that node and the native kernel computed, and how many differ."""
     recording = record(build(experiment))
     rows = np.linspace(0, experiment.cases.count - 1, min(cases, experiment.cases.count)).astype(np.int64)
     given, last = inputs(experiment, rows), experiment.structure.schedule.ticks if ticks is None else ticks
-    found = node.ask(module.compiled(recording), given, 0, last, machine=machine)
+    found = node.ask(module.compiled(recording, quick=quick), given, 0, last, machine=machine)
     pairs = list(zip(backends.load(recording).run(given, last), (found.rows, found.outputs), strict=True))
     assert all(a is not None and a.shape == b.shape for a, b in pairs)
     assert pairs[0][0].std() > 0.0
@@ -152,6 +154,25 @@ def test_arms_of_2_7_and_30_joints_that_reverse_have_the_native_bits(
     deck = decks.experiment(arm, "reversing", record=True, variant=variant)
     count, wrong = differing(deck, machine, cases=3, ticks=100)
     assert wrong == 0 and count > 1_000
+
+
+@pytest.mark.node
+@MACHINE
+def test_a_module_that_is_sooner_made_has_the_same_bits(machine: bool | None, tmp_path: Path) -> None:
+    given = operands()[::31]
+    usual, quick = (
+        node.ask(module.compiled(one_row(), quick=each), given, 0, 0, machine=machine) for each in (False, True)
+    )
+    assert same(usual.rows, quick.rows).all()
+    for deck, run in (("two_link", "hybrid"), ("panda", "swing"), ("free_flyer", "flyer_felt")):
+        (found,) = ic.compile(f"{deck}.ic", select=[run]).experiments
+        count, wrong = differing(found, machine, cases=1, quick=True)
+        assert wrong == 0 and count > 2_000
+    for model in ("lugre", "plume, 36 cells", "tachometer with noise"):
+        deck = decks.experiment(SEVEN, "reversing", record=True, variant={**SERVOS, **OTHERS}[model])
+        count, wrong = differing(deck, machine, cases=3, ticks=100, quick=True)
+        assert wrong == 0 and count > 500
+    assert module.compiled(one_row(), quick=True).code != module.compiled(one_row()).code
 
 
 def wide(columns: int) -> Recording:
