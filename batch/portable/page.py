@@ -136,15 +136,17 @@ def data_of(
     *,
     source: str = "archive",
     prepared: Prepared | None = None,
+    quick: bool = False,
 ) -> dict[str, Any]:
     """Data that the script needs: the module, its description, and what the archive has of the first cases.
 
     archive   the group's; of a group that is in none, the plan
     source    what the page calls whatever its numbers are compared with
     prepared  the experiment, where it is at hand
+    quick     whether a module that is sooner made and slower will do
     """
     prepared = prepared or prepare(experiment)
-    module = compiled(prepared.recording)
+    module = compiled(prepared.recording, quick=quick)
     told = described(prepared, module)
     positions = group.values("case")[:MOST_CASES]
     rows = np.searchsorted(experiment.cases.table, positions)

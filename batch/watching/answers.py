@@ -26,6 +26,7 @@ from ic.meaning.definitions.resolve import Definitions
 from ic.read import read
 from ic.text.complaints import Complaints
 from met.analysis.linear import metrics as linear_metrics
+from met.analysis.memo import AnalysisMemo
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
 from met.messages.render import render
@@ -81,9 +82,14 @@ class DeckAnswer:
     groups: tuple[str, ...] = ()
 
 
-def compiled(deck: WatchedDeck, name: str | None = None, group: str | None = None) -> DeckAnswer:
-    """The deck's run or sweep of this name; for None the one that `met run` would take. group: of several structures
-    the one that is shown; for None the first."""
+def compiled(
+    deck: WatchedDeck, name: str | None = None, group: str | None = None, memo: AnalysisMemo | None = None
+) -> DeckAnswer:
+    """The deck's run or sweep of this name; for None the one that `met run` would take.
+
+    group  of several structures the one that is shown; for None the first
+    memo   answers of the analysis from earlier times; those that are found are added
+    """
     try:
         folders = [Path(each) for each in deck.include_dirs]
         tree = read(deck.name, folders, deck.defines, despite_errors=True)
@@ -93,7 +99,7 @@ def compiled(deck: WatchedDeck, name: str | None = None, group: str | None = Non
     found = [each for kind in EXPERIMENTS for each in known.of_kind(kind).values()]
     names = tuple(each.name for each in [each for each in found if known.writes(each)] or found)
     made = compile_deck(
-        tree, select=None if name is None else (name,), defines=deck.defines, settings=deck.settings
+        tree, select=None if name is None else (name,), defines=deck.defines, settings=deck.settings, memo=memo
     )  # fmt: skip
     words, files = _words(made.diagnostics, made.sources), tuple(made.sources)
     if made.plan is None:
@@ -122,7 +128,7 @@ def page(answer: DeckAnswer, prepared: Prepared) -> str:
     rows = shown_rows(experiment)
     empty = {use.name: np.full(len(rows), np.nan) for use in experiment.metrics}
     group = GroupInMemory.of_metrics(experiment, rows, np.full(len(rows), NOT_YET, np.int8), empty)
-    data = data_of(experiment, plan, group, source=kind_of(experiment), prepared=prepared)
+    data = data_of(experiment, plan, group, source=kind_of(experiment), prepared=prepared, quick=True)
     by = "by the code of `met run`"
     if experiment.cases.count > len(rows):
         by += f"; of {experiment.cases.count:,} cases these are the first {len(rows):,}"

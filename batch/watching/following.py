@@ -17,6 +17,7 @@ from batch.watching.answers import DeckAnswer, WatchedDeck
 from batch.watching.board import Board
 from batch.watching.deck_files import DeckFiles
 from batch.watching.serving import PageServer
+from met.analysis.memo import AnalysisMemo
 from met.cli import of_machine
 from met.diagnostic import Problem
 from met.messages.render import render
@@ -59,6 +60,7 @@ class _Loop:
         self._deck, self._name, self._board, self._confess = deck, name, board, confess
         self._group: str | None = None
         self._files = DeckFiles(deck.file, deck.include_dirs)
+        self._known: dict[bytes, Any] = {}
         self._page = self._work = ""
         self._is_broken = False
         self._cases: threading.Thread | None = None
@@ -103,7 +105,9 @@ class _Loop:
     def _once(self) -> bool:
         """Compile what is on the disk, and show it. True where that has changed meanwhile."""
         begun = self._files.begin()
-        answer = answers.compiled(self._deck, self._name, self._group)
+        memo = AnalysisMemo(self._known)
+        answer = answers.compiled(self._deck, self._name, self._group, memo)
+        self._known = memo.so_far
         if self._files.found(answer.files, begun):
             return True
         self._is_broken = answer.experiment is None

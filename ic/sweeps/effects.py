@@ -26,6 +26,7 @@ from ic.sweeps.reach import first_words, no_scale, parameters_nearby, paths_endi
 from ic.sweeps.settings import SEED as SEED_PATH
 from ic.sweeps.settings import Destination, Settings, applies_to, destination
 from ic.text.complaints import Complaints, known_words
+from met.analysis.memo import AnalysisMemo
 from met.diagnostic import Label, Problem, did_you_mean
 from met.plan import SEED, Cases, Coordinate, Experiment
 from met.trace import Graph, Scalar
@@ -50,7 +51,9 @@ class Effects:
             if destination(scope.definitions, entry) == "run" and applies_to(scope.definitions, run, entry):
                 self.met.add(path)
 
-    def examine(self, scope: Scope, run: Definition, made: Experiment, sweep: Sequence[Entry] = ()) -> None:
+    def examine(
+        self, scope: Scope, run: Definition, made: Experiment, memo: AnalysisMemo, sweep: Sequence[Entry] = ()
+    ) -> None:
         """Looks for effects in a run that was resolved without a mistake. sweep: the block of the sweep of it."""
         if not self.waiting or scope.complaints.errors:
             return
@@ -69,7 +72,7 @@ class Effects:
             if used or path in named:
                 del self.waiting[path]
                 numbers.pop(path, None)
-        for path in _used(scope, run, numbers):
+        for path in _used(scope, run, numbers, memo):
             del self.waiting[path]
 
     def report(self, complaints: Complaints, asked: Sequence[str], *, idle: bool = True) -> None:
@@ -168,7 +171,7 @@ def _is_number(scope: Scope, entry: Setting) -> bool:
     return isinstance(found, Value) and not isinstance(found.number, Scalar)
 
 
-def _used(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> list[str]:
+def _used(scope: Scope, run: Definition, settings: Mapping[str, Setting], memo: AnalysisMemo) -> list[str]:
     """The paths of these settings from which this run computes something."""
     there = {
         path: entry
@@ -177,18 +180,18 @@ def _used(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> lis
     }
     if not there:
         return []
-    found = _idle(scope, run, there)
+    found = _idle(scope, run, there, memo)
     if found is not None:
         return [path for path in there if path not in found]
     used = []
     for path, entry in there.items():  # what cannot be an input decides the program, which the others need not
-        one = _idle(scope, run, {path: entry})
+        one = _idle(scope, run, {path: entry}, memo)
         if one is None or path not in one:
             used.append(path)
     return used
 
 
-def _idle(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> tuple[str, ...] | None:
+def _idle(scope: Scope, run: Definition, settings: Mapping[str, Setting], memo: AnalysisMemo) -> tuple[str, ...] | None:
     """The paths of these settings on which no result depends, as inputs; None if one of them cannot be an input."""
     graph = Graph()
     varied = {
@@ -205,7 +208,10 @@ def _idle(scope: Scope, run: Definition, settings: Mapping[str, Setting]) -> tup
     if resolved is None:
         return None
     cases = Cases(1, tuple(Coordinate(path, "1", 1.0, each.values[:1], ()) for path, each in varied.items()))
-    return without_effect(experiment(trial, run.name, run.place, resolved, cases))
+    made = experiment(trial, run.name, run.place, resolved, cases)
+    zero = tuple(replace(each, values=np.zeros(1)) for each in cases.coordinates)
+    asked = replace(made, cases=replace(cases, coordinates=zero))  # the program's answer, whatever the values are
+    return memo.answer("idle settings", asked, lambda: without_effect(made))
 
 
 def _resolved(trial: Scope, run: Definition) -> Resolved | None:

@@ -96,8 +96,8 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
                 check_overridden(scope, run, made_here)
                 source.complaints.settle(PROVISIONAL)
                 return [(made, scope)]
-            source.effects.examine(scope, run, made)
-            own.examine(scope, run, made)
+            source.effects.examine(scope, run, made, source.memo)
+            own.examine(scope, run, made, source.memo)
             own.report(source.complaints, [run.name])
             check_overridden(scope, run, made_here)
             if not source.complaints.errors:
@@ -281,8 +281,8 @@ class _Sweep:
             made = check_steps(scope, made, self.source.memo)
             check_beds(self.complaints, made, self.source.memo)
         self.complaints.settle()
-        self.source.effects.examine(scope, run, made, self.definition.group.body)
-        self.own.examine(scope, run, made, self.definition.group.body)
+        self.source.effects.examine(scope, run, made, self.source.memo, self.definition.group.body)
+        self.own.examine(scope, run, made, self.source.memo, self.definition.group.body)
         check_overridden(scope, run, self.source.settings.of_run(read.definitions, read.base))
         return ((made, scope), rows), dropped
 

@@ -83,6 +83,11 @@ def _tell(path: Path, why: str) -> None:
     )
 
 
+TRIMMED = "0"
+"""Third letters of objects with which it is looked how much all are: some thousands of files are looked at then, which
+takes as long as a small program's compiling."""
+
+
 def key(*parts: str) -> str:
     """The name of an object that these texts decide."""
     digest = hashlib.sha256()
@@ -107,7 +112,8 @@ def kept(name: str, make: Callable[[], bytes]) -> tuple[bytes, bool]:
     code = make()
     with contextlib.suppress(OSError):
         _write(path, code)
-        _trim(place.parent)
+        if name[2] in TRIMMED:
+            _trim(place.parent)
     return code, False
 
 

@@ -25,8 +25,12 @@ from batch.watching import answers
 from batch.watching.answers import WatchedDeck
 from batch.watching.board import Board
 from batch.watching.following import _Loop
+from ic.sweeps import effects
 from met import cli
+from met.analysis.audit import idle_inputs
+from met.analysis.memo import AnalysisMemo
 from met.messages.render import render
+from met.plan import Experiment
 from met.run import prepare, run
 from tests.batch.watching.watched import DECK, View, replace, started, viewing, write_deck
 
@@ -390,3 +394,24 @@ def test_what_is_no_deck_is_refused(
     ):
         assert cli.main(["view", *words]) == 2
         assert said in capsys.readouterr().err
+
+
+def test_what_has_an_effect_is_asked_again_only_of_another_program(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    deck = tmp_path / "deck.ic"
+    text = "#include <two_link.ic>\nrun mine like nominal { with links.upper.mass = 50 kg; }\n"
+    watched = WatchedDeck(str(deck), deck)
+    found: list[tuple[str, ...]] = []
+
+    def counted(experiment: Experiment) -> tuple[str, ...]:
+        found.append(idle_inputs(experiment))
+        return found[-1]
+
+    monkeypatch.setattr(effects, "without_effect", counted)
+    memo = AnalysisMemo()
+    for changed, asked in (("50 kg", 1), ("51 kg", 1), ("0.5 kg", 1), ("51 kg; integrator = rk4", 2)):
+        deck.write_text(text.replace("50 kg", changed), encoding="utf-8")
+        answer = answers.compiled(watched, "mine", None, memo)
+        memo = AnalysisMemo(memo.so_far)
+        assert answer.experiment is not None and not answer.messages and len(found) == asked

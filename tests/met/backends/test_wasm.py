@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.arms import Arm
+from benchmarks.arms import SEVEN, Arm
 
 from met import backends, models
 from met.backends.llvm import machine
@@ -83,9 +83,9 @@ def test_a_multiply_add_is_rounded_once_for_operands_of_any_size(machine: bool |
     assert (np.abs(native) < 2.0**-1022).sum() > 30_000  # so many have few bits
 
 
-def counted(run: WholeRun, machine: bool | None) -> tuple[int, int]:
+def counted(run: WholeRun, machine: bool | None, *, quick: bool = False) -> tuple[int, int]:
     """Numbers of a run's rows and outputs that node and the native kernel computed, and how many differ."""
-    found = node.ask(module.compiled(run.recording), run.inputs, 0, run.last, machine=machine)
+    found = node.ask(module.compiled(run.recording, quick=quick), run.inputs, 0, run.last, machine=machine)
     pairs = list(zip(run.native(), (found.rows, found.outputs), strict=True))
     return sum(a.size for a, _ in pairs), sum(differing(a, b) for a, b in pairs)
 
@@ -117,6 +117,23 @@ def test_arms_of_2_7_and_30_joints_that_reverse_have_the_native_bits(
 ) -> None:
     count, wrong = counted(whole_runs.reversing(arm, model), machine)
     assert wrong == 0 and count > 1_000
+
+
+@pytest.mark.node
+@MACHINE
+def test_a_module_that_is_sooner_made_has_the_same_bits(machine: bool | None) -> None:
+    given = operands()[::31]
+    usual, quick = (
+        node.ask(module.compiled(one_row(), quick=each), given, 0, 0, machine=machine) for each in (False, True)
+    )
+    assert same(usual.rows, quick.rows).all()
+    for deck, run in (("two_link", "hybrid"), ("panda", "swing"), ("free_flyer", "flyer_felt")):
+        count, wrong = counted(whole_runs.published(deck, run), machine, quick=True)
+        assert wrong == 0 and count > 2_000
+    for model in ("lugre", "plume, 36 cells", "tachometer with noise"):
+        count, wrong = counted(whole_runs.reversing(SEVEN, model), machine, quick=True)
+        assert wrong == 0 and count > 500
+    assert module.compiled(one_row(), quick=True).code != module.compiled(one_row()).code
 
 
 def wide(columns: int) -> Recording:
