@@ -308,5 +308,5 @@ def test_the_readmes_deck_runs_and_its_lines_of_python_open_what_they_wrote(
 
 
 def test_the_metrics_of_the_page_are_those_there_are() -> None:
-    listed = PAGE.split("The\nmodels are ")[1].split(", and those of")[0]
+    listed = " ".join(PAGE.split()).split("The metrics are ")[1].split(", and those of")[0]
     assert re.findall(r"`(\w+)`", listed) == sorted(models.find_own("metric"))
