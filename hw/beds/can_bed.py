@@ -26,7 +26,7 @@ from hw.beds.emulated import FINE, FINE_ANGLE, WIDE
 from hw.drives import DIALECTS
 from hw.drives.arming import begin_driving, forget, prove_watchdogs, switch_off
 from hw.drives.bench_file import TwoDrives, two_drives
-from hw.drives.bus import PythonCanLine
+from hw.drives.bus import open_bus
 from hw.drives.drive import ASKS, CanDrive, DriveReading, DriveState, Talk
 from hw.drives.frames import FAST, NOMINAL, CanFrame, CanLine, on_bus
 from hw.drives.side import Side, agree
@@ -504,7 +504,7 @@ def _opened_port(opening: Opening) -> CanBed:
             raise Problem(error("E446", f"{path}: no dialect `{entry.dialect}`", help=known))
         drives.append(dialect(entry))
     drive = opening.drive or "voltage"
-    bed = CanBed(bench, (drives[0], drives[1]), lambda: PythonCanLine(bench.bus), period=opening.period, drive=drive)
+    bed = CanBed(bench, (drives[0], drives[1]), lambda: open_bus(bench.bus), period=opening.period, drive=drive)
     if opening.experiment is not None and bench.filter_at is None:
         cut = opening.bed_values()["f_cut"]
         message = f"the bench has no filter: the deck's `f_cut`, {cut:g} Hz, has to be that of the drive's own rate"

@@ -10,11 +10,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from hw.drives.fdcanusb import SPEEDS
 from hw.toml_file import TomlFile, quantity
 from met.diagnostic import Place, did_you_mean
 from met.frozen import frozen
 
 MOST_BYTES = 1 << 16
+
+FDCANUSB = "fdcanusb"
+"""The `interface` that is none of python-can's."""
+
+FASTEST = 8_000_000
+"""Bits a second, more than which no bus of CAN-FD carries."""
 
 FIGURES: Mapping[str, Mapping[str, tuple[str, float | None]]] = {
     "shaft": {
@@ -126,7 +133,13 @@ class _BenchFile(TomlFile):
                 raise self.wrong(
                     f"`[bus]` has no `{key}`", 'such as `interface = "socketcan"`, `channel = "can0"`', "bus"
                 )
+        adapter = found["interface"] == FDCANUSB
         for key, value in found.items():
+            if adapter and key not in ("interface", "channel", *SPEEDS):
+                helps = (*did_you_mean(key, SPEEDS), f"it has channel, {', '.join(SPEEDS)}")
+                raise self.wrong(f"an fdcanusb has no `{key}`", helps, "bus", key)
+            if adapter and key in SPEEDS and (type(value) is not int or not 0 < value <= FASTEST):
+                raise self.wrong(f"`{key}` is no number of bits a second", f"`{key} = 1000000`", "bus", key)
             if not isinstance(value, str | int | float | bool):
                 raise self.wrong(f"`{key}` is no word and no number", "python-can's documentation has them", "bus", key)
         return dict(found)

@@ -60,10 +60,9 @@ def bench_file(folder: Path, dialect: str = "odrive", interface: str = "virtual"
     """A bench file of two drives of a dialect, with what it names beside it."""
     (folder / "flat_endpoints.json").write_text(json.dumps(endpoints()))
     path = folder / "bench.toml"
+    bus = "" if interface == "fdcanusb" else BUS.get(dialect, "")
     path.write_text(
-        TEXT.format(
-            dialect=dialect, interface=interface, channel=channel, bus=BUS.get(dialect, ""), more=MORE.get(dialect, "")
-        )
+        TEXT.format(dialect=dialect, interface=interface, channel=channel, bus=bus, more=MORE.get(dialect, ""))
     )
     return path
 

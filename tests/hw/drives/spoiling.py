@@ -6,12 +6,13 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 from hw.bed import BedSample, BedState, Fault
 from hw.beds.can_bed import CanBed
 from hw.drives.frames import CanFrame
 from hw.drives.side import SKEW
-from hw.players.player import PlayedBench, PlayedLine
+from hw.players.player import PlayedBench
 from met.diagnostic import Problem
 
 SHARE = 0.05
@@ -104,6 +105,22 @@ FAULTS: dict[str, Callable[[Spoiler, CanFrame, bool], Spoilt]] = {
 }
 
 
+class WaitingLine(Protocol):
+    """What a campaign needs of a line: its time, and to let it pass."""
+
+    def now(self) -> float: ...
+
+    def sleep(self, seconds: float) -> None: ...
+
+
+class BefallingFault(Protocol):
+    """A fault that a campaign switches on and off. kind: its name;  befell: how often it did"""
+
+    kind: str
+    on: bool
+    befell: int
+
+
 @dataclass
 class Tally:
     """What came of exchanges: how many were answered, how many of these wrong, by how much at most (rad/s), how often
@@ -117,7 +134,7 @@ class Tally:
     worst: float = 0.0
 
 
-def campaign(bed: CanBed, line: PlayedLine, played: PlayedBench, spoiler: Spoiler, exchanges: int) -> Tally:
+def campaign(bed: CanBed, line: WaitingLine, played: PlayedBench, spoiler: BefallingFault, exchanges: int) -> Tally:
     """Drive a bed through a fault, arming it anew each time that it has stopped. An answer is wrong where its rate is
     not the shaft's at any time of the period before it, by more than the shaft can change in the time by which the two
     drives' samples may be apart: what is wrong by less cannot be told."""
