@@ -516,7 +516,7 @@ def _opened_port(opening: Opening) -> CanBed:
 PORT = PortKind(
     scheme="can",
     address="BENCH.toml",
-    doc="Two drives on a CAN bus: ODrive, Damiao, moteus, CiA 402; the file says which.",
+    doc="Two drives on a CAN bus: ODrive, Damiao, moteus, CiA 402, RobStride; the file says which.",
     open=_opened_port,
     check=_check_deck,
     lock_step=lambda name, requested: requested,

@@ -11,7 +11,8 @@ from hw.drives.damiao import DamiaoDrive
 from hw.drives.drive import CanDrive
 from hw.drives.moteus import MoteusDrive
 from hw.drives.odrive import OdriveDrive
+from hw.drives.robstride import RobstrideDrive
 
 DIALECTS: Mapping[str, type[CanDrive]] = {
-    each.dialect: each for each in (OdriveDrive, DamiaoDrive, MoteusDrive, Cia402Drive)
+    each.dialect: each for each in (OdriveDrive, DamiaoDrive, MoteusDrive, Cia402Drive, RobstrideDrive)
 }

@@ -51,8 +51,8 @@ FIGURES: Mapping[str, Mapping[str, tuple[str, float | None]]] = {
 _WORDS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "shaft": {},
     "supply": {},
-    "drive": {"dialect": (), "endpoints": ()},
-    "load": {"dialect": (), "endpoints": ()},
+    "drive": {"dialect": (), "endpoints": (), "model": ()},
+    "load": {"dialect": (), "endpoints": (), "model": ()},
 }
 _TABLES = ("bus", *FIGURES)
 
@@ -65,6 +65,7 @@ class DriveEntry:
     sense     1, or -1 where the drive counts the other way round: two motors that face each other
     figures   those of `FIGURES`, SI
     endpoints  path of the file that says where an ODrive's properties are; "" where none is given
+    model      of the drive, by which a RobStride's frames mean what they mean; "" where none is given
     """
 
     role: str
@@ -73,6 +74,7 @@ class DriveEntry:
     sense: int
     figures: Mapping[str, float]
     endpoints: str = ""
+    model: str = ""
 
 
 @frozen
@@ -157,8 +159,8 @@ class _BenchFile(TomlFile):
         endpoints = self._word(role, "endpoints", "")
         if endpoints:
             endpoints = os.path.join(os.path.dirname(self.name), endpoints)
-        figures = self._figures(role, ("node", "reversed"))
-        return DriveEntry(role, dialect, node, -1 if reversed_ else 1, figures, endpoints)
+        figures, model = self._figures(role, ("node", "reversed")), self._word(role, "model", "")
+        return DriveEntry(role, dialect, node, -1 if reversed_ else 1, figures, endpoints, model)
 
     def _figures(self, table: str, others: tuple[str, ...] = ()) -> dict[str, float]:
         known = (*FIGURES[table], *_WORDS[table], *others)

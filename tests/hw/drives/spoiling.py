@@ -18,6 +18,9 @@ from met.diagnostic import Problem
 SHARE = 0.05
 """Share of frames that a fault befalls."""
 
+SWUNG = 100.0
+"""Largest rate of a shaft, rad/s, for which a bed's limit has to have room, so that it is swung in full."""
+
 Spoilt = list[tuple[float, CanFrame]]
 
 
@@ -135,13 +138,16 @@ class Tally:
 
 
 def campaign(bed: CanBed, line: WaitingLine, played: PlayedBench, spoiler: BefallingFault, exchanges: int) -> Tally:
-    """Drive a bed through a fault, arming it anew each time that it has stopped. An answer is wrong where its rate is
-    not the shaft's at any time of the period before it, by more than the shaft can change in the time by which the two
-    drives' samples may be apart: what is wrong by less cannot be told."""
+    """Drive a bed through a fault, as fast as its limits let, arming it anew each time that it has stopped.
+
+    An answer is wrong where its rate is not the shaft's at any time of the period before it, by more than the shaft can
+    change in the time by which the two drives' samples may be apart: what is wrong by less cannot be told.
+    """
     tally = Tally()
     bed.connect()
     bed.patience = 0.002  # as of a run at 1 kHz
     truth = _Truth(played)
+    swing = min(1.0, bed._there().limits.rate / SWUNG)
     chance = random.Random(f"{spoiler.kind} drives")
     while tally.exchanges < exchanges:
         spoiler.on = False
@@ -165,7 +171,7 @@ def campaign(bed: CanBed, line: WaitingLine, played: PlayedBench, spoiler: Befal
             due += 1e-3
             line.sleep(max(0.0, due - line.now()))
             phase = 2.0 * math.pi * 3.0 * line.now()
-            sample = bed.exchange(6.0 * math.sin(phase), 1.5 * math.sin(0.7 * phase))
+            sample = bed.exchange(swing * 6.0 * math.sin(phase), swing * 1.5 * math.sin(0.7 * phase))
             tally.exchanges += 1
             if spoiler.kind == "reboot" and chance.random() < 0.02:
                 chance.choice(played.drives).reboot()
