@@ -23,7 +23,7 @@ from hw import refusals
 from hw.bed import About, BedDriver, BedSample, BedState, Capability, Fault, Limits, Scales, real_plant
 from hw.beds import greeting
 from hw.beds.emulated import FINE, FINE_ANGLE, WIDE
-from hw.drives import DIALECTS
+from hw.drives import DIALECTS, REFUSED
 from hw.drives.arming import begin_driving, forget, prove_watchdogs, switch_off
 from hw.drives.bench_file import TwoDrives, two_drives
 from hw.drives.bus import open_bus
@@ -498,6 +498,8 @@ def _opened_port(opening: Opening) -> CanBed:
     bench = _bench(path)
     drives = []
     for entry in (bench.drive, bench.load):
+        if why := REFUSED.get(entry.dialect):
+            raise Problem(error("E446", f"{path}: {why[0]}", help=why[1:]))
         dialect = DIALECTS.get(entry.dialect)
         if dialect is None:
             known = (*did_you_mean(entry.dialect, DIALECTS), f"dialects: {', '.join(DIALECTS)}")
