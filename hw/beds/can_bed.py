@@ -23,10 +23,10 @@ from hw import refusals
 from hw.bed import About, BedDriver, BedSample, BedState, Capability, Fault, Limits, Scales, real_plant
 from hw.beds import greeting
 from hw.beds.emulated import FINE, FINE_ANGLE, WIDE
-from hw.drives import DIALECTS
+from hw.drives import DIALECTS, REFUSED
 from hw.drives.arming import begin_driving, forget, prove_watchdogs, switch_off
 from hw.drives.bench_file import TwoDrives, two_drives
-from hw.drives.bus import PythonCanLine
+from hw.drives.bus import open_bus
 from hw.drives.drive import ASKS, CanDrive, DriveReading, DriveState, Talk
 from hw.drives.frames import FAST, NOMINAL, CanFrame, CanLine, on_bus
 from hw.drives.side import Side, agree
@@ -498,13 +498,15 @@ def _opened_port(opening: Opening) -> CanBed:
     bench = _bench(path)
     drives = []
     for entry in (bench.drive, bench.load):
+        if why := REFUSED.get(entry.dialect):
+            raise Problem(error("E446", f"{path}: {why[0]}", help=why[1:]))
         dialect = DIALECTS.get(entry.dialect)
         if dialect is None:
             known = (*did_you_mean(entry.dialect, DIALECTS), f"dialects: {', '.join(DIALECTS)}")
             raise Problem(error("E446", f"{path}: no dialect `{entry.dialect}`", help=known))
         drives.append(dialect(entry))
     drive = opening.drive or "voltage"
-    bed = CanBed(bench, (drives[0], drives[1]), lambda: PythonCanLine(bench.bus), period=opening.period, drive=drive)
+    bed = CanBed(bench, (drives[0], drives[1]), lambda: open_bus(bench.bus), period=opening.period, drive=drive)
     if opening.experiment is not None and bench.filter_at is None:
         cut = opening.bed_values()["f_cut"]
         message = f"the bench has no filter: the deck's `f_cut`, {cut:g} Hz, has to be that of the drive's own rate"
@@ -516,7 +518,7 @@ def _opened_port(opening: Opening) -> CanBed:
 PORT = PortKind(
     scheme="can",
     address="BENCH.toml",
-    doc="Two drives on a CAN bus: ODrive, Damiao, moteus, CiA 402; the file says which.",
+    doc="Two drives on a CAN bus: ODrive, Damiao, moteus, CiA 402, RobStride; the file says which.",
     open=_opened_port,
     check=_check_deck,
     lock_step=lambda name, requested: requested,

@@ -10,11 +10,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from hw.drives.fdcanusb import SPEEDS
 from hw.toml_file import TomlFile, quantity
 from met.diagnostic import Place, did_you_mean
 from met.frozen import frozen
 
 MOST_BYTES = 1 << 16
+
+FDCANUSB = "fdcanusb"
+"""The `interface` that is none of python-can's."""
+
+FASTEST = 8_000_000
+"""Bits a second, more than which no bus of CAN-FD carries."""
 
 FIGURES: Mapping[str, Mapping[str, tuple[str, float | None]]] = {
     "shaft": {
@@ -44,8 +51,8 @@ FIGURES: Mapping[str, Mapping[str, tuple[str, float | None]]] = {
 _WORDS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "shaft": {},
     "supply": {},
-    "drive": {"dialect": (), "endpoints": ()},
-    "load": {"dialect": (), "endpoints": ()},
+    "drive": {"dialect": (), "endpoints": (), "model": ()},
+    "load": {"dialect": (), "endpoints": (), "model": ()},
 }
 _TABLES = ("bus", *FIGURES)
 
@@ -58,6 +65,7 @@ class DriveEntry:
     sense     1, or -1 where the drive counts the other way round: two motors that face each other
     figures   those of `FIGURES`, SI
     endpoints  path of the file that says where an ODrive's properties are; "" where none is given
+    model      of the drive, by which a RobStride's frames mean what they mean; "" where none is given
     """
 
     role: str
@@ -66,6 +74,7 @@ class DriveEntry:
     sense: int
     figures: Mapping[str, float]
     endpoints: str = ""
+    model: str = ""
 
 
 @frozen
@@ -126,7 +135,13 @@ class _BenchFile(TomlFile):
                 raise self.wrong(
                     f"`[bus]` has no `{key}`", 'such as `interface = "socketcan"`, `channel = "can0"`', "bus"
                 )
+        adapter = found["interface"] == FDCANUSB
         for key, value in found.items():
+            if adapter and key not in ("interface", "channel", *SPEEDS):
+                helps = (*did_you_mean(key, SPEEDS), f"it has channel, {', '.join(SPEEDS)}")
+                raise self.wrong(f"an fdcanusb has no `{key}`", helps, "bus", key)
+            if adapter and key in SPEEDS and (type(value) is not int or not 0 < value <= FASTEST):
+                raise self.wrong(f"`{key}` is no number of bits a second", f"`{key} = 1000000`", "bus", key)
             if not isinstance(value, str | int | float | bool):
                 raise self.wrong(f"`{key}` is no word and no number", "python-can's documentation has them", "bus", key)
         return dict(found)
@@ -144,8 +159,8 @@ class _BenchFile(TomlFile):
         endpoints = self._word(role, "endpoints", "")
         if endpoints:
             endpoints = os.path.join(os.path.dirname(self.name), endpoints)
-        figures = self._figures(role, ("node", "reversed"))
-        return DriveEntry(role, dialect, node, -1 if reversed_ else 1, figures, endpoints)
+        figures, model = self._figures(role, ("node", "reversed")), self._word(role, "model", "")
+        return DriveEntry(role, dialect, node, -1 if reversed_ else 1, figures, endpoints, model)
 
     def _figures(self, table: str, others: tuple[str, ...] = ()) -> dict[str, float]:
         known = (*FIGURES[table], *_WORDS[table], *others)

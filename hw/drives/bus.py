@@ -1,4 +1,5 @@
-"""A CAN bus by python-can, whatever interface it has: socketcan, slcan, PCAN ..., or the virtual ones of the library.
+"""A CAN bus by python-can, whatever interface it has: socketcan, slcan, PCAN ..., or the virtual ones of the library;
+or by an adapter that the library has not, an fdcanusb.
 
 python-can is MET's extra `can`, and is imported when a bus is opened.
 """
@@ -10,8 +11,19 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from hw.drives.frames import CanFrame
+from hw.drives.bench_file import FDCANUSB
+from hw.drives.fdcanusb import LOST, FdcanusbLine
+from hw.drives.frames import CanFrame, CanLine
+from hw.line import BAUD
+from hw.serial_port import SerialLine
 from met.diagnostic import Problem, error
+
+
+def open_bus(settings: Mapping[str, Any]) -> CanLine:
+    """The bus that `[bus]` of a bench file describes, open. Raises Problem E400 or E449."""
+    if settings["interface"] != FDCANUSB:
+        return PythonCanLine(settings)
+    return FdcanusbLine(SerialLine(str(settings["channel"]), BAUD, "the fdcanusb", LOST), settings)
 
 
 class PythonCanLine:

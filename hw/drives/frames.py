@@ -9,6 +9,9 @@ from met.frozen import frozen
 NOMINAL, FAST = 1_000_000, 5_000_000
 """Bits a second of a bus unless a bench says otherwise: of a classic frame, and of the data of a CAN-FD one."""
 
+SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)
+"""Lengths that a frame of CAN-FD may have."""
+
 
 @frozen
 class CanFrame:

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 from hw.drives.bench_file import DriveEntry
 from hw.drives.drive import CanDrive, DriveFacts, DriveReading, DriveState, Talk
-from hw.drives.frames import CanFrame
+from hw.drives.frames import SIZES, CanFrame
 
 ASKS_ANSWER = 0x8000
 INT8, INT32, FLOAT = 0, 2, 3
@@ -25,8 +25,6 @@ INT8, INT32, FLOAT = 0, 2, 3
 FORMATS = ("b", "h", "i", "f")
 WRITE, READ, ANSWER = 0x00, 0x10, 0x20
 WRITE_ERROR, READ_ERROR, NOTHING = 0x30, 0x31, 0x50
-SIZES = (*range(9), 12, 16, 20, 24, 32, 48, 64)
-"""Lengths that a frame of CAN-FD may have."""
 
 MODE, POSITION, VELOCITY, POWER, VOLTAGE, FAULT = 0x000, 0x001, 0x002, 0x007, 0x00D, 0x00F
 TARGET, TORQUE, VALID_FOR, INTEGRAL_SCALE, MODEL = 0x020, 0x022, 0x027, 0x02B, 0x100

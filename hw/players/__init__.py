@@ -11,11 +11,13 @@ from hw.players.damiao import PlayedDamiao
 from hw.players.moteus import PlayedMoteus
 from hw.players.odrive import PlayedOdrive
 from hw.players.player import PlayedDrive
+from hw.players.robstride import PlayedRobstride
 
 PLAYED: Mapping[str, Callable[[int, int], PlayedDrive]] = {
     "odrive": PlayedOdrive,
     "damiao": PlayedDamiao,
     "moteus": PlayedMoteus,
     "cia402": PlayedCia402,
+    "robstride": PlayedRobstride,
 }
 """Makes a played drive of a dialect: (node, sense)."""

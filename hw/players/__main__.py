@@ -11,8 +11,8 @@ import sys
 import time
 
 from hw.drives.bench_file import TwoDrives, two_drives
-from hw.drives.bus import PythonCanLine
 from hw.players import PLAYED
+from hw.players.fdcanusb import played_bus
 from hw.players.player import PlayedBench, play
 from hw.players.shaft import InertiaShaft
 from met.diagnostic import Problem
@@ -43,7 +43,7 @@ def main(path: str) -> int:
         signal.signal(each, lambda number, frame: asked.append(number))
     try:
         bench = two_drives(path)
-        line = PythonCanLine(bench.bus)
+        line = played_bus(bench.bus)
     except Problem as problem:
         print(render(problem.diagnostics, problem.sources), file=sys.stderr)
         return 2

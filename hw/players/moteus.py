@@ -86,7 +86,7 @@ class PlayedMoteus(PlayedDrive):
 
     def _obey(self, told: dict[int, float], now: float) -> None:
         """Do what a frame has written. Out of a fault, and of the end of a command's time, only stopping leads."""
-        if 0 not in told:
+        if not math.isfinite(told.get(0, math.nan)):
             return
         mode = int(told[0])
         if mode == 0:

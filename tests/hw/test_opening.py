@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from hw.beds import serial_line
+from hw import serial_port
 from hw.beds.serial_line import SerialBed
 from tests.hw.conftest import LineBed, refusal
 from tests.hw.device import Device
@@ -149,10 +149,10 @@ def test_in_lock_step_no_line_is_too_slow(on_pty: Callable[..., str]) -> None:
 
 
 def test_an_adapter_that_keeps_bytes_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serial_line, "ADAPTERS", tmp_path)
+    monkeypatch.setattr(serial_port, "ADAPTERS", tmp_path)
     (tmp_path / "ttyUSB7").mkdir()
     (tmp_path / "ttyUSB7" / "latency_timer").write_text("16\n")
-    [found] = serial_line.latency("/dev/ttyUSB7")
+    [found] = serial_port.latency("/dev/ttyUSB7")
     assert (found.code, found.severity, found.message) == (
         "E405",
         "warning",
@@ -161,5 +161,5 @@ def test_an_adapter_that_keeps_bytes_back(tmp_path: Path, monkeypatch: pytest.Mo
     file = tmp_path / "ttyUSB7" / "latency_timer"
     assert found.help == (f"`echo 1 | sudo tee {file}`, after each time that it is plugged in",)
     file.write_text("1\n")
-    assert serial_line.latency("/dev/ttyUSB7") == ()
-    assert serial_line.latency("/dev/ttyUSB8") == ()
+    assert serial_port.latency("/dev/ttyUSB7") == ()
+    assert serial_port.latency("/dev/ttyUSB8") == ()

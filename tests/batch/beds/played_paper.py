@@ -37,7 +37,7 @@ from met.plant import Plant, bed_values
 from tests.hw.drives.played import BUS, MORE
 
 SLOW = 0.03
-KT, KT_LOAD, RESISTANCE = 0.061, 0.072, 2.05
+KT, KT_LOAD, RESISTANCE, INERTIA = 0.061, 0.072, 2.05, 6.38e-5
 PERIOD = 5e-4
 """Of a tick of the played shaft, s."""
 
@@ -57,7 +57,19 @@ run fast_volts like fast {
 run fast_torques like fast {
     substitute shoulder { bed = torque_drive(delay = 1);  law = velocity_tracking; }
 }
+run scaled_volts like volts        { shoulder { bed { kt_load = 0.288 N*m/A; }  scale { torque = 0.25;  rate = 4; } } }
+run scaled_torques like torques    { shoulder { bed { kt_load = 0.288 N*m/A; }  scale { torque = 0.25;  rate = 4; } } }
+run fast_scaled_volts like fast_volts     {
+    shoulder { bed { kt_load = 0.288 N*m/A; }  scale { torque = 0.25;  rate = 4; } }
+}
+run fast_scaled_torques like fast_torques {
+    shoulder { bed { kt_load = 0.288 N*m/A; }  scale { torque = 0.25;  rate = 4; } }
+}
 """
+
+SCALED = {"robstride": 4.0}
+"""By how much a dialect's motor is slower and stronger than the shoulder's, where its drives end at
+50 rad/s: the deck's bed has that scale."""
 
 BENCH = """\
 name = "paper"
@@ -67,7 +79,7 @@ interface = "virtual"
 channel   = "paper"
 {bus}
 [shaft]
-inertia  = "6.38e-5 kg*m^2"
+inertia  = "{inertia} kg*m^2"
 rate_max = "200 rad/s"
 filter   = "50 Hz"
 
@@ -77,16 +89,16 @@ voltage_max = "40 V"
 [drive]
 dialect     = "{dialect}"
 node        = 1
-kt          = "0.061 N*m/A"
+kt          = "{kt} N*m/A"
 resistance  = "2.05 ohm"
 voltage_max = "20 V"
-torque_max  = "0.144 N*m"
+torque_max  = "{torque_max} N*m"
 {more}
 [load]
 dialect       = "{dialect}"
 node          = 2
 reversed      = true
-kt            = "0.072 N*m/A"
+kt            = "{kt_load} N*m/A"
 current_max   = "3 A"
 current_rated = "2 A"
 heat          = "9 A^2*s"
@@ -96,16 +108,17 @@ heat          = "9 A^2*s"
 class PlantShaft:
     """The shaft of a deck's bed model `torque_drive`, turned by two played drives.
 
-    load  the share of its torque that the load gives
+    load  the share of its torque that the load gives;  times: by which motors are stronger and slower
     """
 
-    def __init__(self, experiment: Experiment, joint: str, load: float = 1.0) -> None:
+    def __init__(self, experiment: Experiment, joint: str, load: float = 1.0, times: float = 1.0) -> None:
         self.period, self.angle, self.rate, self._share = PERIOD, 0.0, 0.0, load
+        self._kt, self._kt_load = times * KT, times * KT_LOAD
         self._plant = Plant(experiment, joint, period=PERIOD)
         self._plant.start(0.0)
 
     def step(self, drive: Output, load: Output) -> None:
-        self._plant.tick(self._torque(drive, KT), self._share * self._torque(load, KT_LOAD) / KT_LOAD)
+        self._plant.tick(self._torque(drive, self._kt), self._share * self._torque(load, self._kt_load) / self._kt_load)
         self.angle, self.rate = self._plant.shaft_angle, self._plant.shaft_rate
 
     def _torque(self, output: Output, kt: float) -> float:
@@ -140,9 +153,11 @@ def bench(dialect: str, name: str, folder: Path) -> OnTime:
     """Two played drives of a dialect, for a run of the deck; both kinds of run have the same shaft."""
     (folder / "flat_endpoints.json").write_text(json.dumps(endpoints()))
     path = folder / "bench.toml"
-    path.write_text(BENCH.format(dialect=dialect, bus=BUS.get(dialect, ""), more=MORE.get(dialect, "")))
+    times = SCALED.get(dialect, 1.0)
+    figures = {"kt": times * KT, "kt_load": times * KT_LOAD, "inertia": times**2 * INERTIA, "torque_max": times * 0.144}
+    path.write_text(BENCH.format(dialect=dialect, bus=BUS.get(dialect, ""), more=MORE.get(dialect, ""), **figures))
     described, experiment = two_drives(path), compiled(name)
-    shaft = PlantShaft(compiled("torques"), "shoulder")
+    shaft = PlantShaft(compiled("scaled_torques" if dialect in SCALED else "torques"), "shoulder", times=times)
     drives = PLAYED[dialect](1, 1), PLAYED[dialect](2, -1)
     for drive, kt in zip(drives, (KT, KT_LOAD), strict=True):
         if isinstance(drive, PlayedOdrive):
@@ -208,7 +223,8 @@ def errors(dialect: str, name: str) -> tuple[np.ndarray, np.ndarray]:
     """How far a run with a played dialect is from the run in software, and from the serial bed's: [joint] each."""
     fast = "fast_" if name.startswith("fast") else ""
     with tempfile.TemporaryDirectory() as folder:
-        found = driven(bench(dialect, name, Path(folder)), name)
+        own = name.replace(fast, f"{fast}scaled_", 1) if dialect in SCALED else name
+        found = driven(bench(dialect, own, Path(folder)), own)
     line = driven(serial(f"{fast}volts"), f"{fast}volts")
     return apart(found, alone("fast" if fast else "plain")), apart(found, line)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from hw.beds import serial_line
+from hw import serial_port
 from met import cli
 from tests.batch.beds.listening import DECK, HELLO, READ, STOP, Listening
 from tests.hw.device import DEAD, DEADMAN, STOPPED, Device
@@ -106,7 +106,7 @@ def test_an_adapter_that_keeps_bytes_back_is_warned_of(
     file = here / Path(port).name / "latency_timer"
     file.parent.mkdir()
     file.write_text("16\n")
-    monkeypatch.setattr(serial_line, "ADAPTERS", here)
+    monkeypatch.setattr(serial_port, "ADAPTERS", here)
     assert f"""\
   warning: the adapter of {port} keeps bytes back for up to 16 ms: exchanges will be late
     = help: `echo 1 | sudo tee {file}`, after each time that it is plugged in

@@ -6,15 +6,22 @@ from __future__ import annotations
 import sys
 import time
 
+from hw.bed import About
 from hw.beds.can_bed import PORT
 from hw.ports import Opening, Port
 from hw.realtime import take_precedence
+from tests.hw.drives.played import KT
+
+
+def driving_voltage(about: About) -> float:
+    """A voltage at which the shaft of the tests' bench comes to half its largest rate, and to 3 V at most, V."""
+    return min(3.0, 0.5 * KT * about.limits.rate)
 
 
 def main(path: str) -> None:
     bed = PORT.open(Opening(Port(f"can:{path}"), period=2e-3))
     with bed:
-        bed.connect()
+        voltage = driving_voltage(bed.connect())
         take_precedence()
         bed.patience = 0.01
         bed.arm()
@@ -22,7 +29,7 @@ def main(path: str) -> None:
         for n in range(1, 30_000):
             while time.perf_counter() < begun + n * 2e-3:
                 time.sleep(2e-4)
-            sample = bed.exchange(5.0, 0.2)
+            sample = bed.exchange(voltage, 0.1)
             if n == 100 and sample is not None:
                 print("driving", sample.rate, sample.state.name, flush=True)
 

@@ -53,17 +53,16 @@ heat          = "9 A^2*s"
 {more}"""
 
 BUS = {"moteus": "fd = true\n"}
-MORE = {"odrive": 'endpoints = "flat_endpoints.json"\n'}
+MORE = {"odrive": 'endpoints = "flat_endpoints.json"\n', "robstride": 'model = "RS05"\n'}
 
 
 def bench_file(folder: Path, dialect: str = "odrive", interface: str = "virtual", channel: str = "bench") -> Path:
     """A bench file of two drives of a dialect, with what it names beside it."""
     (folder / "flat_endpoints.json").write_text(json.dumps(endpoints()))
     path = folder / "bench.toml"
+    bus = "" if interface == "fdcanusb" else BUS.get(dialect, "")
     path.write_text(
-        TEXT.format(
-            dialect=dialect, interface=interface, channel=channel, bus=BUS.get(dialect, ""), more=MORE.get(dialect, "")
-        )
+        TEXT.format(dialect=dialect, interface=interface, channel=channel, bus=bus, more=MORE.get(dialect, ""))
     )
     return path
 
@@ -110,3 +109,20 @@ class PlayedConformance(conformance.FreeRunning):
         scales = bed._about.scales
         volts = RESISTANCE * drive.value / KT
         return round(volts / scales.voltage) * scales.voltage, round(load.value / KT / scales.current) * scales.current
+
+
+class HalfStepConformance(PlayedConformance):
+    """The same, of a dialect whose torque is a whole number of steps of which none is 0. torque_step: N m"""
+
+    torque_step = 0.0
+
+    def test_a_command_takes_hold_as_whole_counts(self, bed: BedDriver) -> None:
+        """Within half a step, and never by more than was asked for: 0 is between two steps."""
+        assert isinstance(bed, CanBed)
+        about = self.driven(bed)
+        for share in (0.1, -0.1, 0.07, 0.0):
+            current = share * about.limits.current
+            self.drive(bed, self.period, 0.0, current)
+            held, step = self.played.load.output.value, self.torque_step
+            assert abs(held - KT * current) <= 1.001 * step
+            assert abs(held) <= max(abs(KT * current), 0.5001 * step)

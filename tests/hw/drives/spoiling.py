@@ -6,16 +6,20 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 from hw.bed import BedSample, BedState, Fault
 from hw.beds.can_bed import CanBed
 from hw.drives.frames import CanFrame
 from hw.drives.side import SKEW
-from hw.players.player import PlayedBench, PlayedLine
+from hw.players.player import PlayedBench
 from met.diagnostic import Problem
 
 SHARE = 0.05
 """Share of frames that a fault befalls."""
+
+SWUNG = 100.0
+"""Largest rate of a shaft, rad/s, for which a bed's limit has to have room, so that it is swung in full."""
 
 Spoilt = list[tuple[float, CanFrame]]
 
@@ -104,6 +108,22 @@ FAULTS: dict[str, Callable[[Spoiler, CanFrame, bool], Spoilt]] = {
 }
 
 
+class WaitingLine(Protocol):
+    """What a campaign needs of a line: its time, and to let it pass."""
+
+    def now(self) -> float: ...
+
+    def sleep(self, seconds: float) -> None: ...
+
+
+class BefallingFault(Protocol):
+    """A fault that a campaign switches on and off. kind: its name;  befell: how often it did"""
+
+    kind: str
+    on: bool
+    befell: int
+
+
 @dataclass
 class Tally:
     """What came of exchanges: how many were answered, how many of these wrong, by how much at most (rad/s), how often
@@ -117,14 +137,17 @@ class Tally:
     worst: float = 0.0
 
 
-def campaign(bed: CanBed, line: PlayedLine, played: PlayedBench, spoiler: Spoiler, exchanges: int) -> Tally:
-    """Drive a bed through a fault, arming it anew each time that it has stopped. An answer is wrong where its rate is
-    not the shaft's at any time of the period before it, by more than the shaft can change in the time by which the two
-    drives' samples may be apart: what is wrong by less cannot be told."""
+def campaign(bed: CanBed, line: WaitingLine, played: PlayedBench, spoiler: BefallingFault, exchanges: int) -> Tally:
+    """Drive a bed through a fault, as fast as its limits let, arming it anew each time that it has stopped.
+
+    An answer is wrong where its rate is not the shaft's at any time of the period before it, by more than the shaft can
+    change in the time by which the two drives' samples may be apart: what is wrong by less cannot be told.
+    """
     tally = Tally()
     bed.connect()
     bed.patience = 0.002  # as of a run at 1 kHz
     truth = _Truth(played)
+    swing = min(1.0, bed._there().limits.rate / SWUNG)
     chance = random.Random(f"{spoiler.kind} drives")
     while tally.exchanges < exchanges:
         spoiler.on = False
@@ -148,7 +171,7 @@ def campaign(bed: CanBed, line: PlayedLine, played: PlayedBench, spoiler: Spoile
             due += 1e-3
             line.sleep(max(0.0, due - line.now()))
             phase = 2.0 * math.pi * 3.0 * line.now()
-            sample = bed.exchange(6.0 * math.sin(phase), 1.5 * math.sin(0.7 * phase))
+            sample = bed.exchange(swing * 6.0 * math.sin(phase), swing * 1.5 * math.sin(0.7 * phase))
             tally.exchanges += 1
             if spoiler.kind == "reboot" and chance.random() < 0.02:
                 chance.choice(played.drives).reboot()

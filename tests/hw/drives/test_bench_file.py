@@ -61,6 +61,26 @@ def test_a_mistake_has_its_place_and_its_remedy(
     assert f"--> {path}:{line}:" in words, words
 
 
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("fd = true", "an fdcanusb has no `fd`"),
+        ("bitrat = 5", "an fdcanusb has no `bitrat`"),
+        ("bitrate = 0", "`bitrate` is no number of bits a second"),
+        ("data_bitrate = true", "`data_bitrate` is no number of bits a second"),
+        ('bitrate = "1\\ncan on"', "`bitrate` is no number of bits a second"),
+        ("data_bitrate = 9000000", "`data_bitrate` is no number of bits a second"),
+    ],
+)
+def test_an_fdcanusb_has_speeds_and_no_other_settings(tmp_path: Path, line: str, message: str) -> None:
+    path = bench_file(tmp_path, "moteus", "fdcanusb")
+    path.write_text(path.read_text().replace("[bus]\n", f"[bus]\n{line}\n"))
+    with pytest.raises(Problem) as caught:
+        two_drives(path)
+    words = said(caught.value)
+    assert words.startswith(f"error[E446]: {message}\n") and f"--> {path}:4:" in words, words
+
+
 def test_a_file_that_is_large_or_no_file_is_not_read(tmp_path: Path) -> None:
     with pytest.raises(OSError):
         two_drives(tmp_path)

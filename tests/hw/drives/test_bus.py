@@ -80,6 +80,23 @@ def test_a_port_without_its_file_or_with_a_dialect_of_no_one_is_refused(tmp_path
     )
 
 
+@pytest.mark.parametrize("role", ["drive", "load"])
+def test_drives_whose_watchdog_could_not_be_proved_are_refused_with_the_reason(tmp_path: Path, role: str) -> None:
+    path = bench_file(tmp_path)
+    first, second = path.read_text().split("[load]")
+    if role == "drive":
+        first = first.replace('"odrive"', '"cubemars"')
+    else:
+        second = second.replace('"odrive"', '"cubemars"')
+    path.write_text(f"{first}[load]{second}")
+    assert refusal(lambda: opened(path)) == (
+        f"error[E446]: {path}: CubeMars' AK drives are not driven: their manual tells of no watchdog in MIT mode, and "
+        "no answer of theirs says whether they drive\n"
+        " = help: a drive that goes on without its host is not armed, and no watchdog could be proved\n"
+        " = help: RobStride and Damiao have motors of that kind, with a watchdog: `robstride`, `damiao`"
+    )
+
+
 def test_no_transcript_is_kept_of_a_bus(tmp_path: Path) -> None:
     port = Port(f"can:{bench_file(tmp_path)}", transcript=str(tmp_path / "kept"))
     assert refusal(lambda: PORT.open(Opening(port))).startswith("error[E409]: no transcript is kept of a CAN bus\n")

@@ -14,27 +14,16 @@ from hw.drives.mit import STEPS_12, STEPS_16, count_of, packed, value_of
 from hw.players.damiao import PlayedDamiao
 from hw.players.player import PlayedBench, PlayedLine
 from tests.hw.conftest import refusal
-from tests.hw.drives.played import KT, PlayedConformance, bench_file, host_of, played_bench
+from tests.hw.drives.played import HalfStepConformance, bench_file, host_of, played_bench
 
 
-class TestDamiao(PlayedConformance):
-    dialect = "damiao"
+class TestDamiao(HalfStepConformance):
+    dialect, torque_step = "damiao", 2.0 / STEPS_12
 
     @pytest.fixture
     def bed(self, tmp_path: Path) -> Iterator[BedDriver]:
         with self.opened(tmp_path) as bed:
             yield bed
-
-    def test_a_command_takes_hold_as_whole_counts(self, bed: BedDriver) -> None:
-        """Within half a step, and never by more than was asked for: 0 is between two steps."""
-        assert isinstance(bed, CanBed)
-        about = self.driven(bed)
-        for share in (0.1, -0.1, 0.07, 0.0):
-            current = share * about.limits.current
-            self.drive(bed, self.period, 0.0, current)
-            held, step = self.played.load.output.value, 2.0 / STEPS_12
-            assert abs(held - KT * current) <= 1.001 * step
-            assert abs(held) <= max(abs(KT * current), 0.5001 * step)
 
 
 def test_a_frame_is_laid_out_as_the_protocol_says() -> None:

@@ -12,7 +12,7 @@ from hw.players.player import PlayedLine
 from tests.hw.drives.played import bench_file, host_of, played_bench
 from tests.hw.drives.spoiling import FAULTS, Spoiler, Tally, campaign
 
-DIALECTS = ("odrive", "damiao", "moteus", "cia402")
+DIALECTS = ("odrive", "damiao", "moteus", "cia402", "robstride")
 
 
 def through(folder: Path, dialect: str, kind: str, exchanges: int) -> tuple[Tally, Spoiler]:
@@ -43,7 +43,13 @@ def test_no_wrong_answer_of_ten_thousand_is_taken(tmp_path: Path, dialect: str, 
 
 
 @pytest.mark.parametrize(
-    ("dialect", "fault"), [("odrive", Fault.DRIVE), ("damiao", Fault.DRIVE), ("moteus", Fault.DISAGREEMENT)]
+    ("dialect", "fault"),
+    [
+        ("odrive", Fault.DRIVE),
+        ("damiao", Fault.DRIVE),
+        ("moteus", Fault.DISAGREEMENT),
+        ("robstride", Fault.DEADMAN | Fault.DISAGREEMENT),
+    ],
 )
 def test_a_drive_that_has_rebooted_stops_the_bed(tmp_path: Path, dialect: str, fault: Fault) -> None:
     """A moteus drives again at the next command: that its angle has begun anew tells it, where it had gone round."""

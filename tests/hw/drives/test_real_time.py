@@ -22,28 +22,36 @@ import pytest
 from hw.bed import BedState
 from hw.beds.can_bed import CanBed
 from hw.drives.bench_file import two_drives
-from hw.drives.bus import PythonCanLine
+from hw.drives.bus import open_bus
+from hw.players.fdcanusb import played_bus
 from hw.players.player import play
 from hw.realtime import put_first
+from tests.hw.drives.driving import driving_voltage
 from tests.hw.drives.played import bench_file, host_on, played_bench
 
 pytestmark = pytest.mark.alone
 
-DIALECTS = ("odrive", "damiao", "moteus", "cia402")
+DIALECTS = ("odrive", "damiao", "moteus", "cia402", "robstride", "moteus behind an fdcanusb")
 GROUP = "239.74.163.2"
 """Multicast group, of this machine alone, in whose place a bus is."""
+
+
+def file_for(folder: Path, dialect: str, interface: str, channel: str) -> Path:
+    """A bench file of a dialect on a bus; of one behind an adapter, on its pseudo-terminal in the folder."""
+    name, _, adapter = dialect.partition(" behind an ")
+    return bench_file(folder, name, adapter or interface, str(folder / "line") if adapter else channel)
 
 
 @contextmanager
 def on_virtual_bus(folder: Path, dialect: str) -> Iterator[CanBed]:
     """The host's side of a bench that is played by a thread of this process, on python-can's virtual bus."""
-    bench = two_drives(bench_file(folder, dialect))
-    played, ended = played_bench(dialect), threading.Event()
-    theirs = PythonCanLine(bench.bus)
+    bench = two_drives(file_for(folder, dialect, "virtual", "bench"))
+    played, ended = played_bench(bench.drive.dialect), threading.Event()
+    theirs = played_bus(bench.bus)
     thread = threading.Thread(target=play, args=(theirs, played, ended.is_set), daemon=True)
     thread.start()
     try:
-        with host_on(bench, lambda: PythonCanLine(bench.bus)) as bed:
+        with host_on(bench, lambda: open_bus(bench.bus)) as bed:
             yield bed
     finally:
         ended.set()
@@ -55,7 +63,7 @@ def on_virtual_bus(folder: Path, dialect: str) -> Iterator[CanBed]:
 def exchanged(bed: CanBed, seconds: float) -> tuple[int, list[float], list[float]]:
     """Drive a bed at 1 kHz. Returns how many exchanges had no answer, and of all: how late they began, and how long
     they took, s. Where it stops itself, as it does where the machine is busy, it is armed anew."""
-    bed.connect()
+    voltage = driving_voltage(bed.connect())
     bed.patience = 0.002
     bed.arm()
     missed, late, took = 0, [], []
@@ -65,7 +73,7 @@ def exchanged(bed: CanBed, seconds: float) -> tuple[int, list[float], list[float
         if (left := due - time.perf_counter()) > 0.0:
             time.sleep(left)
         now = time.perf_counter()
-        sample = bed.exchange(3.0, 0.2)
+        sample = bed.exchange(voltage, 0.1)
         late.append(now - due)
         took.append(time.perf_counter() - now)
         if sample is None:
@@ -96,8 +104,9 @@ def test_a_host_that_is_killed_leaves_the_drives_off_within_their_watchdog(tmp_p
 
 
 def stopped_after(folder: Path, dialect: str) -> float:
-    """The time from the death of a host to the last of the drives being off, both processes of their own, s."""
-    path = bench_file(folder, dialect, "udp_multicast", GROUP)
+    """The time from the death of a host to the last of the drives being off, both processes of their own, s; below 0
+    where the bed had stopped by itself before."""
+    path = file_for(folder, dialect, "udp_multicast", GROUP)
     player = subprocess.Popen([sys.executable, "-m", "hw.players", str(path)], stdout=subprocess.PIPE, text=True)
     put_first(player.pid)
     assert player.stdout is not None
@@ -108,7 +117,8 @@ def stopped_after(folder: Path, dialect: str) -> float:
             [sys.executable, "-m", "tests.hw.drives.driving", str(path)], stdout=subprocess.PIPE, text=True
         )
         assert host.stdout is not None
-        assert "ARMED" in host.stdout.readline()
+        found = host.stdout.readline()
+        assert found, "the host did not come to drive"
         host.kill()
         killed = time.clock_gettime(time.CLOCK_MONOTONIC)
         host.wait()
@@ -119,7 +129,7 @@ def stopped_after(folder: Path, dialect: str) -> float:
             if each is not None:
                 each.terminate()
                 said = each.communicate()[0]
-    return float(said.split()[-1]) - killed
+    return float(said.split()[-1]) - killed if "ARMED" in found else -1.0
 
 
 def _figures(seconds: float) -> None:

@@ -1,0 +1,193 @@
+"""An fdcanusb, as its maker's description has it, and two ends of it: in a simulated time, and on a pseudo-terminal.
+
+PlayedFdcanusb       the adapter: takes bytes of its line, and says others
+PlayedFdcanusbLine   the host's end of its line, the bus behind it being a `PlayedLine`
+PlayedFdcanusbPort   the bus's end of it, for `play`, its line being a pseudo-terminal
+"""
+
+from __future__ import annotations
+
+import contextlib
+import heapq
+import itertools
+import os
+import select
+import time
+import tty
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from hw.drives.bench_file import FDCANUSB
+from hw.drives.bus import open_bus
+from hw.drives.frames import CanFrame, CanLine
+from hw.players.player import PlayedLine
+from met.diagnostic import Problem, error
+
+
+class PlayedFdcanusb:
+    """An adapter. on: whether it is on its bus;  settings: by name, as they were set"""
+
+    def __init__(self) -> None:
+        self.on = False
+        self.settings = {"can.bitrate": "1000000", "can.fd_bitrate": "5000000"}
+        self._begun = ""
+
+    def hears(self, data: bytes) -> tuple[list[CanFrame], bytes]:
+        """Take bytes from the host. Returns the frames that it sends on its bus, and what it answers."""
+        frames, said = [], ""
+        *lines, self._begun = (self._begun + data.decode("latin-1")).split("\n")
+        for each in lines:
+            words = each.split()
+            if words:
+                found, answer = self._obey(words)
+                frames += found
+                said += f"{answer}\r\n"
+        return frames, said.encode()
+
+    def _obey(self, words: list[str]) -> tuple[list[CanFrame], str]:
+        match words:
+            case ["can", "on"] if self.on:
+                return [], "ERR already in BusOn"
+            case ["can", "off"] if not self.on:
+                return [], "ERR already in BusOff"
+            case ["can", "on" | "off" as which]:
+                self.on = which == "on"
+                return [], "OK"
+            case ["conf", "set", name, value]:
+                if name not in self.settings or self.on:
+                    return [], "ERR error setting"
+                self.settings[name] = value
+                return [], "OK"
+            case ["can", "std" | "ext", *_] if not self.on:
+                return [], "ERR not in BusOn state"
+            case ["can", "std" | "ext" as kind, number, data, *flags]:
+                letters = "".join(flags)
+                try:
+                    frame = CanFrame(
+                        int(number, 16), bytes.fromhex(data), kind == "ext", "R" in letters, "F" in letters
+                    )
+                except ValueError:
+                    return [], "ERR invalid data"
+                return [frame], "OK"
+        return [], "ERR unknown command"
+
+    def says(self, frame: CanFrame) -> bytes:
+        """What it says of a frame that comes on its bus."""
+        if not self.on:
+            return b""
+        number = f"{frame.id:X}"
+        number = number.rjust(len(number) + len(number) % 2, "0")
+        flags = (("e", "E")[frame.extended], ("b", "B")[frame.fd], ("f", "F")[frame.fd], ("r", "R")[frame.remote])
+        return f"rcv {number} {frame.data.hex().upper()} {' '.join(flags)} x-1\r\n".encode()
+
+
+SpoilText = Callable[[bytes, bool], list[tuple[float, bytes]]]
+"""(a line with its end, whether it comes from the adapter) -> what arrives in its place: seconds later, and bytes."""
+
+
+def unspoiled_text(text: bytes, from_adapter: bool) -> list[tuple[float, bytes]]:
+    return [(0.0, text)]
+
+
+class PlayedFdcanusbLine:
+    """The host's end of an adapter's line, whose bus is simulated: bytes in the time of that bus. What is late holds up
+    what comes after it, as a stream does.
+
+    spoil  what becomes of each line of text on its way
+    """
+
+    def __init__(self, bus: PlayedLine, spoil: SpoilText = unspoiled_text) -> None:
+        self.bus, self.spoil, self.adapter = bus, spoil, PlayedFdcanusb()
+        self._waiting: list[tuple[float, int, bytes]] = []
+        self._order, self._last = itertools.count(), 0.0
+
+    @property
+    def closed(self) -> bool:
+        return self.bus.closed
+
+    def now(self) -> float:
+        return self.bus.now()
+
+    def send(self, frame: bytes) -> None:
+        for _, data in self.spoil(frame, False):
+            frames, said = self.adapter.hears(data)
+            for each in frames:
+                self.bus.send(each)
+            self._put(said)
+
+    def receive(self, until: float) -> bytes:
+        while True:
+            if self._waiting and self._waiting[0][0] <= self.now():
+                return heapq.heappop(self._waiting)[2]
+            first = self._waiting[0][0] if self._waiting else until
+            frame = self.bus.receive(min(first, until))
+            if frame is not None:
+                self._put(self.adapter.says(frame))
+            elif self.now() >= until:
+                return b""
+
+    def sleep(self, seconds: float) -> None:
+        self.bus.sleep(seconds)
+
+    def close(self) -> None:
+        self.bus.close()
+
+    def _put(self, said: bytes) -> None:
+        for text in said.splitlines(keepends=True):
+            for later, data in self.spoil(text, True):
+                self._last = max(self._last, self.now() + later)
+                heapq.heappush(self._waiting, (self._last, next(self._order), data))
+
+
+class PlayedFdcanusbPort:
+    """The bus's end of an adapter whose line is a pseudo-terminal, to which a link leads. Making it raises Problem
+    E400 where something else is at that path."""
+
+    def __init__(self, path: str) -> None:
+        self._path, self._adapter, self._frames = path, PlayedFdcanusb(), deque[CanFrame]()
+        if os.path.lexists(path) and not os.path.islink(path):
+            helps = "`channel` of `[bus]` is where its pseudo-terminal will be: a path that is free"
+            raise Problem(error("E400", f"no fdcanusb can be played at {path}: something is there", help=helps))
+        self._host, device = os.openpty()
+        self._device = device  # kept open: else a host that leaves ends the line
+        tty.setraw(device)
+        os.set_blocking(self._host, False)
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(path)
+        os.symlink(os.ttyname(device), path)
+
+    def now(self) -> float:
+        return time.perf_counter()
+
+    def send(self, frame: CanFrame) -> None:
+        self._say(self._adapter.says(frame))
+
+    def receive(self, until: float) -> CanFrame | None:
+        while not self._frames:
+            if not select.select((self._host,), (), (), max(0.0, until - time.perf_counter()))[0]:
+                return None
+            frames, said = self._adapter.hears(os.read(self._host, 4096))
+            self._frames += frames
+            self._say(said)
+        return self._frames.popleft()
+
+    def _say(self, data: bytes) -> None:
+        with contextlib.suppress(BlockingIOError):  # nobody reads: what does not fit is lost, as in the adapter
+            os.write(self._host, data)
+
+    def sleep(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+    def close(self) -> None:
+        with contextlib.suppress(OSError):
+            os.unlink(self._path)
+        for each in (self._host, self._device):
+            os.close(each)
+
+
+def played_bus(settings: Mapping[str, Any]) -> CanLine:
+    """The drives' end of the bus that `[bus]` of a bench file describes. Raises Problem E400 or E449, OSError."""
+    if settings["interface"] == FDCANUSB:
+        return PlayedFdcanusbPort(str(settings["channel"]))
+    return open_bus(settings)
