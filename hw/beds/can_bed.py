@@ -116,7 +116,8 @@ class CanBed(BedDriver):
         self._acceleration = (self._most + self._kt_load * current) / bench.shaft["inertia"]
         self._supply_max = min([bench.supply["voltage_max"], *(each.supply_max for each in facts if each.supply_max)])
         by_voltage = self._kind == "voltage"
-        count = 0.0 if by_rate else drive.facts.torque_count * (self._resistance / self._kt if by_voltage else 1.0)
+        count = drive.facts.torque_count * (self._resistance / self._kt if by_voltage else 1.0)
+        count = drive.facts.rate_told_count if by_rate else count
         scales = Scales(count or FINE, load.facts.torque_count / self._kt_load or FINE, FINE, FINE_ANGLE, FINE, FINE)
         hz = min(each.control_hz for each in facts)
         rate = min(bench.shaft["rate_max"], *(each.rate_max for each in facts))

@@ -78,7 +78,7 @@ def warnings(bench: TwoDrives, path: str, opening: Opening) -> tuple[Diagnostic,
         also = () if origin.place is None else (Label(origin.place, "the deck's"),)
         helps = (
             "beyond it the drive gives less than the law believes, and the run is one of neither motor",
-            "a larger `torque_max` of `[drive]`, if drive and shaft bear it, or a smaller `tau_max` of the servo",
+            "a larger `torque_max` of `[drive]`, if drive and shaft bear it, or a smaller `tau_max` in the deck",
         )
         found.append(Diagnostic("E444", message, Label(bench.torque_at), also, helps, "warning"))
     return tuple(found)

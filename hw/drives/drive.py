@@ -59,6 +59,7 @@ class DriveFacts:
     angle_range     rad after which its angle begins anew; 0 where it does not
     braking         True where it shorts its windings when it stops; False where the shaft coasts
     supply_max      V beyond which it stops by itself; 0 where it does not say
+    rate_told_count  rad/s of the smallest step in which a rate is told; 0 where there is none
     rate_loop       of a drive that is told rates, its loop's gains: N m s/rad on the error, N m/rad on its integral;
                     None where it does not say them
     """
@@ -75,6 +76,7 @@ class DriveFacts:
     angle_range: float = 0.0
     braking: bool = False
     supply_max: float = 0.0
+    rate_told_count: float = 0.0
     rate_loop: tuple[float, float] | None = None
 
 

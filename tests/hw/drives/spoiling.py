@@ -117,10 +117,12 @@ class Tally:
     worst: float = 0.0
 
 
-def campaign(bed: CanBed, line: PlayedLine, played: PlayedBench, spoiler: Spoiler, exchanges: int) -> Tally:
+def campaign(
+    bed: CanBed, line: PlayedLine, played: PlayedBench, spoiler: Spoiler, exchanges: int, swing: float = 6.0
+) -> Tally:
     """Drive a bed through a fault, arming it anew each time that it has stopped. An answer is wrong where its rate is
     not the shaft's at any time of the period before it, by more than the shaft can change in the time by which the two
-    drives' samples may be apart: what is wrong by less cannot be told."""
+    drives' samples may be apart: what is wrong by less cannot be told. swing: of the voltage or rate that is sent."""
     tally = Tally()
     bed.connect()
     bed.patience = 0.002  # as of a run at 1 kHz
@@ -148,7 +150,7 @@ def campaign(bed: CanBed, line: PlayedLine, played: PlayedBench, spoiler: Spoile
             due += 1e-3
             line.sleep(max(0.0, due - line.now()))
             phase = 2.0 * math.pi * 3.0 * line.now()
-            sample = bed.exchange(6.0 * math.sin(phase), 1.5 * math.sin(0.7 * phase))
+            sample = bed.exchange(swing * math.sin(phase), 1.5 * math.sin(0.7 * phase))
             tally.exchanges += 1
             if spoiler.kind == "reboot" and chance.random() < 0.02:
                 chance.choice(played.drives).reboot()
