@@ -186,8 +186,10 @@ class CanBed(BedDriver):
         filter = f"{cut:g} Hz here, the deck's f_cut" if cut else "none here: the deck's f_cut is the drive's"
         sides = [(side.drive.entry.role, side.words) for side in self._sides]
         if loop := self._sides[0].facts.rate_loop:
-            words = f"the drive's own: {loop[0]:.4g} N*m*s/rad, {loop[1]:.4g} N*m/rad, at most {self._most:g} N*m"
-            sides.append(("rate loop", words))
+            words = (
+                f"of rate, the drive's own: {loop[0]:.4g} N*m*s/rad, {loop[1]:.4g} N*m/rad, at most {self._most:g} N*m"
+            )
+            sides.append(("loop", words))
         return (*sides, ("bus", f"{bus['interface']} {bus['channel']}: {most}"), ("filter", filter))
 
     def _of_loop(self) -> tuple[Diagnostic, ...]:

@@ -147,7 +147,7 @@ def test_an_odrive_s_limits_of_torque_are_set_and_its_gains_are_read(tmp_path: P
         assert isinstance(played.drive, PlayedOdrive)
         values = played.drive.values
         assert values["axis0.config.torque_soft_max"] == -values["axis0.config.torque_soft_min"] == pytest.approx(0.4)
-        assert dict(bed.remarks)["rate loop"] == "the drive's own: 0.01 N*m*s/rad, 0.05 N*m/rad, at most 0.4 N*m"
+        assert dict(bed.remarks)["loop"] == "of rate, the drive's own: 0.01 N*m*s/rad, 0.05 N*m/rad, at most 0.4 N*m"
         assert played.load.values["axis0.config.torque_soft_max"] == float("inf")  # type: ignore[attr-defined]
 
 
