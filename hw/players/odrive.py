@@ -65,8 +65,8 @@ class PlayedOdrive(PlayedDrive):
         self.watches = True
         self.version: tuple[int, ...] | None = (2, 4, 4, 58, 0, 6, 10, 0)
         turn = 2.0 * math.pi
-        values = (supply, supply_max, False, 0.1, kt, current_max, rate_max / turn, 100, 10, 0)
-        values = (*values, math.inf, -math.inf, turn * rate_gain, turn * rate_integral)
+        drive = (supply, supply_max, False, 0.1, kt, current_max, rate_max / turn, 100, 10, 0)
+        values = (*drive, math.inf, -math.inf, turn * rate_gain, turn * rate_integral)
         self.values = dict(zip((path for path, _ in PROPERTIES), values, strict=True))
         self.refuses: set[str] = set()
         """Properties that cannot be set."""

@@ -309,9 +309,9 @@ class Substituted:
             tape.write(f"{each.joint}.law.torque", one.torque)
         if self.law.observer:
             self._look_ahead(tape, Lambda, b_0, applied)
-        for each, wire, one in zip(self.mounted, applied, found, strict=True):
+        for each, wire, motion in zip(self.mounted, applied, found, strict=True):
             if each.closes_rate_loop:
-                self._wind(tape, each, wire, one)
+                self._wind(tape, each, wire, motion)
 
     def first(self, tape: Tape) -> None:
         """The acceleration with which the step begins; a servo faster than the dynamics changes it on the way."""
