@@ -65,9 +65,11 @@ def about_as_json(about: About) -> dict[str, Any]:
 
 
 def warnings(bed: BedDriver) -> None:
-    """Say what may make exchanges with a bed late."""
+    """Say what may make exchanges with a bed late, or a bench another one than the deck takes it for."""
     for warning in bed.warnings:
-        say(said=warning.message, help=list(warning.help))
+        place = warning.at.place if warning.at else None
+        said = warning.message if place is None else f"{place.file}:{place.line}: {warning.message}"
+        say(said=said, help=list(warning.help))
 
 
 def precedence() -> None:

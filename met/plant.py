@@ -15,7 +15,8 @@ from met.backends.c.emit import emit, literal
 from met.frozen import frozen
 from met.plan import Experiment, Formula
 from met.program.build import build
-from met.program.control.substituted import Mounted, Substituted
+from met.program.control.rate_drives import Mounted
+from met.program.control.substituted import Substituted
 from met.program.system import PARAMETER, System
 from met.trace import Real
 from met.trace.nodes import evaluate

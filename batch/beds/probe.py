@@ -63,7 +63,7 @@ def probe(chosen: ChosenBed, baud: int) -> ProbeResult:
     """Greet the bed, and read its sensors. Raises Problem."""
     simulated = chosen.simulated
     period = math.inf if simulated is None else pace_of(simulated).period
-    with opened(Port(chosen.port, baud), simulated, chosen.joint, 0, period) as bed:
+    with opened(Port(chosen.port, baud), chosen.experiment, chosen.joint, 0, period) as bed:
         about = bed.connect()
         sample = bed.read()
         trips = _trips(bed) if bed.has_line else ()
@@ -176,7 +176,8 @@ def _firmware(about: About) -> str:
 def _properties(about: About) -> list[str]:
     """Outputs and sensors in words. A bed that speaks no protocol of MET's has drives that tell their rate."""
     if not about.version:
-        drive = "drive torque" + " of an armature at a voltage" * (Capability.ARMATURE in about.capabilities)
+        drive = "drive rate" if about.drive == "rate" else "drive torque"
+        drive += " of an armature at a voltage" * (Capability.ARMATURE in about.capabilities)
         return [drive, "load torque by a current", "rate as the drive tells it", *capabilities(about)]
     return [f"drive {about.drive}", "load current", "tachometer", *capabilities(about)]
 

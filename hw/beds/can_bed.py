@@ -1,11 +1,11 @@
 """A bed of two drives on a CAN bus, `can:BENCH.toml`: one turns the motor under test, the other loads it.
 
-A drive has a current loop of its own, and is told a torque. What a bed's driver is told, for one motor what the deck's
-bed model sends, and the current of the other, becomes torques here:
+A drive has a current loop of its own, and is told a torque; or it closes the rate loop, too, and is told a rate. What a
+bed's driver is told, for one motor what the deck's bed model sends, and the current of the other, becomes here:
 
     load   kt_load i
     drive  a torque as it is sent; of a voltage what an armature of kt and resistance takes from it at the rate that was
-           read last, kt/R (V - kt w); either at most torque_max
+           read last, kt/R (V - kt w); either at most torque_max. Or a rate, and torque_max is its loop's limit
 
 Limits of voltage, current, their slews, rate and heat are watched here, besides those of the drives; what no host can
 do, to stop a shaft whose host is dead, the drives' own watchdogs do, and are made to prove it each time before arming.
@@ -21,21 +21,20 @@ from functools import partial
 
 from hw import refusals
 from hw.bed import About, BedDriver, BedSample, BedState, Capability, Fault, Limits, Scales, real_plant
-from hw.beds import greeting
+from hw.beds import can_deck, greeting
 from hw.beds.emulated import FINE, FINE_ANGLE, WIDE
 from hw.drives import DIALECTS, REFUSED
 from hw.drives.arming import begin_driving, forget, prove_watchdogs, switch_off
-from hw.drives.bench_file import TwoDrives, two_drives
+from hw.drives.bench_file import TwoDrives
 from hw.drives.bus import open_bus
 from hw.drives.drive import ASKS, CanDrive, DriveReading, DriveState, Talk
 from hw.drives.frames import FAST, NOMINAL, CanFrame, CanLine, on_bus
 from hw.drives.side import Side, agree
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
-from met.diagnostic import Diagnostic, Label, Problem, did_you_mean, error
-from met.plan import Experiment
+from met.diagnostic import Diagnostic, Problem, did_you_mean, error
 from met.substitution import butterworth
-from met.substitution.bed import DriveCommand
+from met.substitution.bed import DRIVES, DriveCommand
 
 LONGEST_SHARE = 0.8
 """Largest share of a period that the frames of an exchange may take on the bus."""
@@ -59,7 +58,9 @@ class CanBed(BedDriver):
 
     bench, drives  what the file says, and the host's sides of its drive and load
     open_line      opens the bus;  period: s from one exchange to the next, infinite where none are made
-    drive          what it is sent for the drive: a voltage or a torque
+    drive          what it is sent for the drive: a voltage, a torque or a rate
+    believed       the rate loop that the deck takes for the drive's; None where it sends no rate
+    of_deck        warnings of what the bench's file says otherwise than the deck
     proved         s after which each drive had stopped by itself when it was last armed; None where it said so only
                    when it was asked
     returned       J that the drives gave back to the supply since the bed was armed, as far as they say so
@@ -73,8 +74,11 @@ class CanBed(BedDriver):
         *,
         period: float,
         drive: DriveCommand = "voltage",
+        believed: can_deck.BelievedLoop | None = None,
+        of_deck: tuple[Diagnostic, ...] = (),
     ) -> None:
-        self._kind = drive
+        self._kind, self._believed, self._of_deck = drive, believed, of_deck
+        self.warnings = of_deck
         self._bench, self._drives, self._open, self.period = bench, drives, open_line, period
         self._line: CanLine | None = None
         self._about: About | None = None
@@ -96,7 +100,10 @@ class CanBed(BedDriver):
 
     def _greet(self, line: CanLine) -> About:
         self._talk = talk = Talk(line, self._drives)
-        bench = self._bench
+        bench, by_rate = self._bench, self._kind == "rate"
+        if by_rate and not self._drives[0].takes_rates:
+            raise Problem(error("E438", f"{self._drives[0].words} of bed `{bench.name}` is told no rate"))
+        self._drives[0].rates = by_rate
         facts = [drive.greet(talk) for drive in self._drives]
         sides = [Side(drive, each) for drive, each in zip(self._drives, facts, strict=True)]
         self._sides = (sides[0], sides[1])
@@ -110,10 +117,11 @@ class CanBed(BedDriver):
         self._supply_max = min([bench.supply["voltage_max"], *(each.supply_max for each in facts if each.supply_max)])
         by_voltage = self._kind == "voltage"
         count = drive.facts.torque_count * (self._resistance / self._kt if by_voltage else 1.0)
+        count = drive.facts.rate_told_count if by_rate else count
         scales = Scales(count or FINE, load.facts.torque_count / self._kt_load or FINE, FINE, FINE_ANGLE, FINE, FINE)
         hz = min(each.control_hz for each in facts)
         rate = min(bench.shaft["rate_max"], *(each.rate_max for each in facts))
-        most = figures["voltage_max"] if by_voltage else WIDE * self._most
+        most = rate if by_rate else figures["voltage_max"] if by_voltage else WIDE * self._most
         slews = 2.0 * most * hz, 2.0 * current * hz
         limits = Limits(most, current, rate, bench.shaft["arming_rate"], *slews, load.drive.entry.figures["heat"])
         capabilities = Capability.ENCODER | (Capability.ARMATURE if by_voltage else Capability(0))
@@ -139,6 +147,7 @@ class CanBed(BedDriver):
             side.begin(reading, readings[0].time)
         self._filtered = (self._sides[0].rate, 0.0)
         self.remarks = self._remarks()
+        self.warnings = (*self._of_deck, *self._of_loop())
         self._state = BedState.STOPPED if self._faults else BedState.DISARMED
         self._latch_failures()
         return about
@@ -175,8 +184,21 @@ class CanBed(BedDriver):
         bus, cut = self._bench.bus, self._bench.shaft["filter"]
         most = f"{len(self._exchanged())} frames an exchange, {1e3 * self._on_bus():.3g} ms on the bus at most"
         filter = f"{cut:g} Hz here, the deck's f_cut" if cut else "none here: the deck's f_cut is the drive's"
-        sides = ((side.drive.entry.role, side.words) for side in self._sides)
+        sides = [(side.drive.entry.role, side.words) for side in self._sides]
+        if loop := self._sides[0].facts.rate_loop:
+            words = (
+                f"of rate, the drive's own: {loop[0]:.4g} N*m*s/rad, {loop[1]:.4g} N*m/rad, at most {self._most:g} N*m"
+            )
+            sides.append(("loop", words))
         return (*sides, ("bus", f"{bus['interface']} {bus['channel']}: {most}"), ("filter", filter))
+
+    def _of_loop(self) -> tuple[Diagnostic, ...]:
+        """A warning where the drive's rate loop is not what the deck takes it for."""
+        own = self._sides[0].facts.rate_loop
+        if own is None or self._believed is None:
+            return ()
+        found = can_deck.loop_warning(self._drives[0].words, *own, self._believed)
+        return () if found is None else (found,)
 
     # What a bed does
 
@@ -205,7 +227,7 @@ class CanBed(BedDriver):
 
     def exchange(self, voltage: float, current: float) -> BedSample | None:
         about, force, scales = self._there(), self._in_force, self._about_scales()
-        kind, unit = ("a voltage", "V") if self._kind == "voltage" else ("a torque", "N*m")
+        kind, unit = f"a {self._kind}", DRIVES[self._kind][0]
         volts = greeting.commanded(voltage, scales.voltage, force.voltage)
         amperes = greeting.commanded(current, scales.current, force.current)
         if volts is None or amperes is None:
@@ -405,7 +427,10 @@ class CanBed(BedDriver):
         return self._there().scales
 
     def _told(self, sent: float) -> float:
-        """The torque that the drive under test is told, N m: what was sent, or that of an armature at it, V."""
+        """What the drive under test is told, N m: what was sent, or the torque of an armature at it, V; of one that is
+        told rates the rate that was sent, rad/s, which is within its limit."""
+        if self._kind == "rate":
+            return sent
         if self._kind == "torque":
             torque = sent
         else:
@@ -463,39 +488,12 @@ class CanBed(BedDriver):
         return BedSample(self._state, True, self._faults, refused, tick, self._rate() * FINE, angle)
 
 
-def _check_deck(path: str, experiment: Experiment, joint: str) -> None:
-    """Raise Problem E444 where the filter of the rate, or the load's torque constant, is not what the deck believes."""
-    bench = _bench(path)
-    held = (
-        (bench.filter_at, bench.shaft["filter"], "Hz", "f_cut", "the bench filters the rate at", "`filter`"),
-        (bench.load_kt_at, bench.load.figures["kt"], "N*m/A", "kt_load", "the bench's load gives", "`kt` of `[load]`"),
-    )
-    for at, here, unit, name, words, key in held:
-        believed = experiment.parameters[f"{joint}.bed.{name}"]
-        if at is None or believed.value == here:
-            continue
-        says = f"{believed.value:g} {unit}" if isinstance(believed.value, float) else "varied by a sweep"
-        also = [] if believed.origin.place is None else [Label(believed.origin.place, "the deck's")]
-        message = f"{words} {here:g} {unit}, and the `{name}` of joint `{joint}` is {says}"
-        helps = (f"in the deck: `bed = ...({name} = {here:g} {unit})`", f"or another {key} in the bench's file")
-        raise Problem(error("E444", message, at, also=also, help=helps), {path: bench.text})
-
-
-def _bench(path: str) -> TwoDrives:
-    """The bench of a file. Raises Problem E446."""
-    try:
-        return two_drives(path)
-    except OSError as reason:
-        why = (reason.strerror or str(reason)).lower()
-        raise Problem(error("E446", f"{path} cannot be read: {why}", help="`can:` takes a bench's file")) from None
-
-
 def _opened_port(opening: Opening) -> CanBed:
     if opening.port.transcript is not None:
         helps = "records are kept of every exchange; `candump` keeps what goes over a bus"
         raise Problem(error("E409", "no transcript is kept of a CAN bus", help=helps))
     path = opening.port.address
-    bench = _bench(path)
+    bench = can_deck.bench_at(path)
     drives = []
     for entry in (bench.drive, bench.load):
         if why := REFUSED.get(entry.dialect):
@@ -506,13 +504,15 @@ def _opened_port(opening: Opening) -> CanBed:
             raise Problem(error("E446", f"{path}: no dialect `{entry.dialect}`", help=known))
         drives.append(dialect(entry))
     drive = opening.drive or "voltage"
-    bed = CanBed(bench, (drives[0], drives[1]), lambda: open_bus(bench.bus), period=opening.period, drive=drive)
-    if opening.experiment is not None and bench.filter_at is None:
-        cut = opening.bed_values()["f_cut"]
-        message = f"the bench has no filter: the deck's `f_cut`, {cut:g} Hz, has to be that of the drive's own rate"
-        remedy = (f'else `filter = "{cut:g} Hz"` in `[shaft]` of {path}',)
-        bed.warnings = (Diagnostic("E444", message, help=remedy, severity="warning"),)
-    return bed
+    return CanBed(
+        bench,
+        (drives[0], drives[1]),
+        lambda: open_bus(bench.bus),
+        period=opening.period,
+        drive=drive,
+        believed=can_deck.believed_loop(opening),
+        of_deck=can_deck.warnings(bench, path, opening),
+    )
 
 
 PORT = PortKind(
@@ -520,6 +520,6 @@ PORT = PortKind(
     address="BENCH.toml",
     doc="Two drives on a CAN bus: ODrive, Damiao, moteus, CiA 402, RobStride; the file says which.",
     open=_opened_port,
-    check=_check_deck,
+    check=can_deck.check_deck,
     lock_step=lambda name, requested: requested,
 )

@@ -80,7 +80,8 @@ class DriveEntry:
 @frozen
 class TwoDrives:
     """A bench of two drives on a bus. bus: what `can.Bus` is called with;  shaft, supply: of `FIGURES`, SI;
-    filter_at, load_kt_at: where the filter, None where there is none, and the load's kt are written;  text: the file's
+    filter_at, load_kt_at, dialect_at, torque_at: where the filter, None where there is none, the load's kt, the drive's
+    dialect and its `torque_max` are written;  text: the file's
     """
 
     name: str
@@ -91,6 +92,8 @@ class TwoDrives:
     load: DriveEntry
     filter_at: Place | None = None
     load_kt_at: Place | None = None
+    dialect_at: Place | None = None
+    torque_at: Place | None = None
     text: str = ""
 
 
@@ -126,7 +129,20 @@ class _BenchFile(TomlFile):
             )
         shaft, supply = self._figures("shaft"), self._figures("supply")
         filter_at = self.place("shaft", "filter") if "filter" in self.tables["shaft"] else None
-        return TwoDrives(name, self._bus(), shaft, supply, drive, load, filter_at, self.place("load", "kt"), self.text)
+        load_kt_at, dialect_at = self.place("load", "kt"), self.place("drive", "dialect")
+        return TwoDrives(
+            name,
+            self._bus(),
+            shaft,
+            supply,
+            drive,
+            load,
+            filter_at,
+            load_kt_at,
+            dialect_at,
+            self.place("drive", "torque_max"),
+            self.text,
+        )
 
     def _bus(self) -> dict[str, Any]:
         found = self.tables["bus"]

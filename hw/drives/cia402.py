@@ -1,6 +1,7 @@
-"""Drives of CiA 402 over CANopen, in mode 10, cyclic synchronous torque: maxon, Elmo, Copley, Nanotec and others.
+"""Drives of CiA 402 over CANopen: maxon, Elmo, Copley, Nanotec and others. In mode 10, cyclic synchronous torque, or in
+mode 9, cyclic synchronous velocity, in which they close the rate loop.
 
-    told      PDO: controlword and target torque; then a heartbeat of the host, and a SYNC
+    told      PDO: controlword and target torque, or velocity; then a heartbeat of the host, and a SYNC
     answered  at a SYNC, two PDOs: statusword; position and velocity, in one frame so that they are of one instant
     watchdog  the drive consumes the host's heartbeat, and fails where that stays away
     asked     by SDO, when it is greeted: device, modes, units, limits; PDOs are mapped then, and nothing is saved
@@ -35,7 +36,7 @@ HOST = 127
 """The host's number, under which its heartbeat goes."""
 
 START, PREOPERATIONAL = 1, 0x80
-PROFILE, TORQUE_MODE, MODE_BIT = 402, 10, 1 << 9
+PROFILE, TORQUE_MODE, RATE_MODE = 402, 10, 9
 HEARTBEAT_LOST = 0x8130
 RATE_UNITS = {0x00B44700: 2.0 * math.pi / 60.0, 0x00B40300: 2.0 * math.pi}
 """Units of velocity as object 60A9h tells them, rad/s: turns a minute, turns a second. Its highest byte is a power of
@@ -58,12 +59,14 @@ class Cia402Drive(CanDrive):
 
     dialect = "cia402"
     answers_commands = True
+    takes_rates = True
 
     def __init__(self, entry: DriveEntry) -> None:
         super().__init__(entry)
         self._answer: bytes | None = None
         self._control, self._wanted, self._error = OFF, False, 0
         self._rated = self._step = self._rate_unit = 1.0
+        self._mode = TORQUE_MODE
 
     def greet(self, talk: Talk) -> DriveFacts:
         self._wanted, self._control = False, OFF
@@ -72,8 +75,12 @@ class Cia402Drive(CanDrive):
         device = self._read(talk, DEVICE, "<I")
         if int(device) & 0xFFFF != PROFILE:
             raise self.other(f"its device profile is {int(device) & 0xFFFF}, and a drive's is 402", "another node?")
-        if not int(self._read(talk, MODES, "<I")) & MODE_BIT:
-            raise self.other("it has no cyclic synchronous torque, mode 10", "it is told a torque, and nothing else")
+        self._mode = RATE_MODE if self.rates else TORQUE_MODE
+        if not int(self._read(talk, MODES, "<I")) & 1 << self._mode - 1:
+            raise self.other(
+                f"it has no cyclic synchronous {'velocity, mode 9' if self.rates else 'torque, mode 10'}",
+                f"it is told a {'rate' if self.rates else 'torque'}, and nothing else",
+            )
         unit = int(self._read(talk, VELOCITY_UNIT, "<I"))
         if unit & 0xFFFFFF not in RATE_UNITS:
             helps = "set object 60A9h to thousandths of a turn a minute, 0xFDB44700"
@@ -81,6 +88,10 @@ class Cia402Drive(CanDrive):
         ten = struct.unpack("<b", bytes([unit >> 24]))[0]
         self._rate_unit = RATE_UNITS[unit & 0xFFFFFF] * 10.0**ten
         self._rated = 1e-3 * self._read(talk, RATED, "<I")
+        if self.rates:  # its own loop asks for no more than the bench bears
+            bears = math.floor(1e3 * self.entry.figures["torque_max"] / self._rated + 1e-6) if self._rated > 0.0 else 0
+            if bears < self._read(talk, MOST, "<H"):
+                self._write(talk, MOST, "<H", bears)
         most = 1e-3 * self._rated * self._read(talk, MOST, "<H")
         rate = _TURN / 60.0 * self._read(talk, SPEED, "<I")
         steps, turns = self._read(talk, STEPS, "<I"), self._read(talk, TURNS, "<I")
@@ -103,6 +114,7 @@ class Cia402Drive(CanDrive):
             torque_count=1e-3 * self._rated,
             angle_count=self._step,
             rate_count=self._rate_unit,
+            rate_told_count=self._rate_unit if self.rates else 0.0,
             angle_range=self._step * 2.0**32,
         )
 
@@ -110,7 +122,7 @@ class Cia402Drive(CanDrive):
         """Map the PDOs, and set mode and watchdog."""
         talk.send([CanFrame(NMT, bytes((PREOPERATIONAL, self.node)))])
         for parameters, mapping, cob, kind, objects in (
-            (0x1400, 0x1600, RPDO1, 255, (0x60400010, 0x60710010)),
+            (0x1400, 0x1600, RPDO1, 255, (0x60400010, 0x60FF0020 if self.rates else 0x60710010)),
             (0x1800, 0x1A00, TPDO1, 1, (0x60410010,)),
             (0x1801, 0x1A01, TPDO2, 1, (0x60640020, 0x606C0020)),
         ):
@@ -123,7 +135,7 @@ class Cia402Drive(CanDrive):
             self._write(talk, (parameters, 1), "<I", cob + self.node)
         self._write(talk, ABORT, "<h", 1)
         self._write(talk, CONSUMED, "<I", HOST << 16 | round(1e3 * self.entry.figures["watchdog"]))
-        self._write(talk, MODE, "<b", TORQUE_MODE)
+        self._write(talk, MODE, "<b", self._mode)
 
     def _sdo(self, talk: Talk, data: bytes, what: str) -> bytes:
         """The answer to an SDO of up to four bytes. Raises Problem E402 where none comes, E404 where it is refused."""
@@ -159,21 +171,21 @@ class Cia402Drive(CanDrive):
 
     # Frames
 
-    def _pdo(self, control: int, torque: int = 0) -> CanFrame:
-        return CanFrame(RPDO1 + self.node, struct.pack("<Hh", control, torque))
+    def _pdo(self, control: int, told: int = 0) -> CanFrame:
+        return CanFrame(RPDO1 + self.node, struct.pack("<Hi" if self.rates else "<Hh", control, told))
 
     def armed(self) -> Sequence[CanFrame]:
         self._wanted = True
         return self.told(0.0)
 
     def told(self, value: float) -> Sequence[CanFrame]:
-        """The next step towards operation, or the torque once it is there. The drive's come last: they end with the
+        """The next step towards operation, or torque or rate once it is there. The drive's come last: they end with the
         heartbeat that feeds both watchdogs, and the SYNC at which both answer."""
-        torque = 0
+        told = 0
         if self.state == DriveState.DRIVING:
-            counts = self.own(value) / (1e-3 * self._rated)
-            torque = math.trunc(counts + math.copysign(1e-6, counts))  # rounding must not lose a step
-        frames = (self._pdo(self._control if self._wanted else OFF, torque),)
+            counts = self.own(value) / (self._rate_unit if self.rates else 1e-3 * self._rated)
+            told = math.trunc(counts + math.copysign(1e-6, counts))  # rounding must not lose a step
+        frames = (self._pdo(self._control if self._wanted else OFF, told),)
         return frames if self.entry.role == "load" else (*frames, CanFrame(HEARTBEAT + HOST, b"\x05"), *self.asked())
 
     def asked(self) -> Sequence[CanFrame]:

@@ -1,7 +1,8 @@
 """The host's side of one drive on a CAN bus, as far as all dialects have it in common; each is a file of this folder.
 
-A drive of a bench is told a torque (N m), and says its angle (rad) and rate (rad/s), all of them in the sense of the
-bench's shaft. It disarms itself where it hears nothing for the time of its watchdog.
+A drive of a bench is told a torque (N m) or, where its dialect `takes_rates` and the bench wants it so, a rate (rad/s),
+for which it then closes the loop. It says its angle (rad) and rate (rad/s), all of them in the sense of the bench's
+shaft. It disarms itself where it hears nothing for the time of its watchdog.
 
     drive.greet(talk)        who is there: dialect, firmware, limits; it is idle afterwards
     drive.armed()            frames that arm it with nothing commanded, to be sent until its state says so
@@ -58,6 +59,9 @@ class DriveFacts:
     angle_range     rad after which its angle begins anew; 0 where it does not
     braking         True where it shorts its windings when it stops; False where the shaft coasts
     supply_max      V beyond which it stops by itself; 0 where it does not say
+    rate_told_count  rad/s of the smallest step in which a rate is told; 0 where there is none
+    rate_loop       of a drive that is told rates, its loop's gains: N m s/rad on the error, N m/rad on its integral;
+                    None where it does not say them
     """
 
     firmware: str
@@ -72,6 +76,8 @@ class DriveFacts:
     angle_range: float = 0.0
     braking: bool = False
     supply_max: float = 0.0
+    rate_told_count: float = 0.0
+    rate_loop: tuple[float, float] | None = None
 
 
 class CanDrive(ABC):
@@ -82,14 +88,18 @@ class CanDrive(ABC):
     starved   True where the error that it failed by is that of its watchdog, and no other
     supply    V of its supply, as it said last; None where it never did
     power     W that it takes from its supply, below 0 where it gives back; None where it never said so
+    rates     True where it is told rates: set before it is greeted, where its dialect `takes_rates`
     """
 
     dialect: str
     answers_commands = False
     """True where its answer to a command has its angle, rate and state, so that it need not be asked."""
+    takes_rates = False
+    """True where it can be told rates, and close the rate loop by itself."""
 
     def __init__(self, entry: DriveEntry) -> None:
         self.entry, self.node, self.sense = entry, entry.node, entry.sense
+        self.rates = False
         self.reading: DriveReading | None = None
         self.state, self.stated = DriveState.IDLE, 0.0
         self.errors = ""
@@ -107,7 +117,7 @@ class CanDrive(ABC):
 
     @abstractmethod
     def told(self, value: float) -> Sequence[CanFrame]:
-        """Frames of a command, N m."""
+        """Frames of a command, N m; rad/s of one that is told rates."""
 
     @abstractmethod
     def asked(self) -> Sequence[CanFrame]:

@@ -2,7 +2,7 @@
 
     asked for           request without data, answered under the same identifier: version, estimates
     by itself           heartbeat with state and errors, every `HEARTBEAT`; voltage and current of the supply
-    told                torque, N m of the motor's shaft; nothing answers it
+    told                torque, N m of the motor's shaft, or its rate, turns/s; nothing answers it
     properties          read and written by number; a file of the firmware's maker, flat_endpoints.json, has them
 
 Facts are from ODrive's documentation of the protocol and from what implements it; no ODrive was there. What a property
@@ -23,11 +23,11 @@ from hw.drives.frames import CanFrame
 from met.host.files import read_regular
 
 VERSION, HEARTBEAT_ID, ESTOP, READ_OR_WRITE, ANSWERED, SET_STATE = 0x00, 0x01, 0x02, 0x04, 0x05, 0x07
-ESTIMATES, MODES, TORQUE, SUPPLY, CLEAR = 0x09, 0x0B, 0x0E, 0x17, 0x18
+ESTIMATES, MODES, RATE, TORQUE, SUPPLY, CLEAR = 0x09, 0x0B, 0x0D, 0x0E, 0x17, 0x18
 """Commands, the lower five bits of an identifier."""
 
 IDLE, CLOSED_LOOP = 1, 8
-TORQUE_CONTROL, PASSTHROUGH = 1, 1
+TORQUE_CONTROL, RATE_CONTROL, PASSTHROUGH = 1, 2, 1
 WATCHDOG_EXPIRED, ESTOP_REQUESTED = 1 << 24, 1 << 25
 ERRORS = {
     1: "initializing",
@@ -75,6 +75,10 @@ SUPPLY_RATE = "axis0.config.can.bus_voltage_msg_rate_ms"
 WATCHDOG_TIMEOUT, WATCHDOG_ENABLED = "axis0.config.watchdog_timeout", "axis0.config.enable_watchdog"
 TORQUE_CONSTANT, CURRENT_MAX = "axis0.config.motor.torque_constant", "axis0.config.motor.current_soft_max"
 RATE_MAX, SUPPLY_MAX = "axis0.controller.config.vel_limit", "config.dc_bus_overvoltage_trip_level"
+TORQUE_MOST, TORQUE_LEAST = "axis0.config.torque_soft_max", "axis0.config.torque_soft_min"
+RATE_GAIN, RATE_INTEGRAL = "axis0.controller.config.vel_gain", "axis0.controller.config.vel_integrator_gain"
+NEEDED_FOR_RATES = (TORQUE_MOST, TORQUE_LEAST, RATE_GAIN, RATE_INTEGRAL)
+"""Properties of one that is told rates: the torque that its loop may ask for, N m; its gains, N m s/turn, N m/turn."""
 NEEDED = (
     HEARTBEAT_RATE,
     ESTIMATES_RATE,
@@ -92,6 +96,7 @@ class OdriveDrive(CanDrive):
     """The host's side of an ODrive's axis."""
 
     dialect = "odrive"
+    takes_rates = True
 
     def __init__(self, entry: DriveEntry) -> None:
         super().__init__(entry)
@@ -132,10 +137,23 @@ class OdriveDrive(CanDrive):
         watchdog = self._read(talk, endpoints, WATCHDOG_TIMEOUT)
         if not all(math.isfinite(each) and each > 0.0 for each in (kt, current, rate, supply, watchdog)):
             raise self.wrong("a limit of its is no number above zero", f"{', '.join(NEEDED[3:])}: set them")
+        loop = self._rate_loop(talk, endpoints) if self.rates else None
+        most = kt * current if loop is None else min(kt * current, self._read(talk, endpoints, TORQUE_MOST))
         seen = self._beats
         if not talk.pump(talk.line.now() + 0.5, lambda: self._beats > seen + 1 and self.state != DriveState.DRIVING):
             raise talk.silent(self, "its heartbeat")
-        return DriveFacts(words[0], words[1], watchdog, kt * current, rate, CONTROL_HZ, supply_max=supply)
+        return DriveFacts(words[0], words[1], watchdog, most, rate, CONTROL_HZ, supply_max=supply, rate_loop=loop)
+
+    def _rate_loop(self, talk: Talk, endpoints: dict[str, Any]) -> tuple[float, float]:
+        """Let the drive's rate loop ask for no more torque than the bench bears. Returns its gains, N m s/rad and
+        N m/rad."""
+        most = self.entry.figures["torque_max"]
+        for path, value in ((TORQUE_MOST, most), (TORQUE_LEAST, -most)):
+            self._write(talk, endpoints, path, value)
+        gain, integral = (self._read(talk, endpoints, path) / _TURN for path in (RATE_GAIN, RATE_INTEGRAL))
+        if not (math.isfinite(gain) and math.isfinite(integral) and gain > 0.0 and integral >= 0.0):
+            raise self.wrong("its rate loop has no gain above zero", f"{RATE_GAIN}, {RATE_INTEGRAL}: set them")
+        return gain, integral
 
     def _endpoints(self, firmware: str, hardware: str) -> dict[str, Any]:
         """The numbers of its properties, for the firmware that it has. Raises Problem E403, E404."""
@@ -146,8 +164,9 @@ class OdriveDrive(CanDrive):
         try:
             data = json.loads(read_regular(path, MOST_BYTES))
             found, named = data["endpoints"], (data["fw_version"], data["hw_version"])
-            missing = [each for each in NEEDED if each not in found]
-            numbers = {each: (int(found[each]["id"]), _TYPES[found[each]["type"]]) for each in NEEDED if each in found}
+            needed = (*NEEDED, *NEEDED_FOR_RATES * self.rates)
+            missing = [each for each in needed if each not in found]
+            numbers = {each: (int(found[each]["id"]), _TYPES[found[each]["type"]]) for each in needed if each in found}
         except OSError as reason:
             raise self.wrong(f"{path} cannot be read: {(reason.strerror or str(reason)).lower()}", helps) from None
         except (ValueError, KeyError, TypeError, RecursionError):
@@ -198,19 +217,21 @@ class OdriveDrive(CanDrive):
 
     def armed(self) -> Sequence[CanFrame]:
         return (
-            self._frame(MODES, struct.pack("<II", TORQUE_CONTROL, PASSTHROUGH)),
-            self._frame(TORQUE, struct.pack("<f", 0.0)),
+            self._frame(MODES, struct.pack("<II", RATE_CONTROL if self.rates else TORQUE_CONTROL, PASSTHROUGH)),
+            *self.told(0.0),
             self._frame(SET_STATE, struct.pack("<I", CLOSED_LOOP)),
         )
 
     def told(self, value: float) -> Sequence[CanFrame]:
+        if self.rates:  # with no torque besides that of its loop
+            return (self._frame(RATE, struct.pack("<ff", self.own(value) / _TURN, 0.0)),)
         return (self._frame(TORQUE, struct.pack("<f", self.own(value))),)
 
     def asked(self) -> Sequence[CanFrame]:
         return (self._request(ESTIMATES),)
 
     def idle(self) -> Sequence[CanFrame]:
-        return (self._frame(TORQUE, struct.pack("<f", 0.0)), self._frame(SET_STATE, struct.pack("<I", IDLE)))
+        return (*self.told(0.0), self._frame(SET_STATE, struct.pack("<I", IDLE)))
 
     def halted(self) -> Sequence[CanFrame]:
         return (self._frame(ESTOP),)

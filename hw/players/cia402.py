@@ -1,4 +1,4 @@
-"""A drive of CiA 402 in mode 10, over canopen's LocalNode: its object dictionary and SDO server are that library's.
+"""A drive of CiA 402 in modes 9 and 10, over canopen's LocalNode, whose object dictionary and SDO server it has.
 
 canopen is imported when one is made.
 """
@@ -43,10 +43,15 @@ _LAYOUT = {(index, sub): struct.Struct(_LAYOUTS[kind]) for _, index, sub, kind, 
 
 
 class PlayedCia402(PlayedDrive):
-    """A CiA 402 drive. watches: False for one that does not miss the host's heartbeat"""
+    """A CiA 402 drive.
 
-    def __init__(self, node: int, sense: int = 1) -> None:
+    watches  False for one that does not miss the host's heartbeat
+    rate_gain N m s/rad and rate_integral N m/rad, of its rate loop
+    """
+
+    def __init__(self, node: int, sense: int = 1, *, rate_gain: float = 0.01, rate_integral: float = 0.05) -> None:
         super().__init__(node, sense)
+        self.rate_gain, self.rate_integral = rate_gain, rate_integral
         import canopen
 
         class Network(canopen.Network):
@@ -82,6 +87,7 @@ class PlayedCia402(PlayedDrive):
         for _, index, sub, _, value in _OBJECTS:
             self.set_value(index, sub, value)
         self.status, self.torque, self.heard, self.error = 0x40, 0.0, math.inf, 0
+        self.rate_told, self.integral, self.looped = 0.0, 0.0, 0.0
         self._operational = False
 
     def value(self, index: int, sub: int = 0) -> int:
@@ -108,8 +114,10 @@ class PlayedCia402(PlayedDrive):
             return sent
         elif frame.id == 0x700 + (self.value(0x1016, 1) >> 16) and self.value(0x1016, 1):
             self.heard = now
-        elif self._operational and frame.id == self.value(0x1400, 1) and len(data) >= 4:
-            self._obey(*struct.unpack_from("<Hh", data))
+        elif self._operational and frame.id == self.value(0x1400, 1):
+            layout = "<Hi" if self.value(0x1600, 2) == 0x60FF0020 else "<Hh"
+            if len(data) >= struct.calcsize(layout):
+                self._obey(*struct.unpack_from(layout, data))
         elif self._operational and frame.id == 0x080 and not data:
             return self._answers()
         return ()
@@ -121,9 +129,7 @@ class PlayedCia402(PlayedDrive):
         values = {
             0x60410010: struct.pack("<H", self.status),
             0x60640020: struct.pack("<i", _wrapped(math.floor(self.angle / turns * per_turn))),
-            0x606C0020: struct.pack(
-                "<i", round(self.rate / turns * 60.0 * (1000 if self.value(0x60A9) == 0xFDB44700 else 1))
-            ),
+            0x606C0020: struct.pack("<i", round(self.rate / self._rate_unit)),
         }
         out = []
         for parameters, mapping in ((0x1800, 0x1A00), (0x1801, 0x1A01)):
@@ -132,7 +138,12 @@ class PlayedCia402(PlayedDrive):
                 out.append(CanFrame(cob, b"".join(values[self.value(mapping, n)] for n in range(1, count + 1))))
         return out
 
-    def _obey(self, control: int, torque: int) -> None:
+    @property
+    def _rate_unit(self) -> float:
+        """Its unit of velocity, rad/s: a turn a minute, or a thousandth of it."""
+        return 2.0 * math.pi / 60.0 * (1e-3 if self.value(0x60A9) == 0xFDB44700 else 1.0)
+
+    def _obey(self, control: int, told: int) -> None:
         """Follow the state machine of CiA 402 by a step."""
         if self.status == 0x08:
             if control & 0x80:
@@ -146,12 +157,28 @@ class PlayedCia402(PlayedDrive):
             self.status = 0x23
         elif control & 0x0F == 0x0F and self.status == 0x23:
             self.status = 0x27
-        rated = 1e-3 * self.value(0x6076)
-        most = self.value(0x6072)
-        runs = self.status == 0x27 and self.value(0x6060) == 10
-        self.torque = 1e-3 * rated * min(max(torque, -most), most) if runs else 0.0
+        mode = self.value(0x6060)
+        if self.status != 0x27:
+            self.torque, self.rate_told, self.integral = 0.0, 0.0, 0.0
+        elif mode == 9:
+            fastest = self.value(0x6080) * 2.0 * math.pi / 60.0
+            self.rate_told = min(max(told * self._rate_unit, -fastest), fastest)
+        else:
+            self.torque = self._limited(1e-6 * self.value(0x6076) * told) if mode == 10 else 0.0
+
+    def _limited(self, torque: float) -> float:
+        """A torque within its largest, N m."""
+        most = 1e-6 * self.value(0x6076) * self.value(0x6072)
+        return min(max(torque, -most), most)
 
     def tick(self, now: float) -> Sequence[CanFrame]:
+        passed, self.looped = now - self.looped, now
+        if self.status == 0x27 and self.value(0x6060) == 9:
+            error = self.rate_told - self.rate
+            wanted = self.rate_gain * error + self.integral
+            self.torque = self._limited(wanted)
+            if self.torque == wanted:  # how a maker holds the integral at the limit is no part of CiA 402
+                self.integral += self.rate_integral * passed * error
         time = 1e-3 * (self.value(0x1016, 1) & 0xFFFF)
         lost = self.watches and time and self._operational and now - self.heard > time
         return self.fail(0x8130) if lost and self.value(0x6007) == 1 and self.status == 0x27 else ()

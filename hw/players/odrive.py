@@ -25,6 +25,10 @@ PROPERTIES = (
     ("axis0.config.can.heartbeat_msg_rate_ms", "uint32"),
     ("axis0.config.can.encoder_msg_rate_ms", "uint32"),
     ("axis0.config.can.bus_voltage_msg_rate_ms", "uint32"),
+    ("axis0.config.torque_soft_max", "float"),
+    ("axis0.config.torque_soft_min", "float"),
+    ("axis0.controller.config.vel_gain", "float"),
+    ("axis0.controller.config.vel_integrator_gain", "float"),
 )
 FIRST = 201
 FORMATS = {"float": "<f", "bool": "<?", "uint32": "<I"}
@@ -39,7 +43,7 @@ def endpoints(firmware: str = "0.6.10", hardware: str = "4.4.58") -> dict[str, A
 class PlayedOdrive(PlayedDrive):
     """An ODrive's axis.
 
-    kt N m/A; current_max A; rate_max rad/s
+    kt N m/A; current_max A; rate_max rad/s; rate_gain N m s/rad and rate_integral N m/rad, of its rate loop
     watches    False for one whose watchdog does nothing
     version    protocol, hardware (three numbers), firmware (three), unreleased; None: it does not answer
     """
@@ -54,20 +58,25 @@ class PlayedOdrive(PlayedDrive):
         rate_max: float = 400.0,
         supply: float = 24.0,
         supply_max: float = 56.0,
+        rate_gain: float = 0.01,
+        rate_integral: float = 0.05,
     ) -> None:
         super().__init__(node, sense)
         self.watches = True
         self.version: tuple[int, ...] | None = (2, 4, 4, 58, 0, 6, 10, 0)
-        values = (supply, supply_max, False, 0.1, kt, current_max, rate_max / (2.0 * math.pi), 100, 10, 0)
+        turn = 2.0 * math.pi
+        drive = (supply, supply_max, False, 0.1, kt, current_max, rate_max / turn, 100, 10, 0)
+        values = (*drive, math.inf, -math.inf, turn * rate_gain, turn * rate_integral)
         self.values = dict(zip((path for path, _ in PROPERTIES), values, strict=True))
         self.refuses: set[str] = set()
         """Properties that cannot be set."""
         self.state, self.errors, self.torque, self.fed = 1, 0, 0.0, 0.0
+        self.mode, self.rate_told, self.integral, self.looped = 1, 0.0, 0.0, 0.0
         self._sent = {1: 0.0, 9: 0.0, 0x17: 0.0}
 
     def reboot(self) -> None:
         """As after its supply came back."""
-        self.state, self.errors, self.torque = 1, 0, 0.0
+        self.state, self.errors, self.torque, self.rate_told, self.integral = 1, 0, 0.0, 0.0, 0.0
 
     @property
     def bridge(self) -> Output:
@@ -92,16 +101,39 @@ class PlayedOdrive(PlayedDrive):
             if wanted == 8 and not self.errors:
                 self.state = 8
             elif wanted == 1:
-                self.state, self.torque = 1, 0.0
-        elif command == 0x0E and len(data) >= 4:
-            most = (
-                self.values["axis0.config.motor.torque_constant"] * self.values["axis0.config.motor.current_soft_max"]
-            )
+                self.state, self.torque, self.integral = 1, 0.0, 0.0
+        elif command == 0x0B and len(data) >= 8:
+            self.mode = struct.unpack_from("<I", data)[0]
+        elif command == 0x0D and len(data) >= 8:
             told = struct.unpack_from("<f", data)[0]
-            self.torque = min(max(told, -most), most) if math.isfinite(told) else 0.0
+            most = self.values["axis0.controller.config.vel_limit"]
+            self.rate_told = 2.0 * math.pi * min(max(told, -most), most) if math.isfinite(told) else 0.0
+        elif command == 0x0E and len(data) >= 4 and self.mode == 1:
+            told = struct.unpack_from("<f", data)[0]
+            self.torque = self._limited(told) if math.isfinite(told) else 0.0
         elif command == 0x18:
             self.errors = 0
         return ()
+
+    def _limited(self, torque: float) -> float:
+        """A torque within the limits of its current and of its torque, N m."""
+        most = self.values["axis0.config.motor.torque_constant"] * self.values["axis0.config.motor.current_soft_max"]
+        least = max(self.values["axis0.config.torque_soft_min"], -most)
+        return min(max(torque, least), self.values["axis0.config.torque_soft_max"], most)
+
+    def _close_loop(self, now: float) -> None:
+        """Set the torque by the rate's error and its integral, which fades while the torque is limited, as in the
+        sources of 0.5."""
+        passed, self.looped = now - self.looped, now
+        if self.state != 8 or self.mode != 2:
+            return
+        error = (self.rate_told - self.rate) / (2.0 * math.pi)
+        wanted = self.values["axis0.controller.config.vel_gain"] * error + self.integral
+        self.torque = self._limited(wanted)
+        if self.torque != wanted:
+            self.integral *= 0.99 ** (8000.0 * passed)  # a hundredth of it in each of its ticks
+        else:
+            self.integral += self.values["axis0.controller.config.vel_integrator_gain"] * passed * error
 
     def _asked(self, command: int) -> Sequence[CanFrame]:
         if command == 0x00 and self.version is not None:
@@ -141,6 +173,7 @@ class PlayedOdrive(PlayedDrive):
             and now - self.fed > timeout
         ):
             self._failed(1 << 24)
+        self._close_loop(now)
         if self.state == 8 and self.values["vbus_voltage"] > self.values["config.dc_bus_overvoltage_trip_level"]:
             self._failed(1 << 8)
         out = []
@@ -153,4 +186,4 @@ class PlayedOdrive(PlayedDrive):
         return out
 
     def _failed(self, error: int) -> None:
-        self.errors, self.state, self.torque = self.errors | error, 1, 0.0
+        self.errors, self.state, self.torque, self.integral = self.errors | error, 1, 0.0, 0.0

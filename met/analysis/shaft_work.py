@@ -4,8 +4,9 @@ Of a joint whose motor is on a bed already, the simulated bed says it, at the ti
 
     w = bed.shaft_rate,  w' = N qdd,  tau_m = tau_m(bed.drive_voltage, w),  tau_l = law.torque
 
-Where the drive is told a torque, tau_m is that, and the voltage the one that gives it. w' and tau_l are over their
-scales, where the bed's motor is of another size than the joint's: all is of the bed's own size.
+Where the drive is told a torque, tau_m is that, and the voltage the one that gives it; where it is told a rate, tau_m
+is what its own loop gave as the tick came, `bed.motor_torque`. w' and tau_l are over their scales, where the bed's
+motor is of another size than the joint's: all is of the bed's own size.
 
 Of any other joint, the joint itself does, at the instants of the dynamics: the load motor gives what the arm takes,
 
@@ -166,7 +167,10 @@ def drive_of(use: Substitution) -> DriveCommand:
 def _names(experiment: Experiment, joint: str) -> tuple[str, ...]:
     """The channels of a joint that its motors' work is made of."""
     use = substitution_of(experiment, joint)
-    return OF_JOINT if use is None else (*OF_BED, f"bed.drive_{drive_of(use)}")
+    if use is None:
+        return OF_JOINT
+    told = drive_of(use)
+    return (*OF_BED, "bed.motor_torque" if told == "rate" else f"bed.drive_{told}")
 
 
 def _block(experiment: Experiment, joint: str, found: Any, rows: np.ndarray) -> ShaftWork:
@@ -188,7 +192,7 @@ def _block(experiment: Experiment, joint: str, found: Any, rows: np.ndarray) -> 
             voltage = of["bed.drive_voltage"]
             drive = np.clip(kt / resistance * (voltage - kt * rate), -most, most)
         else:
-            drive = np.clip(of["bed.drive_torque"], -most, most)
+            drive = of["bed.motor_torque"] if drive_of(use) == "rate" else np.clip(of["bed.drive_torque"], -most, most)
             voltage = resistance / kt * drive + kt * rate
     else:
         bed = motor

@@ -8,7 +8,8 @@
     <joint>.servo.command           what the servo was asked at its last tick, in the command's unit
     <joint>.bed.<name>              of a joint whose motor is on a bed: the bed's memory, by its declaration
     <joint>.bed.drive_voltage .load_current                     what the bed's amplifiers hold (V, A);
-                                                                .drive_torque (N m) of a drive that is told one
+                                                                .drive_torque (N m), .drive_rate (rad/s) of a
+                                                                drive that is told one
     <joint>.law.<name>              the law's memory, by its declaration
     <joint>.law.torque .rate        load torque that the law asks (N m), rate of the shaft that it believes (rad/s)
     <joint>.law.unknown_torque .reference_rate                  of a law with an observer

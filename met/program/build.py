@@ -239,6 +239,8 @@ class Builder:
                 tape.write(cell_names.SEEN(joint, of), sensing.true_value(seen, of))
         for fitted in actuator.sensors:
             tape.write(fitted.path, sensing.true_value(seen, sensing.quantity(fitted)))
+        if on_bed is not None:
+            self.step.beds.want(tape, actuator, seen)
         self.compute(tape, actuator, seen)
 
     def setpoint(self, tape: Tape, actuator: Actuator) -> Setpoint:

@@ -89,6 +89,8 @@ GIVEN = CellFamily("{}:given", "acceleration that the law gives the joint", "rad
 GIVEN_FIRST = CellFamily("{}:given.first", "the same where the step under way began", "rad/s^2 (m/s^2)")
 QUEUED = CellFamily("{}:queue.{}.{}", "voltage or current asked so many ticks ago, less one", "V; A")
 SENT = CellFamily("{}:sent.{}", "voltage or current that goes over the wire now", "V; A")
+RATE_WANTED = CellFamily("{}:rate_wanted", "rate of the joint that a drive's own rate loop is given", "rad/s (m/s)")
+LOOP_INTEGRAL = CellFamily("{}:loop.integral", "integral of a drive's own rate loop, as it is believed", "rad")
 
 FAMILIES = tuple(each for each in list(globals().values()) if isinstance(each, CellFamily))
 """All families, as they stand above."""

@@ -53,6 +53,18 @@ class Motor:
         return damping(self.kt, self.resistance, self.f_v)
 
 
+@frozen
+class RateLoop:
+    """The PI loop on a motor's rate that sets its voltage, as its servo's parameters describe it; shaft side.
+
+    kp  V s/rad;  ki: V/rad;  v_max: largest voltage, V
+    """
+
+    kp: Real
+    ki: Real
+    v_max: Real
+
+
 def damping(kt: Real, resistance: Real, f_v: Real) -> Real:
     """Back-EMF and viscous friction, for each unit of the shaft's rate, N m s/rad."""
     return kt * kt / resistance + f_v

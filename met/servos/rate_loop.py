@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import Any
 
 from met.parameter import Memory, Parameter, State
-from met.servos.motor import TABLE_1, damping
+from met.servos.motor import TABLE_1, RateLoop, damping
 from met.servos.servo import Control, Setpoint
 from met.trace import Real, both, clip, either, maximum, sqrt, where
 
@@ -44,7 +44,7 @@ def rate_loop(p: Any, integral: Real, setpoint: Setpoint, *, q: Real, qd: Real) 
         voltage = p.resistance * torque_m / p.kt + p.kt * p.ratio * qd
         return Control({"voltage": clip(voltage, -p.v_max, p.v_max)}, {"integral": 0.0})
 
-    error = p.ratio * (_rate_wanted(p, q, setpoint) - qd)
+    error = p.ratio * (rate_wanted(p, q, setpoint) - qd)
     wanted = p.kp * error + p.ki * integral
     winding_up = either(both(wanted > p.v_max, error > 0.0), both(wanted < -p.v_max, error < 0.0))
     return Control({"voltage": clip(wanted, -p.v_max, p.v_max)}, {"integral": where(winding_up, 0.0, error)})
@@ -56,7 +56,7 @@ def balanced(p: Any, tau_m: Real, setpoint: Setpoint, *, q: Real, qd: Real) -> d
         return {"integral": 0.0}
     tau_m = clip(tau_m, -p.tau_max, p.tau_max)
     voltage = clip(p.resistance / p.kt * tau_m + p.kt * p.ratio * qd, -p.v_max, p.v_max)
-    return {"integral": wound(p, voltage, p.ratio * (_rate_wanted(p, q, setpoint) - qd))}
+    return {"integral": wound(p, voltage, p.ratio * (rate_wanted(p, q, setpoint) - qd))}
 
 
 def wound(p: Any, wanted: Real, error: Real) -> Real:
@@ -79,7 +79,14 @@ def full(p: Any) -> dict[str, Real]:
     return {"voltage": p.v_max}
 
 
-def _rate_wanted(p: Any, q: Real, setpoint: Setpoint) -> Real:
+def settings(p: Any) -> RateLoop:
+    """Gains and limit of the loop, which a drive may have in its place."""
+    return RateLoop(kp=p.kp, ki=p.ki, v_max=p.v_max)
+
+
+def rate_wanted(p: Any, q: Real, setpoint: Setpoint) -> Real:
+    """The rate that the loop is given, of the motor over its ratio (rad/s; m/s): its command under a rate command, the
+    position loop's answer under a position command."""
     if setpoint.kind == "position":
         return setpoint.slope + p.k_position * (setpoint.value - q)
     return setpoint.value

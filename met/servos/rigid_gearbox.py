@@ -89,5 +89,7 @@ SERVO = Servo(
     fastest_law=rate_loop.fastest,
     full=rate_loop.full,
     motor=motor,
+    rate_loop=rate_loop.settings,
+    rate_wanted=rate_loop.rate_wanted,
     motor_only=("friction", ("coulomb",)),
 )

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from met.frozen import frozen
 from met.messages.renamed import old_fields, old_names
 from met.parameter import Memory, Only, Parameter, Signal, State, is_present
-from met.servos.motor import Motor
+from met.servos.motor import Motor, RateLoop
 from met.trace import Real, Truth
 
 
@@ -149,6 +149,9 @@ class Servo:
     motor      (p) -> the motor that a bed may take the place of (met/substitution): the servo's computer then sets
                `voltage`, one of its outputs, on the bed. None: there is none to substitute
     motor_only word and value of it under which that is so; None: under all
+    rate_loop  (p) -> the loop on that motor's rate which is a part of the law, and which a drive on a bed may have
+               in its place. None: there is none, or it is no such loop
+    rate_wanted  (p, q, setpoint) -> the joint rate that this loop is given, under rate and position commands
     fastest_law  (p) -> the same under a law that is continuous, whose gains then count. None: `fastest`
     swings     (p, kind) -> what of the servo swings by itself, in words, and a and b of x'' = -a x - b x' (1/s^2, 1/s),
                the joint held; kind is that of the command. None: nothing, or it is not known
@@ -179,6 +182,8 @@ class Servo:
     follows: bool = False
     motor: Callable[[Any], Motor] | None = None
     motor_only: Only | None = None
+    rate_loop: Callable[[Any], RateLoop] | None = None
+    rate_wanted: Callable[[Any, Real, Setpoint], Real] | None = None
     at_rest: Callable[[Any], Truth] | None = None
 
     @property

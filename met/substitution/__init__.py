@@ -8,6 +8,7 @@ from met.substitution import (
     bare,
     emulated,
     measured_acceleration,
+    rate_drive,
     torque_balance,
     torque_balance_observer,
     torque_drive,
@@ -23,4 +24,4 @@ LAWS: tuple[Law, ...] = (
     bare.LAW,
     measured_acceleration.LAW,
 )
-BEDS: tuple[BedModel, ...] = (emulated.BED, torque_drive.BED)
+BEDS: tuple[BedModel, ...] = (emulated.BED, torque_drive.BED, rate_drive.BED)

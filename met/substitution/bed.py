@@ -41,9 +41,6 @@ DRIVES: Mapping[DriveCommand, tuple[str, str]] = {
 }
 """Unit of each, and what the drive then does itself."""
 
-SENT: tuple[DriveCommand, ...] = ("voltage", "torque")
-"""What laws send. They know the motor's torque by it, so a drive that is told a rate has none that they know of."""
-
 Draw = Callable[[str], Real]
 """A normal deviate of mean 0 and variance 1 by the name of what is noisy: one a tick, the same however it is run."""
 
@@ -81,8 +78,10 @@ converters, which become the counts of the wire. Without them, or at 0, a count 
 """
 
 MEMORY = (Memory(name="shaft_rate", unit="rad/s", doc="rate of the shaft itself"),)
-"""Memory that every bed model has. It may have `shaft_angle` (rad) too, which is then what a simulated bed's encoder
-reads; without it the encoder stays at 0."""
+TORQUE = Memory(name="motor_torque", unit="N*m", doc="torque of the drive motor")
+"""Memory that every bed model has; a model whose drive is told a rate has `TORQUE` too, for nothing else says it. A
+model may have `shaft_angle` (rad), which is then what a simulated bed's encoder reads; without it the encoder stays at
+0."""
 
 
 def of_bed(drive: DriveCommand) -> tuple[tuple[str, str, str], ...]:
@@ -124,12 +123,6 @@ class BedModel:
 
 def check(model: BedModel) -> tuple[str, str] | None:
     """The first fault of a declaration: words that go on after the model's name, and the remedy. None: it is sound."""
-    if model.drive not in SENT:
-        told = f"tells its drive a {model.drive}, and laws send a voltage or a torque"
-        return (
-            told,
-            "with a rate loop of the drive's the motor's torque would have to be read back: run it in torque mode",
-        )
     for needed in PARAMETERS:
         found = [parameter for parameter in model.parameters if parameter.name == needed.name]
         if not found:
@@ -139,17 +132,18 @@ def check(model: BedModel) -> tuple[str, str] | None:
         if needed.at_most is not None and not all(_within(parameter, needed.at_most) for parameter in found):
             message = f"lets `{needed.name}` be other than a whole number from 0 to {needed.at_most:g}"
             return message, f"declare it with `at_least=0.0, at_most={needed.at_most}, whole=True`"
-    for needed_memory in MEMORY:
+    for needed_memory in (*MEMORY, *(TORQUE,) * (model.drive == "rate")):
         held = next((memory for memory in model.memory if memory.name == needed_memory.name), None)
         if held is None:
-            return _missing("memory", needed_memory)
+            whose = " whose drive is told a rate" if needed_memory is TORQUE else ""
+            return _missing("memory", needed_memory, whose)
         if held.unit != needed_memory.unit:
             return _other_unit(needed_memory, held)
     return None
 
 
-def _missing(kind: str, needed: Parameter | Memory) -> tuple[str, str]:
-    message = f"declares no {kind} `{needed.name}`, which every bed model has"
+def _missing(kind: str, needed: Parameter | Memory, whose: str = "") -> tuple[str, str]:
+    message = f"declares no {kind} `{needed.name}`, which every bed model has{whose}"
     return message, f"`{needed.name}`, {needed.unit}: {needed.doc}"
 
 

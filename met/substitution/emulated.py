@@ -39,8 +39,7 @@ BED = BedModel(
     name="emulated",
     doc=__doc__,
     parameters=(
-        Parameter(name="kt", unit="N*m/A", above=0.0, of_servo="kt", doc="torque constant of the drive motor there is"),
-        Parameter(name="resistance", unit="ohm", above=0.0, of_servo="resistance", doc="its armature resistance"),
+        *emulated_shaft.ARMATURE,
         emulated_shaft.TAU_MAX,
         *emulated_shaft.SHAFT,
         *emulated_shaft.REST,

@@ -75,6 +75,11 @@ def read(p: Any, held: Any) -> Real:
 
 ASSUMED = "assumed: of the size that such motors have"
 
+ARMATURE = (
+    Parameter(name="kt", unit="N*m/A", above=0.0, of_servo="kt", doc="torque constant of the drive motor there is"),
+    Parameter(name="resistance", unit="ohm", above=0.0, of_servo="resistance", doc="its armature resistance"),
+)
+
 TAU_MAX = Parameter(name="tau_max", unit="N*m", above=0.0, of_servo="tau_max", doc="its largest torque")
 
 SHAFT = (

@@ -14,10 +14,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from met.parameter import Memory, Parameter
+from met.parameter import Parameter
 from met.sensors.digital import converted
 from met.substitution import emulated_shaft
-from met.substitution.bed import BedModel, Draw, Wire
+from met.substitution.bed import TORQUE, BedModel, Draw, Wire
 from met.substitution.drive import LEAST, at_least
 from met.trace import Real, Truth, absolute, clip, exp
 
@@ -63,7 +63,7 @@ BED = BedModel(
         Parameter(name="converter_torque", unit="N*m", at_least=0.0, default=0.0, doc="resolution of the torque told"),
         emulated_shaft.CURRENT,
     ),
-    memory=(*emulated_shaft.MEMORY, Memory(name="motor_torque", unit="N*m", doc="torque of the drive motor")),
+    memory=(*emulated_shaft.MEMORY, TORQUE),
     begin=begin,
     advance=advance,
     read=emulated_shaft.read,

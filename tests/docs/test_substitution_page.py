@@ -107,6 +107,59 @@ def test_so_is_one_that_is_slow_or_gives_too_much_or_has_faults(tmp_path: Path) 
     assert f"and by {typical} % with typical faults and one of 1 kHz (`emulated`: {voltage} %)" in PAGE
 
 
+SOFT = "velocity_tracking(drift = 1e-3 N^2*m^2/s)"
+
+
+@pytest.mark.slow
+def test_a_drive_told_a_rate_is_off_by_what_the_page_says(tmp_path: Path) -> None:
+    """Against the run in software at 4 kHz of the loop that the drive has."""
+    gains = {
+        "the deck's": "",
+        "`kp` 20 % more than the deck's": "kp = 0.024 V*s/rad",
+        "`ki` 28 % more": "ki = 0.16 V/rad",
+        "`kp` five times, `ki` eight times": "kp = 0.1 V*s/rad, ki = 1 V/rad",
+    }
+    runs: dict[str, tuple[str, str]] = {}
+    for n, own in enumerate(gains.values()):
+        runs[f"there_{n}"] = (f"servos {{ shoulder {{ {own.replace(',', ';')}{';' * bool(own)} }} }}", "fine")
+        for name, law in (("bed", "velocity_tracking"), ("soft", SOFT)):
+            bed = f"rate_drive(delay = 1{', ' * bool(own)}{own})"
+            runs[f"{name}_{n}"] = (f"substitute shoulder {{ bed = {bed};  law = {law}; }}", "own")
+    for name, bed, law in (
+        ("at_once", "rate_drive()", "velocity_tracking"),
+        ("faulty", "rate_drive(delay = 1, faults = typical)", "velocity_tracking"),
+        ("measured", "rate_drive(delay = 1)", "measured_acceleration"),
+        ("balance", "rate_drive(delay = 1)", "torque_balance"),
+    ):
+        runs[name] = (f"substitute shoulder {{ bed = {bed};  law = {law}; }}", "own")
+    (tmp_path / "rates.ic").write_text(
+        "#include <two_link.ic>\nrun own like nominal { rates { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }"
+        "  duration = 5 s;  remove settle;  record = [qd]; }\n"
+        "run fine like own { rates { base = 4 kHz;  dynamics = 4 kHz;  servos = 4 kHz; } }\n"
+        + "".join(f"run {name} like {base} {{ {body} }}\n" for name, (body, base) in runs.items()),
+        encoding="utf-8",
+    )
+
+    def rate(name: str) -> np.ndarray:
+        experiment = ic.compile(tmp_path / "rates.ic", select=[name]).experiments[0]
+        found: np.ndarray = engine.run(experiment).signals["qd"][0, :, 0]
+        return found
+
+    def off(one: np.ndarray, other: np.ndarray) -> str:
+        return f"{100.0 * np.sqrt(np.mean((one - other) ** 2)) / SLOW:#.2g}".rstrip(".")
+
+    plain = rate("fine")
+    for n, words in enumerate(gains):
+        there = rate(f"there_{n}")
+        bed, soft = off(rate(f"bed_{n}"), there), off(rate(f"soft_{n}"), there)
+        row = f"| {words} | {off(there, plain)} % | {bed} % | {soft} % |" if n else f"| {words} | | {bed} % | |"
+        assert row in PAGE
+    said = {name: off(rate(name), plain) for name in ("at_once", "faulty", "measured", "balance")}
+    assert f"without a delay it is {said['at_once']} %" in PAGE
+    assert f"With typical faults it is {said['faulty']} %" in PAGE
+    assert f"and is off by {said['measured']} %; `torque_balance` believes the deck's loop, {said['balance']} %" in PAGE
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", ["100 Hz", "200 Hz", "1 kHz", "2 kHz"])
 def test_the_limits_of_the_page_are_those_that_are_predicted(rate: str) -> None:

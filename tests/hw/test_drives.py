@@ -53,7 +53,7 @@ def test_a_drive_that_takes_a_torque_is_sent_torques(tmp_path: Path) -> None:
         case._check_drive(about(), experiment, "shoulder")
 
 
-def test_a_bed_model_that_tells_its_drive_a_rate_is_refused() -> None:
+def test_a_bed_model_that_tells_its_drive_a_rate_says_its_torque() -> None:
     wrong = check(replace(BEDS[0], drive="rate"))
     assert wrong is not None
-    assert wrong[0] == "tells its drive a rate, and laws send a voltage or a torque"
+    assert wrong[0] == "declares no memory `motor_torque`, which every bed model has whose drive is told a rate"

@@ -117,9 +117,11 @@ def test_no_more_torque_is_told_than_the_drive_gives() -> None:
     assert np.abs(told).max() == 0.025 and np.abs(given).max() == 0.025
 
 
-def turner(folder: Path, law: str, loads: list[float]) -> Experiment:
+def turner(
+    folder: Path, law: str, loads: list[float], bed: str = "torque_drive(delay = 1, bandwidth = 300 Hz)"
+) -> Experiment:
     deck = TURNER.replace("LAW", law).replace("RATE", "100 Hz")
-    deck = deck.replace("emulated(delay = DELAY)", "torque_drive(delay = 1, bandwidth = 300 Hz)")
+    deck = deck.replace("emulated(delay = DELAY)", bed)
     (folder / "deck.ic").write_text(deck)
     (made,) = ic.compile(folder / "deck.ic", select=["loads"]).experiments
     return with_loads(made, loads)

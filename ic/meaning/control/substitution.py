@@ -37,6 +37,8 @@ from met.substitution import bed_scale
 from met.substitution.bed_scale import BedScale
 
 DEFAULTS: dict[models.Kind, str] = {"bed": BED, "law": LAW}
+RATES = ("rate", "position")
+"""Kinds of a joint's command from which a servo's law has a rate to tell a drive."""
 SLOWEST_BED_HZ = 10.0
 """Rate at which a bed is exchanged with at least: its shaft is reckoned in steps of 250 us, each of them recorded."""
 USAGE = "write `substitute JOINT { bed = BED(...);  law = LAW(...); }`"
@@ -124,6 +126,21 @@ def check_brakes(scope: Scope, found: tuple[Substitution, ...], environment: Ite
                     also=[Label(each.place, "on a bed")],
                     help=leave_out("leave it out: on a bed, friction is the bed's"),
                 )
+
+
+def check_runaways(scope: Scope, found: tuple[Substitution, ...], environment: Iterable[EnvironmentUse]) -> None:
+    """No model replaces the outputs of a servo whose rate loop is the drive's: they do not reach the drive."""
+    on_rate = {use.joint: use for use in found if models.find("bed", use.bed).drive == "rate"}
+    for use in environment:
+        model = models.find("environment", use.model)
+        if model.replaced_outputs is None or not model.servo_of:
+            continue
+        joint = scope.parameters.get(f"environment.{use.name}.{model.servo_of}")
+        each = None if joint is None else on_rate.get(str(joint.value))
+        if each is not None and use.place is not None and each.place is not None:
+            message = f"`{use.name}` replaces the voltage of joint `{each.joint}`, and `{each.bed}` sends a rate"
+            helps = leave_out("leave it out: what the drive does with its rate is the drive's")
+            scope.complaints.error("D368", message, use.place, also=[Label(each.place, "on a bed")], help=helps)
 
 
 def _substitution(
@@ -215,9 +232,37 @@ def _substitution(
             use_model(scope, owner, model.parameters, body)
     if bed is None or law is None:
         return None
+    if bed.drive == "rate" and not _has_rate(scope, item, block, bed, use):
+        return None
     named = block.get("law")
     place = _name_place(named.value) if named is not None and named.value is not None else item.place
     return Substitution(item.name, bed.name, law.name, item.place, scaled=scale is not None), place
+
+
+def _has_rate(scope: Scope, item: Item, block: MergedBlock, bed: Any, use: Use) -> bool:
+    """True where the servo's law has a rate loop that a bed's drive may have in its place, and its command a rate to
+    give it; else that was reported."""
+    named = block.get("bed")
+    place = item.place if named is None or named.value is None else _name_place(named.value)
+    told = f"`{bed.name}` tells the drive of joint `{item.name}` a rate"
+    beds = models.find_own("bed").items()
+    sends = [f"`{name}` sends {_of_kind(each.drive)}" for name, each in beds if each.drive != "rate"]
+    other = f"or another bed: {', '.join(sends)}"
+    if use.servo.rate_loop is None or use.servo.rate_wanted is None:
+        known = [name for name, each in models.available("servo").items() if each.rate_loop and models.has_motor(each)]
+        message = f"{told}, and servo `{use.definition}` ({use.servo.name}) has no rate loop that could be the drive's"
+        helps = [known_words("servo models that have one", sorted(known)), other]
+    elif use.command is not None and use.command.kind not in RATES:
+        message = f"{told}, and the joint's command is {_of_kind(use.command.kind)}"
+        helps = [f"command it by {' or '.join(_of_kind(each) for each in RATES)}", other]
+    else:
+        return True
+    scope.complaints.error("D368", message, place, also=[Label(use.place, "its servo")], help=helps)
+    return False
+
+
+def _of_kind(kind: str) -> str:
+    return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
 
 
 def _name_place(value: Expression) -> Place:

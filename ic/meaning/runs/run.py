@@ -23,7 +23,7 @@ from ic.meaning.control.guides import check_guides, name_guides, resolve_guides
 from ic.meaning.control.link_sensors import Sensing, resolve_link_sensors
 from ic.meaning.control.schedule import Rate, Ticks, check_stability, fastest_rate
 from ic.meaning.control.servos import Use, check_rest, check_start, resolve_servos
-from ic.meaning.control.substitution import check_brakes, check_ticks, resolve_substitutions
+from ic.meaning.control.substitution import check_brakes, check_runaways, check_ticks, resolve_substitutions
 from ic.meaning.definitions.merge import WITH, Item, MergedBlock, with_meant_names
 from ic.meaning.definitions.resolve import Definition
 from ic.meaning.mechanics.arm import ResolvedArm, resolve_arm
@@ -128,6 +128,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     integrator = integrator or models.find_own("integrator")["modified_euler"]
     check_ticks(scope, substitutions, ticks, schedule)
     check_brakes(scope, substitutions, environment)
+    check_runaways(scope, substitutions, environment)
     check_failures(scope, uses, ticks, substitutions, environment, schedule)
     check_friction(scope, uses, environment)
     _keep_settings(scope, block, arm, integrator, rates, schedule)

@@ -21,14 +21,16 @@ from met.frozen import frozen
 from met.parameter import Parameter
 from met.plan import REPEAT, SEED
 from met.program import cell_names, cells
+from met.program.control.rate_drives import Mounted, RateDrives
 from met.program.control.sensing import READING
 from met.program.system import Actuator, System
 from met.program.values import NamedValues, answer, parameters, returned
 from met.servos.motor import Motor, torque
+from met.servos.servo import Seen
 from met.substitution import balance, bed_scale, drive, observer
-from met.substitution.bed import DRIVES, BedModel, Wire
+from met.substitution.bed import DRIVES, Wire
 from met.substitution.bed_scale import BedScale
-from met.substitution.law import Law, LawInput, LawOutput
+from met.substitution.law import LawInput, LawOutput
 from met.substitution.shaft import lasting
 from met.trace import Real, absolute, clip, sign, where
 from met.trace.noise import Stream, normal
@@ -48,19 +50,12 @@ _UNKNOWN = (1e4, 1e4, 1e8, 1e-2)
 
 
 @frozen
-class Mounted:
-    """A substituted joint: its servo, the bed that its motor is on, the law, and whether the bed is scaled."""
+class _Ahead:
+    """A joint's shaft when an output computed now begins to act. w: rad/s;  integral: of a drive's own rate loop, as it
+    is believed, rad, 0 of other drives"""
 
-    actuator: Actuator
-    joint: str
-    bed: BedModel
-    law: Law
-    scaled: bool
-
-    @property
-    def index(self) -> int:
-        """Number of the joint among those that move."""
-        return self.actuator.index
+    w: Real
+    integral: Real
 
 
 Loads = Callable[[Tape], tuple[list[list[Real]], list[Real]]]
@@ -85,6 +80,7 @@ class Substituted:
         self.divisor = self.mounted[0].actuator.use.divisor if self.mounted else 1
         self.law = self.mounted[0].law if self.mounted else None
         self.period = self.divisor / self.base_hz
+        self.rate_drives = RateDrives(system, self.period)
 
     def alone(self, each: Mounted) -> Substituted:
         """The same for one joint by itself."""
@@ -165,6 +161,8 @@ class Substituted:
             for part in "wy":
                 tape.write(cell_names.OBSERVED(each.joint, part), w)
             tape.write(cell_names.SHAFT_ANGLE(each.joint), motor.ratio * tape.read(f"{each.joint}.q"))
+            if each.closes_rate_loop:
+                self.rate_drives.begin(tape, each)
             for i in range(4):
                 for j in range(i + 1):
                     tape.write(cell_names.COVARIANCE(each.joint, i, j), _UNKNOWN[i] if i == j else 0.0)
@@ -252,13 +250,21 @@ class Substituted:
             tape.write(f"{each.joint}.qd", tape.read(cell_names.SHAFT_RATE(each.joint)) / ratio)
 
     def seen(self, tape: Tape, actuator: Actuator) -> tuple[Real, Real] | None:
-        """Position and filtered rate of a substituted joint, as its servo's computer sees them; None for others."""
+        """Position and filtered rate of a substituted joint, as its servo's computer sees them; None for others. Where
+        the drive closes the rate loop the rate is not filtered: the drive sees its shaft by itself."""
         for each in self.mounted:
             if each.actuator is actuator:
                 ratio = self.motor(tape, each).ratio
                 q = tape.read(cell_names.SHAFT_ANGLE(each.joint)) / ratio
-                return q, tape.read(cell_names.READ(each.joint)) / ratio
+                rate = cell_names.SHAFT_RATE if each.closes_rate_loop else cell_names.READ
+                return q, tape.read(rate(each.joint)) / ratio
         return None
+
+    def want(self, tape: Tape, actuator: Actuator, seen: Seen) -> None:
+        """Keep what a drive with a rate loop of its own is told, once its servo has seen its joint at this tick."""
+        for each in self.mounted:
+            if each.actuator is actuator and each.closes_rate_loop:
+                self.rate_drives.want(tape, each, seen)
 
     def arm(self, tape: Tape) -> None:
         """Write Lambda and b_0 at this instant: the load of the arm on the substituted joints."""
@@ -276,16 +282,13 @@ class Substituted:
         ahead = [self._ahead(tape, each) for each in self.mounted]
         found: Sequence[balance.Balanced | None] = [None] * len(self.mounted)
         if self.law.balance != "none":
-            sides = [
-                self._side(tape, each, w, self._own_torque(tape, each, w), self._band(tape, each))
-                for each, w in zip(self.mounted, ahead, strict=True)
-            ]
+            sides = [self._own_side(tape, each, one) for each, one in zip(self.mounted, ahead, strict=True)]
             solve = balance.bare if self.law.balance == "bare" else balance.balanced
             found = solve(sides, Lambda, b_0)
         commands = [self._command(tape, *each) for each in zip(self.mounted, ahead, found, strict=True)]
         inputs = [
-            self._law_input(tape, each, self._on_bed(tape, each, told, w, one))
-            for each, told, w, one in zip(self.mounted, commands, ahead, found, strict=True)
+            self._law_input(tape, each, self._on_bed(tape, each, told, at, one), at)
+            for each, told, at, one in zip(self.mounted, commands, ahead, found, strict=True)
         ]
         p = [self._law_values(tape, each) for each in self.mounted]
         held = [
@@ -306,6 +309,9 @@ class Substituted:
             tape.write(f"{each.joint}.law.torque", one.torque)
         if self.law.observer:
             self._look_ahead(tape, Lambda, b_0, applied)
+        for each, wire, motion in zip(self.mounted, applied, found, strict=True):
+            if each.closes_rate_loop:
+                self._wind(tape, each, wire, motion)
 
     def first(self, tape: Tape) -> None:
         """The acceleration with which the step begins; a servo faster than the dynamics changes it on the way."""
@@ -325,16 +331,22 @@ class Substituted:
 
     # Parts of a tick.
 
-    def _ahead(self, tape: Tape, each: Mounted) -> Real:
-        """The rate that the output computed now will meet: the observer's, over the delay; else the one just read."""
+    def _ahead(self, tape: Tape, each: Mounted) -> _Ahead:
+        """The shaft that the output computed now will meet: the observer's, over the delay; else the one just read."""
+        integral = self.rate_drives.integral(tape, each)
         if not each.law.observer:
-            return tape.read(cell_names.READ(each.joint))
+            return _Ahead(tape.read(cell_names.READ(each.joint)), integral)
         delay, x = self._delay(tape, each), self._observed(tape, each)
         for turn in range(QUEUE):
-            new = self._predicted(tape, each, x, self._queued(tape, each, delay - float(turn)))
+            wire = self._queued(tape, each, delay - float(turn))
+            new = self._predicted(tape, each, x, wire, integral)
+            if each.closes_rate_loop:
+                told = wire.drive * self.scale(tape, each).rate
+                wound = self.rate_drives.wound(tape, each, told, integral, x[0], new[0])
+                integral = where(delay > float(turn), wound, integral)
             w, y, z, d = (where(delay > float(turn), b, a) for a, b in zip(x, new, strict=True))
             x = (w, y, z, d)
-        return x[0]
+        return _Ahead(x[0], integral)
 
     def _queued(self, tape: Tape, each: Mounted, ago: Real) -> Wire:
         """The pair that was asked for this many ticks ago, from 1 to `QUEUE`."""
@@ -351,30 +363,55 @@ class Substituted:
         motor = self.motor(tape, each)
         return torque(motor.kt, motor.resistance, motor.tau_max, self._voltage(tape, each), w)
 
-    def _command(self, tape: Tape, each: Mounted, w: Real, found: balance.Balanced | None) -> Real | None:
-        """The torque that the bed's drive is told at this tick, of the joint's size; None where it is told the servo's
-        voltage."""
+    def _own_side(self, tape: Tape, each: Mounted, ahead: _Ahead) -> balance.JointSide:
+        """A joint's side of the balance, with its own motor; under its drive's rate loop where the drive has one."""
+        if each.closes_rate_loop:
+            driving, falls = self._under_loop(tape, each, ahead)
+            return self._side(tape, each, ahead.w, driving, self._band(tape, each), falls=falls)
+        return self._side(tape, each, ahead.w, self._own_torque(tape, each, ahead.w), self._band(tape, each))
+
+    def _command(self, tape: Tape, each: Mounted, ahead: _Ahead, found: balance.Balanced | None) -> Real | None:
+        """The torque or rate that the bed's drive is told at this tick, of the joint's size; None where it is told the
+        servo's voltage."""
         if each.bed.drive == "voltage":
             return None
+        if each.closes_rate_loop:
+            return self.rate_drives.told(tape, each, self.motor(tape, each))
         mean = 0.5 * self.period if each.law.balance == "full" else 0.0
-        return drive.mean_torque(self.motor(tape, each), self._own_torque(tape, each, w), found, mean)
+        return drive.mean_torque(self.motor(tape, each), self._own_torque(tape, each, ahead.w), found, mean)
+
+    def _under_loop(self, tape: Tape, each: Mounted, at: _Ahead, told: Real | None = None) -> tuple[Real, Real]:
+        """Torque of a motor under its drive's rate loop, N m, and what it and viscous friction fall by as the shaft
+        gains speed, N m s/rad. told: rate of the shaft, rad/s; None: the one of this tick"""
+        motor = self.motor(tape, each)
+        told = self.rate_drives.told(tape, each, motor) if told is None else told
+        of = self.rate_drives.torque(tape, each, motor, told, at.integral, at.w)
+        return of.torque, motor.f_v + of.brakes
+
+    def _wind(self, tape: Tape, each: Mounted, wire: Wire, found: balance.Balanced | None) -> None:
+        """Let the integral that the drive's rate loop is believed to have go on to the next tick."""
+        w: Real = tape.read(cell_names.SHAFT_RATE(each.joint))
+        after = w if found is None else w + self.period * self.motor(tape, each).ratio * found.qdd
+        if each.law.observer:
+            after = self._observed(tape, each)[0]
+        self.rate_drives.wind(tape, each, wire.drive * self.scale(tape, each).rate, w, after)
 
     def _on_bed(
-        self, tape: Tape, each: Mounted, told: Real | None, w: Real, found: balance.Balanced | None
+        self, tape: Tape, each: Mounted, told: Real | None, ahead: _Ahead, found: balance.Balanced | None
     ) -> balance.Balanced | None:
-        """The joint's motion, with the torque that the bed's motor has in the coming tick in place of its own."""
-        if found is None or told is None:
+        """The joint's motion, with the torque that the bed's motor is told for the coming tick in place of its own."""
+        if found is None or told is None or each.closes_rate_loop:
             return found
-        net = found.net - self._own_torque(tape, each, w) + told
+        net = found.net - self._own_torque(tape, each, ahead.w) + told
         return balance.Balanced(found.qdd, found.friction, found.s, net)
 
-    def _send(self, tape: Tape, each: Mounted, torque: Real | None, given: LawOutput) -> Wire:
+    def _send(self, tape: Tape, each: Mounted, command: Real | None, given: LawOutput) -> Wire:
         """Puts a command on the wire, and gives back what the amplifiers hold from now on: an older one, if delayed.
-        torque: what the drive is told; None: the servo's voltage."""
+        command: to the drive, of the joint's size; None: the servo's voltage."""
         name, tells = each.joint, each.bed.drive
         p = self._bed_values(tape, each)
         scale = self.scale(tape, each)
-        told = self._voltage(tape, each) if torque is None else torque
+        told = self._voltage(tape, each) if command is None else command
         asked = Wire(told / scale.of(DRIVES[tells][0]), given.torque / scale.torque / p.kt_load)
         with tape.part(READING):
             asked, limited = answer(self._owner(each), each.bed.taken, p, asked)
@@ -402,25 +439,37 @@ class Substituted:
         sides = []
         for each, wire in zip(self.mounted, applied, strict=True):
             w_ref = tape.read(cell_names.REFERENCE_RATE(each.joint))
-            sides.append(self._side(tape, each, w_ref, self._bed_torque(tape, each, wire, w_ref), 0.0, bed=True))
-            self._observe(tape, each, self._predicted(tape, each, self._observed(tape, each), wire))
+            integral = self.rate_drives.integral(tape, each)
+            driving, falls = self._bed_torque(tape, each, wire, w_ref, integral)
+            sides.append(self._side(tape, each, w_ref, driving, 0.0, falls=falls))
+            self._observe(tape, each, self._predicted(tape, each, self._observed(tape, each), wire, integral))
         for each, side, one in zip(self.mounted, sides, balance.balanced(sides, Lambda, b_0), strict=True):
             after = side.w + self.period * side.ratio * one.qdd
             after = where(one.s * after < 0.0, 0.0, after)
             tape.write(cell_names.REFERENCE_RATE(each.joint), after)
             tape.write(f"{each.joint}.law.reference_rate", side.w)
 
-    def _bed_torque(self, tape: Tape, each: Mounted, wire: Wire, w: Real) -> Real:
-        """Torque of a motor as the law believes it, told what the amplifiers hold, at a rate of its shaft, N m."""
-        told = wire.drive * self.scale(tape, each).of(DRIVES[each.bed.drive][0])
-        return drive.bed_torque(each.bed.drive, self.motor(tape, each), told, w)
+    def _bed_torque(self, tape: Tape, each: Mounted, wire: Wire, w: Real, integral: Real) -> tuple[Real, Real | None]:
+        """Torque of a motor as the law believes it, told what the amplifiers hold, at a rate of its shaft, N m; and
+        what it and viscous friction fall by as the shaft gains speed, N m s/rad, None: as at a voltage.
+
+        integral  of the drive's rate loop, where it has one, rad
+        """
+        told, motor = wire.drive * self.scale(tape, each).of(DRIVES[each.bed.drive][0]), self.motor(tape, each)
+        if each.closes_rate_loop:
+            return self._under_loop(tape, each, _Ahead(w, integral), told)
+        falls = None if each.bed.drive == "voltage" else motor.f_v
+        return drive.bed_torque(each.bed.drive, motor, told, w), falls
 
     def _side(
-        self, tape: Tape, each: Mounted, w: Real, driving: Real, band: Real, *, bed: bool = False
+        self, tape: Tape, each: Mounted, w: Real, driving: Real, band: Real, *, falls: Real | None = None
     ) -> balance.JointSide:
-        """A joint's side of the balance at a rate of its shaft and a torque of its motor. bed: that of the bed's."""
+        """A joint's side of the balance at a rate of its shaft and a torque of its motor, N m.
+
+        falls  what that torque and viscous friction fall by as the shaft gains speed, N m s/rad; None: by back-EMF
+        """
         motor = self.motor(tape, each)
-        brakes = motor.f_v if bed and each.bed.drive != "voltage" else motor.damping
+        brakes = motor.damping if falls is None else falls
         mean = 0.0 if each.law.balance == "bare" else 0.5 * brakes * self.period
         unknown = self._observed(tape, each)[3] if each.law.observer else 0.0
         viscous = 0.0 if each.law.balance == "bare" else motor.f_v * w
@@ -429,12 +478,15 @@ class Substituted:
             motor.ratio, motor.ratio * motor.ratio * (motor.inertia + mean), net, motor.f_c, w, band
         )
 
-    def _law_input(self, tape: Tape, each: Mounted, found: balance.Balanced | None) -> LawInput:
+    def _law_input(self, tape: Tape, each: Mounted, found: balance.Balanced | None, ahead: _Ahead) -> LawInput:
         motor, inertia, name = self.motor(tape, each), self._shaft_inertia(tape, each), each.joint
         mean = each.law.balance == "full"
         extra: Real = 0.0
         if mean:
             brakes = drive.bed_damping(each.bed.drive, motor, inertia, self.period)
+            if each.closes_rate_loop:
+                falls = self._under_loop(tape, each, ahead)[1]
+                brakes = drive.at_least(falls, drive.LEAST * inertia / self.period)
             extra = inertia * (self.period / lasting(brakes / inertia, self.period) - 1.0)
         return LawInput(
             motor=motor,
@@ -449,17 +501,23 @@ class Substituted:
             extra=extra,
         )
 
-    def _predicted(self, tape: Tape, each: Mounted, x: observer.Four, wire: Wire) -> observer.Four:
-        """The observer's state a tick on, under what the amplifiers hold."""
+    def _predicted(self, tape: Tape, each: Mounted, x: observer.Four, wire: Wire, integral: Real) -> observer.Four:
+        """The observer's state a tick on, under what the amplifiers hold. integral: of the drive's rate loop, rad"""
         motor, band, scale = self.motor(tape, each), self._band(tape, each), self.scale(tape, each)
         load = self._bed_values(tape, each).kt_load * wire.current * scale.torque
         w, d = x[0], x[3]
-        driving = self._bed_torque(tape, each, wire, w)
+        driving, falls = self._bed_torque(tape, each, wire, w, integral)
         rest = clip(driving + d + load - motor.f_v * w, -motor.f_c, motor.f_c)
         dry = where(absolute(w) > band, sign(w) * motor.f_c, rest)
         # Back-EMF is in the model; where the drive is at its limit this takes it out again.
         own = driving + motor.kt * motor.kt / motor.resistance * w if each.bed.drive == "voltage" else driving
         u = own - dry + load
+        if falls is not None and each.closes_rate_loop:
+            # the loop's gain is in the model too, and is taken out where it is at a limit
+            inertia = self._shaft_inertia(tape, each)
+            slope = drive.bed_damping("rate", motor, inertia, self.period, self.rate_drives.loop(tape, each))
+            gained = self.period / inertia * (driving + d + load - dry - motor.f_v * w)
+            u = driving + (slope - motor.f_v) * w + (slope - falls) * (0.5 * gained) - dry + load
         return observer.predicted(self._model(tape, each), x, u)
 
     # What is known of a joint.
@@ -484,7 +542,8 @@ class Substituted:
 
     def _model(self, tape: Tape, each: Mounted) -> observer.DiscreteModel:
         inertia, f_cut = self._shaft_inertia(tape, each), self._bed_values(tape, each).f_cut
-        damping = drive.bed_damping(each.bed.drive, self.motor(tape, each), inertia, self.period)
+        loop = self.rate_drives.loop(tape, each) if each.closes_rate_loop else None
+        damping = drive.bed_damping(each.bed.drive, self.motor(tape, each), inertia, self.period, loop)
         return observer.model(inertia=inertia, damping=damping, f_cut=f_cut, period=self.period)
 
     def _noise(self, tape: Tape, each: Mounted) -> observer.Noise:

@@ -20,12 +20,14 @@ from hw import loop
 from hw.bed import BedDriver, BedSample
 from hw.beds import emulated
 from hw.beds.can_bed import CanBed
+from hw.beds.can_deck import BelievedLoop
 from hw.beds.emulated import EmulatedBed
 from hw.case import pace_of
 from hw.driven import LANES, CaseKernel
 from hw.drives import DIALECTS
 from hw.drives.bench_file import two_drives
 from hw.players import PLAYED
+from hw.players.cia402 import PlayedCia402
 from hw.players.odrive import PlayedOdrive, endpoints
 from hw.players.player import PlayedBench, PlayedLine
 from hw.players.shaft import Output
@@ -38,6 +40,8 @@ from tests.hw.drives.played import BUS, MORE
 
 SLOW = 0.03
 KT, KT_LOAD, RESISTANCE, INERTIA = 0.061, 0.072, 2.05, 6.38e-5
+GAIN, INTEGRAL = 2.4e-3, 3.7e-3
+"""Of the rate loop of a drive that is told rates, N m s/rad and N m/rad: its poles are those of the paper's servo."""
 PERIOD = 5e-4
 """Of a tick of the played shaft, s."""
 
@@ -64,6 +68,22 @@ run fast_scaled_volts like fast_volts     {
 }
 run fast_scaled_torques like fast_torques {
     shoulder { bed { kt_load = 0.288 N*m/A; }  scale { torque = 0.25;  rate = 4; } }
+}
+servo looped like gearbox {                    // over a current loop: no back-EMF to speak of, and no limit of voltage
+    resistance = 2050 ohm;  v_max = 1e6 V;
+    kp = GAIN/0.061*2050 V*s/rad;  ki = INTEGRAL/0.061*2050 V/rad;
+}
+run looping like plain {
+    servos { shoulder = looped; }
+    rates  { base = 4 kHz;  dynamics = 4 kHz;  servos = 4 kHz;  record = 25 Hz; }
+}
+run rates like plain {
+    servos { shoulder = looped; }
+    substitute shoulder { bed = rate_drive();  law = velocity_tracking; }
+}
+run fast_rates like fast {
+    servos { shoulder = looped; }
+    substitute shoulder { bed = rate_drive(delay = 1);  law = velocity_tracking; }
 }
 """
 
@@ -126,6 +146,9 @@ class PlantShaft:
         return -kt * kt / RESISTANCE * self.rate if output.kind == "short" else output.value
 
 
+BELIEVED = BelievedLoop(GAIN, INTEGRAL, KT * KT / 2050.0)
+
+
 class OnTime(CanBed):
     """A bench on a played line, whose exchanges are a period apart in the line's time."""
 
@@ -142,15 +165,17 @@ class OnTime(CanBed):
         return super().exchange(voltage, current)
 
 
-def compiled(name: str) -> Experiment:
+def compiled(name: str, gains: tuple[float, float] = (1.0, 1.0)) -> Experiment:
+    """A run of the deck. gains: of its rate loop, over `GAIN` and `INTEGRAL`"""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "paper.ic"
-        path.write_text(DECK)
+        path.write_text(DECK.replace("GAIN", f"{gains[0] * GAIN!r}").replace("INTEGRAL", f"{gains[1] * INTEGRAL!r}"))
         return ic.compile(path, select=[name]).experiments[0]
 
 
-def bench(dialect: str, name: str, folder: Path) -> OnTime:
-    """Two played drives of a dialect, for a run of the deck; both kinds of run have the same shaft."""
+def bench(dialect: str, name: str, folder: Path, gains: tuple[float, float] = (1.0, 1.0)) -> OnTime:
+    """Two played drives of a dialect, for a run of the deck; all kinds of run have the same shaft. gains: of the rate
+    loop of drives that are told rates, over those that the deck takes for theirs"""
     (folder / "flat_endpoints.json").write_text(json.dumps(endpoints()))
     path = folder / "bench.toml"
     times = SCALED.get(dialect, 1.0)
@@ -162,12 +187,16 @@ def bench(dialect: str, name: str, folder: Path) -> OnTime:
     for drive, kt in zip(drives, (KT, KT_LOAD), strict=True):
         if isinstance(drive, PlayedOdrive):
             drive.values["axis0.config.motor.torque_constant"] = kt
+            drive.values["axis0.controller.config.vel_gain"] = 2.0 * np.pi * GAIN * gains[0]
+            drive.values["axis0.controller.config.vel_integrator_gain"] = 2.0 * np.pi * INTEGRAL * gains[1]
+        if isinstance(drive, PlayedCia402):
+            drive.rate_gain, drive.rate_integral = GAIN * gains[0], INTEGRAL * gains[1]
     line = PlayedLine(PlayedBench(shaft, *drives))
     own = DIALECTS[dialect]
     sides = own(described.drive), own(described.load)
     use = experiment.structure.substitutions[0]
     kind = models.find("bed", use.bed, use.place).drive
-    bed = OnTime(described, sides, lambda: line, period=pace_of(experiment).period, drive=kind)
+    bed = OnTime(described, sides, lambda: line, period=pace_of(experiment).period, drive=kind, believed=BELIEVED)
     bed.line = line
     return bed
 
@@ -205,9 +234,9 @@ def driven(bed: BedDriver, name: str) -> np.ndarray:
     return found
 
 
-def alone(name: str) -> np.ndarray:
+def alone(name: str, gains: tuple[float, float] = (1.0, 1.0)) -> np.ndarray:
     """Rates of both joints in a run without a bed, rad/s: [time, joint]."""
-    run = engine.run(compiled(name))
+    run = engine.run(compiled(name, gains))
     assert not run.status.any(), run.cause
     found: np.ndarray = run.signals["qd"][0]
     return found
@@ -229,7 +258,20 @@ def errors(dialect: str, name: str) -> tuple[np.ndarray, np.ndarray]:
     return apart(found, alone("fast" if fast else "plain")), apart(found, line)
 
 
+def loop_errors(dialect: str, name: str, gains: tuple[float, float] = (1.0, 1.0)) -> np.ndarray:
+    """How far a run with a played drive that is told rates is from the run in software of its own loop: [joint]. gains:
+    of that, over those that the deck takes for its"""
+    with tempfile.TemporaryDirectory() as folder:
+        return apart(driven(bench(dialect, name, Path(folder), gains), name), alone("looping", gains))
+
+
 def main() -> None:
+    for dialect in (name for name, each in DIALECTS.items() if each.takes_rates):
+        for name in ("rates", "fast_rates"):
+            for gains in ((1.0, 1.0), (1.2, 1.0), (1.0, 1.3)):
+                off = loop_errors(dialect, name, gains)
+                words = " ".join(f"{each:.3%}" for each in off)
+                print(f"{name} {dialect}, gains {gains} of the deck's: off the run in software {words}", flush=True)
     for fast in ("", "fast_"):
         line = driven(serial(f"{fast}volts"), f"{fast}volts")
         off = apart(line, alone("fast" if fast else "plain"))

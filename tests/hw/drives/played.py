@@ -91,23 +91,31 @@ class PlayedConformance(conformance.FreeRunning):
     """What every bed must pass, of two played drives of a dialect, in the time of a simulated bus."""
 
     dialect = "odrive"
+    drive_told: DriveCommand = "voltage"
 
     def opened(self, folder: Path) -> BedDriver:
         self.played = played_bench(self.dialect)
         self.line = PlayedLine(self.played)
-        return host_of(two_drives(bench_file(folder, self.dialect)), self.line)
+        return host_of(two_drives(bench_file(folder, self.dialect)), self.line, drive=self.drive_told)
+
+    def rate_told(self) -> float:
+        """The rate that the drive under test follows, rad/s of the shaft."""
+        raise NotImplementedError
 
     def wait(self, bed: BedDriver, seconds: float) -> None:
         self.line.sleep(seconds)
 
     def outputs(self, bed: BedDriver) -> tuple[float, float]:
-        """Voltage and current for which the drives' torques are, to the nearest count."""
+        """Voltage, or rate of a drive that is told rates, and current for which the drives' torques are, to the nearest
+        count."""
         assert isinstance(bed, CanBed)
         drive, load = (each.output for each in self.played.drives)
         if self.played.off or bed._about is None:
             return 0.0, 0.0
         scales = bed._about.scales
         volts = RESISTANCE * drive.value / KT
+        if self.drive_told == "rate":
+            volts = self.rate_told()
         return round(volts / scales.voltage) * scales.voltage, round(load.value / KT / scales.current) * scales.current
 
 

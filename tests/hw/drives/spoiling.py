@@ -137,17 +137,25 @@ class Tally:
     worst: float = 0.0
 
 
-def campaign(bed: CanBed, line: WaitingLine, played: PlayedBench, spoiler: BefallingFault, exchanges: int) -> Tally:
+def campaign(
+    bed: CanBed,
+    line: WaitingLine,
+    played: PlayedBench,
+    spoiler: BefallingFault,
+    exchanges: int,
+    swing: float = 6.0,
+) -> Tally:
     """Drive a bed through a fault, as fast as its limits let, arming it anew each time that it has stopped.
 
     An answer is wrong where its rate is not the shaft's at any time of the period before it, by more than the shaft can
-    change in the time by which the two drives' samples may be apart: what is wrong by less cannot be told.
+    change in the time by which the two drives' samples may be apart: what is wrong by less cannot be told. swing: of
+    the voltage or rate that is sent, where the bed's limit of the rate lets it.
     """
     tally = Tally()
     bed.connect()
     bed.patience = 0.002  # as of a run at 1 kHz
     truth = _Truth(played)
-    swing = min(1.0, bed._there().limits.rate / SWUNG)
+    share = min(1.0, bed._there().limits.rate / SWUNG)
     chance = random.Random(f"{spoiler.kind} drives")
     while tally.exchanges < exchanges:
         spoiler.on = False
@@ -171,7 +179,7 @@ def campaign(bed: CanBed, line: WaitingLine, played: PlayedBench, spoiler: Befal
             due += 1e-3
             line.sleep(max(0.0, due - line.now()))
             phase = 2.0 * math.pi * 3.0 * line.now()
-            sample = bed.exchange(swing * 6.0 * math.sin(phase), swing * 1.5 * math.sin(0.7 * phase))
+            sample = bed.exchange(share * swing * math.sin(phase), share * 1.5 * math.sin(0.7 * phase))
             tally.exchanges += 1
             if spoiler.kind == "reboot" and chance.random() < 0.02:
                 chance.choice(played.drives).reboot()

@@ -17,6 +17,7 @@ from hw.drives.bench_file import two_drives
 from hw.players.odrive import PlayedOdrive
 from hw.players.player import PlayedBench, PlayedLine
 from hw.ports import Port
+from met.substitution.bed import DriveCommand
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import INERTIA, KT, RESISTANCE, bench_file, host_of, played_bench
 
@@ -332,7 +333,12 @@ def test_a_bench_without_a_filter_says_whose_the_deck_s_has_to_be(tmp_path: Path
 
 def test_probe_has_words_for_what_a_bench_of_drives_is(tmp_path: Path) -> None:
     path = bench_file(tmp_path)
-    for kind, told in (("voltage", "drive torque of an armature at a voltage"), ("torque", "drive torque")):
+    kinds: dict[DriveCommand, str] = {
+        "voltage": "drive torque of an armature at a voltage",
+        "torque": "drive torque",
+        "rate": "drive rate",
+    }
+    for kind, told in kinds.items():
         with host_of(two_drives(path), PlayedLine(played_bench()), drive=kind) as bed:
             about = bed.connect()
             rows = lines(ProbeResult("can:bench.toml", about, bed.read(), (), 0, 0.0, (), bed.remarks))

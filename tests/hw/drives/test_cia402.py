@@ -25,6 +25,15 @@ class TestCia402(PlayedConformance):
             yield bed
 
 
+class TestCia402ToldRates(TestCia402):
+    drive_told = "rate"
+
+    def rate_told(self) -> float:
+        drive = self.played.drive
+        assert isinstance(drive, PlayedCia402)
+        return drive.rate_told if drive.value(0x6060) == 9 else float("nan")
+
+
 def bench(folder: Path) -> tuple[CanBed, PlayedLine, PlayedBench, PlayedCia402, PlayedCia402]:
     played = played_bench("cia402")
     line = PlayedLine(played)

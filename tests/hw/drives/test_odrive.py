@@ -24,6 +24,15 @@ class TestOdrive(PlayedConformance):
             yield bed
 
 
+class TestOdriveToldRates(TestOdrive):
+    drive_told = "rate"
+
+    def rate_told(self) -> float:
+        drive = self.played.drive
+        assert isinstance(drive, PlayedOdrive)
+        return drive.rate_told if drive.mode == 2 else float("nan")
+
+
 def greeting(folder: Path, change: Callable[[PlayedBench, Path], object]) -> str:
     """What is said where a bench that was changed is greeted."""
     played = played_bench()

@@ -78,7 +78,7 @@ def test_the_model_of_a_deck_shows_the_block(capsys: pytest.CaptureFixture[str])
 @pytest.mark.parametrize("kind", ["bed", "law"])
 def test_models_of_beds_and_laws_can_be_asked_for(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     names = {
-        "bed": ["emulated", "torque_drive"],
+        "bed": ["emulated", "rate_drive", "torque_drive"],
         "law": ["bare", "measured_acceleration", "torque_balance", "torque_balance_observer", "velocity_tracking"],
     }[kind]
     lines = printed(capsys, "doc", f"{kind}s").splitlines()

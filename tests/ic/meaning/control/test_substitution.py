@@ -12,6 +12,7 @@ import met.substitution
 from ic.driver.explain import explanations_of
 from met.plan import Experiment, Formula, Substitution
 from met.plan.channel import channels
+from met.servos import rigid_gearbox
 from met.substitution import BEDS
 from tests.ic.small_decks import changed, check, experiment, messages
 
@@ -403,6 +404,61 @@ error[D109]: nothing named `one` in run `it` to change
     )
 
 
+def test_a_drive_with_a_rate_loop_and_a_command_without_a_rate(tmp_path: Path) -> None:
+    said = shown(tmp_path, "servos { one { command = torque(2 N*m); } } substitute one { bed = rate_drive(); }")
+    assert (
+        said
+        == """\
+error[D368]: `rate_drive` tells the drive of joint `one` a rate, and the joint's command is a torque
+ --> deck.ic:1:91
+  |
+1 | run it like base_run { servos { one { command = torque(2 N*m); } } substitute one { bed = rate_drive(); } }
+  |                                                                                           ^^^^^^^^^^
+ ::: deck.ic:24:14  its servo
+  = help: command it by a rate or a position
+  = help: or another bed: `emulated` sends a voltage, `torque_drive` sends a torque
+"""
+    )
+
+
+def test_a_drive_with_a_rate_loop_and_a_servo_without_one(tmp_path: Path) -> None:
+    own = rigid_gearbox.SERVO.rate_loop
+    object.__setattr__(rigid_gearbox.SERVO, "rate_loop", None)
+    try:
+        said = shown(tmp_path, "substitute one { bed = rate_drive(); }")
+    finally:
+        object.__setattr__(rigid_gearbox.SERVO, "rate_loop", own)
+    assert (
+        said
+        == """\
+error[D368]: `rate_drive` tells the drive of joint `one` a rate, and servo `drive` (rigid_gearbox) has no rate loop \
+that could be the drive's
+ --> deck.ic:1:47
+  |
+1 | run it like base_run { substitute one { bed = rate_drive(); } }
+  |                                               ^^^^^^^^^^
+ ::: deck.ic:24:14  its servo
+  = help: servo models that have one: none
+  = help: or another bed: `emulated` sends a voltage, `torque_drive` sends a torque
+"""
+    )
+
+
+def test_a_drive_with_a_rate_loop_does_not_run_away(tmp_path: Path) -> None:
+    assert (
+        shown(tmp_path, "substitute one { bed = rate_drive(); } environment { bolt = runaway(joint = one); }")
+        == """\
+error[D368]: `bolt` replaces the voltage of joint `one`, and `rate_drive` sends a rate
+ --> deck.ic:1:77
+  |
+1 | run it like base_run { substitute one { bed = rate_drive(); } environment { bolt = runaway(joint = one); } }
+  |                                                                             ^^^^
+ ::: deck.ic:1:24  on a bed
+  = help: leave it out: what the drive does with its rate is the drive's
+"""
+    )
+
+
 def test_unknown_models(tmp_path: Path) -> None:
     assert (
         shown(tmp_path, "substitute one { bed = emulatd; law = bar; }")
@@ -413,7 +469,7 @@ error[D140]: no bed model `emulatd`
 1 | run it like base_run { substitute one { bed = emulatd; law = bar; } }
   |                                               ^^^^^^^
   = help: did you mean `emulated`?
-  = help: bed models: emulated, torque_drive
+  = help: bed models: emulated, rate_drive, torque_drive
 
 error[D140]: no law model `bar`
  --> deck.ic:1:62

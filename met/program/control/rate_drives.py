@@ -1,0 +1,87 @@
+"""Joints whose drive on a bed closes the rate loop: what it is told at a tick of the servo, and what is believed of it.
+
+The drive is told the rate that the servo's law gives its rate loop. The torque that it then makes it need not say: the
+servo's own loop, on the shaft's rate that the law believes and with an integral of its own, is taken for the drive's
+(met/substitution/drive.py). Rates and torques are of the joint's size, on the motor's side of the gearbox.
+"""
+
+from __future__ import annotations
+
+from met.frozen import frozen
+from met.program import cell_names
+from met.program.system import Actuator, System
+from met.program.values import answer
+from met.servos.motor import Motor, RateLoop
+from met.servos.servo import Seen
+from met.substitution import drive
+from met.substitution.bed import BedModel
+from met.substitution.law import Law
+from met.trace import Real
+from met.trace.program import Tape
+
+
+@frozen
+class Mounted:
+    """A substituted joint: its servo, the bed that its motor is on, the law, and whether the bed is scaled."""
+
+    actuator: Actuator
+    joint: str
+    bed: BedModel
+    law: Law
+    scaled: bool
+
+    @property
+    def index(self) -> int:
+        """Number of the joint among those that move."""
+        return self.actuator.index
+
+    @property
+    def closes_rate_loop(self) -> bool:
+        """True where the rate loop is the drive's: it is told a rate."""
+        return self.bed.drive == "rate"
+
+
+@frozen
+class RateDrives:
+    """The rate loops of drives on beds as they are believed to be. period: of the servos' ticks, s"""
+
+    system: System
+    period: float
+
+    def begin(self, tape: Tape, each: Mounted) -> None:
+        """A drive that is armed has no integral yet."""
+        tape.write(cell_names.LOOP_INTEGRAL(each.joint), 0.0)
+
+    def integral(self, tape: Tape, each: Mounted) -> Real:
+        """The integral of the drive's loop at this tick, rad; 0 where it has no loop."""
+        return tape.read(cell_names.LOOP_INTEGRAL(each.joint)) if each.closes_rate_loop else 0.0
+
+    def want(self, tape: Tape, each: Mounted, seen: Seen) -> None:
+        """Keep the joint rate that the servo's law gives its rate loop at this tick, rad/s (m/s)."""
+        assert each.actuator.servo.rate_wanted is not None
+        p = self.system.servo_values(each.actuator, tape.read)
+        wanted = answer(each.actuator.owner, each.actuator.servo.rate_wanted, p, seen.q, seen.setpoint)
+        tape.write(cell_names.RATE_WANTED(each.joint), wanted)
+
+    def told(self, tape: Tape, each: Mounted, motor: Motor) -> Real:
+        """The rate of the shaft that the drive is told at this tick, rad/s."""
+        return motor.ratio * tape.read(cell_names.RATE_WANTED(each.joint))
+
+    def torque(self, tape: Tape, each: Mounted, motor: Motor, told: Real, integral: Real, w: Real) -> drive.LoopTorque:
+        """Torque of the motor under the loop, N m. integral: rad;  told, w: rates of the shaft, rad/s"""
+        return drive.loop_torque(motor, self.loop(tape, each), integral, told, w, self.period)
+
+    def wound(self, tape: Tape, each: Mounted, told: Real, integral: Real, w: Real, after: Real) -> Real:
+        """The integral a tick on, rad, under a rate that is told, while the shaft's goes from w to `after`, rad/s."""
+        return drive.wound(self.loop(tape, each), integral, told - 0.5 * (w + after), self.period)
+
+    def wind(self, tape: Tape, each: Mounted, told: Real, w: Real, after: Real) -> None:
+        """Let the integral that is kept go on to the next tick, as `wound` has it."""
+        found = self.wound(tape, each, told, self.integral(tape, each), w, after)
+        tape.write(cell_names.LOOP_INTEGRAL(each.joint), found)
+
+    def loop(self, tape: Tape, each: Mounted) -> RateLoop:
+        """The rate loop of the joint's servo."""
+        assert each.actuator.servo.rate_loop is not None
+        p = self.system.servo_values(each.actuator, tape.read)
+        return answer(each.actuator.owner, each.actuator.servo.rate_loop, p)
