@@ -335,7 +335,7 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
     if texts[-2:] == ["rows", "="]:
         yield Offer(ALL_ROWS, types.CompletionItemKind.EnumMember, "every row is to be used")
         return
-    if where == "initial" and texts[-1] == "=" and texts[-2] in ("q", "qd"):
+    if where == "initial" and texts[-2:] in (["q", "="], ["qd", "="]):
         yield Offer("command", types.CompletionItemKind.EnumMember, "where the command of the joint begins")
     if where == "linear" and texts == ["at", "="]:
         yield Offer(EQUILIBRIUM, types.CompletionItemKind.Function, "the equilibrium near positions of the joints")
@@ -363,7 +363,7 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
         if key != "command":
             return
         yield from (Offer(each, types.CompletionItemKind.Function, "of what is commanded") for each in COMMAND_UNIT)
-    if texts[-1] == "(" and texts[-2] in COMMAND_UNIT:
+    if len(texts) > 1 and texts[-1] == "(" and texts[-2] in COMMAND_UNIT:
         for name, model in models.available("command").items():
             yield Offer(name, types.CompletionItemKind.Class, summary(model))
         yield from _named(names, "guide")
