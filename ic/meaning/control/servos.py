@@ -101,7 +101,7 @@ def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[l
     _note_kinds(scope, body, arm)
     for item in body.items.values():
         with scope.complaints.gather():
-            use = use_shared(scope, item, arm, _use)
+            use: Use | None = use_shared(scope, item, arm, _use)
             if use is not None:
                 uses[use.joint] = use
     moving = [joint.name for joint in arm.moving]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import Any
 
 from ic.grammar.syntax import Name
 from ic.meaning.definitions.merge import Item
@@ -24,25 +24,24 @@ from ic.text.complaints import Complaints
 from met.frozen import frozen
 from met.plan import Joint
 
-if TYPE_CHECKING:
-    from ic.meaning.control.servos import Use
-
 ANY = "\0"
 """The joint on which a shared servo is resolved: no name of a deck has this character."""
 
-Resolve = Callable[[Scope, Item, ResolvedArm], "Use | None"]
+Resolve = Callable[[Scope, Item, ResolvedArm], Any]
+"""Enters the servo of one joint in a scope: its `ic.meaning.control.servos.Use`, None where something is wrong."""
 
 
 @frozen
 class SharedServo:
     """A servo in which nothing is wrong, on the joint `ANY`.
 
+    use  as `Resolve` gives it
     parameters, auxiliary, known, not_sweepable  as a scope has them that holds nothing but the servo
     names  what the `let`s that it is made of are worth
     heads  of paths by which a run or a sweep may change it, besides its joint's: the definition, and those it is like
     """
 
-    use: Use
+    use: Any
     parameters: Mapping[str, Settled]
     auxiliary: Mapping[str, Settled]
     known: Mapping[str, list[str]]
@@ -51,9 +50,9 @@ class SharedServo:
     heads: tuple[str, ...]
 
 
-def use_shared(scope: Scope, item: Item, arm: ResolvedArm, resolve: Resolve) -> Use | None:
+def use_shared(scope: Scope, item: Item, arm: ResolvedArm, resolve: Resolve) -> Any:
     """The servo that an entry of a run's `servos` puts on a joint, entered in the scope; None where something of it is
-    wrong (already reported). resolve: does that for one joint"""
+    wrong (already reported). resolve: what does that for one joint, and is handed on"""
     kind = arm.kind(item.name)
     shared = None
     if not item.kind and item.body is None and kind in ("revolute", "prismatic") and not scope.guides:
