@@ -76,7 +76,7 @@ def numbered(chain: Experiment) -> tuple[Experiment, Mapping[str, str]]:
 
 
 def _are_apart(structure: Structure) -> bool:
-    names = [each.name for each in (*structure.joints, *structure.links)]
+    names = [*(joint.name for joint in structure.joints), *(link.name for link in structure.links)]
     between = (structure.base, structure.payloads, structure.guides, structure.sensors, structure.substitutions)
     return (
         not any(between)
@@ -96,9 +96,9 @@ def _branches(structure: Structure) -> Iterator[frozenset[str]]:
     for first in outward.get(BASE, ()):
         found, waiting = set[str](), [first]
         while waiting:
-            joint = waiting.pop()
-            found.add(joint)
-            waiting += outward.get(children[joint], ())
+            name = waiting.pop()
+            found.add(name)
+            waiting += outward.get(children[name], ())
         if found & moving:
             yield frozenset(found)
 
