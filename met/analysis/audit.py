@@ -6,6 +6,7 @@ computed from it, through however many steps; that is a question about the progr
 
 from __future__ import annotations
 
+from met.analysis.chains import chains
 from met.plan import Experiment
 from met.program.build import COORDINATE, build
 from met.trace.nodes import live
@@ -17,8 +18,18 @@ from met.trace.recording import CodeSection
 def idle_inputs(experiment: Experiment) -> tuple[str, ...]:
     """Inputs of the experiment's program that change nothing: paths of coordinates, `met.plan.REPEAT` and `SEED`.
 
+    Of an arm whose chains do not act on each other, no more is recorded than it takes to see that all have an effect.
     Raises Problem where a model cannot be recorded.
     """
+    every = {*(each.path for each in experiment.cases.coordinates), *experiment.cases.noise}
+    for chain in chains(experiment):
+        every &= set(_idle_inputs(chain))
+        if not every:
+            return ()
+    return _idle_inputs(experiment)
+
+
+def _idle_inputs(experiment: Experiment) -> tuple[str, ...]:
     program = build(experiment)
     recording = record(program, fuse=False)
     control = walk((*program.start, *program.tick, *program.end))

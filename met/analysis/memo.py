@@ -29,6 +29,7 @@ class AnalysisMemo:
         self._known: Mapping[bytes, Any] = known or {}
         self._found = found
         self.asked: dict[bytes, Any] = {}
+        self._of_now: dict[bytes, Any] = {}
 
     def answer(self, question: str, experiment: Experiment, find: Callable[[], T], rows: Sequence[int] = ()) -> T:
         """The answer to a question about an experiment and these rows of its case table; what `find` raises is no
@@ -40,6 +41,16 @@ class AnalysisMemo:
             if not brought and self._found is not None:
                 self._found()
         answer: T = self.asked[key]
+        return answer
+
+    def answer_of_now(
+        self, question: str, experiment: Experiment, find: Callable[[], T], rows: Sequence[int] = ()
+    ) -> T:
+        """The same of an answer that is large: it is not brought along."""
+        key = keys.content_digest(question, experiment, rows)
+        if key not in self._of_now:
+            self._of_now[key] = find()
+        answer: T = self._of_now[key]
         return answer
 
     @property

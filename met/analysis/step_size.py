@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from met import models
-from met.analysis.loops import fastest, growing, least, ticking
+from met.analysis.chains import chains, numbered, ticks_and_steps
+from met.analysis.loops import MOST_EVENTS, fastest, growing, least, ticking
+from met.analysis.memo import AnalysisMemo
 from met.analysis.modes import FAST, TELLING, Mode, modes, of_lane, slowest
 from met.analysis.step_map import Linearizer, StepMap
 from met.diagnostic import Problem
@@ -97,54 +99,140 @@ def chosen_cases(experiment: Experiment, also: Iterable[int] = ()) -> tuple[int,
     return tuple(found)
 
 
-def step_size(experiment: Experiment, cases: Sequence[int]) -> StepSize:
-    """The step of these cases against what it should follow. Raises Problem where the program cannot be built."""
-    integrator, schedule = models.find("integrator", experiment.structure.integrator), experiment.structure.schedule
-    linearizer = Linearizer(experiment, cases)
-    found, sampled = linearizer.map(), linearizer.sampled()
-    every = list(modes(found, integrator))
-    steps, h = schedule.ticks // schedule.dynamics, found.h
-    held = ticking(sampled) if sampled is not None else frozenset()
-    quiet = np.zeros(len(cases), bool)
-    loops: tuple[Unstable, ...] = ()
-    if sampled is not None:
-        rates = fastest(sampled)
-        quiet = rates <= least(sampled, schedule.duration) if held else quiet
-        lanes = list(growing(sampled, rates, schedule.duration))
-        if lanes:
-            from met.analysis.blame import closed
+def step_size(experiment: Experiment, cases: Sequence[int], memo: AnalysisMemo | None = None) -> StepSize:
+    """The step of these cases against what it should follow. Raises Problem where the program cannot be built.
 
-            loops = closed(linearizer, sampled, lanes)
-    faults: list[StepFault] = []
+    Chains of a large arm that do not act on each other are looked at one by one, and only where there is something to
+    say of one the whole arm is. memo: of other experiments, which may have equal chains
+    """
+    parts = chains(experiment) if ticks_and_steps(experiment.structure) <= MOST_EVENTS else ()
+    memo = memo if memo is not None else AnalysisMemo()
+    of_parts = list[StepSize]()
+    for part, names in map(numbered, parts):
+        looked = _look(part, cases, memo)
+        if looked.may_grow(experiment):
+            break
+        of_part = looked.judged(experiment)
+        if of_part.faults or not of_part.finite:
+            break
+        of_parts.append(_named(of_part, names))
+    if parts and len(of_parts) == len(parts):
+        return _together(of_parts)
+    return _Look(experiment, cases).judged(experiment)
 
-    def fault(kind: Literal["grows", "misses", "fast"], mode: Mode, figure: float, truth: float, after: float) -> None:
-        faults.append(StepFault(kind, mode, *owner_of(mode), figure, truth, after))
+
+def _look(part: Experiment, cases: Sequence[int], memo: AnalysisMemo) -> _Look:
+    """The look at a chain, which is the same however long it runs."""
+    schedule = replace(part.structure.schedule, ticks=part.structure.schedule.dynamics)
+    endless = replace(part, structure=replace(part.structure, schedule=schedule))
+    return memo.answer_of_now("look", endless, lambda: _Look(endless, cases), cases)
+
+
+def _named(found: StepSize, names: Mapping[str, str]) -> StepSize:
+    """The findings on a chain with its joints called as the arm calls them. names: by what they are called"""
+    if found.mode is None:
+        return found
+    ways = (name.partition(".") for name in found.mode.names)
+    mode = replace(found.mode, names=tuple(f"{names[head]}.{rest}" for head, _, rest in ways))
+    owner, joint = owner_of(mode)
+    return replace(found, mode=mode, owner=owner, joint=joint)
+
+
+def _together(parts: Sequence[StepSize]) -> StepSize:
+    """The findings on an arm of which nothing is to be said, from those on its chains."""
+    first = parts[0].without_matrices()
+    shown = max((each for each in parts if each.mode is not None), key=_shown, default=first)
+    return replace(
+        first,
+        mode=shown.mode,
+        owner=shown.owner,
+        joint=shown.joint,
+        fastest=max(each.fastest for each in parts),
+        grown=max(each.grown for each in parts),
+    )
+
+
+def _shown(found: StepSize) -> tuple[float, bool]:
+    """The order of the fastest modes of the first case."""
+    assert found.mode is not None
+    return _speed(found.mode, found.map.h)
+
+
+def _speed(mode: Mode, h: float) -> tuple[float, bool]:
+    return round(abs(mode.root) * h, 6), not mode.loose
+
+
+class _Look:
+    """An arm's modes and frames in some cases, whatever time a run takes."""
+
+    def __init__(self, experiment: Experiment, cases: Sequence[int]) -> None:
+        self.cases = cases
+        self.linearizer = Linearizer(experiment, cases)
+        self.map, self.sampled = self.linearizer.map(), self.linearizer.sampled()
+        self.modes = list(modes(self.map, models.find("integrator", experiment.structure.integrator)))
+        self.rates = fastest(self.sampled) if self.sampled is not None else np.zeros(len(cases))
+
+    def may_grow(self, experiment: Experiment) -> bool:
+        """True where something is to be said of loops, or a frame is no number."""
+        if self.sampled is None:
+            return False
+        duration = experiment.structure.schedule.duration
+        growing_lanes = any(True for _ in growing(self.sampled, self.rates, duration))
+        return growing_lanes or bool(np.any(self.rates > least(self.sampled, duration)))
+
+    def judged(self, experiment: Experiment) -> StepSize:
+        """The findings for a run of this length."""
+        schedule, found, every, sampled = experiment.structure.schedule, self.map, self.modes, self.sampled
+        steps, h = schedule.ticks // schedule.dynamics, found.h
+        held = ticking(sampled) if sampled is not None else frozenset()
+        quiet = np.zeros(len(self.cases), bool)
+        loops: tuple[Unstable, ...] = ()
+        if sampled is not None:
+            quiet = self.rates <= least(sampled, schedule.duration) if held else quiet
+            lanes = list(growing(sampled, self.rates, schedule.duration))
+            if lanes:
+                from met.analysis.blame import closed
+
+                loops = closed(self.linearizer, sampled, lanes)
+        faults = list(_faults(every, quiet, held, h, steps))
+        fast = max(every, key=lambda each: _speed(each, h), default=None)
+        first = [each for each in every if each.case == self.cases[0]]
+        shown = max(first, key=lambda each: _speed(each, h), default=None)
+        return StepSize(
+            tuple(self.cases),
+            shown,
+            *(owner_of(shown) if shown is not None else ("", "")),
+            abs(fast.root) * h if fast is not None else 0.0,
+            max((each.grown(h, steps) for each in every), default=0.0),
+            tuple(faults),
+            bool(np.isfinite(found.slope).all()),
+            loops,
+            found,
+        )
+
+
+def _faults(
+    every: Sequence[Mode], quiet: np.ndarray, held: Collection[str], h: float, steps: int
+) -> Iterator[StepFault]:
+    """The worst fault of each kind. quiet: cases whose frames do not grow;  held: joints whose laws tick"""
+
+    def fault(
+        kind: Literal["grows", "misses", "fast"], mode: Mode, figure: float, truth: float, after: float
+    ) -> StepFault:
+        return StepFault(kind, mode, *owner_of(mode), figure, truth, after)
 
     growing_modes = [each for each in every if each.grown(h, steps) > np.log1p(TELLING) and not quiet[each.lane // 2]]
     if growing_modes:
         worst = max(growing_modes, key=lambda each: (each.growth, not each.loose))
-        fault("grows", worst, worst.growth, 0.0, 0.0)
+        yield fault("grows", worst, worst.growth, 0.0, 0.0)
     missing = [(each, *each.missed(h, steps)) for each in every]
     missing = [one for one in missing if abs(one[1] - one[2]) > TELLING and owner_of(one[0])[1] not in held]
     if missing:
         mode, run, truth, k = max(missing, key=lambda one: (abs(one[1] - one[2]), not one[0].loose))
-        fault("misses", mode, run, truth, k * h)
-    fast = max(every, key=lambda each: (round(abs(each.root) * h, 6), not each.loose), default=None)
+        yield fault("misses", mode, run, truth, k * h)
+    fast = max(every, key=lambda each: _speed(each, h), default=None)
     if fast is not None and abs(fast.root) * h > FAST * (1.0 + 1e-6):
-        fault("fast", fast, abs(fast.root) * h, 0.0, 0.0)
-    first = [each for each in every if each.case == cases[0]]
-    shown = max(first, key=lambda each: (round(abs(each.root) * h, 6), not each.loose), default=None)
-    return StepSize(
-        tuple(cases),
-        shown,
-        *(owner_of(shown) if shown is not None else ("", "")),
-        abs(fast.root) * h if fast is not None else 0.0,
-        max((each.grown(h, steps) for each in every), default=0.0),
-        tuple(faults),
-        bool(np.isfinite(found.slope).all()),
-        loops,
-        found,
-    )
+        yield fault("fast", fast, abs(fast.root) * h, 0.0, 0.0)
 
 
 def remedy(

@@ -48,7 +48,7 @@ def check_steps(scope: Scope, experiment: Experiment, memo: AnalysisMemo) -> Exp
     looked: list[StepSize] = []
 
     def look() -> StepSize:
-        looked.append(step_size(experiment, rows))
+        looked.append(step_size(experiment, rows, memo))
         return looked[0]
 
     try:

@@ -14,6 +14,7 @@ from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, 
 from ic.meaning.control.other_joints import with_other_joints
 from ic.meaning.control.schedule import CONTINUOUS, Rate
 from ic.meaning.control.sensors import use_sensor, without_sensors
+from ic.meaning.control.shared_servos import use_shared
 from ic.meaning.control.trajectories import use_file, with_file_named
 from ic.meaning.definitions.merge import Item, MergedBlock, no_block, open_call, overlay, refuse_block
 from ic.meaning.expressions.quantity import measure_of
@@ -100,7 +101,7 @@ def resolve_servos(scope: Scope, body: MergedBlock, arm: ResolvedArm) -> tuple[l
     _note_kinds(scope, body, arm)
     for item in body.items.values():
         with scope.complaints.gather():
-            use = _use(scope, item, arm)
+            use: Use | None = use_shared(scope, item, arm, _use)
             if use is not None:
                 uses[use.joint] = use
     moving = [joint.name for joint in arm.moving]

@@ -1,0 +1,129 @@
+"""Chains of a large arm that do not act on each other, each as an experiment of its own.
+
+Chains on a base that stands are coupled by nothing but what is about several of them: payloads, guides, sensors of
+links, models of the environment. Where there is none of these, what a chain does by itself it does in the whole arm, up
+to rounding, and what has an effect on a chain has one on the whole. The work of an analysis grows faster than an arm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from operator import itemgetter
+
+from met.plan import BASE, Experiment, Formula, Quantity, Structure
+from met.trace.graph import Formulas
+
+MANY_JOINTS = 50
+"""Moving joints from which on an arm is looked at chain by chain."""
+
+APART = ("gravity",)
+"""Models of the environment that act on each link by itself."""
+
+
+def chains(experiment: Experiment) -> tuple[Experiment, ...]:
+    """The chains, each with its servos and parameters and all coordinates, without metrics and records; none where the
+    arm is small, has one chain, or chains may act on each other."""
+    structure = experiment.structure
+    if len(structure.moving) < MANY_JOINTS or not _are_apart(structure):
+        return ()
+    found = tuple(_of(experiment, joints) for joints in _branches(structure))
+    divisors = {use.divisor for use in structure.servos}  # with others a frame of computers would be shorter
+    if len(found) < 2 or any({use.divisor for use in each.structure.servos} != divisors for each in found):
+        return ()
+    return found
+
+
+def ticks_and_steps(structure: Structure) -> int:
+    """Ticks of servos, and steps, until all of these fall together again."""
+    divisors = [structure.schedule.dynamics, *(use.divisor for use in structure.servos)]
+    return sum(math.lcm(*divisors) // each for each in divisors)
+
+
+def numbered(chain: Experiment) -> tuple[Experiment, Mapping[str, str]]:
+    """The chain with joints and links that are called by their numbers, so that of equal chains the experiments are
+    equal; and what its joints are called, by these numbers."""
+    structure = chain.structure
+    joints = {each.name: str(number) for number, each in enumerate(structure.joints)}
+    links = {each.name: str(number) for number, each in enumerate(structure.links)} | {BASE: BASE}
+
+    def path_of(path: str) -> str:
+        head, *rest = path.split(".")
+        if head in ("links", "initial"):
+            return ".".join([head, (links if head == "links" else joints)[rest[0]], *rest[1:]])
+        return ".".join([joints.get(head, head), *rest])
+
+    renamed = sorted(((path_of(path), value) for path, value in chain.parameters.items()), key=itemgetter(0))
+    parameters, outputs = dict[str, Quantity](), list[int]()
+    for path, quantity in renamed:
+        if isinstance(quantity.value, Formula):
+            outputs.append(chain.formulas.outputs[quantity.value.output])
+            quantity = replace(quantity, value=Formula(len(outputs) - 1))
+        parameters[path] = quantity
+    made = replace(
+        structure,
+        links=tuple(replace(each, name=links[each.name]) for each in structure.links),
+        joints=tuple(
+            replace(each, name=joints[each.name], parent=links[each.parent], child=links[each.child])
+            for each in structure.joints
+        ),
+        servos=tuple(replace(each, joint=joints[each.joint]) for each in structure.servos),
+    )
+    formulas = Formulas(chain.formulas.inputs, chain.formulas.nodes, tuple(outputs))
+    found = replace(chain, structure=made, parameters=parameters, formulas=formulas)
+    return found, {number: name for name, number in joints.items()}
+
+
+def _are_apart(structure: Structure) -> bool:
+    names = [*(joint.name for joint in structure.joints), *(link.name for link in structure.links)]
+    between = (structure.base, structure.payloads, structure.guides, structure.sensors, structure.substitutions)
+    return (
+        not any(between)
+        and not structure.balanced
+        and all(use.model in APART for use in structure.environment)
+        and not any("." in name for name in names)
+    )
+
+
+def _branches(structure: Structure) -> Iterator[frozenset[str]]:
+    """The joints of each chain that moves, by name, in the order of their first joints."""
+    outward: dict[str, list[str]] = {}
+    children = {joint.name: joint.child for joint in structure.joints}
+    for joint in structure.joints:
+        outward.setdefault(joint.parent, []).append(joint.name)
+    moving = {joint.name for joint in structure.moving}
+    for first in outward.get(BASE, ()):
+        found, waiting = set[str](), [first]
+        while waiting:
+            name = waiting.pop()
+            found.add(name)
+            waiting += outward.get(children[name], ())
+        if found & moving:
+            yield frozenset(found)
+
+
+def _of(experiment: Experiment, joints: frozenset[str]) -> Experiment:
+    structure = experiment.structure
+    every = {joint.name for joint in structure.joints}
+    links = {joint.child for joint in structure.joints if joint.name in joints} | {BASE}
+
+    def is_of_it(path: str) -> bool:
+        head, *rest = path.split(".")
+        if head in ("links", "initial"):
+            return rest[0] in (links if head == "links" else joints)
+        return head != "metrics" and (head not in every or head in joints)
+
+    return replace(
+        experiment,
+        structure=replace(
+            structure,
+            links=tuple(each for each in structure.links if each.name in links),
+            joints=tuple(each for each in structure.joints if each.name in joints),
+            servos=tuple(each for each in structure.servos if each.joint in joints),
+            metrics=(),
+            record=(),
+            expressions=(),
+        ),
+        parameters={path: value for path, value in experiment.parameters.items() if is_of_it(path)},
+    )
