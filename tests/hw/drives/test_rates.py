@@ -130,11 +130,12 @@ def test_each_arming_proves_the_watchdog_of_a_drive_that_closes_its_loop(tmp_pat
 
 @pytest.mark.parametrize("dialect", TOLD)
 @pytest.mark.parametrize("kind", FAULTS)
-def test_no_wrong_answer_is_taken(tmp_path: Path, dialect: str, kind: str) -> None:
+@pytest.mark.parametrize("exchanges", [400, pytest.param(10_000, marks=pytest.mark.slow)])
+def test_no_wrong_answer_is_taken(tmp_path: Path, dialect: str, kind: str, exchanges: int) -> None:
     played, spoiler = played_bench(dialect), Spoiler(kind, 1)
     line = PlayedLine(played, spoiler)
     with host_of(two_drives(bench_file(tmp_path, dialect)), line, drive="rate") as bed:
-        tally = campaign(bed, line, played, spoiler, 400, 60.0)
+        tally = campaign(bed, line, played, spoiler, exchanges, 60.0)
     assert played.off
     assert spoiler.befell >= 2 and tally.answered >= 100
     assert tally.wrong == 0, tally
