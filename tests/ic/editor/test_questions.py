@@ -185,6 +185,13 @@ def test_only_what_may_be_varied_set_or_required_is_offered_there(editor: Editor
     assert {*signals, "settle", "elbow", "slow"} <= offered("run more like last { require always(|")
 
 
+@pytest.mark.parametrize("token", ["(", "=", "[", "*", ".", "-", "when", "{"])
+def test_an_entry_may_begin_with_anything_while_it_is_written(editor: Editor, deck: Path, token: str) -> None:
+    for block in ("", "servo a {", "run a {", "run a { initial {", "run a { servos {", "sweep a of nominal {"):
+        assert words(editor, deck, f"{ARM}{block} {token}|") is not None, block
+        assert words(editor, deck, f"{ARM}{block} {token} |") is not None, block
+
+
 def test_rows_and_columns_stand_behind_the_name_of_a_table(editor: Editor, tmp_path: Path) -> None:
     (tmp_path / "bodies.csv").write_text(TABLE)
     deck = tmp_path / "own.ic"
