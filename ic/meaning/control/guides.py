@@ -12,8 +12,9 @@ import numpy as np
 
 from ic.grammar.places import place_of
 from ic.grammar.spell import spell
+from ic.meaning.control.courses import course_named, use_course
 from ic.meaning.control.schedule import Rate
-from ic.meaning.control.servos import Use, course_named, fixed_rate, use_course
+from ic.meaning.control.servos import Use, fixed_rate
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.remedies import components
 from ic.meaning.mechanics.arm import ResolvedArm

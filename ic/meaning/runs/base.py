@@ -10,7 +10,7 @@ from typing import Any
 from ic.grammar.places import place_of
 from ic.grammar.syntax import Call, Expression
 from ic.language.runs import BASE_KINDS
-from ic.meaning.control.servos import course_named, use_course
+from ic.meaning.control.courses import course_named, use_course
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.mechanics.bodies import carried_loads
