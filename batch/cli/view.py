@@ -53,7 +53,8 @@ def view(
     archive has the case, the page compares. It is whole in one file and opens without a network.
 
     The page of a deck is served on 127.0.0.1, to who has the address that is printed, until Ctrl-C or until the
-    terminal is closed. A mistake in the deck is shown beside the last run without one.
+    terminal is closed. A mistake in the deck is shown beside the last run without one. A file that is no deck, and a
+    NAME that the deck does not have, are refused (exit status 2).
     """
     of_archive = () if numbers is not None else include_dirs
     check_options(source, () if name is None else (name,), False, defines, of_archive, settings)
@@ -117,13 +118,17 @@ def _watch(
             end = "Ctrl-C ends it" if sys.stdin is not None and sys.stdin.isatty() else f"`kill {os.getpid()}` ends it"
             say(f"The page of {deck}, for a browser on this machine. Who has the address can read it. {end}.", err=True)
 
+    def tell(messages: str) -> None:
+        if not quiet:
+            say(messages, err=True)
+
     words = ["view", deck, *([] if name is None else [name])]
     told = partial(confess, arguments=words, verbose=verbose)
     path = find(deck, include_dirs)
     try:
         with terminable():
             watched = WatchedDeck(deck, path, include_dirs, defines, settings)
-            follow(watched, name, port=port, ready=ready, confess=told)
+            follow(watched, name, port=port, ready=ready, tell=tell, confess=told)
     except Terminated:
         return TERMINATED
     except KeyboardInterrupt:
