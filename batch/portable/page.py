@@ -33,6 +33,7 @@ from met.backends.wasm.module import KERNEL_JS, compiled
 from met.diagnostic import Problem, error
 from met.messages.visible import visible
 from met.plan import Experiment, Plan
+from met.plan.limits import extremes
 from met.run import Prepared, inputs, prepare
 from met.version import VERSION
 
@@ -176,6 +177,12 @@ def data_of(
         "units": [_unit(each["unit"]) for each in told["inputs"]],
         "metricUnits": [visible(unit) for _, unit in metric_units],
         "metricScales": [scale for scale, _ in metric_units],
+        "metricAbout": [visible(stored[known[each["name"]]].long_name) for each in metrics],
+        "watched": [[use.model, visible(use.of)] for use in experiment.structure.metrics],
+        "atLimits": {
+            visible(name): [visible(each.path) for each in uses] for name, uses in extremes(experiment).items()
+        },
+        "signalAbout": {visible(each.name): visible(each.doc) for each in experiment.structure.record},
         "columnUnits": [_unit(unit) for _, unit in columns],
         "columnScales": [scale for scale, _ in columns],
         "arm": _arm(experiment),
@@ -265,11 +272,11 @@ def page_text(
     numbers = ["numbers.js"] if "numbers" in data else []
     script = "\n".join(
         [
-            inlined.licensed("uPlot.iife.min.js", "core.js", *before),
+            inlined.licensed("uPlot.iife.min.js", "core.js", "timeline.js", *before),
             arm_scripts(),
             KERNEL_JS.read_text(encoding="utf-8"),
             f"const MET_PAGE = {script_json(data)};",
-            *((_ASSETS / name).read_text(encoding="utf-8") for name in ("beside.js", *numbers, "view.js")),
+            *((_ASSETS / name).read_text(encoding="utf-8") for name in ("beside.js", "traces.js", *numbers, "view.js")),
             *after,
         ]
     )

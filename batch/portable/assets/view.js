@@ -5,7 +5,7 @@
 
 // data: as `batch.portable.page` wrote it; back: of a second module, the archive's; seen: where the arm was looked at from.
 MET.simulate = (data, back, seen) => {
-  const { node, number, ticks, palette } = MET;
+  const { node, number } = MET;
   const { description: told } = data;
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const kernel = METKernel.make(bytes(data.module), told.kernel);
@@ -24,9 +24,9 @@ MET.simulate = (data, back, seen) => {
   const others = [];
   let turn = 0;  // of computing them
   let values = (data.stood || cases[0]).slice();
-  let plots = [];
   let lines = [];
   let pale = [];  // of what stands beside, under them
+  let measured = [];  // metrics of what is shown; not a number where it failed
   const other = data.beside ? MET.beside.make(data.beside, data, time) : null;
   const free = data.limits ? data.free || (data.free = MET.numbers.make(data, (found) => data.give(found))) : null;
   data.give = (found) => { values = found; update(); };
@@ -65,12 +65,12 @@ MET.simulate = (data, back, seen) => {
     const width = told.columns.length;
     lines = told.columns.map((_, c) => Array.from(time, (_t, row) => (row < rows ? found.rows[row * width + c] / data.columnScales[c] : null)));
     if (other) accompany();
-    draw();
     const which = position();
     chosen.value = which < 0 ? "" : which;
     knobs.forEach(({ shown, input, n }) => { shown.textContent = `${number(values[n] / input.scale)} ${data.units[n]}`; });
-    const measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
-    tell(which, measured, failed, tick, took);
+    measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
+    traces.show(lines, pale, (m, requirement) => (Number.isNaN(measured[m]) ? null : { value: measured[m], met: judged(requirement, measured[m]) }));
+    tell(which, found.outputs, failed, tick, took);
     if (stage && rows) stage.show(taken(values, found.rows, rows), free ? (free.isOwn() ? "the deck's numbers" : "other numbers") : which < 0 ? `not in the ${source}` : `case #${data.positions[which]}`, { reactions: reactions(found.rows, rows), around: around(values, found.rows, rows) });
     if (stage) stage.haunt(others.filter((each) => each.n !== which));
   }
@@ -157,15 +157,15 @@ MET.simulate = (data, back, seen) => {
     return { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b }[comparison](value, limit);
   }
 
-  // One clock: the plots' cursors stand at the arm's time, and the arm at that of a plot that is pointed at.
+  // One clock: the plots' cursors stand at the arm's time, and the arm at that of a plot that is clicked at.
+  const traces = MET.traces.make(panels, data, time, { beside: Boolean(other), seek: (t) => stage && stage.seek(t), now: () => (stage ? stage.time() : null) });
+
   function point(at) {
-    plots.forEach((plot) => plot.setCursor({ left: plot.valToPos(at, "x"), top: plot.over.clientHeight / 2 }, false));
+    traces.point(at);
   }
 
-  const pointed = (plot) => { if (stage && plot.cursor.event && plot.cursor.idx !== null && plot.cursor.left >= 0) stage.seek(time[plot.cursor.idx], true); };
-
   // Whose numbers these are: the archive's, where every metric has the bits that stand there.
-  function tell(which, measured, failed, tick, took) {
+  function tell(which, outputs, failed, tick, took) {
     const speed = `computed here in ${number(took)} ms, ${kernel.fused ? "with this machine's multiply-add" : "with the module's own multiply-add"}`;
     const awaited = which >= 0 && data.status[which] < 0;  // of a deck that is watched: `met` has yet to run it
     const wrong = which < 0 || data.status[which] !== 0 ? [] : told.metrics.filter((_, m) => !Object.is(measured[m], archived[m][which]));
@@ -186,53 +186,22 @@ MET.simulate = (data, back, seen) => {
       const verdicts = told.requirements.filter((each) => each.metric === metric.name).map((each) => {
         if (unknown) return node("div", null, `${each.text}: not known`);
         const met = judged(each, given[m]);
-        return node("div", { class: met ? "met" : "missed" }, `${each.text}: ${met ? "met" : "missed"}`);
+        return node("div", { class: met ? "met" : "missed" }, `${each.text}: ${met ? "met" : `missed${why(each, metric, m, given[m], outputs)}`}`);
       });
       const value = given[m] === null ? "not computed here" : `${number(given[m] / data.metricScales[m])} ${data.metricUnits[m]}`.trim();
       const whose = given[m] === null || m < measured.length ? "" : `, from the ${source}`;
-      return node("tr", null, node("td", null, node("code", null, metric.name)), node("td", null, value + whose), node("td", null, verdicts));
+      return node("tr", null, node("td", null, node("code", null, metric.name)), node("td", null, value + whose), node("td", { class: "about" }, data.metricAbout[m]), node("td", null, verdicts));
     }));
   }
 
-  // A plot a signal, of unlike units one a unit: the columns of each.
-  const plotted = (n) => `${told.columns[n].signal}\n${data.columnUnits[n]}`;
-  const signals = [...new Set(told.columns.map((_, n) => plotted(n)))].map((which) => told.columns.flatMap((_, n) => (plotted(n) === which ? [n] : [])));
-  const drawn = (columns) => [time, ...(other ? columns.map((n) => pale[n]) : []), ...columns.map((n) => lines[n])];
-
-  function draw() {
-    if (plots.length) plots.forEach((plot, n) => plot.setData(drawn(signals[n])));
-    else make();
-  }
-
-  function make() {
-    const colours = palette();
-    plots.forEach((plot) => plot.destroy());
-    panels.replaceChildren();
-    const font = "12px " + getComputedStyle(document.body).fontFamily;
-    const axis = { stroke: colours.muted, font, grid: { stroke: colours.line, width: 1 }, ticks: { stroke: colours.faint, width: 1, size: 4 } };
-    plots = signals.map((columns) => {
-      const { signal } = told.columns[columns[0]];
-      const joints = data.arm.scene ? data.arm.scene.joints.map((joint) => `${joint}.${signal}`) : [];
-      const inks = columns.map((n, nth) => {  // a joint's is that of the arm's joint
-        const joint = joints.indexOf(told.columns[n].channel);
-        return colours.lines[(joint < 0 ? nth : joint) % colours.lines.length];
-      });
-      const frame = node("div", { class: "frame", role: "img", "aria-label": `${signal} against time` });
-      const names = columns.map((n, nth) => {
-        const { channel } = told.columns[n];
-        const name = node("span", null, `— ${channel.endsWith(`.${signal}`) ? channel.slice(0, -signal.length - 1) : channel}`);
-        name.style.color = inks[nth];
-        return name;
-      });
-      panels.append(node("div", { class: "panel" }, node("div", { class: "head" }, node("b", null, node("code", null, signal), data.columnUnits[columns[0]] ? ` (${data.columnUnits[columns[0]]})` : ""),
-        node("div", { class: "reading" }, names)), frame));
-      return new uPlot({ width: MET.width(frame), height: 190, padding: [8, 14, 0, 0], legend: { show: false },
-        scales: { x: { time: false } }, cursor: { y: false, sync: { key: "time" } }, hooks: { setCursor: [pointed] },
-        series: [{}, ...(other ? columns.map((_, nth) => ({ stroke: `${inks[nth]}55`, width: 6, points: { show: false }, spanGaps: false })) : []), ...columns.map((_, nth) => ({ stroke: inks[nth], width: 1.6, points: { show: false }, spanGaps: false }))],
-        axes: [{ ...axis, size: 26, values: (self, v) => ticks(v) }, { ...axis, size: 62, space: 32, values: (self, v) => ticks(v) }],
-      }, drawn(columns), frame);
-    });
-    if (stage) requestAnimationFrame(() => point(stage.time()));
+  // By how much a requirement is missed, when, and at which limit of a machine.
+  function why({ limit }, metric, m, value, outputs) {
+    const far = Math.abs(value - limit) / data.metricScales[m];
+    const when = m < measured.length ? traces.when(m, value) : null;
+    const extreme = told.kernel.outputs.indexOf(`extreme:${metric.name}:at_limit`);
+    const reached = extreme < 0 ? undefined : (data.atLimits[metric.name] ?? [])[outputs[extreme] - 1];
+    return [far > 0 && Number.isFinite(far) ? ` by ${number(far)} ${data.metricUnits[m]}`.trimEnd() : "",
+      when === null ? "" : `, at ${number(when)} s`, reached ? `, while ${reached} was reached` : ""].join("");
   }
 
   main.replaceChildren(room,
@@ -248,7 +217,7 @@ MET.simulate = (data, back, seen) => {
   else document.documentElement.dataset.haunted = "yes";
   MET.shown = stage;
   // For who puts a page in the place of another, or has numbers later: batch/watching/assets/kept.js.
-  MET.page = { data, inputs: () => told.inputs, values: () => values, position, plots: () => plots, put: place, arrive };
+  MET.page = { data, inputs: () => told.inputs, values: () => values, position, plots: traces.plots, put: place, arrive };
 
   function place(given) {
     values = given;
@@ -266,8 +235,7 @@ MET.simulate = (data, back, seen) => {
   function leave() {
     turn++;
     ending.abort();
-    plots.forEach((plot) => plot.destroy());
-    plots = [];
+    traces.close();
     data.stood = values;
     const from = stage && stage.kept();
     if (stage) stage.close();
@@ -278,8 +246,8 @@ MET.simulate = (data, back, seen) => {
     document.title = name;
     [[".kicker", kicker], ["h1", name], [".lede", lede]].forEach(([which, text]) => { document.querySelector(`header ${which}`).textContent = text; });
   }
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", make, { signal: ending.signal });
-  addEventListener("resize", make, { signal: ending.signal });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", traces.draw, { signal: ending.signal });
+  addEventListener("resize", traces.draw, { signal: ending.signal });
 };
 
 MET.simulate(MET_PAGE, null, null);

@@ -148,6 +148,10 @@ def test_arm_and_signals_have_one_clock(webgl: Chromium, pages: Path, tmp_path: 
     left, top, width, height = page.box(".panel .u-over")
     page.mouse("mouseMoved", left + 0.75 * width, top + 0.5 * height)
     page.settle()
+    read = "document.querySelector('.panel .instant').textContent"
+    assert page.run("MET.shown.time()") == 0.0 and page.run(read).startswith("t = 1.")  # it is read there alone
+    page.click(left + 0.75 * width, top + 0.5 * height)
+    page.settle()
     assert page.run("MET.shown.time()") == pytest.approx(1.5, abs=0.05)
     assert changed(start, pixels(page, tmp_path)) > 0.001
     page.mouse("mouseMoved", left + 0.75 * width, top - 400)

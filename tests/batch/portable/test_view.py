@@ -195,13 +195,14 @@ def test_a_margin_is_shown_as_the_archive_has_it_and_is_not_known_elsewhere(chro
     row = "document.querySelector('.answers tr:last-child').innerText"
     for case, verdict in enumerate(("met", "missed")):
         page.run(f"{CHOOSE}({case})")
-        name, value, told = page.run(row).split("\t")
+        name, value, about, told = page.run(row).split("\t")
         assert name.strip() == "loop_gain_margin" and value.strip().endswith(", from the archive")
         assert float(value.partition(",")[0]) == pytest.approx(margins[case], rel=1e-3)
-        assert told.strip() == f"gain_margin(loop) > 20: {verdict}"
+        assert about.strip() == "gain_margin of loop"
+        assert told.strip().startswith(f"gain_margin(loop) > 20: {verdict}")
     assert page.run(f"{MOVE}(0, 0.5)").startswith("Not in the archive: ")
     assert [cell.strip() for cell in page.run(row).split("\t")] == [
-        "loop_gain_margin", "not computed here", "gain_margin(loop) > 20: not known",
+        "loop_gain_margin", "not computed here", "gain_margin of loop", "gain_margin(loop) > 20: not known",
     ]  # fmt: skip
     quiet(page)
     page.close()
@@ -280,7 +281,11 @@ def test_numbers_are_in_the_decks_units_and_a_signal_of_two_has_two_plots(chromi
     assert [unit for _, unit in cells] == ["cm", "deg"]
     assert [float(value) for value, _ in cells] == pytest.approx(metrics, rel=1e-3)
     heads = page.run("Array.from(document.querySelectorAll('.panel .head'), e => e.innerText.replace(/\\s+/g, ' '))")
-    assert heads == ["q (cm) — slide", "q (deg) — turn"]
+    assert heads == ["q (cm) joint position t = 0 s", "q (deg) joint position t = 0 s"]
+    assert page.run("[...document.querySelectorAll('.lines')].map(e => e.innerText.replace(/\\s+/g, ' ').trim())") == [
+        "slide 0",
+        "turn -20",
+    ]
     lines = [panel[0] for panel in page.run(PLOTTED)]
     assert lines[0] == pytest.approx((100.0 * slide).tolist(), rel=1e-12)
     assert lines[1] == pytest.approx(np.degrees(turn).tolist(), rel=1e-12)
