@@ -32,6 +32,7 @@ from batch.report.html.payload import script_json
 from met.backends.wasm.module import KERNEL_JS, compiled
 from met.diagnostic import Problem, error
 from met.messages.visible import visible
+from met.outputs import quoted
 from met.plan import Experiment, Plan
 from met.plan.limits import extremes
 from met.run import Prepared, inputs, prepare
@@ -74,6 +75,7 @@ def view(
         (group,) = groups
         experiment = next(each for each in file.plan().experiments if each.name == group.name)
         data = data_of(experiment, file, group)
+        data["report"] = visible(f"met report {quoted(Path(archive).name)}")
         if against is not None:
             data["beside"] = _beside(against, file, group, experiment)
         if numbers is not None:
@@ -269,14 +271,14 @@ def page_text(
     before, after  further scripts: names of the report's, before the page's own; and texts after it
     style          a further one
     """
-    numbers = ["numbers.js"] if "numbers" in data else []
+    own = ("beside.js", "traces.js", "knobs.js", *(["numbers.js"] if "numbers" in data else []), "view.js")
     script = "\n".join(
         [
             inlined.licensed("uPlot.iife.min.js", "core.js", "timeline.js", *before),
             arm_scripts(),
             KERNEL_JS.read_text(encoding="utf-8"),
             f"const MET_PAGE = {script_json(data)};",
-            *((_ASSETS / name).read_text(encoding="utf-8") for name in ("beside.js", "traces.js", *numbers, "view.js")),
+            *((_ASSETS / name).read_text(encoding="utf-8") for name in own),
             *after,
         ]
     )

@@ -12,7 +12,6 @@ MET.simulate = (data, back, seen) => {
   const cases = told.cases.inputs;
   const { source } = data;  // what the numbers are compared with: an archive, or the run of a deck that is watched
   let archived = data.metrics.map((text) => new Float64Array(bytes(text).buffer));
-  const NEAR = 0.01;  // of a slider's way, within which it takes a value of the archive's
   const time = Float64Array.from({ length: told.rows }, (_, n) => (n * told.kernel.record_divisor) / told.kernel.base_hz);
   const main = document.querySelector("main");
   const came = node("p", { class: "came", role: "status" });
@@ -20,12 +19,14 @@ MET.simulate = (data, back, seen) => {
   const panels = node("div");
   const room = node("div");
   const MOST_GHOSTS = 100;
+  const MOST_VALUES = 4;  // that the list of cases shows of each
   const SLICE = 24;  // ms of work between which the page answers
   const others = [];
   let turn = 0;  // of computing them
   let values = (data.stood || cases[0]).slice();
   let lines = [];
   let pale = [];  // of what stands beside, under them
+  let theirs = null;  // metrics of what stands beside, by name, SI
   let measured = [];  // metrics of what is shown; not a number where it failed
   const other = data.beside ? MET.beside.make(data.beside, data, time) : null;
   const free = data.limits ? data.free || (data.free = MET.numbers.make(data, (found) => data.give(found))) : null;
@@ -35,24 +36,38 @@ MET.simulate = (data, back, seen) => {
   const knobs = free ? [] : told.inputs.map((input, n) => {
     const own = [...new Set(cases.map((each) => each[n]))].sort((a, b) => a - b);
     if (input.is !== "coordinate" || own.length < 2) return null;
-    const [low, high] = [own[0], own[own.length - 1]];
-    const slider = node("input", { type: "range", min: 0, max: 1, step: 0.001, "aria-label": data.labels[n], input: () => {
-      const at = low + Number(slider.value) * (high - low);
-      const nearest = own.reduce((a, b) => (Math.abs(b - at) < Math.abs(a - at) ? b : a));
-      values[n] = Math.abs(nearest - at) <= NEAR * (high - low) ? nearest : at;
+    const made = MET.knobs.make({ label: data.labels[n], unit: data.units[n], scale: input.scale, own }, (value) => {
+      values[n] = value;
       update();
-    } });
-    const shown = node("output");
-    const put = () => {
-      slider.value = (values[n] - low) / (high - low);
-      shown.textContent = `${number(values[n] / input.scale)} ${data.units[n]}`;
-    };
-    return { put, shown, input, n, box: node("label", { class: "knob" }, node("code", null, data.labels[n]), slider, shown) };
+    });
+    return { put: (moved) => made.put(values[n], moved), box: made.box };
   }).filter(Boolean);
 
   const chosen = node("select", { "aria-label": `Case of the ${source}`, change: () => {
     place(cases[chosen.value].slice());
   } }, node("option", { value: "", disabled: true }, `none of the ${source}'s`), ...cases.map((_, n) => node("option", { value: n }, `#${data.positions[n]}`)));
+
+  // Each case with what is varied in it, what it misses, and which is best and worst by the requirement that is hardest on
+  // it: as far as the archive has its metrics.
+  function list() {
+    const varied = told.inputs.flatMap((input, n) => (input.is === "coordinate" && cases.some((each) => each[n] !== cases[0][n]) ? [n] : []));
+    const names = [...told.metrics, ...told.not_computed].map((metric) => metric.name);
+    const found = cases.map((each, n) => {
+      const slack = told.requirements.map((required) => {
+        const value = archived[names.indexOf(required.metric)][n];
+        return { text: required.text, met: judged(required, value), by: (required.comparison[0] === "<" ? 1 : -1) * (required.limit - value) / (Math.abs(required.limit) || 1) };
+      });
+      return { misses: slack.filter(({ met }) => !met).map(({ text }) => text), least: Math.min(...slack.map(({ by }) => by)), known: data.status[n] === 0 && slack.length && slack.every(({ by }) => !Number.isNaN(by)) };
+    });
+    const known = found.filter((each) => each.known).map(({ least }) => least);
+    const [worst, best] = [Math.min(...known), Math.max(...known)];
+    found.forEach(({ misses, least, known: is }, n) => {
+      const own = varied.slice(0, MOST_VALUES).map((at) => `${number(cases[n][at] / told.inputs[at].scale)} ${data.units[at]}`.trim());
+      const verdict = data.status[n] > 0 ? "✗ fails" : !is ? "" : misses.length ? `✗ misses ${misses[0]}${misses.length > 1 ? ` and ${misses.length - 1} more` : ""}` : "✓";
+      const rank = !is || worst === best ? "" : least === best ? "(best)" : least === worst ? "(worst)" : "";
+      chosen.options[n + 1].textContent = [`#${data.positions[n]}`, own.length ? `${own.join(", ")}${varied.length > own.length ? ", …" : ""}` : "", verdict, rank].filter(Boolean).join("  ");
+    });
+  }
 
   const same = (a, b) => a.every((value, n) => Object.is(value, b[n]));
   const position = () => cases.findIndex((each) => same(each, values));  // among the cases; -1 between them
@@ -67,7 +82,7 @@ MET.simulate = (data, back, seen) => {
     if (other) accompany();
     const which = position();
     chosen.value = which < 0 ? "" : which;
-    knobs.forEach(({ shown, input, n }) => { shown.textContent = `${number(values[n] / input.scale)} ${data.units[n]}`; });
+    knobs.forEach((knob) => knob.put(false));
     measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
     traces.show(lines, pale, (m, requirement) => (Number.isNaN(measured[m]) ? null : { value: measured[m], met: judged(requirement, measured[m]) }));
     tell(which, found.outputs, failed, tick, took);
@@ -77,7 +92,8 @@ MET.simulate = (data, back, seen) => {
 
   // What stands beside the run, with the same numbers.
   function accompany() {
-    const { columns, solids } = other.at(values);
+    const { columns, solids, metrics } = other.at(values);
+    theirs = metrics;
     pale = columns.map((numbers, c) => Array.from(time, (_, row) => (numbers && !Number.isNaN(numbers[row]) ? numbers[row] / data.columnScales[c] : null)));
     if (stage) stage.accompany(solids, other.name);
   }
@@ -166,16 +182,18 @@ MET.simulate = (data, back, seen) => {
 
   // Whose numbers these are: the archive's, where every metric has the bits that stand there.
   function tell(which, outputs, failed, tick, took) {
-    const speed = `computed here in ${number(took)} ms, ${kernel.fused ? "with this machine's multiply-add" : "with the module's own multiply-add"}`;
+    const speed = `computed here in ${number(took)} ms`;
+    came.title = kernel.fused ? "with this machine's fused multiply-add, which rounds as the archive's does" : "with the module's own fused multiply-add";
+    const name = which < 0 ? "" : data.count > 1 ? `Case #${data.positions[which]}` : "The run";
     const awaited = which >= 0 && data.status[which] < 0;  // of a deck that is watched: `met` has yet to run it
     const wrong = which < 0 || data.status[which] !== 0 ? [] : told.metrics.filter((_, m) => !Object.is(measured[m], archived[m][which]));
     const bad = wrong.length > 0 || (which >= 0 && !awaited && failed !== (data.status[which] !== 0));
     let words = `Not in the ${source}: `;
-    if (free) words = "Another structure than the archive's, whose bits may differ in the last digits: ";
-    else if (awaited) words = `Case #${data.positions[which]}, before it is compared: `;
-    else if (bad) words = `Other numbers than the ${source} has for case #${data.positions[which]}${wrong.length ? ` (${wrong.map((metric) => metric.name).join(", ")})` : ""}: `;
-    else if (which >= 0 && failed) words = `Case #${data.positions[which]} fails, as in the ${source}: `;
-    else if (which >= 0) words = measured.length ? `Case #${data.positions[which]}, with the ${source}'s bits in ${measured.length === 1 ? "its metric" : `all ${measured.length} metrics`}: ` : `Case #${data.positions[which]}; it has no metric to compare: `;
+    if (free) words = "By another program than the archive's, so that last digits may differ: ";
+    else if (awaited) words = `${name}, before it is compared: `;
+    else if (bad) words = `Other numbers than the ${source} has for ${name[0].toLowerCase()}${name.slice(1)}${wrong.length ? ` (${wrong.map((metric) => metric.name).join(", ")})` : ""}: `;
+    else if (which >= 0 && failed) words = `${name} fails, as in the ${source}: `;
+    else if (which >= 0) words = measured.length ? `${name}, with the ${source}'s bits in ${measured.length === 1 ? "its metric" : `all ${measured.length} metrics`}: ` : `${name}; it has no metric to compare: `;
     const end = failed ? `; it fails at ${number(tick / told.kernel.base_hz)} s` : "";
     came.classList.toggle("bad", bad);
     came.textContent = `${words}${speed}${end}.`;
@@ -189,9 +207,18 @@ MET.simulate = (data, back, seen) => {
         return node("div", { class: met ? "met" : "missed" }, `${each.text}: ${met ? "met" : `missed${why(each, metric, m, given[m], outputs)}`}`);
       });
       const value = given[m] === null ? "not computed here" : `${number(given[m] / data.metricScales[m])} ${data.metricUnits[m]}`.trim();
+      const compared = theirs ? beside(metric.name, m, given[m]) : [];
       const whose = given[m] === null || m < measured.length ? "" : `, from the ${source}`;
-      return node("tr", null, node("td", null, node("code", null, metric.name)), node("td", null, value + whose), node("td", { class: "about" }, data.metricAbout[m]), node("td", null, verdicts));
+      return node("tr", null, node("td", null, node("code", null, metric.name)), node("td", null, value + whose), compared, node("td", { class: "about" }, data.metricAbout[m]), node("td", null, verdicts));
     }));
+  }
+
+  // A metric of what stands beside the run, with the same numbers, and how far it is from this one.
+  function beside(name, m, ours) {
+    const value = theirs[name] ?? NaN;
+    const change = ours === null ? NaN : value === ours ? 0 : value - ours;
+    const text = (found, words) => (Number.isNaN(found) ? "–" : `${words(found / data.metricScales[m])} ${data.metricUnits[m]}`.trim());
+    return [[other.name, text(value, number)], [`${other.name} − this`, text(change, MET.signed)]].map(([head, words]) => node("td", { "data-head": head }, words));
   }
 
   // By how much a requirement is missed, when, and at which limit of a machine.
@@ -204,13 +231,16 @@ MET.simulate = (data, back, seen) => {
       when === null ? "" : `, at ${number(when)} s`, reached ? `, while ${reached} was reached` : ""].join("");
   }
 
+  const heads = other && other.hasMetrics ? [node("thead", null, node("tr", null, ["", "this", other.name, `${other.name} − this`, "", ""].map((head) => node("th", null, head))))] : [];
   main.replaceChildren(room,
     ...(back || data.numbers ? [node("p", null, node("label", null, node("input", { type: "checkbox", class: "other-numbers", checked: Boolean(back), change: () => leave() }), " other numbers"))] : []),
     ...(free ? [node("div", { class: "knobs" }, free.box)] : []),
     ...(cases.length > 1 ? [node("div", { class: "knobs" }, node("label", { class: "knob" }, "Case", chosen, node("output", null, `of ${data.count}`)), knobs.map((knob) => knob.box))] : []),
-    came, ...(other ? [node("p", { class: "note" }, "Beside it, wide and pale: ", node("b", null, other.name), `, ${other.note}.`)] : []), node("table", { class: "answers" }, answers), panels);
+    came, ...(other ? [node("p", { class: "note" }, "Beside it, wide and pale: ", node("b", null, other.name), `, ${other.note}.`)] : []), node("table", { class: heads.length ? "answers against" : "answers" }, heads, answers),
+    ...(data.report ? [node("p", { class: "note" }, "All cases in one page, which miss and why, as points and maps: ", node("code", null, data.report))] : []), panels);
   if (data.head) entitle(data.head);
   knobs.forEach((knob) => knob.put());
+  list();
   update();
   if (stage && seen) stage.resume(seen);
   if (stage && cases.length > 1) requestAnimationFrame(() => setTimeout(haunt));
@@ -228,6 +258,7 @@ MET.simulate = (data, back, seen) => {
   function arrive(found) {
     Object.assign(data, found);
     archived = data.metrics.map((text) => new Float64Array(bytes(text).buffer));
+    list();
     update();
     if (stage && told.not_computed.length && cases.length > 1) haunt();
   }

@@ -184,7 +184,7 @@ def test_a_slider_moves_the_solid_arm_and_leaves_the_view_where_it_was(
     page = opened(webgl, pages / "tuned.view.html")
     before, camera = pixels(page, tmp_path), "JSON.stringify(MET.shown.camera)"
     where = page.run(camera)
-    page.run("""(() => { const e = document.querySelectorAll('.knob input')[1]; e.value = 0.6;
+    page.run("""(() => { const e = document.querySelectorAll('.knob input[type=range]')[1]; e.value = 0.6;
         e.dispatchEvent(new Event('input')); })()""")
     assert page.run("document.querySelector('.stage .told').textContent") == "not in the archive"
     assert page.run("MET.shown.ghosts()") == 4

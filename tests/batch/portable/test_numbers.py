@@ -309,9 +309,9 @@ def test_a_number_is_dragged_and_typed_in_the_decks_unit_and_turns_the_verdict(
 ) -> None:
     page = chromium.open(folder / "it.view.html")
     page.settle()
-    assert page.run(SAID).startswith("Case #0, with the archive's bits")
+    assert page.run(SAID).startswith("The run, with the archive's bits")
     page.run(SWITCH)
-    assert page.run(SAID).startswith("Another structure than the archive's, whose bits may differ in the last digits: ")
+    assert page.run(SAID).startswith("By another program than the archive's, so that last digits may differ: ")
     page.run(f"{PICK}('initial.turn.q')")
     assert page.run("document.querySelector('.typed').innerText").strip() == "deg"
     assert page.run("document.querySelector('.typed input').value") == "-20"

@@ -92,7 +92,7 @@ def chromium() -> Iterator[Chromium]:
 SAID = "document.querySelector('.came').textContent"
 CHOOSE = """(n => { const e = document.querySelector('.knob select'); e.value = n; e.dispatchEvent(new Event('change'));
     return document.querySelector('.came').textContent; })"""
-MOVE = """((n, at) => { const e = document.querySelectorAll('.knob input')[n]; e.value = at;
+MOVE = """((n, at) => { const e = document.querySelectorAll('.knob input[type=range]')[n]; e.value = at;
     e.dispatchEvent(new Event('input')); return document.querySelector('.came').textContent; })"""
 
 
@@ -149,8 +149,48 @@ def test_a_slider_runs_the_case_again_and_turns_the_verdict(chromium: Chromium, 
     page.settle()
     assert page.picture(sent / "after.png").read_bytes() != before
     assert page.run(f"{MOVE}(0, 0.995)").startswith("Case #4, with the archive's bits")  # near what the archive has
-    assert page.run("document.querySelectorAll('.knob output')[2].textContent") == "45000 g"
+    typed = "document.querySelectorAll('.knob .typed')[{0}]"
+    assert page.run(f"{typed.format(1)}.querySelector('input').value") == "45000"
+    assert page.run(f"{typed.format(1)}.innerText").strip() == "g"
+    give = """((text) => { const e = document.querySelector('.knob .typed input'); e.value = text;
+        e.dispatchEvent(new Event('change'));  return document.querySelector('[role=alert]').textContent; })"""
+    assert page.run(f"{give}('0.01')") == "" and page.run(SAID).startswith("Case #2, with the archive's bits")
+    assert page.run(f"{give}('0.012')") == "" and page.run("MET.page.values()[0]") == pytest.approx(0.012, rel=1e-12)
+    assert page.run(f"{give}('0.021')") == (
+        "0.021 V·s/rad is beyond what the sweep has: from 0.005 V·s/rad to 0.02 V·s/rad"
+    )
+    assert page.run(f"{give}('much')") == "much is no number" and page.run("MET.page.values()[0]") != 0.021
+    page.run(f"{CHOOSE}(0)")
+    page.run("document.querySelector('.knob input[type=range]').focus()")
+    seen = []
+    for _ in range(3):  # each press is seen, also at a case, which holds the slider when it is dragged
+        page.key("ArrowRight")
+        seen.append(page.run("MET.page.values()[0]"))
+    assert 0.005 < seen[0] < seen[1] < seen[2]
     quiet(page)
+    page.close()
+
+
+@pytest.mark.browser
+def test_the_list_of_cases_says_values_misses_the_best_and_the_worst(chromium: Chromium, sent: Path) -> None:
+    page = chromium.open(sent / "tuned.view.html")
+    page.settle()
+    with xarray.open_dataset(sent / "tuned.h5") as data:
+        volts = data["volts"].values
+        names = [
+            f"#{n} {kp:g} V·s/rad, {1000 * mass:g} g"
+            for n, (kp, mass) in enumerate(zip(data["gearbox.kp"].values, data["links.upper.mass"].values, strict=True))
+        ]
+    words = ["misses volts < 3.55 V" if value >= 3.55 else "" for value in volts]
+    ranks = {int(volts.argmin()): " (best)", int(volts.argmax()): " (worst)"}
+    assert 0 < sum(map(bool, words)) < len(words)
+    expected = [
+        f"{name} {f'✗ {word}' if word else '✓'}{ranks.get(n, '')}"
+        for n, (name, word) in enumerate(zip(names, words, strict=True))
+    ]
+    options = page.run("[...document.querySelectorAll('.knob option')].map(e => e.textContent.replace(/\\s+/g, ' '))")
+    assert options[1:] == expected
+    assert "met report tuned.h5" in page.run("document.querySelector('main').innerText")
     page.close()
 
 
