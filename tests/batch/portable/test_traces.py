@@ -93,6 +93,12 @@ def test_a_metric_says_what_it_is_of_and_a_missed_requirement_by_how_much_when_a
             assert float(words[words.index("at") + 1]) == pytest.approx(data["time"].values[tau.argmax()], abs=1e-3)
             assert verdict.endswith(f", while {path} was reached")
     assert page.run(ROWS)[1][-1] == "late < 300 deg: met"
+    corner = page.run(
+        "[...document.querySelectorAll('.triad span')].map(e => [e.textContent, parseFloat(e.style.top)])"
+    )
+    (*axes, (gravity, below)) = corner
+    assert [name for name, _ in axes] == ["x", "y", "z"] and gravity == "g" and below > 38 > axes[2][1]
+    assert "9.81 m/s²" in page.run("document.querySelector('.triad').title")
     quiet(page)
     page.close()
 
