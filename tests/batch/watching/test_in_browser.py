@@ -174,6 +174,28 @@ def test_on_a_narrow_screen_nothing_is_cut_off(chromium: Chromium, tmp_path: Pat
         page.close()
 
 
+@pytest.mark.parametrize("width", [400, 1280])
+def test_the_mark_under_a_long_line_is_in_sight_and_the_line_scrolls_where_it_stands(
+    chromium: Chromium, tmp_path: Path, width: int
+) -> None:
+    deck = write_deck(tmp_path)
+    with viewing(deck, "-q") as view:
+        page = opened(chromium, view, width=width)
+        replace(deck, "    vary gearbox.kp = [", " " * 200 + "vary gearbox.kq = [")
+        until(page, "!document.querySelector('aside').hidden")
+        page.settle()
+        found = page.run("""[...document.querySelectorAll('.of-deck')].map(part => {
+            const range = document.createRange(), text = part.firstChild, at = text.data.indexOf('^');
+            range.setStart(text, at); range.setEnd(text, at + 1);
+            const [mark, box] = [range.getBoundingClientRect(), part.getBoundingClientRect()];
+            return [at, mark.left - box.left, box.right - mark.right, box.left, box.right]; })""")
+        assert len(found) == 1
+        at, left, right, *sides = found[0]
+        assert at > 0 and left >= 0 and right >= 0 and 0 <= sides[0] < sides[1] <= width
+        silent(page, view)
+        page.close()
+
+
 def test_another_run_is_chosen_on_the_page(chromium: Chromium, tmp_path: Path) -> None:
     deck = write_deck(tmp_path)
     with viewing(deck, "-q") as view:
