@@ -87,12 +87,14 @@ def _write(
     from batch.portable import files
     from batch.portable.page import view as page
     from ic.printing.columns import size
+    from met.outputs import quoted
 
     target = Path(archive).with_suffix(".view.html") if output is None else Path(output)
     files.check_page(target)
     files.write_page(page(archive, () if name is None else (name,), against, numbers, include_dirs), target)
     if not quiet:
         say(f"{target}  ({size(target.stat().st_size)})")
+        say(f"One file, to open in a browser or to send. All cases at once: `met report {quoted(archive)}`", err=True)
     return YES
 
 

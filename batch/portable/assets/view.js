@@ -23,7 +23,9 @@ MET.simulate = (data, back, seen) => {
   const SLICE = 24;  // ms of work between which the page answers
   const others = [];
   let turn = 0;  // of computing them
-  let values = (data.stood || cases[0]).slice();
+  const addressed = Boolean(data.report) && cases.length > 1;  // the page's address says which case is shown
+  let [noted, moved] = [0, false];
+  let values = (data.stood || (addressed && asked()) || cases[0]).slice();
   let lines = [];
   let pale = [];  // of what stands beside, under them
   let theirs = null;  // metrics of what stands beside, by name, SI
@@ -31,6 +33,20 @@ MET.simulate = (data, back, seen) => {
   const other = data.beside ? MET.beside.make(data.beside, data, time) : null;
   const free = data.limits ? data.free || (data.free = MET.numbers.make(data, (found) => data.give(found))) : null;
   data.give = (found) => { values = found; update(); };
+
+  // The case, or the numbers between cases, that the page's address asks for; nothing where it asks for none that there is.
+  function asked() {
+    const [, kind, text] = /^#(case|at)=([-+.,e\d]{1,4000})$/.exec(location.hash) ?? [];
+    if (kind === "case") return cases[data.positions.indexOf(Number(text))];
+    const found = (text ?? "").split(",").map(Number);
+    const fits = (value, n) => value >= Math.min(...cases.map((each) => each[n])) && value <= Math.max(...cases.map((each) => each[n]));
+    return found.length === told.inputs.length && found.every(fits) ? found : undefined;
+  }
+
+  function address(which) {
+    clearTimeout(noted);
+    noted = setTimeout(() => history.replaceState(null, "", which < 0 ? `#at=${values.join(",")}` : `#case=${data.positions[which]}`), 300);
+  }
 
   // Sliders, and which case of the archive they stand at.
   const knobs = free ? [] : told.inputs.map((input, n) => {
@@ -81,6 +97,8 @@ MET.simulate = (data, back, seen) => {
     lines = told.columns.map((_, c) => Array.from(time, (_t, row) => (row < rows ? found.rows[row * width + c] / data.columnScales[c] : null)));
     if (other) accompany();
     const which = position();
+    if (addressed && moved) address(which);
+    moved = true;
     chosen.value = which < 0 ? "" : which;
     knobs.forEach((knob) => knob.put(false));
     measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
@@ -265,6 +283,7 @@ MET.simulate = (data, back, seen) => {
   const ending = new AbortController();
   function leave() {
     turn++;
+    clearTimeout(noted);
     ending.abort();
     traces.close();
     data.stood = values;

@@ -195,6 +195,34 @@ def test_the_list_of_cases_says_values_misses_the_best_and_the_worst(chromium: C
 
 
 @pytest.mark.browser
+def test_the_address_keeps_the_case_and_the_sliders(chromium: Chromium, sent: Path) -> None:
+    page = chromium.open(sent / "tuned.view.html")
+    page.settle()
+    wait = "new Promise(done => setTimeout(() => done(location.hash), 500))"
+    assert page.run(wait) == ""
+    page.run(f"{CHOOSE}(3)")
+    assert page.run(wait) == "#case=3"
+    page.run(f"{MOVE}(0, 0.5)")
+    between, values = page.run(wait), page.run("MET.page.values()")
+    assert between == f"#at={','.join(map(str, values))}".replace(".0,", ",").removesuffix(".0")
+    page.close()
+    start = (sent / "tuned.view.html").resolve().as_uri()
+    for hash_, expected in (
+        ("#case=3", "cases.inputs[3]"),
+        (between, json.dumps(values)),
+        ("#case=99", "cases.inputs[0]"),
+        ("#at=1e300,1", "cases.inputs[0]"),
+        ("#at=<b>", "cases.inputs[0]"),
+    ):
+        page = chromium.open(start + hash_)
+        page.settle()
+        wanted = page.run(f"(({{ cases }}) => {expected})(MET_PAGE.description)")
+        assert page.run("MET.page.values()") == wanted, hash_
+        quiet(page)
+        page.close()
+
+
+@pytest.mark.browser
 def test_an_archive_that_holds_other_numbers_is_told_apart(chromium: Chromium, sent: Path, tmp_path: Path) -> None:
     text = (sent / "tuned.view.html").read_text(encoding="utf-8")
     changed = re.sub(r'"metrics":\["[^"]{8}', lambda found: found[0][:-8] + "AAAAAAAA", text)
