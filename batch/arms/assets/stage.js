@@ -115,7 +115,7 @@ MET.stage = (() => {
     const chosenPills = () => inView((at) => [...arm.solids(chosen.at(at)), ...legend.nozzles(at), ...legend.forces(at, chosen.at(at))], FITTED);
     const inView = (solids, count) => {
       const all = Array.from({ length: count }, (_, n) => solids((end * n) / (count - 1))).flat()
-        .map((one) => ({ ...MET.arm.ends(one), own: !APART.includes(one.role) })).filter(near);
+        .map((one) => ({ ...MET.arm.ends(one), own: !APART.includes(one.role), isForce: one.role === "force" })).filter(near);
       const box = [0, 1, 2].map((axis) => all.filter((one) => one.own).flatMap(({ ends }) => ends.map((p) => p[axis])))
         .map((places) => [places.reduce((a, b) => Math.min(a, b), Infinity), places.reduce((a, b) => Math.max(a, b), -Infinity)]);
       const close = (p) => Math.hypot(...box.map(([low, high], axis) => Math.max(low - p[axis], p[axis] - high, 0))) <= arm.reach;
@@ -123,7 +123,7 @@ MET.stage = (() => {
     };
 
     function ground(all) {
-      const lowest = all.reduce((low, { ends, radius }) => Math.min(low, ends[0][2] - radius, ends[1][2] - radius), Infinity);
+      const lowest = all.filter(({ isForce }) => !isForce).reduce((low, { ends, radius }) => Math.min(low, ends[0][2] - radius, ends[1][2] - radius), Infinity);
       floor = scene.moves ? lowest - 0.25 * arm.reach : Math.min(0, lowest);
     }
 
@@ -132,7 +132,7 @@ MET.stage = (() => {
       const all = chosenPills();
       if (!all.length) return;
       ground(all);
-      camera.choose(all.flatMap(({ ends }) => ends));
+      camera.choose(all.filter(({ isForce }) => !isForce).flatMap(({ ends }) => ends));
       camera.fit([...all, ...(twin && twinned ? inView(twin, FITTED_OF_GHOSTS) : []), ...(ghostly ? others.flatMap((each) => pills(each, FITTED_OF_GHOSTS)) : [])], BAR / view.clientHeight);
     }
 

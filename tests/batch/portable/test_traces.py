@@ -169,3 +169,20 @@ def test_a_stretch_of_time_that_is_dragged_stays_while_a_slider_moves(chromium: 
     assert stretch(page) == [[0.0, 1.0]] * 3
     quiet(page)
     page.close()
+
+
+@pytest.mark.browser
+def test_arrows_of_recorded_forces_are_in_view_below_the_switches(chromium: Chromium, folder: Path) -> None:
+    page = chromium.open(folder / "a.view.html")
+    page.settle()
+    seen = """(() => { const { camera } = MET.shown, high = document.querySelector('.stage .view').clientHeight;
+        const ends = MET.shown.around().filter(each => each.role === 'force').flatMap(each => MET.arm.ends(each).ends);
+        return ends.map(p => camera.see(p)).map(([x, y]) => [Math.abs(x / camera.aspect), y + 88 / high]); })()"""
+    fit = "[...document.querySelectorAll('.stage .chip')].find(e => e.textContent === 'fit').click()"
+    for without, inside in ((False, True), (True, False)):
+        if without:
+            page.run("MET.shown.legend.forces = () => []; 0")  # the arm alone decides
+        page.run(fit)
+        page.settle()
+        assert all(x < 1 and y < 1 for x, y in page.run(seen)) == inside
+    page.close()
