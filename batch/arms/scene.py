@@ -8,7 +8,7 @@ its own numbers, a base that moves and payloads that fly included.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from batch.arms.placing import OF_FREE_BASE, POSITION, parameters, world_poses
@@ -59,6 +59,7 @@ class ArmScene:
     reach     from the base to the farthest tip, m, stretched out
     limb      radius with which lines and rods are drawn, m
     up        against gravity, world axes; z where there is none
+    gravity   in the world, m/s^2; None where there is none, or cases differ in it
     moves     whether the base moves: then there is no floor under it
     """
 
@@ -70,6 +71,7 @@ class ArmScene:
     reach: float
     limb: float
     up: tuple[float, float, float]
+    gravity: tuple[float, float, float] | None
     moves: bool
 
 
@@ -134,6 +136,7 @@ def arm_scene(experiment: Experiment, recorded: Sequence[str]) -> ArmScene:
         reach,
         _limb(experiment, first, reach),
         _up(experiment, first),
+        _gravity(experiment, first, varied),
         structure.base is not None,
     )
 
@@ -158,6 +161,7 @@ def scene_json(scene: ArmScene) -> dict[str, Any]:
         "reach": scene.reach,
         "limb": scene.limb,
         "up": list(scene.up),
+        "gravity": None if scene.gravity is None else list(scene.gravity),
         "moves": scene.moves,
     }
 
@@ -226,6 +230,18 @@ def _limb(experiment: Experiment, first: Mapping[str, float], reach: float) -> f
     lengths = sorted(way for way in ways if way > 1e-6 * reach)
     middle = lengths[len(lengths) // 2] if lengths else reach
     return min(LIMB * reach, LIMB_OF_LINK * middle)
+
+
+def _gravity(
+    experiment: Experiment, first: Mapping[str, float], varied: Collection[str]
+) -> tuple[float, float, float] | None:
+    """The pull in the world, m/s^2; None where there is none, or cases differ in it."""
+    for use in experiment.structure.environment:
+        if use.model == "gravity":
+            path = f"environment.{use.name}.g"
+            x, y, z = (float(first.get(f"{path}.{part}", 0.0)) for part in "xyz")
+            return None if any(each.startswith(path) for each in varied) or x == y == z == 0.0 else (x, y, z)
+    return None
 
 
 def _up(experiment: Experiment, first: Mapping[str, float]) -> tuple[float, float, float]:

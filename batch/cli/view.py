@@ -53,7 +53,8 @@ def view(
     archive has the case, the page compares. It is whole in one file and opens without a network.
 
     The page of a deck is served on 127.0.0.1, to who has the address that is printed, until Ctrl-C or until the
-    terminal is closed. A mistake in the deck is shown beside the last run without one.
+    terminal is closed. A mistake in the deck is shown beside the last run without one. A file that is no deck, and a
+    NAME that the deck does not have, are refused (exit status 2).
     """
     of_archive = () if numbers is not None else include_dirs
     check_options(source, () if name is None else (name,), False, defines, of_archive, settings)
@@ -86,12 +87,14 @@ def _write(
     from batch.portable import files
     from batch.portable.page import view as page
     from ic.printing.columns import size
+    from met.outputs import quoted
 
     target = Path(archive).with_suffix(".view.html") if output is None else Path(output)
     files.check_page(target)
     files.write_page(page(archive, () if name is None else (name,), against, numbers, include_dirs), target)
     if not quiet:
         say(f"{target}  ({size(target.stat().st_size)})")
+        say(f"One file, to open in a browser or to send. All cases at once: `met report {quoted(archive)}`", err=True)
     return YES
 
 
@@ -117,13 +120,17 @@ def _watch(
             end = "Ctrl-C ends it" if sys.stdin is not None and sys.stdin.isatty() else f"`kill {os.getpid()}` ends it"
             say(f"The page of {deck}, for a browser on this machine. Who has the address can read it. {end}.", err=True)
 
+    def tell(messages: str) -> None:
+        if not quiet:
+            say(messages, err=True)
+
     words = ["view", deck, *([] if name is None else [name])]
     told = partial(confess, arguments=words, verbose=verbose)
     path = find(deck, include_dirs)
     try:
         with terminable():
             watched = WatchedDeck(deck, path, include_dirs, defines, settings)
-            follow(watched, name, port=port, ready=ready, confess=told)
+            follow(watched, name, port=port, ready=ready, tell=tell, confess=told)
     except Terminated:
         return TERMINATED
     except KeyboardInterrupt:

@@ -32,7 +32,9 @@ from batch.report.html.payload import script_json
 from met.backends.wasm.module import KERNEL_JS, compiled
 from met.diagnostic import Problem, error
 from met.messages.visible import visible
+from met.outputs import quoted
 from met.plan import Experiment, Plan
+from met.plan.limits import extremes
 from met.run import Prepared, inputs, prepare
 from met.version import VERSION
 
@@ -73,6 +75,7 @@ def view(
         (group,) = groups
         experiment = next(each for each in file.plan().experiments if each.name == group.name)
         data = data_of(experiment, file, group)
+        data["report"] = visible(f"met report {quoted(Path(archive).name)}")
         if against is not None:
             data["beside"] = _beside(against, file, group, experiment)
         if numbers is not None:
@@ -176,6 +179,12 @@ def data_of(
         "units": [_unit(each["unit"]) for each in told["inputs"]],
         "metricUnits": [visible(unit) for _, unit in metric_units],
         "metricScales": [scale for scale, _ in metric_units],
+        "metricAbout": [visible(stored[known[each["name"]]].long_name) for each in metrics],
+        "watched": [[use.model, visible(use.of)] for use in experiment.structure.metrics],
+        "atLimits": {
+            visible(name): [visible(each.path) for each in uses] for name, uses in extremes(experiment).items()
+        },
+        "signalAbout": {visible(each.name): visible(each.doc) for each in experiment.structure.record},
         "columnUnits": [_unit(unit) for _, unit in columns],
         "columnScales": [scale for scale, _ in columns],
         "arm": _arm(experiment),
@@ -262,14 +271,14 @@ def page_text(
     before, after  further scripts: names of the report's, before the page's own; and texts after it
     style          a further one
     """
-    numbers = ["numbers.js"] if "numbers" in data else []
+    own = ("beside.js", "traces.js", "knobs.js", *(["numbers.js"] if "numbers" in data else []), "view.js")
     script = "\n".join(
         [
-            inlined.licensed("uPlot.iife.min.js", "core.js", *before),
+            inlined.licensed("uPlot.iife.min.js", "core.js", "timeline.js", *before),
             arm_scripts(),
             KERNEL_JS.read_text(encoding="utf-8"),
             f"const MET_PAGE = {script_json(data)};",
-            *((_ASSETS / name).read_text(encoding="utf-8") for name in ("beside.js", *numbers, "view.js")),
+            *((_ASSETS / name).read_text(encoding="utf-8") for name in own),
             *after,
         ]
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from batch.portable.page import data_of, doubles, page_text
 from batch.queries.pool import ENDED, Pool
 from batch.report.contents.overview import overview
 from batch.report.html.payload import overview_data
-from ic.driver.compile import compile_deck
+from ic.driver.compile import asked_definitions, compile_deck
 from ic.language import EXPERIMENTS
 from ic.meaning.definitions.resolve import Definitions
 from ic.read import read
@@ -29,6 +30,7 @@ from met.analysis.linear import metrics as linear_metrics
 from met.analysis.memo import AnalysisMemo
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
+from met.host.sources import ARCHIVES
 from met.messages.render import render
 from met.messages.visible import visible
 from met.outputs import quoted
@@ -47,6 +49,9 @@ NOT_YET = -1
 FIRST, SHARE, TELLING = 32, 0.2, 1.0
 """Cases that are run first; seconds that further ones take before it is looked whether they are still wanted; and
 seconds after which it is told what there is so far."""
+
+ENDING = ".ic"
+"""The name of a deck ends so. What is named otherwise is watched where it is a deck."""
 
 MOST_LETTERS = 200_000
 """Letters of messages that are shown."""
@@ -80,6 +85,37 @@ class DeckAnswer:
     plan: Plan | None = None
     experiment: Experiment | None = None
     groups: tuple[str, ...] = ()
+
+
+def check(deck: WatchedDeck, name: str | None = None) -> None:
+    """Refuse what is not worth watching: a file that is no deck, and a run or sweep that the deck does not have. A deck
+    with other mistakes is watched until they are mended. Raises Problem."""
+    is_named_so = deck.file.suffix == ENDING
+    try:
+        tree = read(deck.name, [Path(each) for each in deck.include_dirs], deck.defines, despite_errors=is_named_so)
+    except Problem as problem:
+        if is_named_so:
+            return
+        raise Problem(_no_deck(deck, problem.diagnostics), problem.sources) from problem
+    complaints = Complaints()
+    known = Definitions(tree, complaints)
+    has_none = not any(known.of_kind(kind) for kind in EXPERIMENTS)
+    if has_none and not is_named_so:
+        try:
+            asked_definitions(known, Complaints(), None)
+        except Problem as problem:
+            raise Problem(_no_deck(deck, problem.diagnostics)) from problem
+    if name is not None and not tree.unreadable and not has_none:
+        asked_definitions(known, complaints, (name,))
+        if unknown := [each for each in complaints.errors if each.code == "D164"]:
+            raise Problem(unknown)
+
+
+def _no_deck(deck: WatchedDeck, found: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
+    """Mistakes of a file that is not named like a deck, with a word on why it is read as one."""
+    kinds = ", ".join(ARCHIVES)
+    helps = f"{deck.name} is read as a deck: its name does not end like an archive's ({kinds})"
+    return (*found[:-1], replace(found[-1], help=(*found[-1].help, helps)))
 
 
 def compiled(

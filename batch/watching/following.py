@@ -32,19 +32,27 @@ PATIENCE_SECONDS = 2.0
 
 
 def follow(
-    deck: WatchedDeck, name: str | None, *, port: int, ready: Callable[[str], None], confess: Callable[[Exception], str]
+    deck: WatchedDeck,
+    name: str | None,
+    *,
+    port: int,
+    ready: Callable[[str], None],
+    tell: Callable[[str], None],
+    confess: Callable[[Exception], str],
 ) -> None:
-    """Show the deck's run until an interrupt. Raises Problem E477 where the port cannot be had.
+    """Show the deck's run until an interrupt. Raises Problem of `answers.check`, and E477 where the port cannot be had.
 
     name     of the run or sweep; None: the one that `met run` would take, or that is chosen on the page
     ready    told the address of the page, when it can be opened
+    tell     told what `met check` says of the deck as it is at first, where it says something
     confess  tells in the terminal that MET has a defect, and gives back in which words
     """
+    answers.check(deck, name)
     board = Board(visible(deck.name))
     server = PageServer(board, port)
     server.begin()
     ready(server.address)
-    loop = _Loop(deck, name, board, confess)
+    loop = _Loop(deck, name, board, confess, tell)
     try:
         loop.run()
     finally:
@@ -54,10 +62,17 @@ def follow(
 
 class _Loop:
     """The run that is shown, and the thread that runs its cases. name, group: asked for, or chosen on the page.
-    confess: as `follow` has it."""
+    confess, tell: as `follow` has them; told once, tell is None."""
 
-    def __init__(self, deck: WatchedDeck, name: str | None, board: Board, confess: Callable[[Exception], str]) -> None:
-        self._deck, self._name, self._board, self._confess = deck, name, board, confess
+    def __init__(
+        self,
+        deck: WatchedDeck,
+        name: str | None,
+        board: Board,
+        confess: Callable[[Exception], str],
+        tell: Callable[[str], None] | None = None,
+    ) -> None:
+        self._deck, self._name, self._board, self._confess, self._tell = deck, name, board, confess, tell
         self._group: str | None = None
         self._files = DeckFiles(deck.file, deck.include_dirs)
         self._known: dict[bytes, Any] = {}
@@ -110,6 +125,9 @@ class _Loop:
         self._known = memo.so_far
         if self._files.found(answer.files, begun):
             return True
+        if self._tell is not None and answer.messages:
+            self._tell(answer.messages)
+        self._tell = None
         self._is_broken = answer.experiment is None
         told: dict[str, Any] = {"names": list(answer.names), "groups": list(answer.groups), "messages": answer.messages}
         told["fault"] = False

@@ -114,7 +114,7 @@ MET.acting = (() => {
       const out = [];
       const clear = [];
       const far = LONGEST * arm.reach;
-      if (forces && on.force) out.push(...arm.arrows(numbers, forces.at(t), far / forces.most));
+      out.push(...reacting(t, numbers));
       if (!taken) return { solids: out, clear };
       const { limb } = arm;
       const own = taken.at(t);
@@ -154,7 +154,10 @@ MET.acting = (() => {
     // Nozzles, firing or not, which come into view with the arm.
     const nozzles = (t) => (taken ? made.gas(taken.at(t)) : []).map(({ at }) => ball(arm.up(at)));
 
-    return { box, show, tell, say, solids, nozzles, shown: (kind) => on[kind],
+    // The recorded forces of joints as arrows.
+    const reacting = (t, numbers) => (forces && on.force ? arm.arrows(numbers, forces.at(t), (LONGEST * arm.reach) / forces.most) : []);
+
+    return { box, show, tell, say, solids, nozzles, forces: reacting, shown: (kind) => on[kind],
       key: (key) => Object.keys(KINDS).find((kind) => KINDS[kind][2] === key && !chips[kind].box.hidden && (press(kind), true)) !== undefined,
       kept: () => ({ ...on }), resume: (before) => Object.keys(on).forEach((kind) => { if (before && before[kind] !== undefined && before[kind] !== on[kind]) press(kind); }),
       reactions: (t) => (forces ? forces.at(t) : []), looked: () => !taken || taken.look(0), now: (t) => (taken ? made.acts(taken.at(t)) : []), most };

@@ -13,8 +13,11 @@ MET.stage = (() => {
   const FILM = 6;  // pictures on paper
   const rgb = (hex, alpha = 1) => [...[1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255), alpha];
   const BODY = { light: MET.look.colours, dark: ["#aab6c3", "#66717d", "#e0b44a"] };
-  const AXES = { x: "#d8434e", y: "#3a9d4f", z: "#3d6fe0" };
+  const KEYS = [["drag, arrow keys", "turn the view"], ["shift and drag or arrow keys, two fingers", "move it"], ["wheel, pinch, + −", "zoom, once it is in use"],
+    ["double click, 0", "all in view"], ["space", "play or stop"], [", .", "an instant back or on"], ["g", "other cases"], ["b", "what stands beside"], ["f", "frames of the links"],
+    ["a l c p o", "joint forces, loads, contact, plumes, payloads"]];
   const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 50];
+  const APART = ["payload", "plume", "force"];  // roles of what may be far from the arm
   const LONG = 20;  // s, longer than which nobody looks at a run
 
   // A step of the grid: 1, 2 or 5 of a power of ten, about a share of the reach.
@@ -48,13 +51,16 @@ MET.stage = (() => {
       } }, words);
       return made;
     };
-    const withFrames = toggle("frames", "Axes of the links' frames: x red, y green, z blue", frames, () => (frames = !frames));
-    const withOthers = toggle("", "The other cases, as ghosts", ghostly, () => (ghostly = !ghostly));
+    const withFrames = toggle("frames", "Axes of the links' frames: x red, y green, z blue (f)", frames, () => (frames = !frames));
+    const withOthers = toggle("", "The other cases, pale; in the colour of a warning those that fail or miss a requirement (g)", ghostly, () => (ghostly = !ghostly));
     const withTwin = toggle("", "What stands beside the run", true, () => (twinned = !twinned));
     withTwin.hidden = true;
     const whole = node("button", { type: "button", class: "chip", title: "Everything in view (0)", click: () => { home(); redraw(); } }, "fit");
+    const help = toggle("?", "Keys and mouse (?)", false, () => !(keys.hidden = !keys.hidden));
+    const keys = node("dl", { class: "keys", hidden: true }, KEYS.map(([key, does]) => [node("dt", null, key), node("dd", null, does)]));
+    const triad = MET.triad.make(arm, scene.gravity);
     const view = node("div", { class: "view", tabindex: 0, role: "application", "aria-label": "The arm in 3D. Space plays, comma and full stop step, arrows turn, with shift they move, plus and minus zoom, 0 shows all." },
-      canvas, paper, told, scaled, node("div", { class: "tools" }, withTwin, withOthers, withFrames, whole));
+      canvas, paper, told, scaled, triad.box, node("div", { class: "tools" }, withTwin, withOthers, withFrames, whole, help), keys);
     const sign = node("path", { d: "M3 1.5 L14 8 L3 14.5 Z" });
     const play = node("button", { type: "button", class: "play", "aria-label": "Play", click: () => run(!playing) }, node("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, sign));
     const scrub = node("input", { type: "range", min: 0, max: 1, step: "any", "aria-label": "Time", input: () => { run(false); seek(Number(scrub.value) * end); } });
@@ -78,7 +84,7 @@ MET.stage = (() => {
       const by = { link: rgb(link), base: rgb(base), rail: rgb(base), joint: rgb(base) };
       Object.entries(MET.acting.inks()).forEach(([kind, colour]) => { by[kind] = rgb(colour); });
       [by.payload, by.flying, by.grip] = [payload, MET.dark() ? "#8d7c55" : "#f0d9a6", payload].map((each) => rgb(each));
-      Object.entries(AXES).forEach(([axis, colour]) => { by[axis] = rgb(colour); });
+      Object.entries(MET.triad.AXES).forEach(([axis, colour]) => { by[axis] = rgb(colour); });
       const joints = mine.lines.map((each) => rgb(each));
       const faint = Math.min(0.2, Math.max(0.06, 2 / Math.max(1, others.length)));
       const [plain, bad] = [mine.muted, mine.attend].map((each) => rgb(each, faint));
@@ -106,10 +112,10 @@ MET.stage = (() => {
     // reach from the box round all that the arm comes to: it comes into view.
     const near = ({ ends }) => ends.flat().every((x) => Math.abs(x) < FAR * arm.reach);
     const pills = (each, count) => inView((at) => arm.solids(each.at(at)), count);
-    const chosenPills = () => inView((at) => [...arm.solids(chosen.at(at)), ...legend.nozzles(at)], FITTED);
+    const chosenPills = () => inView((at) => [...arm.solids(chosen.at(at)), ...legend.nozzles(at), ...legend.forces(at, chosen.at(at))], FITTED);
     const inView = (solids, count) => {
       const all = Array.from({ length: count }, (_, n) => solids((end * n) / (count - 1))).flat()
-        .map((one) => ({ ...MET.arm.ends(one), own: one.role !== "payload" && one.role !== "plume" })).filter(near);
+        .map((one) => ({ ...MET.arm.ends(one), own: !APART.includes(one.role), isForce: one.role === "force" })).filter(near);
       const box = [0, 1, 2].map((axis) => all.filter((one) => one.own).flatMap(({ ends }) => ends.map((p) => p[axis])))
         .map((places) => [places.reduce((a, b) => Math.min(a, b), Infinity), places.reduce((a, b) => Math.max(a, b), -Infinity)]);
       const close = (p) => Math.hypot(...box.map(([low, high], axis) => Math.max(low - p[axis], p[axis] - high, 0))) <= arm.reach;
@@ -117,7 +123,7 @@ MET.stage = (() => {
     };
 
     function ground(all) {
-      const lowest = all.reduce((low, { ends, radius }) => Math.min(low, ends[0][2] - radius, ends[1][2] - radius), Infinity);
+      const lowest = all.filter(({ isForce }) => !isForce).reduce((low, { ends, radius }) => Math.min(low, ends[0][2] - radius, ends[1][2] - radius), Infinity);
       floor = scene.moves ? lowest - 0.25 * arm.reach : Math.min(0, lowest);
     }
 
@@ -126,7 +132,7 @@ MET.stage = (() => {
       const all = chosenPills();
       if (!all.length) return;
       ground(all);
-      camera.choose(all.flatMap(({ ends }) => ends));
+      camera.choose(all.filter(({ isForce }) => !isForce).flatMap(({ ends }) => ends));
       camera.fit([...all, ...(twin && twinned ? inView(twin, FITTED_OF_GHOSTS) : []), ...(ghostly ? others.flatMap((each) => pills(each, FITTED_OF_GHOSTS)) : [])], BAR / view.clientHeight);
     }
 
@@ -150,6 +156,7 @@ MET.stage = (() => {
         renderer.draw(shown);
       } else paper.replaceChildren(MET.painter.draw(shown, wide, high));
       legend.say(shown.words);
+      triad.turn(camera.axes());
       scrub.value = end ? time / end : 0;
       clock.textContent = `${time.toFixed(end < 10 ? 2 : 1)} s`;
     }
@@ -248,6 +255,7 @@ MET.stage = (() => {
       else if (event.key === "0" || event.key === "Home") home();
       else if (event.key === "b" && !withTwin.hidden) withTwin.click();
       else if (legend.key(event.key)) return;
+      else if (event.key === "?") help.click();
       else if (event.key === "f") withFrames.click();
       else if (event.key === "g" && !withOthers.hidden) withOthers.click();
       else return;
@@ -278,7 +286,8 @@ MET.stage = (() => {
       others = list.map(({ taken, bad }) => ({ at: taken.at, bad }));
       inks = null;
       withOthers.hidden = !list.length;
-      withOthers.textContent = words;
+      const bad = list.filter((each) => each.bad).length;
+      withOthers.replaceChildren(...(bad ? [node("i", { class: "swatch bad" })] : []), bad ? `${words}, ${bad} ${bad === 1 ? "misses" : "miss"}` : words);
       redraw();
     }
     haunt([]);

@@ -8,7 +8,7 @@ MET.beside = (() => {
   // given: as `batch.portable.page` wrote it; data, time: the page's own, and the times of its rows.
   function make(given, data, time) {
     const own = data.description.columns.map(({ channel }) => channel);
-    const made = given.page ? ofArchive(given.page, own, data.description.inputs, time) : ofLog(given, own, data, time);
+    const made = given.page ? ofArchive(given.page, own, data.description, time) : ofLog(given, own, data, time);
     return { name: given.name, ...made };
   }
 
@@ -23,7 +23,8 @@ MET.beside = (() => {
     return (t) => (t < time[first] || t > time[last] ? [] : arm.solids(taken.at(t)));
   }
 
-  function ofArchive(page, own, inputs, time) {
+  function ofArchive(page, own, { inputs, metrics: ours }, time) {
+    const asked = Object.fromEntries(ours.map(({ name, unit }) => [name, unit]));
     const told = page.description;
     const kernel = METKernel.make(bytes(page.module), told.kernel);
     const arm = page.arm.scene ? MET.arm.make(page.arm.scene) : null;
@@ -46,10 +47,11 @@ MET.beside = (() => {
       const moving = arm ? arm.scene.channels.map((name) => theirs(told.columns.findIndex((column) => column.channel === name))) : [];
       const times = Float64Array.from({ length: rows }, (_, row) => row * step);
       const named = Object.fromEntries(told.inputs.map(({ name }, n) => [name, given[n]]));
-      return { columns, solids: arm && rows ? drawn(arm, named, times, moving) : null };
+      const metrics = Object.fromEntries(told.metrics.filter(({ name, unit }) => asked[name] === unit).map(({ name, output }) => [name, tick === null ? found.outputs[output] : NaN]));
+      return { columns, metrics, solids: arm && rows ? drawn(arm, named, times, moving) : null };
     }
     const code = page.same_code ? "the code that it was made with" : "other code than it was made with";
-    return { at, note: `the same numbers, computed here by ${code}` };
+    return { at, hasMetrics: true, note: `the same numbers, computed here by ${code}` };
   }
 
   // Numbers of rows that follow one another by a step, at other times.

@@ -59,13 +59,13 @@ MET.numbers = (() => {
     const own = data.description.cases.inputs[0];
     const told = own.map((value, i) => written(value, inputs[i].scale, data.exact[i]));  // the deck's, in its units
     let [n, text] = [0, told[0]];
-    const slider = node("input", { type: "range", min: 0, max: 1, step: 0.001, "aria-label": "value", input: () => {
+    const slider = MET.knobs.stepped(node("input", { type: "range", min: 0, max: 1, step: 0.001, "aria-label": "value", input: () => {
       const [low, high] = ends();
       const at = low + Number(slider.value) * (high - low);
       const inside = Math.min(high, Math.max(low, at));
       if (Math.abs(at - own[n]) <= NEAR * (high - low)) give(told[n]);
       else give(String(Number((inside / inputs[n].scale).toPrecision(DIGITS))));
-    } });
+    } }));
     const typed = node("input", { type: "text", inputmode: "decimal", autocomplete: "off", spellcheck: "false", "aria-label": "value, typed", change: () => give(typed.value) });
     const unit = node("span", { class: "unit" });
     const refused = node("p", { class: "refused", role: "alert" });

@@ -5,14 +5,13 @@
 
 // data: as `batch.portable.page` wrote it; back: of a second module, the archive's; seen: where the arm was looked at from.
 MET.simulate = (data, back, seen) => {
-  const { node, number, ticks, palette } = MET;
+  const { node, number } = MET;
   const { description: told } = data;
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const kernel = METKernel.make(bytes(data.module), told.kernel);
   const cases = told.cases.inputs;
   const { source } = data;  // what the numbers are compared with: an archive, or the run of a deck that is watched
   let archived = data.metrics.map((text) => new Float64Array(bytes(text).buffer));
-  const NEAR = 0.01;  // of a slider's way, within which it takes a value of the archive's
   const time = Float64Array.from({ length: told.rows }, (_, n) => (n * told.kernel.record_divisor) / told.kernel.base_hz);
   const main = document.querySelector("main");
   const came = node("p", { class: "came", role: "status" });
@@ -20,39 +19,71 @@ MET.simulate = (data, back, seen) => {
   const panels = node("div");
   const room = node("div");
   const MOST_GHOSTS = 100;
+  const MOST_VALUES = 4;  // that the list of cases shows of each
   const SLICE = 24;  // ms of work between which the page answers
   const others = [];
   let turn = 0;  // of computing them
-  let values = (data.stood || cases[0]).slice();
-  let plots = [];
+  const addressed = Boolean(data.report) && cases.length > 1;  // the page's address says which case is shown
+  let [noted, moved] = [0, false];
+  let values = (data.stood || (addressed && asked()) || cases[0]).slice();
   let lines = [];
   let pale = [];  // of what stands beside, under them
+  let theirs = null;  // metrics of what stands beside, by name, SI
+  let measured = [];  // metrics of what is shown; not a number where it failed
   const other = data.beside ? MET.beside.make(data.beside, data, time) : null;
   const free = data.limits ? data.free || (data.free = MET.numbers.make(data, (found) => data.give(found))) : null;
   data.give = (found) => { values = found; update(); };
+
+  // The case, or the numbers between cases, that the page's address asks for; nothing where it asks for none that there is.
+  function asked() {
+    const [, kind, text] = /^#(case|at)=([-+.,e\d]{1,4000})$/.exec(location.hash) ?? [];
+    if (kind === "case") return cases[data.positions.indexOf(Number(text))];
+    const found = (text ?? "").split(",").map(Number);
+    const fits = (value, n) => value >= Math.min(...cases.map((each) => each[n])) && value <= Math.max(...cases.map((each) => each[n]));
+    return found.length === told.inputs.length && found.every(fits) ? found : undefined;
+  }
+
+  function address(which) {
+    clearTimeout(noted);
+    noted = setTimeout(() => history.replaceState(null, "", which < 0 ? `#at=${values.join(",")}` : `#case=${data.positions[which]}`), 300);
+  }
 
   // Sliders, and which case of the archive they stand at.
   const knobs = free ? [] : told.inputs.map((input, n) => {
     const own = [...new Set(cases.map((each) => each[n]))].sort((a, b) => a - b);
     if (input.is !== "coordinate" || own.length < 2) return null;
-    const [low, high] = [own[0], own[own.length - 1]];
-    const slider = node("input", { type: "range", min: 0, max: 1, step: 0.001, "aria-label": data.labels[n], input: () => {
-      const at = low + Number(slider.value) * (high - low);
-      const nearest = own.reduce((a, b) => (Math.abs(b - at) < Math.abs(a - at) ? b : a));
-      values[n] = Math.abs(nearest - at) <= NEAR * (high - low) ? nearest : at;
+    const made = MET.knobs.make({ label: data.labels[n], unit: data.units[n], scale: input.scale, own }, (value) => {
+      values[n] = value;
       update();
-    } });
-    const shown = node("output");
-    const put = () => {
-      slider.value = (values[n] - low) / (high - low);
-      shown.textContent = `${number(values[n] / input.scale)} ${data.units[n]}`;
-    };
-    return { put, shown, input, n, box: node("label", { class: "knob" }, node("code", null, data.labels[n]), slider, shown) };
+    });
+    return { put: (moved) => made.put(values[n], moved), box: made.box };
   }).filter(Boolean);
 
   const chosen = node("select", { "aria-label": `Case of the ${source}`, change: () => {
     place(cases[chosen.value].slice());
   } }, node("option", { value: "", disabled: true }, `none of the ${source}'s`), ...cases.map((_, n) => node("option", { value: n }, `#${data.positions[n]}`)));
+
+  // Each case with what is varied in it, what it misses, and which is best and worst by the requirement that is hardest on
+  // it: as far as the archive has its metrics.
+  function list() {
+    const varied = told.inputs.flatMap((input, n) => (input.is === "coordinate" && cases.some((each) => each[n] !== cases[0][n]) ? [n] : []));
+    const names = [...told.metrics, ...told.not_computed].map((metric) => metric.name);
+    const found = cases.map((each, n) => {
+      const slack = told.requirements.map((required) => {
+        const value = archived[names.indexOf(required.metric)][n];
+        return { text: required.text, met: judged(required, value), by: (required.comparison[0] === "<" ? 1 : -1) * (required.limit - value) / (Math.abs(required.limit) || 1) };
+      });
+      return { misses: slack.filter(({ met }) => !met).map(({ text }) => text), least: Math.min(...slack.map(({ by }) => by)), known: data.status[n] === 0 && slack.length && slack.every(({ by }) => !Number.isNaN(by)) };
+    });
+    const known = found.filter((each) => each.known).map(({ least }) => least);
+    const [worst, best] = [Math.min(...known), Math.max(...known)];
+    found.forEach(({ misses, least, known: is }, n) => {
+      const own = varied.slice(0, MOST_VALUES).map((at) => `${number(cases[n][at] / told.inputs[at].scale)} ${data.units[at]}`.trim());
+      const verdict = data.status[n] > 0 ? "✗ fails" : !is ? "" : misses.length ? `✗ misses ${misses[0]}${misses.length > 1 ? ` and ${misses.length - 1} more` : ""}` : "✓";
+      const rank = !is || worst === best ? "" : least === best ? "(best)" : least === worst ? "(worst)" : "";
+      chosen.options[n + 1].textContent = [`#${data.positions[n]}`, own.length ? `${own.join(", ")}${varied.length > own.length ? ", …" : ""}` : "", verdict, rank].filter(Boolean).join("  ");
+    });
+  }
 
   const same = (a, b) => a.every((value, n) => Object.is(value, b[n]));
   const position = () => cases.findIndex((each) => same(each, values));  // among the cases; -1 between them
@@ -65,19 +96,22 @@ MET.simulate = (data, back, seen) => {
     const width = told.columns.length;
     lines = told.columns.map((_, c) => Array.from(time, (_t, row) => (row < rows ? found.rows[row * width + c] / data.columnScales[c] : null)));
     if (other) accompany();
-    draw();
     const which = position();
+    if (addressed && moved) address(which);
+    moved = true;
     chosen.value = which < 0 ? "" : which;
-    knobs.forEach(({ shown, input, n }) => { shown.textContent = `${number(values[n] / input.scale)} ${data.units[n]}`; });
-    const measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
-    tell(which, measured, failed, tick, took);
+    knobs.forEach((knob) => knob.put(false));
+    measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
+    traces.show(lines, pale, (m, requirement) => (Number.isNaN(measured[m]) ? null : { value: measured[m], met: judged(requirement, measured[m]) }));
+    tell(which, found.outputs, failed, tick, took);
     if (stage && rows) stage.show(taken(values, found.rows, rows), free ? (free.isOwn() ? "the deck's numbers" : "other numbers") : which < 0 ? `not in the ${source}` : `case #${data.positions[which]}`, { reactions: reactions(found.rows, rows), around: around(values, found.rows, rows) });
     if (stage) stage.haunt(others.filter((each) => each.n !== which));
   }
 
   // What stands beside the run, with the same numbers.
   function accompany() {
-    const { columns, solids } = other.at(values);
+    const { columns, solids, metrics } = other.at(values);
+    theirs = metrics;
     pale = columns.map((numbers, c) => Array.from(time, (_, row) => (numbers && !Number.isNaN(numbers[row]) ? numbers[row] / data.columnScales[c] : null)));
     if (stage) stage.accompany(solids, other.name);
   }
@@ -157,25 +191,27 @@ MET.simulate = (data, back, seen) => {
     return { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b }[comparison](value, limit);
   }
 
-  // One clock: the plots' cursors stand at the arm's time, and the arm at that of a plot that is pointed at.
+  // One clock: the plots' cursors stand at the arm's time, and the arm at that of a plot that is clicked at.
+  const traces = MET.traces.make(panels, data, time, { beside: Boolean(other), seek: (t) => stage && stage.seek(t), now: () => (stage ? stage.time() : null) });
+
   function point(at) {
-    plots.forEach((plot) => plot.setCursor({ left: plot.valToPos(at, "x"), top: plot.over.clientHeight / 2 }, false));
+    traces.point(at);
   }
 
-  const pointed = (plot) => { if (stage && plot.cursor.event && plot.cursor.idx !== null && plot.cursor.left >= 0) stage.seek(time[plot.cursor.idx], true); };
-
   // Whose numbers these are: the archive's, where every metric has the bits that stand there.
-  function tell(which, measured, failed, tick, took) {
-    const speed = `computed here in ${number(took)} ms, ${kernel.fused ? "with this machine's multiply-add" : "with the module's own multiply-add"}`;
+  function tell(which, outputs, failed, tick, took) {
+    const speed = `computed here in ${number(took)} ms`;
+    came.title = kernel.fused ? "with this machine's fused multiply-add, which rounds as the archive's does" : "with the module's own fused multiply-add";
+    const name = which < 0 ? "" : data.count > 1 ? `Case #${data.positions[which]}` : "The run";
     const awaited = which >= 0 && data.status[which] < 0;  // of a deck that is watched: `met` has yet to run it
     const wrong = which < 0 || data.status[which] !== 0 ? [] : told.metrics.filter((_, m) => !Object.is(measured[m], archived[m][which]));
     const bad = wrong.length > 0 || (which >= 0 && !awaited && failed !== (data.status[which] !== 0));
     let words = `Not in the ${source}: `;
-    if (free) words = "Another structure than the archive's, whose bits may differ in the last digits: ";
-    else if (awaited) words = `Case #${data.positions[which]}, before it is compared: `;
-    else if (bad) words = `Other numbers than the ${source} has for case #${data.positions[which]}${wrong.length ? ` (${wrong.map((metric) => metric.name).join(", ")})` : ""}: `;
-    else if (which >= 0 && failed) words = `Case #${data.positions[which]} fails, as in the ${source}: `;
-    else if (which >= 0) words = measured.length ? `Case #${data.positions[which]}, with the ${source}'s bits in ${measured.length === 1 ? "its metric" : `all ${measured.length} metrics`}: ` : `Case #${data.positions[which]}; it has no metric to compare: `;
+    if (free) words = "By another program than the archive's, so that last digits may differ: ";
+    else if (awaited) words = `${name}, before it is compared: `;
+    else if (bad) words = `Other numbers than the ${source} has for ${name[0].toLowerCase()}${name.slice(1)}${wrong.length ? ` (${wrong.map((metric) => metric.name).join(", ")})` : ""}: `;
+    else if (which >= 0 && failed) words = `${name} fails, as in the ${source}: `;
+    else if (which >= 0) words = measured.length ? `${name}, with the ${source}'s bits in ${measured.length === 1 ? "its metric" : `all ${measured.length} metrics`}: ` : `${name}; it has no metric to compare: `;
     const end = failed ? `; it fails at ${number(tick / told.kernel.base_hz)} s` : "";
     came.classList.toggle("bad", bad);
     came.textContent = `${words}${speed}${end}.`;
@@ -186,69 +222,50 @@ MET.simulate = (data, back, seen) => {
       const verdicts = told.requirements.filter((each) => each.metric === metric.name).map((each) => {
         if (unknown) return node("div", null, `${each.text}: not known`);
         const met = judged(each, given[m]);
-        return node("div", { class: met ? "met" : "missed" }, `${each.text}: ${met ? "met" : "missed"}`);
+        return node("div", { class: met ? "met" : "missed" }, `${each.text}: ${met ? "met" : `missed${why(each, metric, m, given[m], outputs)}`}`);
       });
       const value = given[m] === null ? "not computed here" : `${number(given[m] / data.metricScales[m])} ${data.metricUnits[m]}`.trim();
+      const compared = theirs ? beside(metric.name, m, given[m]) : [];
       const whose = given[m] === null || m < measured.length ? "" : `, from the ${source}`;
-      return node("tr", null, node("td", null, node("code", null, metric.name)), node("td", null, value + whose), node("td", null, verdicts));
+      return node("tr", null, node("td", null, node("code", null, metric.name)), node("td", null, value + whose), compared, node("td", { class: "about" }, data.metricAbout[m]), node("td", null, verdicts));
     }));
   }
 
-  // A plot a signal, of unlike units one a unit: the columns of each.
-  const plotted = (n) => `${told.columns[n].signal}\n${data.columnUnits[n]}`;
-  const signals = [...new Set(told.columns.map((_, n) => plotted(n)))].map((which) => told.columns.flatMap((_, n) => (plotted(n) === which ? [n] : [])));
-  const drawn = (columns) => [time, ...(other ? columns.map((n) => pale[n]) : []), ...columns.map((n) => lines[n])];
-
-  function draw() {
-    if (plots.length) plots.forEach((plot, n) => plot.setData(drawn(signals[n])));
-    else make();
+  // A metric of what stands beside the run, with the same numbers, and how far it is from this one.
+  function beside(name, m, ours) {
+    const value = theirs[name] ?? NaN;
+    const change = ours === null ? NaN : value === ours ? 0 : value - ours;
+    const text = (found, words) => (Number.isNaN(found) ? "–" : `${words(found / data.metricScales[m])} ${data.metricUnits[m]}`.trim());
+    return [[other.name, text(value, number)], [`${other.name} − this`, text(change, MET.signed)]].map(([head, words]) => node("td", { "data-head": head }, words));
   }
 
-  function make() {
-    const colours = palette();
-    plots.forEach((plot) => plot.destroy());
-    panels.replaceChildren();
-    const font = "12px " + getComputedStyle(document.body).fontFamily;
-    const axis = { stroke: colours.muted, font, grid: { stroke: colours.line, width: 1 }, ticks: { stroke: colours.faint, width: 1, size: 4 } };
-    plots = signals.map((columns) => {
-      const { signal } = told.columns[columns[0]];
-      const joints = data.arm.scene ? data.arm.scene.joints.map((joint) => `${joint}.${signal}`) : [];
-      const inks = columns.map((n, nth) => {  // a joint's is that of the arm's joint
-        const joint = joints.indexOf(told.columns[n].channel);
-        return colours.lines[(joint < 0 ? nth : joint) % colours.lines.length];
-      });
-      const frame = node("div", { class: "frame", role: "img", "aria-label": `${signal} against time` });
-      const names = columns.map((n, nth) => {
-        const { channel } = told.columns[n];
-        const name = node("span", null, `— ${channel.endsWith(`.${signal}`) ? channel.slice(0, -signal.length - 1) : channel}`);
-        name.style.color = inks[nth];
-        return name;
-      });
-      panels.append(node("div", { class: "panel" }, node("div", { class: "head" }, node("b", null, node("code", null, signal), data.columnUnits[columns[0]] ? ` (${data.columnUnits[columns[0]]})` : ""),
-        node("div", { class: "reading" }, names)), frame));
-      return new uPlot({ width: MET.width(frame), height: 190, padding: [8, 14, 0, 0], legend: { show: false },
-        scales: { x: { time: false } }, cursor: { y: false, sync: { key: "time" } }, hooks: { setCursor: [pointed] },
-        series: [{}, ...(other ? columns.map((_, nth) => ({ stroke: `${inks[nth]}55`, width: 6, points: { show: false }, spanGaps: false })) : []), ...columns.map((_, nth) => ({ stroke: inks[nth], width: 1.6, points: { show: false }, spanGaps: false }))],
-        axes: [{ ...axis, size: 26, values: (self, v) => ticks(v) }, { ...axis, size: 62, space: 32, values: (self, v) => ticks(v) }],
-      }, drawn(columns), frame);
-    });
-    if (stage) requestAnimationFrame(() => point(stage.time()));
+  // By how much a requirement is missed, when, and at which limit of a machine.
+  function why({ limit }, metric, m, value, outputs) {
+    const far = Math.abs(value - limit) / data.metricScales[m];
+    const when = m < measured.length ? traces.when(m, value) : null;
+    const extreme = told.kernel.outputs.indexOf(`extreme:${metric.name}:at_limit`);
+    const reached = extreme < 0 ? undefined : (data.atLimits[metric.name] ?? [])[outputs[extreme] - 1];
+    return [far > 0 && Number.isFinite(far) ? ` by ${number(far)} ${data.metricUnits[m]}`.trimEnd() : "",
+      when === null ? "" : `, at ${number(when)} s`, reached ? `, while ${reached} was reached` : ""].join("");
   }
 
+  const heads = other && other.hasMetrics ? [node("thead", null, node("tr", null, ["", "this", other.name, `${other.name} − this`, "", ""].map((head) => node("th", null, head))))] : [];
   main.replaceChildren(room,
     ...(back || data.numbers ? [node("p", null, node("label", null, node("input", { type: "checkbox", class: "other-numbers", checked: Boolean(back), change: () => leave() }), " other numbers"))] : []),
     ...(free ? [node("div", { class: "knobs" }, free.box)] : []),
     ...(cases.length > 1 ? [node("div", { class: "knobs" }, node("label", { class: "knob" }, "Case", chosen, node("output", null, `of ${data.count}`)), knobs.map((knob) => knob.box))] : []),
-    came, ...(other ? [node("p", { class: "note" }, "Beside it, wide and pale: ", node("b", null, other.name), `, ${other.note}.`)] : []), node("table", { class: "answers" }, answers), panels);
+    came, ...(other ? [node("p", { class: "note" }, "Beside it, wide and pale: ", node("b", null, other.name), `, ${other.note}.`)] : []), node("table", { class: heads.length ? "answers against" : "answers" }, heads, answers),
+    ...(data.report ? [node("p", { class: "note" }, "All cases in one page, which miss and why, as points and maps: ", node("code", null, data.report))] : []), panels);
   if (data.head) entitle(data.head);
   knobs.forEach((knob) => knob.put());
+  list();
   update();
   if (stage && seen) stage.resume(seen);
   if (stage && cases.length > 1) requestAnimationFrame(() => setTimeout(haunt));
   else document.documentElement.dataset.haunted = "yes";
   MET.shown = stage;
   // For who puts a page in the place of another, or has numbers later: batch/watching/assets/kept.js.
-  MET.page = { data, inputs: () => told.inputs, values: () => values, position, plots: () => plots, put: place, arrive };
+  MET.page = { data, inputs: () => told.inputs, values: () => values, position, plots: traces.plots, put: place, arrive };
 
   function place(given) {
     values = given;
@@ -259,15 +276,16 @@ MET.simulate = (data, back, seen) => {
   function arrive(found) {
     Object.assign(data, found);
     archived = data.metrics.map((text) => new Float64Array(bytes(text).buffer));
+    list();
     update();
     if (stage && told.not_computed.length && cases.length > 1) haunt();
   }
   const ending = new AbortController();
   function leave() {
     turn++;
+    clearTimeout(noted);
     ending.abort();
-    plots.forEach((plot) => plot.destroy());
-    plots = [];
+    traces.close();
     data.stood = values;
     const from = stage && stage.kept();
     if (stage) stage.close();
@@ -278,8 +296,8 @@ MET.simulate = (data, back, seen) => {
     document.title = name;
     [[".kicker", kicker], ["h1", name], [".lede", lede]].forEach(([which, text]) => { document.querySelector(`header ${which}`).textContent = text; });
   }
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", make, { signal: ending.signal });
-  addEventListener("resize", make, { signal: ending.signal });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", traces.draw, { signal: ending.signal });
+  addEventListener("resize", traces.draw, { signal: ending.signal });
 };
 
 MET.simulate(MET_PAGE, null, null);

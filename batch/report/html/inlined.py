@@ -19,6 +19,7 @@ SCRIPTS = (
     "overview.js",
     "cells.js",
     "map.js",
+    "timeline.js",
     "signals.js",
     "stability.js",
 )

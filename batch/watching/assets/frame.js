@@ -43,7 +43,26 @@
   function say(text) {
     if (told === text) return;
     told = text;
-    words.replaceChildren(...text.split("\n").map((line) => (ofDeck.test(line) ? make("span", { className: "of-deck" }, line) : `${line}\n`)));
+    const parts = [];  // lines of a file that follow one another, which scroll together; and other lines
+    text.split("\n").forEach((line) => {
+      const last = parts[parts.length - 1];
+      if (!ofDeck.test(line)) parts.push(`${line}\n`);
+      else if (Array.isArray(last)) last.push(line);
+      else parts.push([line]);
+    });
+    words.replaceChildren(...parts.map((part) => (Array.isArray(part) ? make("span", { className: "of-deck", tabIndex: 0 }, part.join("\n")) : part)));
+    reach();
+  }
+
+  // The mark under a line comes into sight, also where the line is longer than its place.
+  function reach() {
+    requestAnimationFrame(() => words.querySelectorAll(".of-deck").forEach((part) => {
+      const lines = part.textContent.split("\n");
+      const column = Math.max(...lines.map((line) => line.search(/\^/)));
+      const longest = Math.max(...lines.map((line) => line.length));
+      const mark = (column / longest) * part.scrollWidth;
+      if (column >= 0 && mark > 0.8 * part.clientWidth) part.scrollLeft = mark - part.clientWidth / 2;
+    }));
   }
 
   function tell() {

@@ -61,6 +61,7 @@ def flat() -> Iterator[Chromium]:
 def opened(chromium: Chromium, path: Path, **words: object) -> Page:
     page = chromium.open(path, **words)  # type: ignore[arg-type]
     page.run(GATHERED)
+    page.run("document.querySelectorAll('.triad').forEach(e => { e.style.visibility = 'hidden'; })")  # it has colours
     page.settle()
     return page
 
@@ -137,7 +138,7 @@ def test_keys_and_mouse_turn_the_view_and_ghosts_and_frames_come_and_go(
         new = becomes(page, tmp_path, lambda shown, old=old: changed(old, shown) > 0.0005)  # type: ignore[misc]
         assert changed(old, new) > 0.0005, key
     page.run("MET.shown.haunt([])")  # nobody is told of no other cases
-    assert page.run("document.querySelector('.stage .tools').innerText.split(/\\s+/)") == ["frames", "fit"]
+    assert page.run("document.querySelector('.stage .tools').innerText.split(/\\s+/)") == ["frames", "fit", "?"]
     page.close()
 
 
@@ -147,6 +148,10 @@ def test_arm_and_signals_have_one_clock(webgl: Chromium, pages: Path, tmp_path: 
     start = pixels(page, tmp_path)
     left, top, width, height = page.box(".panel .u-over")
     page.mouse("mouseMoved", left + 0.75 * width, top + 0.5 * height)
+    page.settle()
+    read = "document.querySelector('.panel .instant').textContent"
+    assert page.run("MET.shown.time()") == 0.0 and page.run(read).startswith("t = 1.")  # it is read there alone
+    page.click(left + 0.75 * width, top + 0.5 * height)
     page.settle()
     assert page.run("MET.shown.time()") == pytest.approx(1.5, abs=0.05)
     assert changed(start, pixels(page, tmp_path)) > 0.001
@@ -158,6 +163,47 @@ def test_arm_and_signals_have_one_clock(webgl: Chromium, pages: Path, tmp_path: 
     page.run("document.querySelector('.stage .play').click()")
     page.run("new Promise(d => { const f = () => MET.shown.time() > 0.55 ? d() : setTimeout(f, 20); f(); })")
     assert page.run("MET.shown.isPlaying()") == (page.run("MET.shown.time()") < 2.0)
+    quiet(page)
+    page.close()
+
+
+@pytest.mark.browser
+def test_the_worlds_axes_stand_in_the_corner_and_turn_with_the_view(webgl: Chromium, pages: Path) -> None:
+    page = opened(webgl, pages / "tuned.view.html")
+    letters = """[...document.querySelectorAll('.triad span')].map(e =>
+        [e.textContent, parseFloat(e.style.left), parseFloat(e.style.top)])"""
+    before = {name: (x, y) for name, x, y in page.run(letters)}
+    assert list(before) == ["x", "y", "z"]  # this deck has no gravity
+    assert before["z"][1] < 38 and before["z"][0] == pytest.approx(38, abs=0.1)  # up
+    right = page.run("MET.shown.camera.axes().right")
+    assert before["x"][0] == pytest.approx(38 + 32 * right[0], abs=0.1)
+    page.run("MET.shown.camera.orbit(0.8, 0); MET.shown.redraw()")
+    page.settle()
+    after = {name: (x, y) for name, x, y in page.run(letters)}
+    assert after["x"] != before["x"] and after["z"] == before["z"]
+    quiet(page)
+    page.close()
+
+
+@pytest.mark.browser
+def test_keys_are_listed_behind_a_question_mark_and_no_switch_is_cut_off(webgl: Chromium, pages: Path) -> None:
+    page = opened(webgl, pages / "tuned.view.html", width=400)
+    page.run("MET.shown.accompany(() => [], 'an_archive_of_a_rather_long_name.h5')")
+    page.settle()
+    boxes = page.run("""[...document.querySelectorAll('.stage .tools .chip:not([hidden])')].map(e => {
+        const b = e.getBoundingClientRect();
+        return [b.left, b.top, b.right, b.bottom, e.scrollWidth - e.clientWidth]; })""")
+    assert len(boxes) == 5 and all(left >= 0 and right <= 400 and not cut for left, _, right, _, cut in boxes)
+    for n, (left, top, right, bottom, _) in enumerate(boxes):
+        for other in boxes[n + 1 :]:
+            assert other[0] >= right or other[2] <= left or other[1] >= bottom or other[3] <= top
+    shown = "getComputedStyle(document.querySelector('.stage .keys')).display"
+    assert page.run(shown) == "none"
+    page.run("document.querySelector('.stage .view').focus()")
+    page.key("?")
+    assert page.run(shown) == "grid" and "joint forces" in page.run("document.querySelector('.stage .keys').innerText")
+    page.key("?")
+    assert page.run(shown) == "none"
     quiet(page)
     page.close()
 
@@ -180,7 +226,7 @@ def test_a_slider_moves_the_solid_arm_and_leaves_the_view_where_it_was(
     page = opened(webgl, pages / "tuned.view.html")
     before, camera = pixels(page, tmp_path), "JSON.stringify(MET.shown.camera)"
     where = page.run(camera)
-    page.run("""(() => { const e = document.querySelectorAll('.knob input')[1]; e.value = 0.6;
+    page.run("""(() => { const e = document.querySelectorAll('.knob input[type=range]')[1]; e.value = 0.6;
         e.dispatchEvent(new Event('input')); })()""")
     assert page.run("document.querySelector('.stage .told').textContent") == "not in the archive"
     assert page.run("MET.shown.ghosts()") == 4

@@ -135,7 +135,18 @@ def test_another_archives_run_stands_beside_with_its_bits(chromium: Chromium, fo
                 expected = data["q"].values[case][:, data["joint"].values.tolist().index(joint)] / scale
                 assert values == expected.tolist()
                 compared += len(values)
+            for row in page.run(
+                "[...document.querySelectorAll('.answers tbody tr')].map(e => [...e.cells].map(c => c.innerText))"
+            ):
+                ours, theirs, change = (float(cell.split()[0].replace("−", "-")) for cell in row[1:4])
+                assert theirs == pytest.approx(float(data[row[0].strip()][case]), rel=1e-3)
+                assert change == pytest.approx(theirs - ours, abs=2e-3 * abs(theirs))
     assert compared > 100
+    assert page.run("[...document.querySelectorAll('.answers th')].map(e => e.innerText.trim())")[1:4] == [
+        "this",
+        "b.h5",
+        "b.h5 − this",
+    ]
     assert "b.h5, the same numbers, computed here by the code" in page.run("document.querySelector('main').innerText")
     page.run("MET.shown.seek(1)")
     before = pixels(page, tmp_path)

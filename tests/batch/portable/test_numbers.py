@@ -309,14 +309,14 @@ def test_a_number_is_dragged_and_typed_in_the_decks_unit_and_turns_the_verdict(
 ) -> None:
     page = chromium.open(folder / "it.view.html")
     page.settle()
-    assert page.run(SAID).startswith("Case #0, with the archive's bits")
+    assert page.run(SAID).startswith("The run, with the archive's bits")
     page.run(SWITCH)
-    assert page.run(SAID).startswith("Another structure than the archive's, whose bits may differ in the last digits: ")
+    assert page.run(SAID).startswith("By another program than the archive's, so that last digits may differ: ")
     page.run(f"{PICK}('initial.turn.q')")
     assert page.run("document.querySelector('.typed').innerText").strip() == "deg"
     assert page.run("document.querySelector('.typed input').value") == "-20"
     said = {value: page.run(f"{TYPE}('{value}')").split(": ")[-1] for value in ("-20.5", "-22")}
-    assert said == {"-20.5": "met", "-22": "missed"}
+    assert said == {"-20.5": "met", "-22": "missed by 1 deg, at 0 s"}
     assert page.run(f"{AT}('initial.turn.q')") == -parse_unit("deg").to_si(22.0, "22")
     assert page.run(f"{DRAG}(0.25)") == "-30" and page.run(f"{DRAG}(0.503)") == "-20"  # near the deck's, which it takes
     assert page.run("document.querySelector('.told').textContent") == "the deck's numbers"

@@ -92,7 +92,7 @@ def chromium() -> Iterator[Chromium]:
 SAID = "document.querySelector('.came').textContent"
 CHOOSE = """(n => { const e = document.querySelector('.knob select'); e.value = n; e.dispatchEvent(new Event('change'));
     return document.querySelector('.came').textContent; })"""
-MOVE = """((n, at) => { const e = document.querySelectorAll('.knob input')[n]; e.value = at;
+MOVE = """((n, at) => { const e = document.querySelectorAll('.knob input[type=range]')[n]; e.value = at;
     e.dispatchEvent(new Event('input')); return document.querySelector('.came').textContent; })"""
 
 
@@ -149,9 +149,77 @@ def test_a_slider_runs_the_case_again_and_turns_the_verdict(chromium: Chromium, 
     page.settle()
     assert page.picture(sent / "after.png").read_bytes() != before
     assert page.run(f"{MOVE}(0, 0.995)").startswith("Case #4, with the archive's bits")  # near what the archive has
-    assert page.run("document.querySelectorAll('.knob output')[2].textContent") == "45000 g"
+    typed = "document.querySelectorAll('.knob .typed')[{0}]"
+    assert page.run(f"{typed.format(1)}.querySelector('input').value") == "45000"
+    assert page.run(f"{typed.format(1)}.innerText").strip() == "g"
+    give = """((text) => { const e = document.querySelector('.knob .typed input'); e.value = text;
+        e.dispatchEvent(new Event('change'));  return document.querySelector('[role=alert]').textContent; })"""
+    assert page.run(f"{give}('0.01')") == "" and page.run(SAID).startswith("Case #2, with the archive's bits")
+    assert page.run(f"{give}('0.012')") == "" and page.run("MET.page.values()[0]") == pytest.approx(0.012, rel=1e-12)
+    assert page.run(f"{give}('0.021')") == (
+        "0.021 V·s/rad is beyond what the sweep has: from 0.005 V·s/rad to 0.02 V·s/rad"
+    )
+    assert page.run(f"{give}('much')") == "much is no number" and page.run("MET.page.values()[0]") != 0.021
+    page.run(f"{CHOOSE}(0)")
+    page.run("document.querySelector('.knob input[type=range]').focus()")
+    seen = []
+    for _ in range(3):  # each press is seen, also at a case, which holds the slider when it is dragged
+        page.key("ArrowRight")
+        seen.append(page.run("MET.page.values()[0]"))
+    assert 0.005 < seen[0] < seen[1] < seen[2]
     quiet(page)
     page.close()
+
+
+@pytest.mark.browser
+def test_the_list_of_cases_says_values_misses_the_best_and_the_worst(chromium: Chromium, sent: Path) -> None:
+    page = chromium.open(sent / "tuned.view.html")
+    page.settle()
+    with xarray.open_dataset(sent / "tuned.h5") as data:
+        volts = data["volts"].values
+        names = [
+            f"#{n} {kp:g} V·s/rad, {1000 * mass:g} g"
+            for n, (kp, mass) in enumerate(zip(data["gearbox.kp"].values, data["links.upper.mass"].values, strict=True))
+        ]
+    words = ["misses volts < 3.55 V" if value >= 3.55 else "" for value in volts]
+    ranks = {int(volts.argmin()): " (best)", int(volts.argmax()): " (worst)"}
+    assert 0 < sum(map(bool, words)) < len(words)
+    expected = [
+        f"{name} {f'✗ {word}' if word else '✓'}{ranks.get(n, '')}"
+        for n, (name, word) in enumerate(zip(names, words, strict=True))
+    ]
+    options = page.run("[...document.querySelectorAll('.knob option')].map(e => e.textContent.replace(/\\s+/g, ' '))")
+    assert options[1:] == expected
+    assert "met report tuned.h5" in page.run("document.querySelector('main').innerText")
+    page.close()
+
+
+@pytest.mark.browser
+def test_the_address_keeps_the_case_and_the_sliders(chromium: Chromium, sent: Path) -> None:
+    page = chromium.open(sent / "tuned.view.html")
+    page.settle()
+    wait = "new Promise(done => setTimeout(() => done(location.hash), 500))"
+    assert page.run(wait) == ""
+    page.run(f"{CHOOSE}(3)")
+    assert page.run(wait) == "#case=3"
+    page.run(f"{MOVE}(0, 0.5)")
+    between, values = page.run(wait), page.run("MET.page.values()")
+    assert between == f"#at={','.join(map(str, values))}".replace(".0,", ",").removesuffix(".0")
+    page.close()
+    start = (sent / "tuned.view.html").resolve().as_uri()
+    for hash_, expected in (
+        ("#case=3", "cases.inputs[3]"),
+        (between, json.dumps(values)),
+        ("#case=99", "cases.inputs[0]"),
+        ("#at=1e300,1", "cases.inputs[0]"),
+        ("#at=<b>", "cases.inputs[0]"),
+    ):
+        page = chromium.open(start + hash_)
+        page.settle()
+        wanted = page.run(f"(({{ cases }}) => {expected})(MET_PAGE.description)")
+        assert page.run("MET.page.values()") == wanted, hash_
+        quiet(page)
+        page.close()
 
 
 @pytest.mark.browser
@@ -195,13 +263,14 @@ def test_a_margin_is_shown_as_the_archive_has_it_and_is_not_known_elsewhere(chro
     row = "document.querySelector('.answers tr:last-child').innerText"
     for case, verdict in enumerate(("met", "missed")):
         page.run(f"{CHOOSE}({case})")
-        name, value, told = page.run(row).split("\t")
+        name, value, about, told = page.run(row).split("\t")
         assert name.strip() == "loop_gain_margin" and value.strip().endswith(", from the archive")
         assert float(value.partition(",")[0]) == pytest.approx(margins[case], rel=1e-3)
-        assert told.strip() == f"gain_margin(loop) > 20: {verdict}"
+        assert about.strip() == "gain_margin of loop"
+        assert told.strip().startswith(f"gain_margin(loop) > 20: {verdict}")
     assert page.run(f"{MOVE}(0, 0.5)").startswith("Not in the archive: ")
     assert [cell.strip() for cell in page.run(row).split("\t")] == [
-        "loop_gain_margin", "not computed here", "gain_margin(loop) > 20: not known",
+        "loop_gain_margin", "not computed here", "gain_margin of loop", "gain_margin(loop) > 20: not known",
     ]  # fmt: skip
     quiet(page)
     page.close()
@@ -280,7 +349,11 @@ def test_numbers_are_in_the_decks_units_and_a_signal_of_two_has_two_plots(chromi
     assert [unit for _, unit in cells] == ["cm", "deg"]
     assert [float(value) for value, _ in cells] == pytest.approx(metrics, rel=1e-3)
     heads = page.run("Array.from(document.querySelectorAll('.panel .head'), e => e.innerText.replace(/\\s+/g, ' '))")
-    assert heads == ["q (cm) — slide", "q (deg) — turn"]
+    assert heads == ["q (cm) joint position t = 0 s", "q (deg) joint position t = 0 s"]
+    assert page.run("[...document.querySelectorAll('.lines')].map(e => e.innerText.replace(/\\s+/g, ' ').trim())") == [
+        "slide 0",
+        "turn -20",
+    ]
     lines = [panel[0] for panel in page.run(PLOTTED)]
     assert lines[0] == pytest.approx((100.0 * slide).tolist(), rel=1e-12)
     assert lines[1] == pytest.approx(np.degrees(turn).tolist(), rel=1e-12)

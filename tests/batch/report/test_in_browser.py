@@ -116,6 +116,21 @@ def test_a_case_is_chosen_by_a_click_and_its_signals_are_shown(page: Page) -> No
     quiet(page)
 
 
+def test_a_case_of_the_verdict_leads_to_where_it_is_shown_and_is_marked(page: Page) -> None:
+    buttons = "[...document.querySelectorAll('#verdict button[data-case]')]"
+    case = page.run(f"{buttons}[0].dataset.case")
+    page.run(f"scrollTo(0, 0); {buttons}[0].click()")
+    page.run("new Promise(done => setTimeout(done, 1500))")  # it scrolls smoothly
+    assert page.run("MET.models[0].chosen") == int(case) and page.run("scrollY") > 0
+    place = (
+        "[...document.querySelectorAll('[data-plot]')].map(e => e.getBoundingClientRect()).find(b => b.top >= -2).top"
+    )
+    assert page.run(place) < 450  # of a window of 900
+    pressed = page.run(f"{buttons}.map(e => [e.dataset.case, e.getAttribute('aria-pressed')])")
+    assert pressed and all((each == case) == (mark == "true") for each, mark in pressed)
+    quiet(page)
+
+
 def test_a_drag_over_points_zooms_and_chooses_none(page: Page) -> None:
     left, top, width, height = page.box(".points .u-over")
     page.drag([(left + 100, top + 40), (left + 300, top + 100), (left + 0.7 * width, top + height - 30)])

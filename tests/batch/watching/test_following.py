@@ -138,9 +138,6 @@ def test_of_several_runs_one_is_chosen_on_the_page_or_named(tmp_path: Path) -> N
         assert view.whole(page=4)["group"] == "ways.rk4"  # it stays chosen
     with viewing(deck, "tuned", *WATCHED) as view:
         assert view.whole(page=1)["run"] == "tuned"
-    with viewing(deck, "tund", *WATCHED) as view:
-        state = view.until(broken=True, doing="")
-        assert state["messages"].startswith("error[D164]: no run or sweep `tund` in this deck\n = help: did you mean")
 
 
 def test_what_is_set_on_the_command_line_counts_each_time(tmp_path: Path) -> None:
@@ -188,6 +185,19 @@ def test_cases_that_fail_are_told_with_their_cause(tmp_path: Path) -> None:
 
 
 SEARCH = DECK + "search hardest of brief { gearbox.kp = between(0.005, 0.02) V*s/rad; maximise volts; at_most = 20; }\n"
+
+
+def test_what_met_check_says_at_the_start_stands_in_the_terminal_too(tmp_path: Path) -> None:
+    deck = write_deck(tmp_path, DECK.replace("volts < 3.55 V", "vols < 3.55 V"))
+    with viewing("deck.ic", "brief", cwd=tmp_path) as view:
+        view.until(broken=True, doing="")
+        replace(deck, "vols <", "volts <")  # it is watched on
+        view.until(page=1, broken=False)
+        view.process.terminate()
+        _, err = view.process.communicate(timeout=60)
+    found = err.partition("\n")[2]
+    (tmp_path / "deck.ic").write_text(DECK.replace("volts < 3.55 V", "vols < 3.55 V"))
+    assert found.startswith("error[D") and "deck.ic:6:13" in found and found.count("error[") == 1
 
 
 def test_of_a_search_it_is_said_that_its_cases_are_not_known_yet(tmp_path: Path) -> None:
@@ -384,7 +394,14 @@ def test_what_is_no_deck_is_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     write_deck(tmp_path)
+    (tmp_path / "page.html").write_text("<p>\n")
+    (tmp_path / "empty.txt").write_text("")
+    read_as = "is read as a deck: its name does not end like an archive's (.h5, .hdf5, .nc)\n\n1 error\n"
+    write = " = help: write `run NAME { ... }`"
     for words, said in (
+        (["deck.ic", "brif"], "error[D164]: no run or sweep `brif` in this deck\n = help: did you mean `brief`?\n"),
+        (["page.html"], f" = help: page.html {read_as}"),
+        (["empty.txt"], f"error[D161]: this deck has no run\n{write}\n = help: empty.txt {read_as}"),
         (["dek.ic"], "error[D173]: no deck `dek.ic`\n = help: did you mean `deck.ic`?\n"),
         (["plan.json"], "`plan.json` is a plan: `met run plan.json` runs it, and `met view` takes the archive\n"),
         (["deck.ic", "-o", "a.html"], "-o is for archives: the page of the deck `deck.ic` is served; "),

@@ -66,8 +66,8 @@ def test_a_save_changes_the_run_and_leaves_the_view_where_it_was(chromium: Chrom
         left, top, wide, _ = page.box("iframe")
         middle = (left + wide / 2, top + 420)
         page.drag([middle, (middle[0] + 60, middle[1] + 25)])  # the view is turned
-        page.run(f"{RUN}.document.querySelector('.knob input').value = 0.4")
-        page.run(f"{RUN}.document.querySelector('.knob input').dispatchEvent(new Event('input'))")
+        page.run(f"{RUN}.document.querySelector('.knob input[type=range]').value = 0.4")
+        page.run(f"{RUN}.document.querySelector('.knob input[type=range]').dispatchEvent(new Event('input'))")
         chips = f"[...{RUN}.document.querySelectorAll('.stage .chip')]"
         page.run(f"{chips}.find((each) => each.textContent === 'frames').click()")
         page.run(f"{RUN}.scrollTo(0, 700)")
@@ -107,7 +107,7 @@ def test_the_chosen_case_stays_chosen_and_comes_with_the_bits_of_met_run(chromiu
         replace(deck, "0.02] V", "0.03] V")
         shown(page, 2)
         assert page.run(said).startswith("Case #4, with the sweep's bits in its metric: ")
-        assert page.run(f"{RUN}.document.querySelectorAll('.knob output')[1].textContent") == "0.03 V·s/rad"
+        assert page.run(f"{RUN}.document.querySelector('.knob .typed input').value") == "0.03"
         assert page.run(f"{RUN}.document.querySelector('.answers').innerText") != before
         silent(page, view)
         page.close()
@@ -150,8 +150,8 @@ def test_a_mistake_stands_beside_the_run_with_its_line_until_it_is_mended(chromi
         )
         assert aside[1] <= run[0] + 1 and run[1] == 1280 and run[2] < 60 and run[3] == 900
         assert page.run("document.querySelector('.doing').className") == "doing bad"
-        page.run(f"{RUN}.document.querySelectorAll('.knob input')[0].value = 1")
-        page.run(f"{RUN}.document.querySelectorAll('.knob input')[0].dispatchEvent(new Event('input'))")
+        page.run(f"{RUN}.document.querySelectorAll('.knob input[type=range]')[0].value = 1")
+        page.run(f"{RUN}.document.querySelectorAll('.knob input[type=range]')[0].dispatchEvent(new Event('input'))")
         assert page.run(f"{RUN}.document.querySelector('.came').textContent").startswith("Case #4, ")  # it goes on
         replace(deck, "gearbox.kq = [", "gearbox.kp = [")
         until(page, "document.querySelector('aside').hidden")
@@ -170,6 +170,28 @@ def test_on_a_narrow_screen_nothing_is_cut_off(chromium: Chromium, tmp_path: Pat
         assert page.run("document.documentElement.scrollWidth") <= 400
         assert page.run(f"{RUN}.document.documentElement.scrollWidth") <= 400
         assert page.run("document.querySelector('iframe').getBoundingClientRect().height") > 300
+        silent(page, view)
+        page.close()
+
+
+@pytest.mark.parametrize("width", [400, 1280])
+def test_the_mark_under_a_long_line_is_in_sight_and_the_line_scrolls_where_it_stands(
+    chromium: Chromium, tmp_path: Path, width: int
+) -> None:
+    deck = write_deck(tmp_path)
+    with viewing(deck, "-q") as view:
+        page = opened(chromium, view, width=width)
+        replace(deck, "    vary gearbox.kp = [", " " * 200 + "vary gearbox.kq = [")
+        until(page, "!document.querySelector('aside').hidden")
+        page.settle()
+        found = page.run("""[...document.querySelectorAll('.of-deck')].map(part => {
+            const range = document.createRange(), text = part.firstChild, at = text.data.indexOf('^');
+            range.setStart(text, at); range.setEnd(text, at + 1);
+            const [mark, box] = [range.getBoundingClientRect(), part.getBoundingClientRect()];
+            return [at, mark.left - box.left, box.right - mark.right, box.left, box.right]; })""")
+        assert len(found) == 1
+        at, left, right, *sides = found[0]
+        assert at > 0 and left >= 0 and right >= 0 and 0 <= sides[0] < sides[1] <= width
         silent(page, view)
         page.close()
 
@@ -228,8 +250,8 @@ def test_the_page_says_when_nothing_is_watched_any_more(chromium: Chromium, tmp_
         page = opened(chromium, view)
         view.process.kill()
         until(page, "document.querySelector('.doing').textContent.startsWith('met view has ended')")
-        page.run(f"{RUN}.document.querySelectorAll('.knob input')[0].value = 1")
-        page.run(f"{RUN}.document.querySelectorAll('.knob input')[0].dispatchEvent(new Event('input'))")
+        page.run(f"{RUN}.document.querySelectorAll('.knob input[type=range]')[0].value = 1")
+        page.run(f"{RUN}.document.querySelectorAll('.knob input[type=range]')[0].dispatchEvent(new Event('input'))")
         assert page.run(f"{RUN}.document.querySelector('.came').textContent").startswith("Case #4, ")
         page.close()
 
@@ -253,11 +275,11 @@ def test_a_margin_comes_with_the_cases_and_is_not_known_between_them(chromium: C
         for case, verdict in enumerate(("met", "missed")):
             page.run(f"{RUN}.document.querySelector('.knob select').value = {case}")
             page.run(f"{RUN}.document.querySelector('.knob select').dispatchEvent(new Event('change'))")
-            name, value, said = (cell.strip() for cell in page.run(row).split("\t"))
+            name, value, about, said = (cell.strip() for cell in page.run(row).split("\t"))
             assert name == "loop_gain_margin" and value.endswith(", from the sweep")
-            assert said == f"gain_margin(loop) > 20: {verdict}"
-        page.run(f"{RUN}.document.querySelector('.knob input').value = 0.5")
-        page.run(f"{RUN}.document.querySelector('.knob input').dispatchEvent(new Event('input'))")
+            assert about == "gain_margin of loop" and said.startswith(f"gain_margin(loop) > 20: {verdict}")
+        page.run(f"{RUN}.document.querySelector('.knob input[type=range]').value = 0.5")
+        page.run(f"{RUN}.document.querySelector('.knob input[type=range]').dispatchEvent(new Event('input'))")
         assert page.run(row).split("\t")[1].strip() == "not computed here"
         assert page.run(f"{RUN}.document.querySelector('.came-of li').textContent") == (
             "gain_margin(loop) > 20: 1 met, 1 missed"

@@ -4,6 +4,9 @@
 (() => {
   const models = [];
 
+  // The chosen case is marked wherever it can be chosen.
+  const mark = (place, chosen) => place.querySelectorAll("button[data-case]").forEach((button) => button.setAttribute("aria-pressed", String(button.dataset.case === String(chosen))));
+
   document.querySelectorAll("[data-section]").forEach((root) => {
     const number = root.dataset.section;
     const model = MET.model(JSON.parse(document.getElementById(`d${number}`).textContent));
@@ -20,6 +23,7 @@
     if (place("arm")) MET.posing.make(place("arm"), model);
     if (place("signals")) MET.signals.make(place("signals"), model);
     if (place("stability")) MET.stability.make(place("stability"), model);
+    model.watch((chosen) => mark(root, chosen));
     model.watch((chosen) => root.querySelectorAll("tr[data-case]").forEach((row) => row.classList.toggle("chosen", row.dataset.case === String(chosen))));
     root.addEventListener("click", (event) => {
       const pressed = event.target.closest("button[data-case]");
@@ -31,8 +35,12 @@
   document.querySelectorAll("#verdict .verdict").forEach((box, n) => {
     box.addEventListener("click", (event) => {
       const pressed = event.target.closest("button[data-case]");
-      if (pressed && models[n]) models[n].choose(+pressed.dataset.case);
+      if (!pressed || !models[n]) return;
+      models[n].choose(+pressed.dataset.case);
+      const seen = ["arm", "signals", "card"].map((name) => models[n].root.querySelector(`[data-plot="${name}"]`)).find((place) => place && place.offsetParent);
+      if (seen) seen.scrollIntoView({ block: "start", behavior: matchMedia("(prefers-reduced-motion: reduce)").matches ? "auto" : "smooth" });
     });
+    if (models[n]) models[n].watch((chosen) => mark(box, chosen));
   });
 
   document.addEventListener("click", async (event) => {

@@ -4,12 +4,11 @@
 "use strict";
 
 MET.signals = (() => {
-  const { node, number, palette, ticks, unpack } = MET;
-  const DASHES = [[], [7, 4], [2, 3], [10, 3, 2, 3]];
+  const { node, number, palette, unpack } = MET;
+  const { room, pale, swatch, DASHES } = MET.timeline;
   const MOST = DASHES.length;
   const READ = 8;
   const OFFERED = 25;  // cases of a structure that are offered by name, of all that can be run again
-  const CLOSEST = 1e-9;  // of all time, what is shown at least
   const [WIDE, WAS] = [1.6, 5];  // px, how wide a line is, and one of before
 
   function make(root, model) {
@@ -19,13 +18,13 @@ MET.signals = (() => {
     const { simulation } = model;
     const has = (case_) => histories.has(case_) || Boolean(simulation && simulation.has(case_));
     const lines = new Map();
-    const sync = uPlot.sync(`${model.id}-time`);
+    const timeline = MET.timeline.make(`${model.id}-time`);
     let shown = data.shown.filter(has).slice(0, MOST);
     const hidden = new Set();
     const compared = data.histories.some((each) => each.before.panels) || Boolean(simulation && simulation.structures.some((each) => each.before));
     const names = compared ? model.data.against : null;
     let how = names ? "both" : "now";
-    let [plots, range] = [[], null];
+    let plots = [];
     const caseChips = node("div", { class: "chips" });
     const jointChips = node("div", { class: "chips" });
     const legend = node("div", { class: "versions" });
@@ -115,7 +114,7 @@ MET.signals = (() => {
       chips();
       const filled = data.panels.map((panel, n) => [panel, series(panel, n)]).filter(([, found]) => found.length);
       plots = filled.map(([panel, found], n) => draws(panel, found, n === filled.length - 1));
-      if (range) zoom(range);
+      timeline.put(plots.map(({ u }) => u));
     }
 
     function draws(panel, found, last) {
@@ -130,29 +129,24 @@ MET.signals = (() => {
       roomFor(box, reading, found, MET.width(frame));
       frame.setAttribute("aria-label", `${change ? "change of " : ""}${panel.name}${unit} against time, cases ${shown.map((c) => `#${c}`).join(", ")}. Arrow keys move the reading, plus and minus zoom, Escape shows all.`);
       const flat = found.every((each) => each.points.every((v) => v === null || v === 0));
-      const font = "12px " + getComputedStyle(document.body).fontFamily;
-      const axis = { stroke: colours.muted, font, labelFont: font, labelSize: 18, labelGap: 2,
-        grid: { stroke: colours.line, width: 1 }, ticks: { stroke: colours.faint, width: 1, size: 4 } };
       const strong = (each) => (each.line.command ? colours.ink : colourOf(each.own ? each.line.joint : "", each.at, colours));
       const colour = (each) => (each.was ? pale(strong(each)) : strong(each));
       const u = new uPlot({
         width: MET.width(frame), height: (flat ? 90 : 178) + (last ? 18 : 0), padding: [8, 14, 0, 0], legend: { show: false },
-        cursor: { y: false, points: { size: 6 }, drag: { x: true, y: false }, focus: { prox: -1 },
-          sync: { key: sync.key, setSeries: false, filters: { pub: moves, sub: moves } } },
+        cursor: timeline.cursor,
         scales: { x: { time: false }, y: { range: (self, low, high) => (low === null ? [-1, 1] : room(low, high)) } },
         series: [{}, ...found.map((each) => ({
           stroke: colour(each), width: each.was ? WAS : WIDE, dash: each.line.command ? [3, 3] : DASHES[each.nth],
           points: { show: false }, spanGaps: false, pxAlign: 0,
         }))],
-        axes: [{ ...axis, label: last ? "time (s)" : null, size: 26, values: (self, v) => ticks(v) },
-          { ...axis, label: `${change ? "Δ " : ""}${panel.name.split(".").slice(-1)[0]}${unit}`, size: 62, space: 32, values: (self, v) => ticks(v), splits: flat ? () => [0] : undefined }],
+        axes: MET.timeline.axes(colours, `${change ? "Δ " : ""}${panel.name.split(".").slice(-1)[0]}${unit}`, last, flat ? () => [0] : undefined),
         hooks: {
           setCursor: [(self) => read(self, reading, found, colour)],
-          setScale: [(self, key) => { if (key === "x") follow(self); }],
+          setScale: [timeline.setScale],
           draw: [(self) => ends(self, found, colour)],
         },
       }, joined(found), frame);
-      frame.addEventListener("keydown", (event) => keys(event, u));
+      frame.addEventListener("keydown", (event) => timeline.keys(event, u));
       return { u, panel, frame };
     }
 
@@ -169,41 +163,6 @@ MET.signals = (() => {
       if (need <= wide - 320) return;
       box.classList.add("many");
       reading.style.height = `${1.35 * Math.ceil(need / wide)}rem`;
-    }
-
-    // A plot was zoomed: the others go with it.
-    function follow(self) {
-      if (!plots.some((plot) => plot.u === self)) return;
-      const { min, max } = self.scales.x;
-      const all = self.data[0];
-      range = min <= all[0] && max >= all[all.length - 1] ? null : [min, max];
-      zoom([min, max]);
-    }
-
-    function zoom([min, max]) {
-      plots.forEach(({ u }) => {
-        if (u.scales.x.min !== min || u.scales.x.max !== max) u.setScale("x", { min, max });
-      });
-    }
-
-    function keys(event, u) {
-      const { min, max } = u.scales.x;
-      const all = u.data[0];
-      const [first, last] = [all[0], all[all.length - 1]];
-      const held = u.cursor.idx ?? Math.floor(all.length / 2);
-      const middle = all[held] >= min && all[held] <= max ? all[held] : (min + max) / 2;
-      const to = (low, high) => {
-        if (high - low > CLOSEST * (last - first)) u.setScale("x", { min: Math.max(first, low), max: Math.min(last, high) });
-      };
-      if (event.key === "+" || event.key === "=") to(middle - (middle - min) / 2, middle + (max - middle) / 2);
-      else if (event.key === "-") to(middle - (middle - min) * 2, middle + (max - middle) * 2);
-      else if (event.key === "Escape") to(first, last);
-      else if (event.key === "ArrowRight" || event.key === "ArrowLeft") {
-        const step = Math.max(1, Math.round((max - min) / (last - first) * all.length / 100)) * (event.key === "ArrowLeft" ? -1 : 1);
-        const next = Math.min(Math.max(held + step, 0), all.length - 1);
-        u.setCursor({ left: u.valToPos(all[next], "x"), top: u.over.clientHeight / 2 });
-      } else return;
-      event.preventDefault();
     }
 
     // What stands at the pointer.
@@ -226,7 +185,7 @@ MET.signals = (() => {
     let pointing = false;
     model.point = (time) => {
       pointing = true;
-      plots.forEach(({ u }) => u.setCursor({ left: u.valToPos(time, "x"), top: u.over.clientHeight / 2 }, true, false));
+      timeline.point(time);
       pointing = false;
     };
 
@@ -308,21 +267,6 @@ MET.signals = (() => {
       if (wide !== u.width) u.setSize({ width: wide, height: u.height });
     })).observe(root);
     model.signalPlots = () => plots.map((plot) => plot.u);
-  }
-
-  function room(low, high) {
-    const span = MET.span(low, high);
-    return [low - 0.07 * span, high + 0.07 * span];
-  }
-
-  // Of what happens to the pointer, only that it moves is told to the other plots: zooms are handed on by `follow`.
-  const moves = (type) => type === "mousemove" || type === "mouseleave" || type === "mouseenter";
-
-  const pale = (colour) => (/^#[0-9a-f]{6}$/i.test(colour) ? `${colour}55` : colour);
-
-  function swatch(colour, dash, width = 2) {
-    return node("svg", { viewBox: "0 0 22 8", "aria-hidden": "true" }, node("line", { x1: 0, x2: 22, y1: 4, y2: 4, stroke: colour, "stroke-width": width,
-      "stroke-dasharray": dash.length ? dash.join(" ") : null }));
   }
 
   return { make };
