@@ -65,6 +65,11 @@ class SerialLine:
             self._port.set_low_latency_mode(True)
         self.warnings = latency(url) if local else ()
 
+    @property
+    def file(self) -> int | None:
+        """The number of its file, by which the system can wait for it; None where it has none."""
+        return self._file
+
     def now(self) -> float:
         return time.perf_counter()
 

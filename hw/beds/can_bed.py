@@ -1,4 +1,5 @@
-"""A bed of two drives on a CAN bus, `can:BENCH.toml`: one turns the motor under test, the other loads it.
+"""A bed of two drives on a CAN bus, or on a serial line each, `can:BENCH.toml`: one turns the motor under test, the
+other loads it.
 
 A drive has a current loop of its own, and is told a torque; or it closes the rate loop, too, and is told a rate. What a
 bed's driver is told, for one motor what the deck's bed model sends, and the current of the other, becomes here:
@@ -25,10 +26,11 @@ from hw.beds import can_deck, greeting
 from hw.beds.emulated import FINE, FINE_ANGLE, WIDE
 from hw.drives import DIALECTS, REFUSED
 from hw.drives.arming import begin_driving, forget, prove_watchdogs, switch_off
-from hw.drives.bench_file import TwoDrives
+from hw.drives.bench_file import SERIAL, TwoDrives
 from hw.drives.bus import open_bus
 from hw.drives.drive import ASKS, CanDrive, DriveReading, DriveState, Talk
 from hw.drives.frames import FAST, NOMINAL, CanFrame, CanLine, on_bus
+from hw.drives.odrive_lines import on_lines
 from hw.drives.side import Side, agree
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
@@ -165,6 +167,8 @@ class CanBed(BedDriver):
     def _on_bus(self) -> float:
         """Longest time that the frames of an exchange take on the bus, s."""
         bus = self._bench.bus
+        if bus["interface"] == SERIAL:
+            return on_lines(self._exchanged(), bus["baud"])
         speeds = float(bus.get("bitrate", NOMINAL)), float(bus.get("data_bitrate", FAST))
         return sum(on_bus(frame, *speeds) for frame in self._exchanged())
 
@@ -182,7 +186,8 @@ class CanBed(BedDriver):
 
     def _remarks(self) -> tuple[tuple[str, str], ...]:
         bus, cut = self._bench.bus, self._bench.shaft["filter"]
-        most = f"{len(self._exchanged())} frames an exchange, {1e3 * self._on_bus():.3g} ms on the bus at most"
+        each, where = ("lines", "there") if bus["interface"] == SERIAL else ("frames", "on the bus at most")
+        most = f"{len(self._exchanged())} {each} an exchange, {1e3 * self._on_bus():.3g} ms {where}"
         filter = f"{cut:g} Hz here, the deck's f_cut" if cut else "none here: the deck's f_cut is the drive's"
         sides = [(side.drive.entry.role, side.words) for side in self._sides]
         if loop := self._sides[0].facts.rate_loop:
@@ -518,7 +523,7 @@ def _opened_port(opening: Opening) -> CanBed:
 PORT = PortKind(
     scheme="can",
     address="BENCH.toml",
-    doc="Two drives on a CAN bus: ODrive, Damiao, moteus, CiA 402, RobStride; the file says which.",
+    doc="Two drives on a CAN bus (ODrive, Damiao, moteus, CiA 402, RobStride) or serial lines (ODrive): the file says.",
     open=_opened_port,
     check=can_deck.check_deck,
     lock_step=lambda name, requested: requested,

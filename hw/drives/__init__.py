@@ -1,4 +1,4 @@
-"""The host's side of drives on a CAN bus, one dialect a file.
+"""The host's side of drives on a CAN bus or on serial lines, one dialect a file.
 
 To add one: write its file with a `CanDrive` (hw/drives/drive.py), add that to `DIALECTS`, and write the drive's side
 of it in hw/players, which the tests of every dialect are derived from.
@@ -11,10 +11,12 @@ from hw.drives.damiao import DamiaoDrive
 from hw.drives.drive import CanDrive
 from hw.drives.moteus import MoteusDrive
 from hw.drives.odrive import OdriveDrive
+from hw.drives.odrive_ascii import OdriveAsciiDrive
 from hw.drives.robstride import RobstrideDrive
 
 DIALECTS: Mapping[str, type[CanDrive]] = {
-    each.dialect: each for each in (OdriveDrive, DamiaoDrive, MoteusDrive, Cia402Drive, RobstrideDrive)
+    each.dialect: each
+    for each in (OdriveDrive, DamiaoDrive, MoteusDrive, Cia402Drive, RobstrideDrive, OdriveAsciiDrive)
 }
 
 REFUSED: Mapping[str, Sequence[str]] = {

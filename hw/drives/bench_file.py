@@ -1,4 +1,5 @@
-"""The file of a bench of two drives on a CAN bus, in TOML: which bus, which two nodes, and what the shaft bears.
+"""The file of a bench of two drives, in TOML: which CAN bus and which two nodes, or which two serial lines, and what
+the shaft bears.
 
 A file is data of others: bounded, each key known, each figure a number with a unit of its kind.
 """
@@ -19,6 +20,9 @@ MOST_BYTES = 1 << 16
 
 FDCANUSB = "fdcanusb"
 """The `interface` that is none of python-can's."""
+
+SERIAL, ASCII = "serial", "odrive_ascii"
+"""The `interface` of drives on serial lines, one each, and the only dialect there is on them."""
 
 FASTEST = 8_000_000
 """Bits a second, more than which no bus of CAN-FD carries."""
@@ -51,8 +55,8 @@ FIGURES: Mapping[str, Mapping[str, tuple[str, float | None]]] = {
 _WORDS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "shaft": {},
     "supply": {},
-    "drive": {"dialect": (), "endpoints": (), "model": ()},
-    "load": {"dialect": (), "endpoints": (), "model": ()},
+    "drive": {"dialect": (), "endpoints": (), "model": (), "port": ()},
+    "load": {"dialect": (), "endpoints": (), "model": (), "port": ()},
 }
 _TABLES = ("bus", *FIGURES)
 
@@ -66,6 +70,7 @@ class DriveEntry:
     figures   those of `FIGURES`, SI
     endpoints  path of the file that says where an ODrive's properties are; "" where none is given
     model      of the drive, by which a RobStride's frames mean what they mean; "" where none is given
+    port       its serial line; "" of one on a CAN bus
     """
 
     role: str
@@ -75,11 +80,13 @@ class DriveEntry:
     figures: Mapping[str, float]
     endpoints: str = ""
     model: str = ""
+    port: str = ""
 
 
 @frozen
 class TwoDrives:
-    """A bench of two drives on a bus. bus: what `can.Bus` is called with;  shaft, supply: of `FIGURES`, SI;
+    """A bench of two drives on a bus. bus: what `can.Bus` is called with, or what serial lines
+    are, with `ports` by node;  shaft, supply: of `FIGURES`, SI;
     filter_at, load_kt_at, dialect_at, torque_at: where the filter, None where there is none, the load's kt, the drive's
     dialect and its `torque_max` are written;  text: the file's
     """
@@ -122,7 +129,9 @@ class _BenchFile(TomlFile):
         for table in _TABLES:
             if table not in self.tables:
                 raise self.wrong(f"it has no table `[{table}]`", "docs/drives.md shows a whole bench file")
-        drive, load = self._drive("drive"), self._drive("load")
+        drive, load = self._drive("drive", 1), self._drive("load", 2)
+        if drive.port and drive.port == load.port:
+            raise self.wrong(f"drive and load are both on {load.port}", "each has a line of its own", "load", "port")
         if (drive.dialect, drive.node) == (load.dialect, load.node):
             raise self.wrong(
                 f"drive and load are both node {load.node}", "each has a number of its own", "load", "node"
@@ -132,7 +141,7 @@ class _BenchFile(TomlFile):
         load_kt_at, dialect_at = self.place("load", "kt"), self.place("drive", "dialect")
         return TwoDrives(
             name,
-            self._bus(),
+            self._bus() if not drive.port else self._lines(drive, load),
             shaft,
             supply,
             drive,
@@ -162,21 +171,52 @@ class _BenchFile(TomlFile):
                 raise self.wrong(f"`{key}` is no word and no number", "python-can's documentation has them", "bus", key)
         return dict(found)
 
-    def _drive(self, role: str) -> DriveEntry:
+    def _lines(self, drive: DriveEntry, load: DriveEntry) -> dict[str, Any]:
+        """`[bus]` of drives on serial lines, with their ports."""
+        found = self.tables["bus"]
+        for key in found:
+            if key not in ("interface", "baud"):
+                helps = "`baud` of UARTs, and nothing of USB; each drive has its `port`"
+                raise self.wrong(f"serial lines have no `{key}`", helps, "bus", key)
+        baud = found.get("baud")
+        if baud is not None and (type(baud) is not int or not 0 < baud <= FASTEST):
+            raise self.wrong("`baud` is no number of bits a second", "`baud = 921600`", "bus", "baud")
+        ports = {each.node: each.port for each in (drive, load)}
+        return {"interface": SERIAL, "channel": ", ".join(ports.values()), "baud": baud, "ports": ports}
+
+    def _port(self, role: str, dialect: str) -> str:
+        """The serial line of a drive; "" of one on a CAN bus."""
+        serial = self.tables["bus"].get("interface") == SERIAL
+        if serial != (dialect == ASCII):
+            message = f"dialect `{dialect}` is spoken on no {'serial line' if serial else 'CAN bus'}"
+            helps = f'`interface = "{SERIAL}"` is for `dialect = "{ASCII}"`, of both drives'
+            raise self.wrong(message, helps, role, "dialect")
+        other = "node" if serial else "port"
+        if other in self.tables[role]:
+            message = f"a drive on a {'serial line' if serial else 'CAN bus'} has no `{other}`"
+            raise self.wrong(message, f"`{'port' if serial else 'node'}` says which it is", role, other)
+        port = self._word(role, "port", "")
+        if serial and not port:
+            raise self.wrong(f"`[{role}]` has no `port`", '`port = "/dev/ttyACM0"`', role)
+        return port
+
+    def _drive(self, role: str, number: int) -> DriveEntry:
+        """A drive. number: the node that it is taken for on a serial line of its own"""
         table = self.tables[role]
-        node, reversed_ = table.get("node"), table.get("reversed", False)
+        dialect = self._word(role, "dialect", None)
+        port = self._port(role, dialect)
+        node, reversed_ = number if port else table.get("node"), table.get("reversed", False)
         if not isinstance(node, int) or isinstance(node, bool) or not 0 <= node <= 127:
             raise self.wrong(f"`node` of `[{role}]` is no number of a node", "`node = 1`: 0 to 127", role, "node")
         if not isinstance(reversed_, bool):
             raise self.wrong(
                 f"`reversed` of `[{role}]` is neither true nor false", "`reversed = true`", role, "reversed"
             )
-        dialect = self._word(role, "dialect", None)
         endpoints = self._word(role, "endpoints", "")
         if endpoints:
             endpoints = os.path.join(os.path.dirname(self.name), endpoints)
         figures, model = self._figures(role, ("node", "reversed")), self._word(role, "model", "")
-        return DriveEntry(role, dialect, node, -1 if reversed_ else 1, figures, endpoints, model)
+        return DriveEntry(role, dialect, node, -1 if reversed_ else 1, figures, endpoints, model, port)
 
     def _figures(self, table: str, others: tuple[str, ...] = ()) -> dict[str, float]:
         known = (*FIGURES[table], *_WORDS[table], *others)

@@ -1,5 +1,5 @@
 """A CAN bus by python-can, whatever interface it has: socketcan, slcan, PCAN ..., or the virtual ones of the library;
-or by an adapter that the library has not, an fdcanusb.
+or by an adapter that the library has not, an fdcanusb; or the serial lines of two drives in its place.
 
 python-can is MET's extra `can`, and is imported when a bus is opened.
 """
@@ -7,13 +7,15 @@ python-can is MET's extra `can`, and is imported when a bus is opened.
 from __future__ import annotations
 
 import contextlib
+import select
 import time
 from collections.abc import Mapping
 from typing import Any
 
-from hw.drives.bench_file import FDCANUSB
+from hw.drives.bench_file import FDCANUSB, SERIAL
 from hw.drives.fdcanusb import LOST, FdcanusbLine
 from hw.drives.frames import CanFrame, CanLine
+from hw.drives.odrive_lines import PULLED, OdriveLines
 from hw.line import BAUD
 from hw.serial_port import SerialLine
 from met.diagnostic import Problem, error
@@ -21,6 +23,9 @@ from met.diagnostic import Problem, error
 
 def open_bus(settings: Mapping[str, Any]) -> CanLine:
     """The bus that `[bus]` of a bench file describes, open. Raises Problem E400 or E449."""
+    if settings["interface"] == SERIAL:
+        ports, baud = settings["ports"], settings["baud"]
+        return OdriveLines(SerialPair(ports, baud or BAUD), tuple(ports), baud)
     if settings["interface"] != FDCANUSB:
         return PythonCanLine(settings)
     return FdcanusbLine(SerialLine(str(settings["channel"]), BAUD, "the fdcanusb", LOST), settings)
@@ -103,3 +108,44 @@ class PythonCanLine:
         )
         message = f"CAN bus {self._name} was lost: {' '.join(str(reason).split()) or type(reason).__name__}"
         return Problem(error("E401", message, help=helps))
+
+
+class SerialPair:
+    """The bytes of serial lines, as frames whose identifier is the number of the line's drive, however they are cut.
+    Making it raises Problem E400, its methods raise E401.
+
+    ports  by number
+    """
+
+    def __init__(self, ports: Mapping[int, str], baud: int) -> None:
+        self._lines: dict[int, SerialLine] = {}
+        try:
+            for number, port in ports.items():
+                self._lines[number] = SerialLine(port, baud, "a drive", PULLED)
+        except BaseException:
+            self.close()
+            raise
+
+    def now(self) -> float:
+        return time.perf_counter()
+
+    def send(self, frame: CanFrame) -> None:
+        self._lines[frame.id].send(frame.data)
+
+    def receive(self, until: float) -> CanFrame | None:
+        files = [line.file for line in self._lines.values() if line.file is not None]
+        while True:
+            if len(files) == len(self._lines):
+                select.select(files, (), (), max(0.0, until - time.perf_counter()))
+            for number, line in self._lines.items():  # one that cannot be waited for waits a moment by itself
+                if data := line.receive(0.0):
+                    return CanFrame(number, data, time=time.perf_counter())
+            if time.perf_counter() >= until:
+                return None
+
+    def sleep(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+    def close(self) -> None:
+        for line in self._lines.values():
+            line.close()

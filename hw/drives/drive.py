@@ -39,11 +39,13 @@ class DriveState(enum.Enum):
 
 @frozen
 class DriveReading:
-    """An answer of a drive. time: when its frame came, s of the line's clock;  angle rad, rate rad/s, of the shaft"""
+    """An answer of a drive. time: when its frame came, s of the line's clock;  angle rad, rate rad/s, of the shaft;
+    time_unsure: s by which it may have sampled before or after `time`, besides what frames of a bus may be off"""
 
     time: float
     angle: float
     rate: float
+    time_unsure: float = 0.0
 
 
 @frozen
@@ -149,9 +151,14 @@ class CanDrive(ABC):
         return self.sense * value
 
     @property
+    def where(self) -> str:
+        """Where it is found, in words."""
+        return f"node {self.node}"
+
+    @property
     def words(self) -> str:
         """The drive in words, for messages."""
-        return f"{self.entry.role} (node {self.node})"
+        return f"{self.entry.role} ({self.where})"
 
     def wrong(self, what: str, helps: str | Sequence[str]) -> Problem:
         """The error for a drive that cannot be driven as it is."""

@@ -21,6 +21,7 @@ class CanFrame:
     remote  True for a request without data, which the node of that identifier answers
     fd      True for a frame of CAN-FD, up to 64 bytes
     time    when the interface received it, s of the line's clock; 0 for one that is to be sent
+    time_unsure  s by which what it says may have been so before or after `time`, of a line that bounds that itself
     """
 
     id: int
@@ -29,6 +30,7 @@ class CanFrame:
     remote: bool = False
     fd: bool = False
     time: float = 0.0
+    time_unsure: float = 0.0
 
 
 class CanLine(Protocol):

@@ -5,8 +5,8 @@
     told                torque, N m of the motor's shaft, or its rate, turns/s; nothing answers it
     properties          read and written by number; a file of the firmware's maker, flat_endpoints.json, has them
 
-Facts are from ODrive's documentation of the protocol and from what implements it; no ODrive was there. What a property
-is set to here is not saved: the drive has its own after it was switched off.
+Facts are from ODrive's documentation of the protocol and from what implements it; no ODrive was there. What CAN and
+serial lines have in common is in hw/drives/odrive_axis.py.
 """
 
 from __future__ import annotations
@@ -15,92 +15,50 @@ import json
 import math
 import struct
 from collections.abc import Sequence
-from typing import Any
 
 from hw.drives.bench_file import DriveEntry
-from hw.drives.drive import ASKS, CanDrive, DriveFacts, DriveReading, DriveState, Talk
+from hw.drives.drive import ASKS, DriveFacts, DriveReading, DriveState, Talk
 from hw.drives.frames import CanFrame
+from hw.drives.odrive_axis import (
+    CLOSED_LOOP,
+    IDLE,
+    NEEDED,
+    NEEDED_FOR_RATES,
+    PASSTHROUGH,
+    RATE_CONTROL,
+    TORQUE_CONTROL,
+    TURN,
+    OdriveAxis,
+)
 from met.host.files import read_regular
 
 VERSION, HEARTBEAT_ID, ESTOP, READ_OR_WRITE, ANSWERED, SET_STATE = 0x00, 0x01, 0x02, 0x04, 0x05, 0x07
 ESTIMATES, MODES, RATE, TORQUE, SUPPLY, CLEAR = 0x09, 0x0B, 0x0D, 0x0E, 0x17, 0x18
 """Commands, the lower five bits of an identifier."""
 
-IDLE, CLOSED_LOOP = 1, 8
-TORQUE_CONTROL, RATE_CONTROL, PASSTHROUGH = 1, 2, 1
-WATCHDOG_EXPIRED, ESTOP_REQUESTED = 1 << 24, 1 << 25
-ERRORS = {
-    1: "initializing",
-    1 << 1: "system level",
-    1 << 2: "timing",
-    1 << 3: "missing estimate",
-    1 << 4: "bad configuration",
-    1 << 5: "gate driver",
-    1 << 6: "missing input",
-    1 << 8: "supply over voltage",
-    1 << 9: "supply under voltage",
-    1 << 10: "supply over current",
-    1 << 11: "more current given back than is allowed",
-    1 << 12: "current limit",
-    1 << 13: "motor too hot",
-    1 << 14: "inverter too hot",
-    1 << 15: "velocity limit",
-    1 << 16: "position limit",
-    WATCHDOG_EXPIRED: "watchdog expired",
-    ESTOP_REQUESTED: "told to stop",
-    1 << 26: "spinout",
-    1 << 27: "brake resistor disarmed",
-    1 << 28: "thermistor disconnected",
-    1 << 30: "calibration",
-}
-
 HEARTBEAT_MS, SUPPLY_MS = 5, 20
 """Periods at which a drive is set to tell its state, and its supply's voltage and current, ms."""
-
-CONTROL_HZ = 8000.0
-"""Rate of the drive's own control, Hz."""
-
-FIRMWARE = (0, 6)
-KT_TOLERANCE = 0.02
-"""Share by which the drive's torque constant may differ from that of the bench file."""
 
 MOST_BYTES = 1 << 20
 _TYPES = {"bool": "<?", "uint8": "<B", "int8": "<b", "uint16": "<H", "int16": "<h", "uint32": "<I", "int32": "<i"}
 _TYPES |= {"float": "<f", "uint64": "<Q", "int64": "<q"}
-_TURN = 2.0 * math.pi
 
 HEARTBEAT_RATE = "axis0.config.can.heartbeat_msg_rate_ms"
 ESTIMATES_RATE = "axis0.config.can.encoder_msg_rate_ms"
 SUPPLY_RATE = "axis0.config.can.bus_voltage_msg_rate_ms"
-WATCHDOG_TIMEOUT, WATCHDOG_ENABLED = "axis0.config.watchdog_timeout", "axis0.config.enable_watchdog"
-TORQUE_CONSTANT, CURRENT_MAX = "axis0.config.motor.torque_constant", "axis0.config.motor.current_soft_max"
-RATE_MAX, SUPPLY_MAX = "axis0.controller.config.vel_limit", "config.dc_bus_overvoltage_trip_level"
-TORQUE_MOST, TORQUE_LEAST = "axis0.config.torque_soft_max", "axis0.config.torque_soft_min"
-RATE_GAIN, RATE_INTEGRAL = "axis0.controller.config.vel_gain", "axis0.controller.config.vel_integrator_gain"
-NEEDED_FOR_RATES = (TORQUE_MOST, TORQUE_LEAST, RATE_GAIN, RATE_INTEGRAL)
-"""Properties of one that is told rates: the torque that its loop may ask for, N m; its gains, N m s/turn, N m/turn."""
-NEEDED = (
-    HEARTBEAT_RATE,
-    ESTIMATES_RATE,
-    SUPPLY_RATE,
-    WATCHDOG_TIMEOUT,
-    WATCHDOG_ENABLED,
-    TORQUE_CONSTANT,
-    CURRENT_MAX,
-    RATE_MAX,
-    SUPPLY_MAX,
-)
+REPORTS = (HEARTBEAT_RATE, ESTIMATES_RATE, SUPPLY_RATE)
 
 
-class OdriveDrive(CanDrive):
+class OdriveDrive(OdriveAxis):
     """The host's side of an ODrive's axis."""
 
     dialect = "odrive"
-    takes_rates = True
 
     def __init__(self, entry: DriveEntry) -> None:
         super().__init__(entry)
         self._version: bytes | None = None
+        self._numbers: dict[str, tuple[int, str]] = {}
+        """Properties' numbers and formats, by path."""
         self._answered: dict[int, bytes] = {}
         self._beats = 0
 
@@ -115,47 +73,18 @@ class OdriveDrive(CanDrive):
         _, *hardware = self._version[:4]
         firmware = tuple(self._version[4:7])
         words = ".".join(str(each) for each in firmware), ".".join(str(each) for each in hardware)
-        if firmware[:2] != FIRMWARE:
-            raise self.other(f"its firmware is {words[0]}", "MET speaks to firmware 0.6")
-        endpoints = self._endpoints(*words)
+        self._check_firmware(firmware)
+        self._numbers = self._endpoints(*words)
         talk.send(self.idle())
-        for path, value in (
-            (HEARTBEAT_RATE, HEARTBEAT_MS),
-            (ESTIMATES_RATE, 0),
-            (SUPPLY_RATE, SUPPLY_MS),
-            (WATCHDOG_TIMEOUT, self.entry.figures["watchdog"]),
-            (WATCHDOG_ENABLED, True),
-        ):
-            self._write(talk, endpoints, path, value)
-        kt, current = self._read(talk, endpoints, TORQUE_CONSTANT), self._read(talk, endpoints, CURRENT_MAX)
-        own = self.entry.figures["kt"]
-        if not abs(kt - own) <= KT_TOLERANCE * own:
-            helps = "what they are told is a torque: the drive makes its current of it by its own constant"
-            raise self.wrong(f"its torque constant is {kt:.4g} N*m/A, and the bench file's {own:.4g}", helps)
-        rate = _TURN * self._read(talk, endpoints, RATE_MAX)
-        supply = self._read(talk, endpoints, SUPPLY_MAX)
-        watchdog = self._read(talk, endpoints, WATCHDOG_TIMEOUT)
-        if not all(math.isfinite(each) and each > 0.0 for each in (kt, current, rate, supply, watchdog)):
-            raise self.wrong("a limit of its is no number above zero", f"{', '.join(NEEDED[3:])}: set them")
-        loop = self._rate_loop(talk, endpoints) if self.rates else None
-        most = kt * current if loop is None else min(kt * current, self._read(talk, endpoints, TORQUE_MOST))
+        for path, value in zip(REPORTS, (HEARTBEAT_MS, 0, SUPPLY_MS), strict=True):
+            self._write(talk, path, value)
+        facts = self._described(talk, *words)
         seen = self._beats
         if not talk.pump(talk.line.now() + 0.5, lambda: self._beats > seen + 1 and self.state != DriveState.DRIVING):
             raise talk.silent(self, "its heartbeat")
-        return DriveFacts(words[0], words[1], watchdog, most, rate, CONTROL_HZ, supply_max=supply, rate_loop=loop)
+        return facts
 
-    def _rate_loop(self, talk: Talk, endpoints: dict[str, Any]) -> tuple[float, float]:
-        """Let the drive's rate loop ask for no more torque than the bench bears. Returns its gains, N m s/rad and
-        N m/rad."""
-        most = self.entry.figures["torque_max"]
-        for path, value in ((TORQUE_MOST, most), (TORQUE_LEAST, -most)):
-            self._write(talk, endpoints, path, value)
-        gain, integral = (self._read(talk, endpoints, path) / _TURN for path in (RATE_GAIN, RATE_INTEGRAL))
-        if not (math.isfinite(gain) and math.isfinite(integral) and gain > 0.0 and integral >= 0.0):
-            raise self.wrong("its rate loop has no gain above zero", f"{RATE_GAIN}, {RATE_INTEGRAL}: set them")
-        return gain, integral
-
-    def _endpoints(self, firmware: str, hardware: str) -> dict[str, Any]:
+    def _endpoints(self, firmware: str, hardware: str) -> dict[str, tuple[int, str]]:
         """The numbers of its properties, for the firmware that it has. Raises Problem E403, E404."""
         path = self.entry.endpoints
         helps = f"its maker has flat_endpoints.json for firmware {firmware} and hardware {hardware}"
@@ -164,7 +93,7 @@ class OdriveDrive(CanDrive):
         try:
             data = json.loads(read_regular(path, MOST_BYTES))
             found, named = data["endpoints"], (data["fw_version"], data["hw_version"])
-            needed = (*NEEDED, *NEEDED_FOR_RATES * self.rates)
+            needed = (*REPORTS, *NEEDED, *NEEDED_FOR_RATES * self.rates)
             missing = [each for each in needed if each not in found]
             numbers = {each: (int(found[each]["id"]), _TYPES[found[each]["type"]]) for each in needed if each in found}
         except OSError as reason:
@@ -185,9 +114,9 @@ class OdriveDrive(CanDrive):
             raise talk.silent(self, f"what its property {number} is")
         return self._answered[number]
 
-    def _read(self, talk: Talk, endpoints: dict[str, Any], path: str) -> float:
+    def _read(self, talk: Talk, path: str) -> float:
         """A property, read until two answers in a row are the same: a limit is not taken from one frame."""
-        number, layout = endpoints[path]
+        number, layout = self._numbers[path]
         before = b""
         for _ in range(ASKS):
             data = self._property(talk, number, struct.pack("<BHB", 0, number, 0))
@@ -196,16 +125,10 @@ class OdriveDrive(CanDrive):
             before = data
         raise self.wrong(f"it answers each time differently what `{path}` is", "two nodes of one number on the bus?")
 
-    def _write(self, talk: Talk, endpoints: dict[str, Any], path: str, value: float) -> None:
-        """Set a property, and see that it is set. Raises Problem E404 where it is not."""
-        number, layout = endpoints[path]
+    def _put(self, talk: Talk, path: str, value: float) -> None:
+        number, layout = self._numbers[path]
         exact = value if layout == "<f" else int(value)
-        for _ in range(ASKS):
-            talk.send([self._frame(READ_OR_WRITE, struct.pack("<BHB", 1, number, 0) + struct.pack(layout, exact))])
-            found = self._read(talk, endpoints, path)
-            if abs(found - value) <= 1e-6 * abs(value):
-                return
-        raise self.wrong(f"it does not take {value:g} for `{path}`, which is {found:g}", "set it by its maker's tool")
+        talk.send([self._frame(READ_OR_WRITE, struct.pack("<BHB", 1, number, 0) + struct.pack(layout, exact))])
 
     # Frames
 
@@ -224,7 +147,7 @@ class OdriveDrive(CanDrive):
 
     def told(self, value: float) -> Sequence[CanFrame]:
         if self.rates:  # with no torque besides that of its loop
-            return (self._frame(RATE, struct.pack("<ff", self.own(value) / _TURN, 0.0)),)
+            return (self._frame(RATE, struct.pack("<ff", self.own(value) / TURN, 0.0)),)
         return (self._frame(TORQUE, struct.pack("<f", self.own(value))),)
 
     def asked(self) -> Sequence[CanFrame]:
@@ -255,10 +178,11 @@ class OdriveDrive(CanDrive):
             angle, rate = struct.unpack("<ff", data)
             if not (math.isfinite(angle) and math.isfinite(rate)):
                 return False
-            self.reading = DriveReading(frame.time, self.own(_TURN * angle), self.own(_TURN * rate))
+            self.reading = DriveReading(frame.time, self.own(TURN * angle), self.own(TURN * rate))
         elif command == HEARTBEAT_ID:
             errors, state = struct.unpack_from("<IB", data)
-            self._beat(errors, state, frame.time)
+            self._beats += 1
+            self._says(errors, state, frame.time)
         elif command == VERSION:
             self._version = data
         elif command == SUPPLY:
@@ -268,15 +192,3 @@ class OdriveDrive(CanDrive):
         else:
             return False
         return True
-
-    def _beat(self, errors: int, state: int, time: float) -> None:
-        self._beats += 1
-        self.stated = time
-        self.errors = ", ".join(words for bit, words in ERRORS.items() if errors & bit)
-        if errors & ~sum(ERRORS):
-            self.errors += f"{', ' if self.errors else ''}error 0x{errors:X}"
-        self.starved = errors == WATCHDOG_EXPIRED
-        if state == CLOSED_LOOP and not errors:
-            self.state = DriveState.DRIVING
-        else:
-            self.state = DriveState.FAILED if errors else DriveState.IDLE

@@ -22,12 +22,13 @@ FLOAT = 2.0**-23
 class Side:
     """A drive, its description, and what its last sound answer says of the shaft.
 
-    angle  rad, without jumps, from what it was at the greeting;  rate: rad/s;  time: s of the line's clock
+    angle  rad, without jumps, from what it was at the greeting;  rate: rad/s;  time: s of the line's clock, which may
+           be off by `time_unsure`, s
     """
 
     def __init__(self, drive: CanDrive, facts: DriveFacts) -> None:
         self.drive, self.facts = drive, facts
-        self.angle = self.rate = self.time = 0.0
+        self.angle = self.rate = self.time = self.time_unsure = 0.0
         self.zero_unsure = 0.0
         """By how much the angle may be off because the shaft turned when it began to count, rad."""
         self._told = 0.0
@@ -40,7 +41,7 @@ class Side:
         counts = ((f.torque_count, "N*m"), (f.angle_count, "rad"), (f.rate_count, "rad/s"))
         steps = ", ".join(f"{count:.3g} {unit}" for count, unit in counts if count)
         said = [
-            f"node {d.node}, {d.dialect} {f.firmware}, {f.hardware}",
+            f"{d.where}, {d.dialect} {f.firmware}, {f.hardware}",
             f"in steps of {steps}" if steps else "in floats",
             *(["counts the other way round"] if d.sense < 0 else []),
         ]
@@ -54,7 +55,8 @@ class Side:
             reading.rate,
             reading.time,
         )
-        self.zero_unsure = abs(reading.rate) * SKEW
+        self.time_unsure = reading.time_unsure
+        self.zero_unsure = abs(reading.rate) * (SKEW + reading.time_unsure)
 
     def angle_of(self, reading: DriveReading) -> float:
         """The angle that an answer means, rad, without jumps."""
@@ -66,6 +68,7 @@ class Side:
     def follow(self, reading: DriveReading) -> None:
         """Keep what an answer means."""
         self.angle, self.rate, self.time = self.angle_of(reading), reading.rate, reading.time
+        self.time_unsure = reading.time_unsure
         self._told = reading.angle
 
     def unsure(self, reading: DriveReading) -> tuple[float, float]:
@@ -82,9 +85,10 @@ class Side:
         if not 0.0 <= time <= LONGEST_STEP:
             return True
         angle_step, rate_step = self.unsure(reading)
-        slack = time + SKEW
+        skew = SKEW + self.time_unsure + reading.time_unsure
+        slack = time + skew
         jump = abs(self.angle_of(reading) - self.angle - self.rate * time)
-        most = acceleration * slack * slack + 2.0 * (abs(self.rate) * SKEW + rate_step * slack + angle_step)
+        most = acceleration * slack * slack + 2.0 * (abs(self.rate) * skew + rate_step * slack + angle_step)
         return jump <= most and abs(reading.rate - self.rate) <= 2.0 * (acceleration * slack + rate_step)
 
 
@@ -93,13 +97,14 @@ def agree(sides: tuple[Side, Side], readings: tuple[DriveReading, DriveReading],
     differ by no more than the largest acceleration (rad/s^2) makes of the time between their samples, and by the steps
     in which they are told."""
     (one, other), (first, second) = sides, readings
-    apart = abs(first.time - second.time)
-    if apart > APART or not (one.goes_on(first, acceleration) and other.goes_on(second, acceleration)):
+    apart, unsure = abs(first.time - second.time), first.time_unsure + second.time_unsure
+    if apart > APART + unsure or not (one.goes_on(first, acceleration) and other.goes_on(second, acceleration)):
         return False
     steps = one.unsure(first), other.unsure(second)
-    rate_most = acceleration * (apart + SKEW) + steps[0][1] + steps[1][1]
+    skew = apart + SKEW + unsure
+    rate_most = acceleration * skew + steps[0][1] + steps[1][1]
     angle_steps = steps[0][0] + steps[1][0] + one.zero_unsure + other.zero_unsure
-    angle_most = 2.0 * ((abs(first.rate) + rate_most) * (apart + SKEW) + angle_steps)
+    angle_most = 2.0 * ((abs(first.rate) + rate_most) * skew + angle_steps)
     differ = one.angle_of(first) - other.angle_of(second)
     if turns := max(one.facts.angle_range, other.facts.angle_range):
         differ = math.remainder(differ, turns)  # after a pause nobody knows how often either went round

@@ -10,6 +10,7 @@ from hw.players.cia402 import PlayedCia402
 from hw.players.damiao import PlayedDamiao
 from hw.players.moteus import PlayedMoteus
 from hw.players.odrive import PlayedOdrive
+from hw.players.odrive_ascii import PlayedOdriveAscii
 from hw.players.player import PlayedDrive
 from hw.players.robstride import PlayedRobstride
 
@@ -19,5 +20,6 @@ PLAYED: Mapping[str, Callable[[int, int], PlayedDrive]] = {
     "moteus": PlayedMoteus,
     "cia402": PlayedCia402,
     "robstride": PlayedRobstride,
+    "odrive_ascii": PlayedOdriveAscii,
 }
 """Makes a played drive of a dialect: (node, sense)."""

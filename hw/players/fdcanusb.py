@@ -7,22 +7,20 @@ PlayedFdcanusbPort   the bus's end of it, for `play`, its line being a pseudo-te
 
 from __future__ import annotations
 
-import contextlib
 import heapq
 import itertools
-import os
 import select
 import time
-import tty
 from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from hw.drives.bench_file import FDCANUSB
+from hw.drives.bench_file import FDCANUSB, SERIAL
 from hw.drives.bus import open_bus
 from hw.drives.frames import CanFrame, CanLine
+from hw.players.odrive_ascii import PlayedOdrivePorts
 from hw.players.player import PlayedLine
-from met.diagnostic import Problem, error
+from hw.players.terminal import Terminal
 
 
 class PlayedFdcanusb:
@@ -145,49 +143,35 @@ class PlayedFdcanusbPort:
     E400 where something else is at that path."""
 
     def __init__(self, path: str) -> None:
-        self._path, self._adapter, self._frames = path, PlayedFdcanusb(), deque[CanFrame]()
-        if os.path.lexists(path) and not os.path.islink(path):
-            helps = "`channel` of `[bus]` is where its pseudo-terminal will be: a path that is free"
-            raise Problem(error("E400", f"no fdcanusb can be played at {path}: something is there", help=helps))
-        self._host, device = os.openpty()
-        self._device = device  # kept open: else a host that leaves ends the line
-        tty.setraw(device)
-        os.set_blocking(self._host, False)
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(path)
-        os.symlink(os.ttyname(device), path)
+        self._terminal = Terminal(path, "fdcanusb", "`channel` of `[bus]`")
+        self._adapter, self._frames = PlayedFdcanusb(), deque[CanFrame]()
 
     def now(self) -> float:
         return time.perf_counter()
 
     def send(self, frame: CanFrame) -> None:
-        self._say(self._adapter.says(frame))
+        self._terminal.write(self._adapter.says(frame))
 
     def receive(self, until: float) -> CanFrame | None:
         while not self._frames:
-            if not select.select((self._host,), (), (), max(0.0, until - time.perf_counter()))[0]:
+            if not select.select((self._terminal.file,), (), (), max(0.0, until - time.perf_counter()))[0]:
                 return None
-            frames, said = self._adapter.hears(os.read(self._host, 4096))
+            frames, said = self._adapter.hears(self._terminal.read())
             self._frames += frames
-            self._say(said)
+            self._terminal.write(said)
         return self._frames.popleft()
-
-    def _say(self, data: bytes) -> None:
-        with contextlib.suppress(BlockingIOError):  # nobody reads: what does not fit is lost, as in the adapter
-            os.write(self._host, data)
 
     def sleep(self, seconds: float) -> None:
         time.sleep(seconds)
 
     def close(self) -> None:
-        with contextlib.suppress(OSError):
-            os.unlink(self._path)
-        for each in (self._host, self._device):
-            os.close(each)
+        self._terminal.close()
 
 
 def played_bus(settings: Mapping[str, Any]) -> CanLine:
     """The drives' end of the bus that `[bus]` of a bench file describes. Raises Problem E400 or E449, OSError."""
+    if settings["interface"] == SERIAL:
+        return PlayedOdrivePorts(settings["ports"])
     if settings["interface"] == FDCANUSB:
         return PlayedFdcanusbPort(str(settings["channel"]))
     return open_bus(settings)

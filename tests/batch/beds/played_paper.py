@@ -36,7 +36,7 @@ from met import models
 from met import run as engine
 from met.plan import Experiment
 from met.plant import Plant, bed_values
-from tests.hw.drives.played import BUS, MORE
+from tests.hw.drives.played import BUS, MORE, host_line, line_of, on_serial_lines
 
 SLOW = 0.03
 KT, KT_LOAD, RESISTANCE, INERTIA = 0.061, 0.072, 2.05, 6.38e-5
@@ -90,6 +90,9 @@ run fast_rates like fast {
 SCALED = {"robstride": 4.0}
 """By how much a dialect's motor is slower and stronger than the shoulder's, where its drives end at
 50 rad/s: the deck's bed has that scale."""
+
+FAST, SLOWER = 1000, {"odrive_ascii": 500}
+"""Rate of the fast runs, Hz, and of those of dialects that are slower than that."""
 
 BENCH = """\
 name = "paper"
@@ -165,11 +168,12 @@ class OnTime(CanBed):
         return super().exchange(voltage, current)
 
 
-def compiled(name: str, gains: tuple[float, float] = (1.0, 1.0)) -> Experiment:
-    """A run of the deck. gains: of its rate loop, over `GAIN` and `INTEGRAL`"""
+def compiled(name: str, gains: tuple[float, float] = (1.0, 1.0), hz: int = FAST) -> Experiment:
+    """A run of the deck. gains: of its rate loop, over `GAIN` and `INTEGRAL`;  hz: of the fast runs, Hz"""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "paper.ic"
-        path.write_text(DECK.replace("GAIN", f"{gains[0] * GAIN!r}").replace("INTEGRAL", f"{gains[1] * INTEGRAL!r}"))
+        text = DECK.replace("GAIN", f"{gains[0] * GAIN!r}").replace("INTEGRAL", f"{gains[1] * INTEGRAL!r}")
+        path.write_text(text.replace("1 kHz", f"{hz} Hz"))
         return ic.compile(path, select=[name]).experiments[0]
 
 
@@ -180,8 +184,9 @@ def bench(dialect: str, name: str, folder: Path, gains: tuple[float, float] = (1
     path = folder / "bench.toml"
     times = SCALED.get(dialect, 1.0)
     figures = {"kt": times * KT, "kt_load": times * KT_LOAD, "inertia": times**2 * INERTIA, "torque_max": times * 0.144}
-    path.write_text(BENCH.format(dialect=dialect, bus=BUS.get(dialect, ""), more=MORE.get(dialect, ""), **figures))
-    described, experiment = two_drives(path), compiled(name)
+    text = BENCH.format(dialect=dialect, bus=BUS.get(dialect, ""), more=MORE.get(dialect, ""), **figures)
+    path.write_text(on_serial_lines(text, folder) if dialect in SLOWER else text)
+    described, experiment = two_drives(path), compiled(name, hz=SLOWER.get(dialect, FAST))
     shaft = PlantShaft(compiled("scaled_torques" if dialect in SCALED else "torques"), "shoulder", times=times)
     drives = PLAYED[dialect](1, 1), PLAYED[dialect](2, -1)
     for drive, kt in zip(drives, (KT, KT_LOAD), strict=True):
@@ -191,27 +196,28 @@ def bench(dialect: str, name: str, folder: Path, gains: tuple[float, float] = (1
             drive.values["axis0.controller.config.vel_integrator_gain"] = 2.0 * np.pi * INTEGRAL * gains[1]
         if isinstance(drive, PlayedCia402):
             drive.rate_gain, drive.rate_integral = GAIN * gains[0], INTEGRAL * gains[1]
-    line = PlayedLine(PlayedBench(shaft, *drives))
+    line = line_of(dialect, PlayedBench(shaft, *drives))
     own = DIALECTS[dialect]
     sides = own(described.drive), own(described.load)
     use = experiment.structure.substitutions[0]
     kind = models.find("bed", use.bed, use.place).drive
-    bed = OnTime(described, sides, lambda: line, period=pace_of(experiment).period, drive=kind, believed=BELIEVED)
+    period = pace_of(experiment).period
+    bed = OnTime(described, sides, lambda: host_line(described, line), period=period, drive=kind, believed=BELIEVED)
     bed.line = line
     return bed
 
 
-def serial(name: str) -> EmulatedBed:
+def serial(name: str, hz: int = FAST) -> EmulatedBed:
     """The bed whose bits a serial line has (tests/batch/beds/test_paper.py), told voltages."""
-    experiment = compiled(name)
+    experiment = compiled(name, hz=hz)
     period, values = pace_of(experiment).period, bed_values(experiment, "shoulder")
     plant = Plant(experiment, "shoulder", period=period)
     return EmulatedBed(plant, emulated.scales(values), emulated.limits(values, period))
 
 
-def driven(bed: BedDriver, name: str) -> np.ndarray:
+def driven(bed: BedDriver, name: str, hz: int = FAST) -> np.ndarray:
     """Rates of both joints in a run of the deck on a bed, rad/s: [time, joint]."""
-    experiment = compiled(name)
+    experiment = compiled(name, hz=hz)
     pace = pace_of(experiment)
     prepared = engine.prepare(experiment, wire=True, late=pace.late(False), lanes=LANES)
     kernel = CaseKernel(prepared, 0, pace.repeats)
@@ -234,9 +240,9 @@ def driven(bed: BedDriver, name: str) -> np.ndarray:
     return found
 
 
-def alone(name: str, gains: tuple[float, float] = (1.0, 1.0)) -> np.ndarray:
+def alone(name: str, gains: tuple[float, float] = (1.0, 1.0), hz: int = FAST) -> np.ndarray:
     """Rates of both joints in a run without a bed, rad/s: [time, joint]."""
-    run = engine.run(compiled(name, gains))
+    run = engine.run(compiled(name, gains, hz))
     assert not run.status.any(), run.cause
     found: np.ndarray = run.signals["qd"][0]
     return found
@@ -250,19 +256,20 @@ def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 def errors(dialect: str, name: str) -> tuple[np.ndarray, np.ndarray]:
     """How far a run with a played dialect is from the run in software, and from the serial bed's: [joint] each."""
-    fast = "fast_" if name.startswith("fast") else ""
+    fast, hz = "fast_" if name.startswith("fast") else "", SLOWER.get(dialect, FAST)
     with tempfile.TemporaryDirectory() as folder:
         own = name.replace(fast, f"{fast}scaled_", 1) if dialect in SCALED else name
-        found = driven(bench(dialect, own, Path(folder)), own)
-    line = driven(serial(f"{fast}volts"), f"{fast}volts")
-    return apart(found, alone("fast" if fast else "plain")), apart(found, line)
+        found = driven(bench(dialect, own, Path(folder)), own, hz)
+    line = driven(serial(f"{fast}volts", hz), f"{fast}volts", hz)
+    return apart(found, alone("fast" if fast else "plain", hz=hz)), apart(found, line)
 
 
 def loop_errors(dialect: str, name: str, gains: tuple[float, float] = (1.0, 1.0)) -> np.ndarray:
     """How far a run with a played drive that is told rates is from the run in software of its own loop: [joint]. gains:
     of that, over those that the deck takes for its"""
     with tempfile.TemporaryDirectory() as folder:
-        return apart(driven(bench(dialect, name, Path(folder), gains), name), alone("looping", gains))
+        run = driven(bench(dialect, name, Path(folder), gains), name, SLOWER.get(dialect, FAST))
+        return apart(run, alone("looping", gains))
 
 
 def main() -> None:

@@ -25,12 +25,13 @@ def main(path: str) -> None:
         take_precedence()
         bed.patience = 0.01
         bed.arm()
-        begun = time.perf_counter()
+        begun, said = time.perf_counter(), False
         for n in range(1, 30_000):
             while time.perf_counter() < begun + n * 2e-3:
                 time.sleep(2e-4)
             sample = bed.exchange(voltage, 0.1)
-            if n == 100 and sample is not None:
+            if n >= 100 and sample is not None and not said:
+                said = True
                 print("driving", sample.rate, sample.state.name, flush=True)
 
 

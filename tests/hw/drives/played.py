@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,9 +13,11 @@ from hw.beds.can_bed import CanBed
 from hw.drives import DIALECTS
 from hw.drives.bench_file import TwoDrives, two_drives
 from hw.drives.frames import CanLine
+from hw.drives.odrive_lines import OdriveLines
 from hw.players import PLAYED
 from hw.players.odrive import endpoints
-from hw.players.player import PlayedBench, PlayedLine
+from hw.players.odrive_ascii import PlayedOdriveLines
+from hw.players.player import PlayedBench, PlayedLine, Spoil, unspoiled
 from hw.players.shaft import InertiaShaft
 from met.substitution.bed import DriveCommand
 
@@ -60,11 +63,43 @@ def bench_file(folder: Path, dialect: str = "odrive", interface: str = "virtual"
     """A bench file of two drives of a dialect, with what it names beside it."""
     (folder / "flat_endpoints.json").write_text(json.dumps(endpoints()))
     path = folder / "bench.toml"
+    if dialect == "odrive_ascii":
+        path.write_text(
+            on_serial_lines(TEXT.format(dialect=dialect, interface="", channel="", bus="", more=""), folder)
+        )
+        return path
     bus = "" if interface == "fdcanusb" else BUS.get(dialect, "")
     path.write_text(
         TEXT.format(dialect=dialect, interface=interface, channel=channel, bus=bus, more=MORE.get(dialect, ""))
     )
     return path
+
+
+def on_serial_lines(text: str, folder: Path) -> str:
+    """The text of a bench file, its drives being each on a serial line, in a folder."""
+    text = re.sub(r"(?m)^interface = .*\nchannel .*$", 'interface = "serial"', text)
+    ports = iter(f'port = "{folder / name}"' for name in ("ttyDrive", "ttyLoad"))
+    return re.sub(r"(?m)^node +=.*$", lambda found: next(ports), text)
+
+
+def line_of(dialect: str, played: PlayedBench, spoil: Spoil = unspoiled) -> PlayedLine:
+    """The host's end of a played bench's bus, or of its two serial lines."""
+    return (PlayedOdriveLines if dialect == "odrive_ascii" else PlayedLine)(played, spoil)
+
+
+def host_line(bench: TwoDrives, line: PlayedLine) -> CanLine:
+    """What the host's side of a bench speaks to, at its end of a played line."""
+    ports = bench.bus.get("ports")
+    return OdriveLines(line, tuple(ports)) if ports else line
+
+
+PERIODS = {"odrive_ascii": 2e-3}
+"""Times from one exchange to the next, s, of dialects for which 1 ms is too short."""
+
+
+def period_of(dialect: str) -> float:
+    """Time from one exchange to the next, at the highest rate of a dialect, s."""
+    return PERIODS.get(dialect, 1e-3)
 
 
 def played_bench(dialect: str = "odrive") -> PlayedBench:
@@ -75,16 +110,18 @@ def played_bench(dialect: str = "odrive") -> PlayedBench:
 
 
 def host_on(
-    bench: TwoDrives, open_line: Callable[[], CanLine], period: float = 1e-3, drive: DriveCommand = "voltage"
+    bench: TwoDrives, open_line: Callable[[], CanLine], period: float | None = None, drive: DriveCommand = "voltage"
 ) -> CanBed:
-    """The host's side of a bench, on lines that `open_line` gives."""
+    """The host's side of a bench, on lines that `open_line` gives. period: s; None: that of its highest rate"""
     one, other = (DIALECTS[entry.dialect](entry) for entry in (bench.drive, bench.load))
+    if period is None:
+        period = period_of(bench.drive.dialect)
     return CanBed(bench, (one, other), open_line, period=period, drive=drive)
 
 
-def host_of(bench: TwoDrives, line: PlayedLine, period: float = 1e-3, drive: DriveCommand = "voltage") -> CanBed:
-    """The host's side of a bench, on a line."""
-    return host_on(bench, lambda: line, period, drive)
+def host_of(bench: TwoDrives, line: PlayedLine, period: float | None = None, drive: DriveCommand = "voltage") -> CanBed:
+    """The host's side of a bench, on a line, or on two."""
+    return host_on(bench, lambda: host_line(bench, line), period, drive)
 
 
 class PlayedConformance(conformance.FreeRunning):
@@ -95,7 +132,7 @@ class PlayedConformance(conformance.FreeRunning):
 
     def opened(self, folder: Path) -> BedDriver:
         self.played = played_bench(self.dialect)
-        self.line = PlayedLine(self.played)
+        self.line = line_of(self.dialect, self.played)
         return host_of(two_drives(bench_file(folder, self.dialect)), self.line, drive=self.drive_told)
 
     def rate_told(self) -> float:

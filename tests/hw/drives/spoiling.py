@@ -126,8 +126,8 @@ class BefallingFault(Protocol):
 
 @dataclass
 class Tally:
-    """What came of exchanges: how many were answered, how many of these wrong, by how much at most (rad/s), how often
-    the bed stopped, and by what."""
+    """What came of exchanges: how many were answered, how many of these wrong, by how much at most, and how much was
+    allowed at most (rad/s), how often the bed stopped, and by what."""
 
     exchanges: int = 0
     answered: int = 0
@@ -135,6 +135,7 @@ class Tally:
     stops: int = 0
     faults: Fault = field(default_factory=lambda: Fault(0))
     worst: float = 0.0
+    allowed: float = 0.0
 
 
 def campaign(
@@ -144,16 +145,17 @@ def campaign(
     spoiler: BefallingFault,
     exchanges: int,
     swing: float = 6.0,
+    period: float = 1e-3,
 ) -> Tally:
     """Drive a bed through a fault, as fast as its limits let, arming it anew each time that it has stopped.
 
     An answer is wrong where its rate is not the shaft's at any time of the period before it, by more than the shaft can
     change in the time by which the two drives' samples may be apart: what is wrong by less cannot be told. swing: of
-    the voltage or rate that is sent, where the bed's limit of the rate lets it.
+    the voltage or rate that is sent, where the bed's limit of the rate lets it;  period: s from one to the next
     """
     tally = Tally()
     bed.connect()
-    bed.patience = 0.002  # as of a run at 1 kHz
+    bed.patience = 2.0 * period  # as of a run
     truth = _Truth(played)
     share = min(1.0, bed._there().limits.rate / SWUNG)
     chance = random.Random(f"{spoiler.kind} drives")
@@ -176,7 +178,7 @@ def campaign(
         due = line.now()
         missed = 0
         while tally.exchanges < exchanges:
-            due += 1e-3
+            due += period
             line.sleep(max(0.0, due - line.now()))
             phase = 2.0 * math.pi * 3.0 * line.now()
             sample = bed.exchange(share * swing * math.sin(phase), share * 1.5 * math.sin(0.7 * phase))
@@ -195,7 +197,9 @@ def campaign(
                 break
             one, other = (side.time for side in bed._sides)
             steps = sum(side.facts.rate_count for side in bed._sides)
-            allowed = bed._acceleration * (abs(one - other) + SKEW) + steps + 0.01
+            skew = SKEW + sum(side.time_unsure for side in bed._sides)
+            allowed = bed._acceleration * (abs(one - other) + skew) + steps + 0.01
+            tally.allowed = max(tally.allowed, allowed)
             _judge(tally, sample, truth.between(one - 1e-3, one), allowed)
         spoiler.on = False
         bed.stop()

@@ -81,6 +81,49 @@ def test_an_fdcanusb_has_speeds_and_no_other_settings(tmp_path: Path, line: str,
     assert words.startswith(f"error[E446]: {message}\n") and f"--> {path}:4:" in words, words
 
 
+def test_drives_on_serial_lines_have_a_port_each(tmp_path: Path) -> None:
+    path = bench_file(tmp_path, "odrive_ascii")
+    bench = two_drives(path)
+    assert bench.drive.port == str(tmp_path / "ttyDrive") and bench.load.port == str(tmp_path / "ttyLoad")
+    assert bench.bus["ports"] == {1: bench.drive.port, 2: bench.load.port} and bench.bus["baud"] is None
+    path.write_text(path.read_text().replace('"serial"\n', '"serial"\nbaud = 921600\n'))
+    assert two_drives(path).bus["baud"] == 921600
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "message", "help"),
+    [
+        ('"serial"', '"serial"\nbaud = 0', 5, "`baud` is no number of bits a second", "`baud = 921600`"),
+        ('"serial"', '"serial"\nchannel = "can0"', 5, "serial lines have no `channel`", "`baud` of UARTs, and nothing"),
+        ('"serial"', '"socketcan"', 14, "dialect `odrive_ascii` is spoken on no CAN bus", '`interface = "serial"` is'),
+        ('"odrive_ascii"', '"damiao"', 14, "dialect `damiao` is spoken on no serial line", '`interface = "serial"` is'),
+        ("port = ", "node = 1\nport = ", 15, "a drive on a serial line has no `node`", "`port` says which it is"),
+        ("port = ", "endpoints = ", 13, "`[drive]` has no `port`", '`port = "/dev/ttyACM0"`'),
+        ("ttyDrive", "ttyLoad", 23, "drive and load are both on FOLDER/ttyLoad", "each has a line of its own"),
+    ],
+)
+def test_a_mistake_about_serial_lines_has_its_place_and_its_remedy(
+    tmp_path: Path, old: str, new: str, line: int, message: str, help: str
+) -> None:
+    path = bench_file(tmp_path, "odrive_ascii")
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(Problem) as caught:
+        two_drives(path)
+    words = said(caught.value).replace(str(tmp_path), "FOLDER")
+    assert words.startswith(f"error[E446]: {message}\n") and f" = help: {help}" in words, words
+    assert f"--> FOLDER/bench.toml:{line}:" in words, words
+
+
+def test_a_drive_on_a_bus_has_no_port(tmp_path: Path) -> None:
+    path = bench_file(tmp_path)
+    path.write_text(path.read_text().replace("node        = 1", 'node = 1\nport = "/dev/ttyACM0"'))
+    with pytest.raises(Problem) as caught:
+        two_drives(path)
+    assert said(caught.value).startswith("error[E446]: a drive on a CAN bus has no `port`\n")
+
+
 def test_a_file_that_is_large_or_no_file_is_not_read(tmp_path: Path) -> None:
     with pytest.raises(OSError):
         two_drives(tmp_path)

@@ -8,19 +8,18 @@ import pytest
 
 from hw.bed import Fault
 from hw.drives.bench_file import two_drives
-from hw.players.player import PlayedLine
-from tests.hw.drives.played import bench_file, host_of, played_bench
+from tests.hw.drives.played import bench_file, host_of, line_of, period_of, played_bench
 from tests.hw.drives.spoiling import FAULTS, Spoiler, Tally, campaign
 
-DIALECTS = ("odrive", "damiao", "moteus", "cia402", "robstride")
+DIALECTS = ("odrive", "damiao", "moteus", "cia402", "robstride", "odrive_ascii")
 
 
 def through(folder: Path, dialect: str, kind: str, exchanges: int) -> tuple[Tally, Spoiler]:
     """What comes of so many exchanges under a fault; the bed is off afterwards."""
     played, spoiler = played_bench(dialect), Spoiler(kind, 1)
-    line = PlayedLine(played, spoiler)
+    line = line_of(dialect, played, spoiler)
     with host_of(two_drives(bench_file(folder, dialect)), line) as bed:
-        tally = campaign(bed, line, played, spoiler, exchanges)
+        tally = campaign(bed, line, played, spoiler, exchanges, period=period_of(dialect))
     assert played.off
     return tally, spoiler
 
@@ -64,7 +63,7 @@ def table(folder: Path, exchanges: int = 10_000) -> None:
         for kind in FAULTS:
             tally, spoiler = through(folder, dialect, kind, exchanges)
             print(
-                f"{dialect:8} {kind:13} befell {spoiler.befell:6,} answered {tally.answered:6,} wrong {tally.wrong} "
+                f"{dialect:12} {kind:13} befell {spoiler.befell:6,} answered {tally.answered:6,} wrong {tally.wrong} "
                 f"worst {tally.worst:.3f} rad/s stops {tally.stops} {tally.faults!r}",
                 flush=True,
             )

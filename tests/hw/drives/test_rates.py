@@ -20,7 +20,7 @@ from hw.ports import Port
 from met.messages.render import render
 from met.plan import Experiment
 from tests.hw.conftest import refusal
-from tests.hw.drives.played import KT, bench_file, host_of, played_bench
+from tests.hw.drives.played import KT, bench_file, host_of, line_of, period_of, played_bench
 from tests.hw.drives.spoiling import FAULTS, Spoiler, campaign
 
 TOLD = [name for name, each in DIALECTS.items() if each.takes_rates]
@@ -44,7 +44,7 @@ run torques like bench { shoulder { bed = torque_drive(delay = 1, kt_load = 0.06
 
 def bed_of(folder: Path, dialect: str) -> tuple[CanBed, PlayedBench, PlayedLine]:
     played = played_bench(dialect)
-    line = PlayedLine(played)
+    line = line_of(dialect, played)
     return host_of(two_drives(bench_file(folder, dialect)), line, drive="rate"), played, line
 
 
@@ -133,9 +133,9 @@ def test_each_arming_proves_the_watchdog_of_a_drive_that_closes_its_loop(tmp_pat
 @pytest.mark.parametrize("exchanges", [400, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_no_wrong_answer_is_taken(tmp_path: Path, dialect: str, kind: str, exchanges: int) -> None:
     played, spoiler = played_bench(dialect), Spoiler(kind, 1)
-    line = PlayedLine(played, spoiler)
+    line = line_of(dialect, played, spoiler)
     with host_of(two_drives(bench_file(tmp_path, dialect)), line, drive="rate") as bed:
-        tally = campaign(bed, line, played, spoiler, exchanges, 60.0)
+        tally = campaign(bed, line, played, spoiler, exchanges, 60.0, period_of(dialect))
     assert played.off
     assert spoiler.befell >= 2 and tally.answered >= 100
     assert tally.wrong == 0, tally

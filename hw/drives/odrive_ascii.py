@@ -1,0 +1,239 @@
+"""ODrive's ASCII protocol, of firmware 0.6, each drive on a serial line of its own: USB, or a UART.
+
+    c 0 TORQUE, v 0 RATE 0    told: N m of the motor's shaft, or turns/s with no torque besides; feeds the watchdog
+    f 0                       asked: angle and rate, turns and turns/s, in decimals
+    r PATH, w PATH VALUE      properties, by their names
+    sc                        forget errors
+
+Lines, checksums and whose turn it is are those of hw/drives/odrive_lines.py; what CAN and serial lines have in common
+is in hw/drives/odrive_axis.py. The protocol has no emergency stop: `es` sets an encoder.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+from hw.drives.bench_file import ASCII, DriveEntry
+from hw.drives.drive import ASKS, GREETED, DriveFacts, DriveReading, DriveState, Talk
+from hw.drives.frames import CanFrame
+from hw.drives.odrive_axis import (
+    CLOSED_LOOP,
+    IDLE,
+    PASSTHROUGH,
+    RATE_CONTROL,
+    TORQUE_CONTROL,
+    TURN,
+    OdriveAxis,
+)
+from hw.drives.odrive_lines import OdriveLines
+from met.diagnostic import Problem, error
+
+STATE, ACTIVE, REASON = "axis0.current_state", "axis0.active_errors", "axis0.disarm_reason"
+VOLTAGE, CURRENT = "vbus_voltage", "ibus"
+REQUESTED, CONTROL_MODE, INPUT_MODE = (
+    "axis0.requested_state",
+    "axis0.controller.config.control_mode",
+    "axis0.controller.config.input_mode",
+)
+FIRMWARE_NUMBERS = ("fw_version_major", "fw_version_minor", "fw_version_revision")
+HARDWARE_NUMBERS = ("hw_version_major", "hw_version_minor", "hw_version_variant")
+
+QUIET = 0.02
+"""Time for which late answers are waited for before a question of a greeting is asked again, s."""
+
+SUPPLY_EVERY = 4
+"""Exchanges of which one asks for the supply in the place of the state."""
+
+DIGITS = 1e-6
+"""Turns, and turns/s, of the last decimal of an angle and a rate, as firmware 0.5 writes them."""
+
+STILL = 0.01
+"""Turns/s above which an answer that is the one before again is old: the shaft has turned since."""
+
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?|[-+]?inf")
+
+
+class OdriveAsciiDrive(OdriveAxis):
+    """The host's side of an ODrive's axis on a serial line."""
+
+    dialect = ASCII
+    answers_commands = True  # each command goes with the questions of an exchange
+
+    def __init__(self, entry: DriveEntry) -> None:
+        super().__init__(entry)
+        self._answered: dict[str, str] = {}
+        """What properties are, as was answered last."""
+        self._state: int | None = None
+        """The state that is not that of driving, until it is known why."""
+        self._errors: dict[str, int] = {}
+        """Its errors, as they were answered since that state."""
+        self._turn = 0
+        self._last = ""
+        """The last angle and rate, as they were answered."""
+
+    @property
+    def where(self) -> str:
+        return self.entry.port
+
+    def greet(self, talk: Talk) -> DriveFacts:
+        self._state, self._turn = None, 0
+        if not isinstance(talk.line, OdriveLines):
+            raise self.wrong("it is not on a serial line", '`interface = "serial"` of `[bus]`')
+        numbers = [self._read(talk, path) for path in (*FIRMWARE_NUMBERS, *HARDWARE_NUMBERS)]
+        if not all(math.isfinite(each) for each in numbers):
+            raise self.other("its version is no number", "MET speaks to firmware 0.6")
+        firmware, hardware = (tuple(int(each) for each in numbers[at : at + 3]) for at in (0, 3))
+        self._check_firmware(firmware)
+        took, most = talk.line.fastest(self.node), talk.line.late
+        if took > most:
+            helps = ("no hub between, another USB port of the computer", "a UART, at 921600 bits a second")
+            raise self.wrong(f"an answer of its takes {1e3 * took:.3g} ms, and {1e3 * most:.3g} ms is the most", helps)
+        talk.send(self.idle())
+        for path, value in self._modes():
+            self._write(talk, path, value)
+        words = (".".join(str(each) for each in version) for version in (firmware, hardware))
+        facts = self._described(talk, *words)
+        self._property(talk, VOLTAGE)
+        seen = talk.line.now()
+        if not talk.ask(self.asked(), lambda: self.stated > seen and self.state != DriveState.DRIVING):
+            raise self._silent(talk, f"`r {STATE}`")
+        return replace(facts, angle_count=TURN * DIGITS, rate_count=TURN * DIGITS)
+
+    def _read(self, talk: Talk, path: str) -> float:
+        """A property, read until two answers in a row are the same: the checksum lets some through that are altered."""
+        before = ""
+        for _ in range(ASKS):
+            said = self._property(talk, path)
+            if said == before:
+                return _number(said)
+            before = said
+        raise self.wrong(f"it answers each time differently what `{path}` is", "look at the cable of its line")
+
+    def _property(self, talk: Talk, path: str) -> str:
+        self._answered.pop(path, None)
+        for _ in range(ASKS):
+            talk.send([self._text(f"r {path}")])
+            if talk.pump(talk.line.now() + GREETED / ASKS - QUIET, lambda: path in self._answered):
+                said = self._answered[path]
+                if math.isnan(_number(said)):
+                    raise self.other(f"it answers `{said[:40]}` to `r {path}`", "MET speaks to firmware 0.6")
+                return said
+            talk.pump(talk.line.now() + QUIET)
+        raise self._silent(talk, f"`r {path}`")
+
+    def _put(self, talk: Talk, path: str, value: float) -> None:
+        talk.send([self._text(f"w {path} {float(value):.9g}")])
+
+    def _silent(self, talk: Talk, what: str) -> Problem:
+        """The error for a drive that does not answer a question of its greeting."""
+        assert isinstance(talk.line, OdriveLines)
+        came = talk.line.heard(self.node)
+        said = "".join(each if each.isprintable() else "?" for each in came[:60].decode("ascii", "replace"))
+        if came:
+            helps = (f"what came is `{said}`: no answer with a checksum", "is this the line of an ODrive?")
+        else:
+            helps = (
+                "is it switched on? its line may have another name since it was plugged in: `ls /dev/serial/by-id`",
+                "its USB line speaks ASCII where `config.usb_cdc_protocol` says so, a UART `config.uart0_protocol`",
+            )
+        message = f"no {self.dialect} answers {what} as {self.words}"
+        return Problem(error("E402", message, help=[*helps, f"`port` of `[{self.entry.role}]`, and its `dialect`"]))
+
+    def _modes(self) -> tuple[tuple[str, int], ...]:
+        """Properties that say what it is told, and what they are to be."""
+        return ((CONTROL_MODE, RATE_CONTROL if self.rates else TORQUE_CONTROL), (INPUT_MODE, PASSTHROUGH))
+
+    # Texts
+
+    def _text(self, text: str) -> CanFrame:
+        return CanFrame(self.node, text.encode())
+
+    def _command(self, value: float) -> CanFrame:
+        if self.rates:
+            return self._text(f"v 0 {self.own(value) / TURN:.7f} 0")
+        return self._text(f"c 0 {self.own(value):.7f}")
+
+    def armed(self) -> Sequence[CanFrame]:
+        return (
+            *(self._text(f"w {path} {value}") for path, value in self._modes()),
+            self._command(0.0),
+            self._text(f"w {REQUESTED} {CLOSED_LOOP}"),
+            *self.asked(),
+        )
+
+    def told(self, value: float) -> Sequence[CanFrame]:
+        self._turn += 1
+        asks: tuple[str, ...] = (STATE,)
+        if self.state == DriveState.DRIVING and self._state is not None:  # it has stopped, and does not say why itself
+            asks = (ACTIVE, REASON)
+        elif self._turn % SUPPLY_EVERY == 0:
+            asks = (CURRENT if self._turn % (2 * SUPPLY_EVERY) else VOLTAGE,)
+        return (self._command(value), self._text("f 0"), *(self._text(f"r {path}") for path in asks))
+
+    def asked(self) -> Sequence[CanFrame]:
+        return (self._text("f 0"), *(self._text(f"r {path}") for path in (STATE, ACTIVE, REASON)))
+
+    def idle(self) -> Sequence[CanFrame]:
+        return (self._command(0.0), self._text(f"w {REQUESTED} {IDLE}"))
+
+    def halted(self) -> Sequence[CanFrame]:
+        return self.idle()
+
+    def cleared(self) -> Sequence[CanFrame]:
+        return (self._text("sc"), self._text(f"w {REQUESTED} {IDLE}"))
+
+    def answers(self) -> Sequence[CanFrame]:
+        return (self._text("-1000.000000 -1000.000000"), self._text("16777216"))
+
+    def take(self, frame: CanFrame) -> bool:
+        if frame.id != self.node:
+            return False
+        question, _, answer = frame.data.decode("ascii", "replace").partition("\n")
+        if question.startswith("f "):
+            angle, rate = (_number(each) for each in answer.split())
+            old = answer == self._last and abs(rate) > STILL
+            self._last = answer
+            if old or not (math.isfinite(angle) and math.isfinite(rate)):
+                return False
+            own = self.own(TURN * angle), self.own(TURN * rate)
+            self.reading = DriveReading(frame.time, *own, frame.time_unsure)
+            return True
+        path = question[2:]
+        self._answered[path] = answer
+        value = _number(answer)
+        if path in (STATE, ACTIVE, REASON):
+            self._judge(path, value, frame.time)
+        elif path in (VOLTAGE, CURRENT) and math.isfinite(value):
+            self._supplied(path, value)
+        return True
+
+    def _judge(self, path: str, value: float, time: float) -> None:
+        """Take its state, and where that is not that of driving, its errors with it, which are asked after it."""
+        if not math.isfinite(value) or value != int(value):
+            return
+        if path != STATE:
+            if self._state is not None and path == REASON and ACTIVE in self._errors:
+                self._says(self._errors[ACTIVE] | int(value), self._state, time)
+                self._state = None
+            self._errors[path] = int(value)
+            return
+        self._errors = {}
+        self._state = None if value == CLOSED_LOOP else int(value)
+        if self._state is None:  # an axis with errors does not drive
+            self._says(0, CLOSED_LOOP, time)
+
+    def _supplied(self, path: str, value: float) -> None:
+        if path == VOLTAGE:
+            self.supply = value
+        elif self.supply is not None:
+            self.power = self.supply * value
+
+
+def _number(text: str) -> float:
+    """A number as it is answered, 1 or 0 of a truth; not a number where it is none."""
+    if text.lower() in ("true", "false"):
+        return float(text.lower() == "true")
+    return float(text) if _NUMBER.fullmatch(text) else math.nan

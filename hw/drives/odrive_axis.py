@@ -1,0 +1,131 @@
+"""An ODrive's axis, of firmware 0.6, whatever carries its properties and commands: what is set and read at a greeting,
+and what its state and errors mean. On a CAN bus hw/drives/odrive.py speaks to it, on a serial line
+hw/drives/odrive_ascii.py.
+
+Facts are from ODrive's documentation; no ODrive was there. What a property is set to here is not saved: the drive has
+its own after it was switched off.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+
+from hw.drives.drive import ASKS, CanDrive, DriveFacts, DriveState, Talk
+
+IDLE, CLOSED_LOOP = 1, 8
+TORQUE_CONTROL, RATE_CONTROL, PASSTHROUGH = 1, 2, 1
+WATCHDOG_EXPIRED, ESTOP_REQUESTED = 1 << 24, 1 << 25
+ERRORS = {
+    1: "initializing",
+    1 << 1: "system level",
+    1 << 2: "timing",
+    1 << 3: "missing estimate",
+    1 << 4: "bad configuration",
+    1 << 5: "gate driver",
+    1 << 6: "missing input",
+    1 << 8: "supply over voltage",
+    1 << 9: "supply under voltage",
+    1 << 10: "supply over current",
+    1 << 11: "more current given back than is allowed",
+    1 << 12: "current limit",
+    1 << 13: "motor too hot",
+    1 << 14: "inverter too hot",
+    1 << 15: "velocity limit",
+    1 << 16: "position limit",
+    WATCHDOG_EXPIRED: "watchdog expired",
+    ESTOP_REQUESTED: "told to stop",
+    1 << 26: "spinout",
+    1 << 27: "brake resistor disarmed",
+    1 << 28: "thermistor disconnected",
+    1 << 30: "calibration",
+}
+
+CONTROL_HZ = 8000.0
+"""Rate of the drive's own control, Hz."""
+
+FIRMWARE = (0, 6)
+KT_TOLERANCE = 0.02
+"""Share by which the drive's torque constant may differ from that of the bench file."""
+
+TURN = 2.0 * math.pi
+"""rad of the turns in which an ODrive tells angles and rates."""
+
+WATCHDOG_TIMEOUT, WATCHDOG_ENABLED = "axis0.config.watchdog_timeout", "axis0.config.enable_watchdog"
+TORQUE_CONSTANT, CURRENT_MAX = "axis0.config.motor.torque_constant", "axis0.config.motor.current_soft_max"
+RATE_MAX, SUPPLY_MAX = "axis0.controller.config.vel_limit", "config.dc_bus_overvoltage_trip_level"
+TORQUE_MOST, TORQUE_LEAST = "axis0.config.torque_soft_max", "axis0.config.torque_soft_min"
+RATE_GAIN, RATE_INTEGRAL = "axis0.controller.config.vel_gain", "axis0.controller.config.vel_integrator_gain"
+NEEDED = (WATCHDOG_TIMEOUT, WATCHDOG_ENABLED, TORQUE_CONSTANT, CURRENT_MAX, RATE_MAX, SUPPLY_MAX)
+NEEDED_FOR_RATES = (TORQUE_MOST, TORQUE_LEAST, RATE_GAIN, RATE_INTEGRAL)
+"""Properties of one that is told rates: the torque that its loop may ask for, N m; its gains, N m s/turn, N m/turn."""
+
+
+class OdriveAxis(CanDrive):
+    """The host's side of an ODrive's axis, but for how it is spoken to."""
+
+    takes_rates = True
+
+    @abstractmethod
+    def _read(self, talk: Talk, path: str) -> float:
+        """A property. Raises Problem E402 to E404."""
+
+    @abstractmethod
+    def _put(self, talk: Talk, path: str, value: float) -> None:
+        """Send what sets a property, which nothing answers."""
+
+    def _write(self, talk: Talk, path: str, value: float) -> None:
+        """Set a property, and see that it is set. Raises Problem E404 where it is not."""
+        for _ in range(ASKS):
+            self._put(talk, path, value)
+            found = self._read(talk, path)
+            if abs(found - value) <= 1e-6 * abs(value):
+                return
+        raise self.wrong(f"it does not take {value:g} for `{path}`, which is {found:g}", "set it by its maker's tool")
+
+    def _check_firmware(self, firmware: tuple[int, ...]) -> None:
+        """Raise Problem E403 where MET does not speak to a firmware: its numbers, the first first."""
+        if firmware[:2] != FIRMWARE:
+            words = ".".join(str(each) for each in firmware)
+            raise self.other(f"its firmware is {words}", "MET speaks to firmware 0.6")
+
+    def _described(self, talk: Talk, firmware: str, hardware: str) -> DriveFacts:
+        """Set its watchdog, and read its limits and what its rate loop is. Raises Problem E402 to E404."""
+        for path, value in ((WATCHDOG_TIMEOUT, self.entry.figures["watchdog"]), (WATCHDOG_ENABLED, True)):
+            self._write(talk, path, value)
+        kt, current = self._read(talk, TORQUE_CONSTANT), self._read(talk, CURRENT_MAX)
+        own = self.entry.figures["kt"]
+        if not abs(kt - own) <= KT_TOLERANCE * own:
+            helps = "what they are told is a torque: the drive makes its current of it by its own constant"
+            raise self.wrong(f"its torque constant is {kt:.4g} N*m/A, and the bench file's {own:.4g}", helps)
+        rate = TURN * self._read(talk, RATE_MAX)
+        supply = self._read(talk, SUPPLY_MAX)
+        watchdog = self._read(talk, WATCHDOG_TIMEOUT)
+        if not all(math.isfinite(each) and each > 0.0 for each in (kt, current, rate, supply, watchdog)):
+            raise self.wrong("a limit of its is no number above zero", f"{', '.join(NEEDED)}: set them")
+        loop = self._rate_loop(talk) if self.rates else None
+        most = kt * current if loop is None else min(kt * current, self._read(talk, TORQUE_MOST))
+        return DriveFacts(firmware, hardware, watchdog, most, rate, CONTROL_HZ, supply_max=supply, rate_loop=loop)
+
+    def _rate_loop(self, talk: Talk) -> tuple[float, float]:
+        """Let the drive's rate loop ask for no more torque than the bench bears. Returns its gains, N m s/rad and
+        N m/rad."""
+        most = self.entry.figures["torque_max"]
+        for path, value in ((TORQUE_MOST, most), (TORQUE_LEAST, -most)):
+            self._write(talk, path, value)
+        gain, integral = (self._read(talk, path) / TURN for path in (RATE_GAIN, RATE_INTEGRAL))
+        if not (math.isfinite(gain) and math.isfinite(integral) and gain > 0.0 and integral >= 0.0):
+            raise self.wrong("its rate loop has no gain above zero", f"{RATE_GAIN}, {RATE_INTEGRAL}: set them")
+        return gain, integral
+
+    def _says(self, errors: int, state: int, time: float) -> None:
+        """Take its errors and its state, as its numbers have them, said at a time of the line's clock, s."""
+        self.stated = time
+        self.errors = ", ".join(words for bit, words in ERRORS.items() if errors & bit)
+        if errors & ~sum(ERRORS):
+            self.errors += f"{', ' if self.errors else ''}error 0x{errors:X}"
+        self.starved = errors == WATCHDOG_EXPIRED
+        if state == CLOSED_LOOP and not errors:
+            self.state = DriveState.DRIVING
+        else:
+            self.state = DriveState.FAILED if errors else DriveState.IDLE
