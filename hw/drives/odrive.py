@@ -64,9 +64,12 @@ FIRMWARE = (0, 6)
 KT_TOLERANCE = 0.02
 """Share by which the drive's torque constant may differ from that of the bench file."""
 
+MOST_NODE = 62
+"""Largest number of a drive: an identifier has six bits for it, and 63 is one that has none."""
+
 MOST_BYTES = 1 << 20
 _TYPES = {"bool": "<?", "uint8": "<B", "int8": "<b", "uint16": "<H", "int16": "<h", "uint32": "<I", "int32": "<i"}
-_TYPES |= {"float": "<f", "uint64": "<Q", "int64": "<q"}
+_TYPES |= {"float": "<f"}
 _TURN = 2.0 * math.pi
 
 HEARTBEAT_RATE = "axis0.config.can.heartbeat_msg_rate_ms"
@@ -92,6 +95,14 @@ NEEDED = (
 )
 
 
+def _endpoint(found: Any) -> tuple[int, str]:
+    """The number of a property, of 16 bits, and the format of its value. Raises ValueError, KeyError, TypeError."""
+    number = found["id"]
+    if type(number) is not int or not 0 <= number < 1 << 16:
+        raise ValueError
+    return number, _TYPES[found["type"]]
+
+
 class OdriveDrive(CanDrive):
     """The host's side of an ODrive's axis."""
 
@@ -106,6 +117,8 @@ class OdriveDrive(CanDrive):
 
     def greet(self, talk: Talk) -> DriveFacts:
         self._version, self._beats = None, 0
+        if self.node > MOST_NODE:
+            raise self.wrong("its number is none of an ODrive", f"a number from 0 to {MOST_NODE}")
         if not talk.ask([self._request(VERSION)], lambda: self._version is not None):
             if self._beats:
                 helps = ("firmware 0.5 and before does not: put 0.6 on it", "its maker's `odrivetool dfu` does so")
@@ -166,7 +179,7 @@ class OdriveDrive(CanDrive):
             found, named = data["endpoints"], (data["fw_version"], data["hw_version"])
             needed = (*NEEDED, *NEEDED_FOR_RATES * self.rates)
             missing = [each for each in needed if each not in found]
-            numbers = {each: (int(found[each]["id"]), _TYPES[found[each]["type"]]) for each in needed if each in found}
+            numbers = {each: _endpoint(found[each]) for each in needed if each in found}
         except OSError as reason:
             raise self.wrong(f"{path} cannot be read: {(reason.strerror or str(reason)).lower()}", helps) from None
         except (ValueError, KeyError, TypeError, RecursionError):
