@@ -219,6 +219,8 @@ class CanBed(BedDriver):
         if self._state != BedState.DISARMED or not self._slow():
             raise self._refused("arm")
         self._disagreed, self.returned = 0, 0.0
+        for drive in self._drives:
+            drive.renew(self._talk)
         self.proved = prove_watchdogs(self._talk, about.deadman)
         begin_driving(self._talk)
         self._state, self.confirmed = BedState.ARMED, False

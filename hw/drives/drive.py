@@ -5,6 +5,7 @@ for which it then closes the loop. It says its angle (rad) and rate (rad/s), all
 shaft. It disarms itself where it hears nothing for the time of its watchdog.
 
     drive.greet(talk)        who is there: dialect, firmware, limits; it is idle afterwards
+    drive.renew(talk)        set again what its greeting set, before each arming
     drive.armed()            frames that arm it with nothing commanded, to be sent until its state says so
     drive.told(value)        frames of a command
     drive.asked()            frames that ask for its angle, rate and state
@@ -110,6 +111,11 @@ class CanDrive(ABC):
     @abstractmethod
     def greet(self, talk: Talk) -> DriveFacts:
         """Find the drive, leave it idle, and read what it is. Raises Problem E402 to E404."""
+
+    def renew(self, talk: Talk) -> None:
+        """Set again what its greeting has set, where that is not part of its commands, and see that it is: a drive that
+        has begun anew since then has its own mode, limits and watchdog. Raises Problem E402, E404."""
+        return
 
     @abstractmethod
     def armed(self) -> Sequence[CanFrame]:

@@ -80,6 +80,7 @@ TORQUE_CONSTANT, CURRENT_MAX = "axis0.config.motor.torque_constant", "axis0.conf
 RATE_MAX, SUPPLY_MAX = "axis0.controller.config.vel_limit", "config.dc_bus_overvoltage_trip_level"
 TORQUE_MOST, TORQUE_LEAST = "axis0.config.torque_soft_max", "axis0.config.torque_soft_min"
 RATE_GAIN, RATE_INTEGRAL = "axis0.controller.config.vel_gain", "axis0.controller.config.vel_integrator_gain"
+CONTROL_MODE, INPUT_MODE = "axis0.controller.config.control_mode", "axis0.controller.config.input_mode"
 NEEDED_FOR_RATES = (TORQUE_MOST, TORQUE_LEAST, RATE_GAIN, RATE_INTEGRAL)
 """Properties of one that is told rates: the torque that its loop may ask for, N m; its gains, N m s/turn, N m/turn."""
 NEEDED = (
@@ -92,6 +93,8 @@ NEEDED = (
     CURRENT_MAX,
     RATE_MAX,
     SUPPLY_MAX,
+    CONTROL_MODE,
+    INPUT_MODE,
 )
 
 
@@ -113,10 +116,13 @@ class OdriveDrive(CanDrive):
         super().__init__(entry)
         self._version: bytes | None = None
         self._answered: dict[int, bytes] = {}
+        self._written: dict[str, tuple[dict[str, Any], float]] = {}
+        """Properties that were set, and to what: endpoints and value of each, by path."""
         self._beats = 0
 
     def greet(self, talk: Talk) -> DriveFacts:
         self._version, self._beats = None, 0
+        self._written.clear()
         if self.node > MOST_NODE:
             raise self.wrong("its number is none of an ODrive", f"a number from 0 to {MOST_NODE}")
         if not talk.ask([self._request(VERSION)], lambda: self._version is not None):
@@ -138,6 +144,8 @@ class OdriveDrive(CanDrive):
             (SUPPLY_RATE, SUPPLY_MS),
             (WATCHDOG_TIMEOUT, self.entry.figures["watchdog"]),
             (WATCHDOG_ENABLED, True),
+            (CONTROL_MODE, self._mode),
+            (INPUT_MODE, PASSTHROUGH),
         ):
             self._write(talk, endpoints, path, value)
         kt, current = self._read(talk, endpoints, TORQUE_CONSTANT), self._read(talk, endpoints, CURRENT_MAX)
@@ -149,7 +157,7 @@ class OdriveDrive(CanDrive):
         supply = self._read(talk, endpoints, SUPPLY_MAX)
         watchdog = self._read(talk, endpoints, WATCHDOG_TIMEOUT)
         if not all(math.isfinite(each) and each > 0.0 for each in (kt, current, rate, supply, watchdog)):
-            raise self.wrong("a limit of its is no number above zero", f"{', '.join(NEEDED[3:])}: set them")
+            raise self.wrong("a limit of its is no number above zero", f"{', '.join(NEEDED[3:-2])}: set them")
         loop = self._rate_loop(talk, endpoints) if self.rates else None
         most = kt * current if loop is None else min(kt * current, self._read(talk, endpoints, TORQUE_MOST))
         seen = self._beats
@@ -167,6 +175,10 @@ class OdriveDrive(CanDrive):
         if not (math.isfinite(gain) and math.isfinite(integral) and gain > 0.0 and integral >= 0.0):
             raise self.wrong("its rate loop has no gain above zero", f"{RATE_GAIN}, {RATE_INTEGRAL}: set them")
         return gain, integral
+
+    def renew(self, talk: Talk) -> None:
+        for path, (endpoints, value) in self._written.items():
+            self._write(talk, endpoints, path, value)
 
     def _endpoints(self, firmware: str, hardware: str) -> dict[str, Any]:
         """The numbers of its properties, for the firmware that it has. Raises Problem E403, E404."""
@@ -217,10 +229,15 @@ class OdriveDrive(CanDrive):
             talk.send([self._frame(READ_OR_WRITE, struct.pack("<BHB", 1, number, 0) + struct.pack(layout, exact))])
             found = self._read(talk, endpoints, path)
             if abs(found - value) <= 1e-6 * abs(value):
+                self._written[path] = endpoints, value
                 return
         raise self.wrong(f"it does not take {value:g} for `{path}`, which is {found:g}", "set it by its maker's tool")
 
     # Frames
+
+    @property
+    def _mode(self) -> int:
+        return RATE_CONTROL if self.rates else TORQUE_CONTROL
 
     def _request(self, command: int) -> CanFrame:
         return CanFrame(self.node << 5 | command, remote=True)
@@ -230,7 +247,7 @@ class OdriveDrive(CanDrive):
 
     def armed(self) -> Sequence[CanFrame]:
         return (
-            self._frame(MODES, struct.pack("<II", RATE_CONTROL if self.rates else TORQUE_CONTROL, PASSTHROUGH)),
+            self._frame(MODES, struct.pack("<II", self._mode, PASSTHROUGH)),
             *self.told(0.0),
             self._frame(SET_STATE, struct.pack("<I", CLOSED_LOOP)),
         )
