@@ -403,7 +403,7 @@ class CanBed(BedDriver):
     def _watch(self) -> None:
         """Stop where a drive has stopped, the supply's voltage is too high, or the shaft is too fast."""
         for drive in self._drives:
-            if drive.state != DriveState.DRIVING:
+            if not drive.sound:
                 words = f"{drive.words}: {drive.errors or 'it drives no more'}"
                 self._stopped(Fault.DEADMAN if drive.starved else Fault.DRIVE, words)
                 return

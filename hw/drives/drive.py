@@ -31,7 +31,7 @@ ASKS = 5
 
 
 class DriveState(enum.Enum):
-    """The state of a drive: idle, its outputs off; driving, so that it takes commands; or stopped by an error."""
+    """The state of a drive: idle, its outputs off; driving, its outputs on; or stopped by an error."""
 
     IDLE = "idle"
     DRIVING = "driving"
@@ -85,7 +85,7 @@ class CanDrive(ABC):
     """The host's side of one drive.
 
     reading   the last answer; None before the first
-    state     as it said last;  stated: when, s of the line's clock
+    state     as it said last;  errors: that it told, in words;  stated: when, s of the line's clock
     starved   True where the error that it failed by is that of its watchdog, and no other
     supply    V of its supply, as it said last; None where it never did
     power     W that it takes from its supply, below 0 where it gives back; None where it never said so
@@ -149,6 +149,11 @@ class CanDrive(ABC):
     @abstractmethod
     def answers(self) -> Sequence[CanFrame]:
         """Frames as long as those with which it answers an exchange, to reckon how long they take on the bus."""
+
+    @property
+    def sound(self) -> bool:
+        """True where it drives, and tells no error."""
+        return self.state == DriveState.DRIVING and not self.errors
 
     def own(self, value: float) -> float:
         """A quantity of the shaft in the drive's own sense, or the other way round."""
