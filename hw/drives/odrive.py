@@ -264,10 +264,10 @@ class OdriveDrive(CanDrive):
         return (*self.told(0.0), self._frame(SET_STATE, struct.pack("<I", IDLE)))
 
     def halted(self) -> Sequence[CanFrame]:
-        return (self._frame(ESTOP),)
+        return (self._frame(ESTOP), *self.told(0.0))  # what it is told it would go on with once it is armed again
 
     def cleared(self) -> Sequence[CanFrame]:
-        return (self._frame(CLEAR, b"\0"), self._frame(SET_STATE, struct.pack("<I", IDLE)))
+        return (self._frame(CLEAR, b"\0"), *self.idle())
 
     def answers(self) -> Sequence[CanFrame]:
         return (self._frame(ESTIMATES, bytes(8)),)
@@ -306,7 +306,7 @@ class OdriveDrive(CanDrive):
         if errors & ~sum(ERRORS):
             self.errors += f"{', ' if self.errors else ''}error 0x{errors:X}"
         self.starved = errors == WATCHDOG_EXPIRED
-        if state == CLOSED_LOOP and not errors:
+        if state == CLOSED_LOOP:  # whatever its errors
             self.state = DriveState.DRIVING
         else:
             self.state = DriveState.FAILED if errors else DriveState.IDLE

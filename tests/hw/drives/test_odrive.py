@@ -188,3 +188,13 @@ def test_a_number_that_no_identifier_has_room_for_is_refused_before_anything_is_
         "error[E404]: drive (node 63) cannot be driven: its number is none of an ODrive\n = help: a number from 0 to 62"
     )
     assert not sent
+
+
+def test_a_watchdog_that_tells_and_does_not_stop_is_not_taken_for_one(tmp_path: Path) -> None:
+    played = played_bench()
+    drive = odrive(played)
+    drive._failed = lambda error: setattr(drive, "errors", error)  # type: ignore[method-assign]
+    with host_of(two_drives(bench_file(tmp_path)), PlayedLine(played)) as bed:
+        bed.connect()
+        assert refusal(bed.arm).startswith("error[E406]: drive (node 1) still drives 50 ms after the last command")
+        assert played.off

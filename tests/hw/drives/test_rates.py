@@ -14,6 +14,7 @@ from hw.beds.can_deck import BelievedLoop, loop_warning
 from hw.drivers import check_model, opened
 from hw.drives import DIALECTS
 from hw.drives.bench_file import two_drives
+from hw.players.cia402 import PlayedCia402
 from hw.players.odrive import PlayedOdrive
 from hw.players.player import PlayedBench, PlayedLine
 from hw.ports import Port
@@ -196,6 +197,35 @@ def test_a_mode_that_does_not_reach_an_odrive_is_not_that_of_the_session_before(
         bed.arm()
         lossy.sleep(0.01)
         assert drive.state == 8 and drive.mode == 1 and played.shaft.rate == 0.0
+
+
+@pytest.mark.parametrize("dialect", TOLD)
+@pytest.mark.parametrize("by", ["fault", "host", "silence"])
+def test_a_drive_that_has_stopped_keeps_no_rate_that_it_was_told(tmp_path: Path, dialect: str, by: str) -> None:
+    """Else it would go on with that rate from when it is armed until its first command comes."""
+    bed, played, line = bed_of(tmp_path, dialect)
+    drive = played.drive
+    assert isinstance(drive, PlayedOdrive | PlayedCia402)
+    with bed:
+        bed.connect()
+        bed.arm()
+        for _ in range(50):
+            line.sleep(1e-3)
+            bed.exchange(60.0, 0.0)
+        assert drive.rate_told == pytest.approx(60.0, abs=0.1)
+        if by == "fault":
+            played.slip = 1.0
+            for _ in range(6):
+                line.sleep(1e-3)
+                bed.exchange(60.0, 0.0)
+        elif by == "silence":
+            line.sleep(8.0)
+            bed.read()
+            bed.clear()
+        else:
+            bed.stop()
+        line.sleep(1e-3)
+        assert played.off and drive.rate_told == 0.0
 
 
 def test_an_odrive_whose_mode_cannot_be_set_is_refused(tmp_path: Path) -> None:
