@@ -30,6 +30,11 @@ ASKS = 5
 """How often a question of a greeting is asked: a bus loses frames only where something is wrong with it."""
 
 
+LATE = 256
+"""Frames that are taken after the time until which they were waited for: what has come meanwhile, and no more, for on a
+bus that is never quiet there is always another."""
+
+
 class DriveState(enum.Enum):
     """The state of a drive: idle, its outputs off; driving, its outputs on; or stopped by an error."""
 
@@ -187,9 +192,11 @@ class Talk:
 
     def pump(self, until: float, done: Callable[[], bool] = lambda: False) -> bool:
         """Take what comes until a time of the line's clock, s, or until `done`. Returns whether it is."""
+        late = 0
         while not done():
             frame = self.line.receive(until)
-            if frame is None:
+            late += self.line.now() > until
+            if frame is None or late > LATE:
                 return done()
             if not any(drive.take(frame) for drive in self.drives) and len(self.strange) < 64:
                 self.strange[frame.id] = self.strange.get(frame.id, 0) + 1
