@@ -224,6 +224,8 @@ class CanBed(BedDriver):
         if self._state != BedState.DISARMED or not self._slow():
             raise self._refused("arm")
         self._disagreed, self.returned = 0, 0.0
+        for drive in self._drives:
+            drive.renew(self._talk)
         self.proved = prove_watchdogs(self._talk, about.deadman)
         begin_driving(self._talk)
         self._state, self.confirmed = BedState.ARMED, False
@@ -406,7 +408,7 @@ class CanBed(BedDriver):
     def _watch(self) -> None:
         """Stop where a drive has stopped, the supply's voltage is too high, or the shaft is too fast."""
         for drive in self._drives:
-            if drive.state != DriveState.DRIVING:
+            if not drive.sound:
                 words = f"{drive.words}: {drive.errors or 'it drives no more'}"
                 self._stopped(Fault.DEADMAN if drive.starved else Fault.DRIVE, words)
                 return

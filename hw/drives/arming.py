@@ -17,11 +17,12 @@ def begin_driving(talk: Talk) -> None:
     for drive in reversed(talk.drives):
         talk.send(drive.armed())
     end = talk.line.now() + TO_ARM
-    while not talk.pump(talk.line.now() + FEED, lambda: all(d.state == DriveState.DRIVING for d in talk.drives)):
-        if talk.line.now() > end:
-            late = next(d for d in talk.drives if d.state != DriveState.DRIVING)
-            _give_up(talk)
+    while not talk.pump(talk.line.now() + FEED, lambda: all(d.sound for d in talk.drives)):
+        wrong = [d for d in talk.drives if d.state == DriveState.DRIVING and d.errors]
+        if wrong or talk.line.now() > end:
+            late = next(d for d in (*wrong, *talk.drives) if not d.sound)
             message = f"{late.words} does not begin to drive: {late.errors or 'it does not say why'}"
+            _give_up(talk)
             raise Problem(error("E406", message, help="is it calibrated? its maker's tool says what it lacks"))
         for drive in talk.drives:
             talk.send(drive.told(0.0))
@@ -57,9 +58,9 @@ def prove_watchdogs(talk: Talk, deadman: float) -> tuple[float | None, ...]:
             )
             raise Problem(error("E406", message, help=helps))
         if not drive.starved:
-            _give_up(talk)
             message = f"{drive.words} stopped while it was armed without torque: "
             message += drive.errors or "it does not say why"
+            _give_up(talk)
             raise Problem(error("E406", message, help="its maker's tool says what that means"))
     if not forget(talk):
         late = [d for d in talk.drives if d.state != DriveState.IDLE]

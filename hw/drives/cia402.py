@@ -2,7 +2,7 @@
 mode 9, cyclic synchronous velocity, in which they close the rate loop.
 
     told      PDO: controlword and target torque, or velocity; then a heartbeat of the host, and a SYNC
-    answered  at a SYNC, two PDOs: statusword; position and velocity, in one frame so that they are of one instant
+    answered  at a SYNC, two PDOs: statusword and mode; position and velocity, in one frame as they are of one instant
     watchdog  the drive consumes the host's heartbeat, and fails where that stays away
     asked     by SDO, when it is greeted: device, modes, units, limits; PDOs are mapped then, and nothing is saved
 
@@ -45,10 +45,14 @@ ten, signed."""
 DEVICE, PRODUCT, CONSUMED, ABORT = (0x1000, 0), (0x1018, 2), (0x1016, 1), (0x6007, 0)
 REVISION, MODES, MODE, RATED, MOST, SPEED = (0x1018, 3), (0x6502, 0), (0x6060, 0), (0x6076, 0), (0x6072, 0), (0x6080, 0)
 STEPS, TURNS, VELOCITY_UNIT = (0x608F, 1), (0x608F, 2), (0x60A9, 0)
+CONTROL, STATUS = (0x6040, 0), (0x6041, 0)
 """Objects, by index and subindex."""
 
 CONTROL_HZ = 1000.0
 """Rate at which two such drives answer on a bus of 1 Mbit/s."""
+
+MOST_TOLD, MOST_RATE = (1 << 15) - 1, (1 << 31) - 1
+"""Largest torque and velocity that target torque and velocity can tell, in their units."""
 
 OFF, SHUT_DOWN, SWITCH_ON, ENABLE, RESET = 0x00, 0x06, 0x07, 0x0F, 0x80
 _TURN = 2.0 * math.pi
@@ -75,6 +79,9 @@ class Cia402Drive(CanDrive):
         device = self._read(talk, DEVICE, "<I")
         if int(device) & 0xFFFF != PROFILE:
             raise self.other(f"its device profile is {int(device) & 0xFFFF}, and a drive's is 402", "another node?")
+        self._write(talk, CONTROL, "<H", OFF)  # what it was told by somebody else ends before anything is changed
+        if int(self._read(talk, STATUS, "<H")) & 0x6F == 0x27:
+            raise self.wrong("it drives, and does not stop when it is told to", "switch it off and on")
         self._mode = RATE_MODE if self.rates else TORQUE_MODE
         if not int(self._read(talk, MODES, "<I")) & 1 << self._mode - 1:
             raise self.other(
@@ -88,18 +95,17 @@ class Cia402Drive(CanDrive):
         ten = struct.unpack("<b", bytes([unit >> 24]))[0]
         self._rate_unit = RATE_UNITS[unit & 0xFFFFFF] * 10.0**ten
         self._rated = 1e-3 * self._read(talk, RATED, "<I")
-        if self.rates:  # its own loop asks for no more than the bench bears
-            bears = math.floor(1e3 * self.entry.figures["torque_max"] / self._rated + 1e-6) if self._rated > 0.0 else 0
-            if bears < self._read(talk, MOST, "<H"):
-                self._write(talk, MOST, "<H", bears)
-        most = 1e-3 * self._rated * self._read(talk, MOST, "<H")
+        most = 1e-3 * self._rated * self._most(talk)
         rate = _TURN / 60.0 * self._read(talk, SPEED, "<I")
         steps, turns = self._read(talk, STEPS, "<I"), self._read(talk, TURNS, "<I")
         if not all(each > 0.0 for each in (self._rated, most, rate, steps, turns)):
             raise self.wrong("a limit or a unit of its is 0", "objects 6072h, 6076h, 6080h and 608Fh")
+        if rate > MOST_RATE * self._rate_unit:
+            helps = "set object 60A9h to thousandths of a turn a minute, 0xFDB44700"
+            raise self.wrong(f"its largest speed, {rate:.4g} rad/s, is more than 32 bits hold in its unit", helps)
         self._step = _TURN * turns / steps
         self._set_up(talk)
-        talk.send([CanFrame(NMT, bytes((START, self.node))), *self.idle()])
+        talk.send(self.idle())
         self.reading = None
         if not talk.ask(self.asked(), lambda: self.reading is not None and self.state != DriveState.DRIVING):
             raise talk.silent(self, "SYNC")
@@ -118,12 +124,25 @@ class Cia402Drive(CanDrive):
             angle_range=self._step * 2.0**32,
         )
 
+    def renew(self, talk: Talk) -> None:
+        self._most(talk)
+        self._set_up(talk)
+
+    def _most(self, talk: Talk) -> float:
+        """The largest torque that it may be told, in thousandths of its rated torque. Where its own loop asks for it
+        that is no more than the bench bears."""
+        if self.rates and self._rated > 0.0:
+            bears = math.floor(1e3 * self.entry.figures["torque_max"] / self._rated + 1e-6)
+            if bears < self._read(talk, MOST, "<H"):
+                self._set(talk, MOST, "<H", bears)
+        return min(self._read(talk, MOST, "<H"), MOST_TOLD)
+
     def _set_up(self, talk: Talk) -> None:
-        """Map the PDOs, and set mode and watchdog."""
+        """Map the PDOs, set mode and watchdog, and let PDOs begin."""
         talk.send([CanFrame(NMT, bytes((PREOPERATIONAL, self.node)))])
         for parameters, mapping, cob, kind, objects in (
             (0x1400, 0x1600, RPDO1, 255, (0x60400010, 0x60FF0020 if self.rates else 0x60710010)),
-            (0x1800, 0x1A00, TPDO1, 1, (0x60410010,)),
+            (0x1800, 0x1A00, TPDO1, 1, (0x60410010, 0x60610008)),
             (0x1801, 0x1A01, TPDO2, 1, (0x60640020, 0x606C0020)),
         ):
             self._write(talk, (parameters, 1), "<I", 0x80000000 | cob + self.node)
@@ -133,9 +152,10 @@ class Cia402Drive(CanDrive):
                 self._write(talk, (mapping, n), "<I", each)
             self._write(talk, (mapping, 0), "<B", len(objects))
             self._write(talk, (parameters, 1), "<I", cob + self.node)
-        self._write(talk, ABORT, "<h", 1)
-        self._write(talk, CONSUMED, "<I", HOST << 16 | round(1e3 * self.entry.figures["watchdog"]))
-        self._write(talk, MODE, "<b", self._mode)
+        self._set(talk, ABORT, "<h", 1)
+        self._set(talk, CONSUMED, "<I", HOST << 16 | round(1e3 * self.entry.figures["watchdog"]))
+        self._set(talk, MODE, "<b", self._mode)
+        talk.send([CanFrame(NMT, bytes((START, self.node)))])
 
     def _sdo(self, talk: Talk, data: bytes, what: str) -> bytes:
         """The answer to an SDO of up to four bytes. Raises Problem E402 where none comes, E404 where it is refused."""
@@ -168,6 +188,13 @@ class Cia402Drive(CanDrive):
         head = 0x23 | (4 - size) << 2
         what = f"to set object {which[0]:04X}h:{which[1]}"
         self._sdo(talk, struct.pack("<BHB", head, *which) + struct.pack(layout, value), what)
+
+    def _set(self, talk: Talk, which: tuple[int, int], layout: str, value: int) -> None:
+        """Set an object, and see that it is set. Raises Problem E404 where it is not."""
+        self._write(talk, which, layout, value)
+        if (found := self._read(talk, which, layout)) != value:
+            what = f"object {which[0]:04X}h:{which[1]}"
+            raise self.wrong(f"it does not take {value} for {what}, which is {found:g}", "set it by its maker's tool")
 
     # Frames
 
@@ -203,7 +230,7 @@ class Cia402Drive(CanDrive):
         return (self._pdo(OFF), self._pdo(RESET), self._pdo(OFF))
 
     def answers(self) -> Sequence[CanFrame]:
-        return (CanFrame(TPDO1 + self.node, bytes(2)), CanFrame(TPDO2 + self.node, bytes(8)))
+        return (CanFrame(TPDO1 + self.node, bytes(3)), CanFrame(TPDO2 + self.node, bytes(8)))
 
     def take(self, frame: CanFrame) -> bool:
         if frame.extended or frame.fd or frame.remote or frame.id & 0x7F != self.node:
@@ -211,8 +238,8 @@ class Cia402Drive(CanDrive):
         which, data = frame.id & 0x780, frame.data
         if which == SDO_ANSWER and len(data) == 8:
             self._answer = data
-        elif which == TPDO1 and len(data) == 2:
-            self._status(struct.unpack("<H", data)[0], frame.time)
+        elif which == TPDO1 and len(data) == 3:
+            self._status(*struct.unpack("<Hb", data), frame.time)
         elif which == TPDO2 and len(data) == 8:
             position, velocity = struct.unpack("<ii", data)
             angle, rate = position * self._step, velocity * self._rate_unit
@@ -223,14 +250,19 @@ class Cia402Drive(CanDrive):
             return False
         return True
 
-    def _status(self, status: int, time: float) -> None:
-        self.stated = time
+    def _status(self, status: int, mode: int, time: float) -> None:
+        self.stated, drove = time, self.state == DriveState.DRIVING
         if status & 0x4F in (0x08, 0x0F):
             self.state, self.errors = DriveState.FAILED, f"error 0x{self._error:04X}"
         elif status & 0x6F == 0x27:
-            self.state, self.errors = DriveState.DRIVING, ""
+            self.state = DriveState.DRIVING
+            self.errors = "" if mode == self._mode else f"it is in mode {mode}, and not in {self._mode}"
+        elif status & 0x6F == 0x07:
+            self.state, self.errors = DriveState.DRIVING, "it makes a quick stop"
         else:
             self.state, self.errors = DriveState.IDLE, ""
+        if drove and self.state != DriveState.DRIVING:
+            self._wanted = False  # it goes on only where it is armed again
         self.starved = self.state == DriveState.FAILED and self._error == HEARTBEAT_LOST
         self._control = {0x40: SHUT_DOWN, 0x21: SWITCH_ON, 0x23: ENABLE, 0x27: ENABLE}.get(
             status & 0x4F if status & 0x4F == 0x40 else status & 0x6F, SHUT_DOWN

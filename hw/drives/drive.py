@@ -5,6 +5,7 @@ for which it then closes the loop. It says its angle (rad) and rate (rad/s), all
 shaft. It disarms itself where it hears nothing for the time of its watchdog.
 
     drive.greet(talk)        who is there: dialect, firmware, limits; it is idle afterwards
+    drive.renew(talk)        set again what its greeting set, before each arming
     drive.armed()            frames that arm it with nothing commanded, to be sent until its state says so
     drive.told(value)        frames of a command
     drive.asked()            frames that ask for its angle, rate and state
@@ -29,8 +30,13 @@ ASKS = 5
 """How often a question of a greeting is asked: a bus loses frames only where something is wrong with it."""
 
 
+LATE = 256
+"""Frames that are taken after the time until which they were waited for: what has come meanwhile, and no more, for on a
+bus that is never quiet there is always another."""
+
+
 class DriveState(enum.Enum):
-    """The state of a drive: idle, its outputs off; driving, so that it takes commands; or stopped by an error."""
+    """The state of a drive: idle, its outputs off; driving, its outputs on; or stopped by an error."""
 
     IDLE = "idle"
     DRIVING = "driving"
@@ -86,7 +92,7 @@ class CanDrive(ABC):
     """The host's side of one drive.
 
     reading   the last answer; None before the first
-    state     as it said last;  stated: when, s of the line's clock
+    state     as it said last;  errors: that it told, in words;  stated: when, s of the line's clock
     starved   True where the error that it failed by is that of its watchdog, and no other
     supply    V of its supply, as it said last; None where it never did
     power     W that it takes from its supply, below 0 where it gives back; None where it never said so
@@ -112,6 +118,11 @@ class CanDrive(ABC):
     @abstractmethod
     def greet(self, talk: Talk) -> DriveFacts:
         """Find the drive, leave it idle, and read what it is. Raises Problem E402 to E404."""
+
+    def renew(self, talk: Talk) -> None:
+        """Set again what its greeting has set, where that is not part of its commands, and see that it is: a drive that
+        has begun anew since then has its own mode, limits and watchdog. Raises Problem E402, E404."""
+        return
 
     @abstractmethod
     def armed(self) -> Sequence[CanFrame]:
@@ -145,6 +156,11 @@ class CanDrive(ABC):
     @abstractmethod
     def answers(self) -> Sequence[CanFrame]:
         """Frames as long as those with which it answers an exchange, to reckon how long they take on the bus."""
+
+    @property
+    def sound(self) -> bool:
+        """True where it drives, and tells no error."""
+        return self.state == DriveState.DRIVING and not self.errors
 
     def own(self, value: float) -> float:
         """A quantity of the shaft in the drive's own sense, or the other way round."""
@@ -183,9 +199,11 @@ class Talk:
 
     def pump(self, until: float, done: Callable[[], bool] = lambda: False) -> bool:
         """Take what comes until a time of the line's clock, s, or until `done`. Returns whether it is."""
+        late = 0
         while not done():
             frame = self.line.receive(until)
-            if frame is None:
+            late += self.line.now() > until
+            if frame is None or late > LATE:
                 return done()
             if not any(drive.take(frame) for drive in self.drives) and len(self.strange) < 64:
                 self.strange[frame.id] = self.strange.get(frame.id, 0) + 1

@@ -45,6 +45,9 @@ OWED = 0.01
 LONGEST_LINE = 512
 """Bytes of a line beyond which it is none: one of 64 bytes of data has 160."""
 
+LATE_READS = 16
+"""How often bytes are read that come after the time until which a frame was waited for, where they make none."""
+
 LOST = (
     "the drives stop themselves when they hear nothing for the time of their watchdog",
     "look at the adapter, the cable and its two terminators, then start again",
@@ -89,18 +92,21 @@ class FdcanusbLine:
             message = f"an fdcanusb, on {self._name}, cannot send a frame without data, as these drives need"
             helps = "moteus, Damiao and RobStride need none; for the others another adapter"
             raise Problem(error("E404", message, help=helps))
-        self._sent.append(self._line.now())
+        self._forget(now := self._line.now())
+        self._sent.append(now)
         kind, flags = "ext" if frame.extended else "std", "B F r" if frame.fd else "b f r"
         self._line.send(f"can {kind} {frame.id:X} {frame.data.hex().upper()} {flags}\n".encode())
 
     def receive(self, until: float) -> CanFrame | None:
+        late = 0
         while not self._frames:
             data = self._line.receive(until)
             now = self._line.now()
             self._keep(data)
             while self._lines:
                 self._take(self._lines.popleft(), now)
-            if not data and now >= until:
+            late += now >= until
+            if late and (not data or late > LATE_READS):
                 break
         return self._frames.popleft() if self._frames else None
 
@@ -113,8 +119,7 @@ class FdcanusbLine:
 
     def _take(self, text: bytes, time: float) -> None:
         if text == b"OK" or text.startswith(b"ERR"):
-            while self._sent and time - self._sent[0] > OWED:
-                self._sent.popleft()
+            self._forget(time)
             if self._sent:
                 self._asked, self._taken = self._sent.popleft(), time
         if text.startswith(b"ERR"):
@@ -124,6 +129,11 @@ class FdcanusbLine:
             self.refused += 1
         elif (frame := frame_of(text, self._came(time))) is not None:
             self._frames.append(frame)
+
+    def _forget(self, time: float) -> None:
+        """Expect no answer any more to commands that were given too long before a time, s."""
+        while self._sent and time - self._sent[0] > OWED:
+            self._sent.popleft()
 
     def _came(self, time: float) -> float:
         """When a frame came whose line was read at a time, s."""

@@ -15,6 +15,7 @@ import json
 import math
 import struct
 from collections.abc import Sequence
+from typing import Any
 
 from hw.drives.bench_file import DriveEntry
 from hw.drives.drive import ASKS, DriveFacts, DriveReading, DriveState, Talk
@@ -25,8 +26,6 @@ from hw.drives.odrive_axis import (
     NEEDED,
     NEEDED_FOR_RATES,
     PASSTHROUGH,
-    RATE_CONTROL,
-    TORQUE_CONTROL,
     TURN,
     OdriveAxis,
 )
@@ -39,14 +38,25 @@ ESTIMATES, MODES, RATE, TORQUE, SUPPLY, CLEAR = 0x09, 0x0B, 0x0D, 0x0E, 0x17, 0x
 HEARTBEAT_MS, SUPPLY_MS = 5, 20
 """Periods at which a drive is set to tell its state, and its supply's voltage and current, ms."""
 
+MOST_NODE = 62
+"""Largest number of a drive: an identifier has six bits for it, and 63 is one that has none."""
+
 MOST_BYTES = 1 << 20
 _TYPES = {"bool": "<?", "uint8": "<B", "int8": "<b", "uint16": "<H", "int16": "<h", "uint32": "<I", "int32": "<i"}
-_TYPES |= {"float": "<f", "uint64": "<Q", "int64": "<q"}
+_TYPES |= {"float": "<f"}
 
 HEARTBEAT_RATE = "axis0.config.can.heartbeat_msg_rate_ms"
 ESTIMATES_RATE = "axis0.config.can.encoder_msg_rate_ms"
 SUPPLY_RATE = "axis0.config.can.bus_voltage_msg_rate_ms"
 REPORTS = (HEARTBEAT_RATE, ESTIMATES_RATE, SUPPLY_RATE)
+
+
+def _endpoint(found: Any) -> tuple[int, str]:
+    """The number of a property, of 16 bits, and the format of its value. Raises ValueError, KeyError, TypeError."""
+    number = found["id"]
+    if type(number) is not int or not 0 <= number < 1 << 16:
+        raise ValueError
+    return number, _TYPES[found["type"]]
 
 
 class OdriveDrive(OdriveAxis):
@@ -64,6 +74,9 @@ class OdriveDrive(OdriveAxis):
 
     def greet(self, talk: Talk) -> DriveFacts:
         self._version, self._beats = None, 0
+        self._written.clear()
+        if self.node > MOST_NODE:
+            raise self.wrong("its number is none of an ODrive", f"a number from 0 to {MOST_NODE}")
         if not talk.ask([self._request(VERSION)], lambda: self._version is not None):
             if self._beats:
                 helps = ("firmware 0.5 and before does not: put 0.6 on it", "its maker's `odrivetool dfu` does so")
@@ -95,7 +108,7 @@ class OdriveDrive(OdriveAxis):
             found, named = data["endpoints"], (data["fw_version"], data["hw_version"])
             needed = (*REPORTS, *NEEDED, *NEEDED_FOR_RATES * self.rates)
             missing = [each for each in needed if each not in found]
-            numbers = {each: (int(found[each]["id"]), _TYPES[found[each]["type"]]) for each in needed if each in found}
+            numbers = {each: _endpoint(found[each]) for each in needed if each in found}
         except OSError as reason:
             raise self.wrong(f"{path} cannot be read: {(reason.strerror or str(reason)).lower()}", helps) from None
         except (ValueError, KeyError, TypeError, RecursionError):
@@ -140,7 +153,7 @@ class OdriveDrive(OdriveAxis):
 
     def armed(self) -> Sequence[CanFrame]:
         return (
-            self._frame(MODES, struct.pack("<II", RATE_CONTROL if self.rates else TORQUE_CONTROL, PASSTHROUGH)),
+            self._frame(MODES, struct.pack("<II", self._mode, PASSTHROUGH)),
             *self.told(0.0),
             self._frame(SET_STATE, struct.pack("<I", CLOSED_LOOP)),
         )
@@ -157,10 +170,10 @@ class OdriveDrive(OdriveAxis):
         return (*self.told(0.0), self._frame(SET_STATE, struct.pack("<I", IDLE)))
 
     def halted(self) -> Sequence[CanFrame]:
-        return (self._frame(ESTOP),)
+        return (self._frame(ESTOP), *self.told(0.0))  # what it is told it would go on with once it is armed again
 
     def cleared(self) -> Sequence[CanFrame]:
-        return (self._frame(CLEAR, b"\0"), self._frame(SET_STATE, struct.pack("<I", IDLE)))
+        return (self._frame(CLEAR, b"\0"), *self.idle())
 
     def answers(self) -> Sequence[CanFrame]:
         return (self._frame(ESTIMATES, bytes(8)),)

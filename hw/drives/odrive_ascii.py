@@ -21,10 +21,10 @@ from hw.drives.drive import ASKS, GREETED, DriveFacts, DriveReading, DriveState,
 from hw.drives.frames import CanFrame
 from hw.drives.odrive_axis import (
     CLOSED_LOOP,
+    CONTROL_MODE,
     IDLE,
+    INPUT_MODE,
     PASSTHROUGH,
-    RATE_CONTROL,
-    TORQUE_CONTROL,
     TURN,
     OdriveAxis,
 )
@@ -33,11 +33,7 @@ from met.diagnostic import Problem, error
 
 STATE, ACTIVE, REASON = "axis0.current_state", "axis0.active_errors", "axis0.disarm_reason"
 VOLTAGE, CURRENT = "vbus_voltage", "ibus"
-REQUESTED, CONTROL_MODE, INPUT_MODE = (
-    "axis0.requested_state",
-    "axis0.controller.config.control_mode",
-    "axis0.controller.config.input_mode",
-)
+REQUESTED = "axis0.requested_state"
 FIRMWARE_NUMBERS = ("fw_version_major", "fw_version_minor", "fw_version_revision")
 HARDWARE_NUMBERS = ("hw_version_major", "hw_version_minor", "hw_version_variant")
 
@@ -80,6 +76,7 @@ class OdriveAsciiDrive(OdriveAxis):
 
     def greet(self, talk: Talk) -> DriveFacts:
         self._state, self._turn = None, 0
+        self._written.clear()
         if not isinstance(talk.line, OdriveLines):
             raise self.wrong("it is not on a serial line", '`interface = "serial"` of `[bus]`')
         numbers = [self._read(talk, path) for path in (*FIRMWARE_NUMBERS, *HARDWARE_NUMBERS)]
@@ -92,8 +89,6 @@ class OdriveAsciiDrive(OdriveAxis):
             helps = ("no hub between, another USB port of the computer", "a UART, at 921600 bits a second")
             raise self.wrong(f"an answer of its takes {1e3 * took:.3g} ms, and {1e3 * most:.3g} ms is the most", helps)
         talk.send(self.idle())
-        for path, value in self._modes():
-            self._write(talk, path, value)
         words = (".".join(str(each) for each in version) for version in (firmware, hardware))
         facts = self._described(talk, *words)
         self._property(talk, VOLTAGE)
@@ -142,10 +137,6 @@ class OdriveAsciiDrive(OdriveAxis):
         message = f"no {self.dialect} answers {what} as {self.words}"
         return Problem(error("E402", message, help=[*helps, f"`port` of `[{self.entry.role}]`, and its `dialect`"]))
 
-    def _modes(self) -> tuple[tuple[str, int], ...]:
-        """Properties that say what it is told, and what they are to be."""
-        return ((CONTROL_MODE, RATE_CONTROL if self.rates else TORQUE_CONTROL), (INPUT_MODE, PASSTHROUGH))
-
     # Texts
 
     def _text(self, text: str) -> CanFrame:
@@ -158,7 +149,10 @@ class OdriveAsciiDrive(OdriveAxis):
 
     def armed(self) -> Sequence[CanFrame]:
         return (
-            *(self._text(f"w {path} {value}") for path, value in self._modes()),
+            *(
+                self._text(f"w {path} {value}")
+                for path, value in ((CONTROL_MODE, self._mode), (INPUT_MODE, PASSTHROUGH))
+            ),
             self._command(0.0),
             self._text(f"w {REQUESTED} {CLOSED_LOOP}"),
             *self.asked(),
@@ -183,7 +177,7 @@ class OdriveAsciiDrive(OdriveAxis):
         return self.idle()
 
     def cleared(self) -> Sequence[CanFrame]:
-        return (self._text("sc"), self._text(f"w {REQUESTED} {IDLE}"))
+        return (self._text("sc"), *self.idle())
 
     def answers(self) -> Sequence[CanFrame]:
         return (self._text("-1000.000000 -1000.000000"), self._text("16777216"))

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 
+from hw.drives.bench_file import DriveEntry
 from hw.drives.drive import ASKS, CanDrive, DriveFacts, DriveState, Talk
 
 IDLE, CLOSED_LOOP = 1, 8
@@ -56,7 +57,9 @@ TORQUE_CONSTANT, CURRENT_MAX = "axis0.config.motor.torque_constant", "axis0.conf
 RATE_MAX, SUPPLY_MAX = "axis0.controller.config.vel_limit", "config.dc_bus_overvoltage_trip_level"
 TORQUE_MOST, TORQUE_LEAST = "axis0.config.torque_soft_max", "axis0.config.torque_soft_min"
 RATE_GAIN, RATE_INTEGRAL = "axis0.controller.config.vel_gain", "axis0.controller.config.vel_integrator_gain"
-NEEDED = (WATCHDOG_TIMEOUT, WATCHDOG_ENABLED, TORQUE_CONSTANT, CURRENT_MAX, RATE_MAX, SUPPLY_MAX)
+CONTROL_MODE, INPUT_MODE = "axis0.controller.config.control_mode", "axis0.controller.config.input_mode"
+LIMITS = (WATCHDOG_TIMEOUT, WATCHDOG_ENABLED, TORQUE_CONSTANT, CURRENT_MAX, RATE_MAX, SUPPLY_MAX)
+NEEDED = (*LIMITS, CONTROL_MODE, INPUT_MODE)
 NEEDED_FOR_RATES = (TORQUE_MOST, TORQUE_LEAST, RATE_GAIN, RATE_INTEGRAL)
 """Properties of one that is told rates: the torque that its loop may ask for, N m; its gains, N m s/turn, N m/turn."""
 
@@ -65,6 +68,20 @@ class OdriveAxis(CanDrive):
     """The host's side of an ODrive's axis, but for how it is spoken to."""
 
     takes_rates = True
+
+    def __init__(self, entry: DriveEntry) -> None:
+        super().__init__(entry)
+        self._written: dict[str, float] = {}
+        """Properties that were set, and to what, by path."""
+
+    @property
+    def _mode(self) -> int:
+        """The mode of its control: it is told rates, or torques."""
+        return RATE_CONTROL if self.rates else TORQUE_CONTROL
+
+    def renew(self, talk: Talk) -> None:
+        for path, value in self._written.items():
+            self._write(talk, path, value)
 
     @abstractmethod
     def _read(self, talk: Talk, path: str) -> float:
@@ -80,6 +97,7 @@ class OdriveAxis(CanDrive):
             self._put(talk, path, value)
             found = self._read(talk, path)
             if abs(found - value) <= 1e-6 * abs(value):
+                self._written[path] = value
                 return
         raise self.wrong(f"it does not take {value:g} for `{path}`, which is {found:g}", "set it by its maker's tool")
 
@@ -90,8 +108,13 @@ class OdriveAxis(CanDrive):
             raise self.other(f"its firmware is {words}", "MET speaks to firmware 0.6")
 
     def _described(self, talk: Talk, firmware: str, hardware: str) -> DriveFacts:
-        """Set its watchdog, and read its limits and what its rate loop is. Raises Problem E402 to E404."""
-        for path, value in ((WATCHDOG_TIMEOUT, self.entry.figures["watchdog"]), (WATCHDOG_ENABLED, True)):
+        """Set its watchdog and its mode, and read its limits and what its rate loop is. Raises Problem E402 to E404."""
+        for path, value in (
+            (WATCHDOG_TIMEOUT, self.entry.figures["watchdog"]),
+            (WATCHDOG_ENABLED, True),
+            (CONTROL_MODE, self._mode),
+            (INPUT_MODE, PASSTHROUGH),
+        ):
             self._write(talk, path, value)
         kt, current = self._read(talk, TORQUE_CONSTANT), self._read(talk, CURRENT_MAX)
         own = self.entry.figures["kt"]
@@ -102,7 +125,7 @@ class OdriveAxis(CanDrive):
         supply = self._read(talk, SUPPLY_MAX)
         watchdog = self._read(talk, WATCHDOG_TIMEOUT)
         if not all(math.isfinite(each) and each > 0.0 for each in (kt, current, rate, supply, watchdog)):
-            raise self.wrong("a limit of its is no number above zero", f"{', '.join(NEEDED)}: set them")
+            raise self.wrong("a limit of its is no number above zero", f"{', '.join(LIMITS)}: set them")
         loop = self._rate_loop(talk) if self.rates else None
         most = kt * current if loop is None else min(kt * current, self._read(talk, TORQUE_MOST))
         return DriveFacts(firmware, hardware, watchdog, most, rate, CONTROL_HZ, supply_max=supply, rate_loop=loop)
@@ -125,7 +148,7 @@ class OdriveAxis(CanDrive):
         if errors & ~sum(ERRORS):
             self.errors += f"{', ' if self.errors else ''}error 0x{errors:X}"
         self.starved = errors == WATCHDOG_EXPIRED
-        if state == CLOSED_LOOP and not errors:
+        if state == CLOSED_LOOP:  # whatever its errors
             self.state = DriveState.DRIVING
         else:
             self.state = DriveState.FAILED if errors else DriveState.IDLE

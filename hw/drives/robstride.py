@@ -303,7 +303,8 @@ class RobstrideDrive(CanDrive):
         at_end, before = angle in (0, STEPS_16), self._last
         self._last = angle, time
         if at_end and before[0] == angle and abs(turned) * (time - before[1]) > STAYS * 2.0 * ANGLE_MAX / STEPS_16:
-            self.state, self.errors, self.starved = DriveState.FAILED, "its angle stays at the end of its range", False
+            self.errors, self.starved = "its angle stays at the end of its range", False
+            self.state = self.state if self.state == DriveState.DRIVING else DriveState.FAILED
         self.reading = DriveReading(time, self.own(value_of(angle, ANGLE_MAX, STEPS_16)), self.own(turned))
 
     def _state(self, mode: int, faults: int, time: float) -> None:
@@ -314,9 +315,7 @@ class RobstrideDrive(CanDrive):
             said.append(f"fault 0x{self._faults:X}")
         self.starved = not said and self._ran and mode != RUNNING
         self.errors = STARVED if self.starved else ", ".join(said)
-        if self.errors:
-            self.state = DriveState.FAILED
-        elif mode == RUNNING:
+        if mode == RUNNING:  # whatever its faults
             self.state, self._ran = DriveState.DRIVING, self._wanted
         else:
-            self.state = DriveState.IDLE
+            self.state = DriveState.FAILED if self.errors else DriveState.IDLE

@@ -27,7 +27,10 @@ _OBJECTS = (
     *((f"tpdo1 map {n}", 0x1A00, n, 5 if n == 0 else 7, 0) for n in range(5)),
     *((f"tpdo2 map {n}", 0x1A01, n, 5 if n == 0 else 7, 0) for n in range(5)),
     ("abort", 0x6007, 0, 3, 0),
+    ("control", 0x6040, 0, 6, 0),
+    ("status", 0x6041, 0, 6, 0x40),
     ("mode", 0x6060, 0, 2, 0),
+    ("mode shown", 0x6061, 0, 2, 0),
     ("most torque", 0x6072, 0, 6, 3000),
     ("rated torque", 0x6076, 0, 7, 200),
     ("most speed", 0x6080, 0, 7, 6000),
@@ -46,6 +49,7 @@ class PlayedCia402(PlayedDrive):
     """A CiA 402 drive.
 
     watches  False for one that does not miss the host's heartbeat
+    refuses  objects that keep what they are, by index; 0x6061: it stays in the mode that it is in
     rate_gain N m s/rad and rate_integral N m/rad, of its rate loop
     """
 
@@ -76,6 +80,7 @@ class PlayedCia402(PlayedDrive):
                 record.add_member(variable)
             else:
                 dictionary.add_object(variable)
+        self.refuses: set[int] = set()
         self._network = Network()
         self._node = canopen.LocalNode(node, dictionary)
         self._node.associate_network(self._network)
@@ -99,6 +104,11 @@ class PlayedCia402(PlayedDrive):
         self._node.set_data(index, sub, _LAYOUT[index, sub].pack(value))
 
     @property
+    def mode(self) -> int:
+        """The mode that it is in."""
+        return self.value(0x6061)
+
+    @property
     def bridge(self) -> Output:
         return Output("torque", self.torque) if self.status == 0x27 else OFF
 
@@ -109,9 +119,7 @@ class PlayedCia402(PlayedDrive):
         if frame.id == 0x000 and len(data) == 2 and data[1] in (0, self.node):
             self._operational = {1: True, 0x80: False, 2: False}.get(data[0], self._operational)
         elif frame.id == 0x600 + self.node and len(data) == 8:
-            self._network.notify(frame.id, bytearray(data), now)
-            sent, self._network.sent = self._network.sent, []
-            return sent
+            return self._served(data, now)
         elif frame.id == 0x700 + (self.value(0x1016, 1) >> 16) and self.value(0x1016, 1):
             self.heard = now
         elif self._operational and frame.id == self.value(0x1400, 1):
@@ -122,12 +130,29 @@ class PlayedCia402(PlayedDrive):
             return self._answers()
         return ()
 
+    def _served(self, data: bytes, now: float) -> Sequence[CanFrame]:
+        """What its SDO server answers."""
+        self.set_value(0x6041, 0, self.status)
+        which, kept = (data[2] << 8 | data[1], data[3]), b""
+        if which[0] in self.refuses:
+            kept = self._node.get_data(*which)
+        self._network.notify(0x600 + self.node, bytearray(data), now)
+        if kept:
+            self._node.set_data(*which, kept)
+        if data[0] & 0xE0 == 0x20 and which[0] == 0x6040:
+            self._obey(self.value(0x6040), 0)
+        if 0x6061 not in self.refuses:
+            self.set_value(0x6061, 0, self.value(0x6060))
+        sent, self._network.sent = self._network.sent, []
+        return sent
+
     def _answers(self) -> Sequence[CanFrame]:
         """Its two PDOs, as they are mapped."""
         turns = 2.0 * math.pi
         per_turn = self.value(0x608F, 1) / self.value(0x608F, 2)
         values = {
             0x60410010: struct.pack("<H", self.status),
+            0x60610008: struct.pack("<b", self.mode),
             0x60640020: struct.pack("<i", _wrapped(math.floor(self.angle / turns * per_turn))),
             0x606C0020: struct.pack("<i", round(self.rate / self._rate_unit)),
         }
@@ -157,7 +182,7 @@ class PlayedCia402(PlayedDrive):
             self.status = 0x23
         elif control & 0x0F == 0x0F and self.status == 0x23:
             self.status = 0x27
-        mode = self.value(0x6060)
+        mode = self.mode
         if self.status != 0x27:
             self.torque, self.rate_told, self.integral = 0.0, 0.0, 0.0
         elif mode == 9:
@@ -173,7 +198,7 @@ class PlayedCia402(PlayedDrive):
 
     def tick(self, now: float) -> Sequence[CanFrame]:
         passed, self.looped = now - self.looped, now
-        if self.status == 0x27 and self.value(0x6060) == 9:
+        if self.status == 0x27 and self.mode == 9:
             error = self.rate_told - self.rate
             wanted = self.rate_gain * error + self.integral
             self.torque = self._limited(wanted)

@@ -29,9 +29,11 @@ PROPERTIES = (
     ("axis0.config.torque_soft_min", "float"),
     ("axis0.controller.config.vel_gain", "float"),
     ("axis0.controller.config.vel_integrator_gain", "float"),
+    (MODE := "axis0.controller.config.control_mode", "uint8"),
+    ("axis0.controller.config.input_mode", "uint8"),
 )
 FIRST = 201
-FORMATS = {"float": "<f", "bool": "<?", "uint32": "<I"}
+FORMATS = {"float": "<f", "bool": "<?", "uint32": "<I", "uint8": "<B"}
 
 
 def endpoints(firmware: str = "0.6.10", hardware: str = "4.4.58") -> dict[str, Any]:
@@ -45,6 +47,7 @@ class PlayedOdrive(PlayedDrive):
 
     kt N m/A; current_max A; rate_max rad/s; rate_gain N m s/rad and rate_integral N m/rad, of its rate loop
     watches    False for one whose watchdog does nothing
+    saved      its properties after it was switched on
     version    protocol, hardware (three numbers), firmware (three), unreleased; None: it does not answer
     """
 
@@ -66,17 +69,25 @@ class PlayedOdrive(PlayedDrive):
         self.version: tuple[int, ...] | None = (2, 4, 4, 58, 0, 6, 10, 0)
         turn = 2.0 * math.pi
         drive = (supply, supply_max, False, 0.1, kt, current_max, rate_max / turn, 100, 10, 0)
-        values = (*drive, math.inf, -math.inf, turn * rate_gain, turn * rate_integral)
+        values = (*drive, math.inf, -math.inf, turn * rate_gain, turn * rate_integral, 3, 1)
         self.values = dict(zip((path for path, _ in PROPERTIES), values, strict=True))
         self.refuses: set[str] = set()
         """Properties that cannot be set."""
         self.state, self.errors, self.torque, self.fed = 1, 0, 0.0, 0.0
-        self.mode, self.rate_told, self.integral, self.looped = 1, 0.0, 0.0, 0.0
+        self.rate_told, self.integral, self.looped = 0.0, 0.0, 0.0
+        self.saved = dict(self.values)
         self._sent = {1: 0.0, 9: 0.0, 0x17: 0.0}
 
     def reboot(self) -> None:
-        """As after its supply came back."""
+        """As after its supply came back: what was not saved is gone."""
         self.state, self.errors, self.torque, self.rate_told, self.integral = 1, 0, 0.0, 0.0, 0.0
+        self.values = dict(self.saved)
+        self._sent = dict.fromkeys(self._sent, -math.inf)
+
+    @property
+    def mode(self) -> int:
+        """Mode of its control: 1 torque, 2 rate."""
+        return int(self.values[MODE])
 
     @property
     def bridge(self) -> Output:
@@ -103,7 +114,7 @@ class PlayedOdrive(PlayedDrive):
             elif wanted == 1:
                 self.state, self.torque, self.integral = 1, 0.0, 0.0
         elif command == 0x0B and len(data) >= 8:
-            self.mode = struct.unpack_from("<I", data)[0]
+            self.values[MODE] = struct.unpack_from("<I", data)[0]
         elif command == 0x0D and len(data) >= 8:
             told = struct.unpack_from("<f", data)[0]
             most = self.values["axis0.controller.config.vel_limit"]

@@ -38,7 +38,7 @@ class PlayedOdriveAscii(PlayedOdrive):
         super().__init__(node, sense, **figures)
         self._begun = b""
         self.hardware, self.firmware = (4, 4, 58), (0, 6, 10)
-        self.reason, self.input_mode = 0, 1
+        self.reason = 0
 
     def reboot(self) -> None:
         super().reboot()
@@ -116,8 +116,6 @@ class PlayedOdriveAscii(PlayedOdrive):
             "axis0.current_state": self.state,
             "axis0.active_errors": self.errors,
             "axis0.disarm_reason": self.reason,
-            "axis0.controller.config.control_mode": self.mode,
-            "axis0.controller.config.input_mode": self.input_mode,
         }
         if path in numbers:
             return str(numbers[path])
@@ -135,10 +133,6 @@ class PlayedOdriveAscii(PlayedOdrive):
                 self.state, self.fed = 8, now
             elif number == 1:
                 self.state, self.torque, self.integral = 1, 0.0, 0.0
-        elif path == "axis0.controller.config.control_mode":
-            self.mode = int(number)
-        elif path == "axis0.controller.config.input_mode":
-            self.input_mode = int(number)
         elif path not in self.values:
             return UNKNOWN
         elif path not in self.refuses and not math.isnan(number):

@@ -10,6 +10,7 @@ import pytest
 from hw.bed import BedDriver
 from hw.beds.can_bed import PORT
 from hw.drives.bus import PythonCanLine
+from hw.drives.drive import Talk
 from hw.drives.frames import CanFrame, on_bus
 from hw.ports import Opening, Port
 from tests.hw.conftest import refusal
@@ -100,3 +101,33 @@ def test_drives_whose_watchdog_could_not_be_proved_are_refused_with_the_reason(t
 def test_no_transcript_is_kept_of_a_bus(tmp_path: Path) -> None:
     port = Port(f"can:{bench_file(tmp_path)}", transcript=str(tmp_path / "kept"))
     assert refusal(lambda: PORT.open(Opening(port))).startswith("error[E409]: no transcript is kept of a CAN bus\n")
+
+
+class _NeverQuiet:
+    """A bus on which there is always another frame, in steps of 10 us."""
+
+    def __init__(self) -> None:
+        self.time, self.frames = 0.0, 0
+
+    def now(self) -> float:
+        return self.time
+
+    def send(self, frame: CanFrame) -> None: ...
+
+    def receive(self, until: float) -> CanFrame | None:
+        self.time, self.frames = self.time + 1e-5, self.frames + 1
+        assert self.frames < 10_000, "it is listened to for ever"
+        return CanFrame(0x555, b"12", time=self.time)
+
+    def sleep(self, seconds: float) -> None: ...
+
+    def close(self) -> None: ...
+
+
+def test_a_bus_that_is_never_quiet_is_left_when_the_time_is_over() -> None:
+    line = _NeverQuiet()
+    talk = Talk(line, ())
+    assert not talk.pump(1e-3)
+    assert line.time < 5e-3
+    talk.drain()
+    assert line.time < 1e-2

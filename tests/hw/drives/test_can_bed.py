@@ -119,7 +119,7 @@ def test_a_host_that_dies_leaves_both_drives_off_within_their_watchdog(on: Calla
     bench.go(0.1, voltage=5.0, current=0.5)
     died = bench.line.now()
     while not bench.played.off:
-        bench.line.sleep(1e-3)
+        bench.line.sleep(1e-4)
     assert bench.line.now() - died <= about.deadman + 1e-3
 
 
@@ -217,7 +217,7 @@ def test_the_rate_is_behind_the_filter_that_the_file_says(on: Callable[..., Benc
     time, rate = bench.bed._sides[0].time, bench.bed._sides[0].rate
     for n in range(100):
         bench.go(1e-3, voltage=8.0 * math.sin(0.2 * n), current=0.3)
-        side, steps = bench.bed._sides[0], 2000
+        side, steps = bench.bed._sides[0], 6000  # of the first order: three times as many have a third of the error
         step = (side.time - time) / steps
         for k in range(steps):
             there = rate + (k + 0.5) / steps * (side.rate - rate)

@@ -104,6 +104,99 @@ def test_a_fault_in_a_run_stops_both_and_is_said(tmp_path: Path) -> None:
         assert " = help: drive (node 1): error 0x3210\n" in refusal(bed.arm)
 
 
+def test_one_that_drives_when_it_is_greeted_is_off_before_its_mode_is_changed(tmp_path: Path) -> None:
+    bed, line, played, drive, _ = bench(tmp_path)
+    for index, value in ((0x6060, 9), (0x6061, 9)):
+        drive.set_value(index, 0, value)
+    drive.status, drive.rate_told = 0x27, 50.0
+    line.sleep(0.1)
+    assert played.shaft.rate > 1.0
+    changed: list[int] = []
+    line.spoil = lambda frame, from_drive: (
+        (changed.append(drive.status) if frame.data[:3] == b"\x2f\x60\x60" else None) or [(0.0, frame)]
+    )
+    bed.connect()
+    assert len(changed) == 2 and 0x27 not in changed and played.off
+
+
+def test_one_that_stays_in_another_mode_is_not_armed(tmp_path: Path) -> None:
+    """It would go on with the rate that it was told last."""
+    bed, _, played, drive, _ = bench(tmp_path)
+    drive.set_value(0x6061, 0, 9)
+    drive.refuses.add(0x6061)
+    with bed:
+        bed.connect()
+        assert refusal(bed.arm) == (
+            "error[E406]: drive (node 1) does not begin to drive: it is in mode 9, and not in 10\n"
+            " = help: is it calibrated? its maker's tool says what it lacks"
+        )
+        assert played.off
+
+
+def test_a_mode_that_changes_in_a_run_stops_both(tmp_path: Path) -> None:
+    bed, line, played, drive, _ = bench(tmp_path)
+    with bed:
+        bed.connect()
+        bed.arm()
+        drive.set_value(0x6061, 0, 9)
+        line.sleep(1e-3)
+        sample = bed.exchange(1.0, 0.0)
+        assert sample is not None and sample.state == BedState.STOPPED and played.off
+
+
+@pytest.mark.parametrize("index", [0x6007, 0x6060])
+def test_a_setting_that_it_does_not_take_is_found(tmp_path: Path, index: int) -> None:
+    bed, _, _, drive, _ = bench(tmp_path)
+    drive.refuses.add(index)
+    words = refusal(bed.connect)
+    assert words.startswith("error[E404]: drive (node 1) cannot be driven: it does not take ")
+    assert f" for object {index:04X}h:0, which is 0\n = help: set it by its maker's tool" in words
+
+
+def test_one_told_rates_that_keeps_a_larger_torque_than_the_bench_bears_is_refused(tmp_path: Path) -> None:
+    bed, _, _, drive, _ = bench(tmp_path)
+    bed._kind = "rate"
+    drive.set_value(0x6072, 0, 3000)
+    drive.refuses.add(0x6072)
+    assert " it does not take 2000 for object 6072h:0, which is 3000\n" in refusal(bed.connect)
+
+
+def test_one_that_has_stopped_does_not_drive_again_by_itself(tmp_path: Path) -> None:
+    """An emergency stop that is pressed and let go while the other drive is not heard."""
+    bed, line, _, drive, load = bench(tmp_path)
+    with bed:
+        bed.connect()
+        bed.arm()
+        line.spoil = lambda frame, from_drive: [] if frame.id == 0x280 + load.node else [(0.0, frame)]
+        drive.status, drive.torque = 0x40, 0.0
+        for _ in range(8):
+            line.sleep(1e-3)
+            bed.exchange(1.0, 0.0)
+            assert drive.status == 0x40
+
+
+def test_no_torque_is_told_that_its_frame_cannot_hold(tmp_path: Path) -> None:
+    bed, line, _, drive, _ = bench(tmp_path)
+    bed._kind = "torque"
+    drive.set_value(0x6076, 0, 10)
+    drive.set_value(0x6072, 0, 60_000)
+    with bed:
+        bed.connect()
+        bed.arm()
+        line.sleep(1e-3)
+        bed.exchange(0.39, 0.0)
+        assert drive.torque == pytest.approx(0.32767)
+
+
+def test_a_unit_of_velocity_in_which_its_speed_has_no_room_is_refused(tmp_path: Path) -> None:
+    bed, _, _, drive, _ = bench(tmp_path)
+    drive.set_value(0x60A9, 0, 0xF7B40300)
+    assert refusal(bed.connect) == (
+        "error[E404]: drive (node 1) cannot be driven: its largest speed, 628.3 rad/s, is more than 32 bits hold in "
+        "its unit\n = help: set object 60A9h to thousandths of a turn a minute, 0xFDB44700"
+    )
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -352,3 +352,51 @@ def table(exchanges: int = 10_000) -> None:
 
 if __name__ == "__main__":
     table()
+
+
+class _Babbling:
+    """A line on which there is always more, and an adapter that says nothing else. step: s that each reading takes"""
+
+    def __init__(self, said: bytes, step: float = 1e-5) -> None:
+        self.said, self.step, self.time, self.reads = said, step, 0.0, 0
+
+    def now(self) -> float:
+        return self.time
+
+    def send(self, frame: bytes) -> None:
+        if frame.startswith((b"can o", b"conf")):
+            self.reads = -1
+
+    def receive(self, until: float) -> bytes:
+        self.time += self.step
+        if self.reads < 0:
+            self.reads = 0
+            return b"OK\r\n"
+        self.reads += 1
+        assert self.reads < 10_000, "it is read for ever"
+        return self.said if self.time > 2.5 else b""
+
+    def sleep(self, seconds: float) -> None:
+        self.time += seconds
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("said", [b"x" * 4096, b"rcv 0100 24 e B F r x-1 and more\r\n" * 100, b"\n" * 4096])
+def test_a_line_that_is_never_quiet_is_left_when_the_time_is_over(said: bytes) -> None:
+    line = _Babbling(said)
+    adapter = FdcanusbLine(line, SETTINGS)
+    line.time = 3.0
+    assert adapter.receive(3.001) is None and line.time < 3.0015
+    assert adapter.receive(-1.0) is None
+    assert len(adapter._rest) <= LONGEST_LINE + 1
+
+
+def test_what_an_adapter_never_answers_is_not_kept() -> None:
+    line = _Babbling(b"")
+    adapter = FdcanusbLine(line, SETTINGS)
+    for _ in range(1000):
+        line.sleep(1e-3)
+        adapter.send(CanFrame(1, b"1"))
+    assert len(adapter._sent) <= 12

@@ -110,6 +110,13 @@ def test_a_file_of_another_firmware_s_properties_is_found(tmp_path: Path) -> Non
     )
 
 
+def _with(**changed: object) -> str:
+    """The file of its properties, one of which is changed."""
+    found = endpoints()
+    found["endpoints"]["axis0.config.enable_watchdog"] |= changed
+    return json.dumps(found)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -121,6 +128,11 @@ def test_a_file_of_another_firmware_s_properties_is_found(tmp_path: Path) -> Non
             '{"endpoints": {"axis0.config.enable_watchdog": {"id": "x", "type": "bool"}}}',
             "is no file of its properties",
         ),
+        (_with(id=70_000), "is no file of its properties"),
+        (_with(id=-1), "is no file of its properties"),
+        (_with(id=float("inf")), "is no file of its properties"),
+        (_with(id=True), "is no file of its properties"),
+        (_with(type="uint64"), "is no file of its properties"),
     ],
 )
 def test_a_file_that_is_none_of_properties_is_refused(tmp_path: Path, text: str | None, said: str) -> None:
@@ -160,3 +172,29 @@ def test_a_limit_that_is_no_number_is_found(tmp_path: Path) -> None:
         odrive(played).values["axis0.controller.config.vel_limit"] = float("inf")
 
     assert "cannot be driven: a limit of its is no number above zero\n" in greeting(tmp_path, endless)
+
+
+def test_a_number_that_no_identifier_has_room_for_is_refused_before_anything_is_sent(tmp_path: Path) -> None:
+    sent: list[bool] = []
+
+    def heard(frame: CanFrame, from_drive: bool) -> list[tuple[float, CanFrame]]:
+        sent.append(from_drive)
+        return [(0.0, frame)]
+
+    line = PlayedLine(played_bench(), heard)
+    path = bench_file(tmp_path)
+    path.write_text(path.read_text().replace("node        = 1", "node        = 63"))
+    assert refusal(host_of(two_drives(path), line).connect) == (
+        "error[E404]: drive (node 63) cannot be driven: its number is none of an ODrive\n = help: a number from 0 to 62"
+    )
+    assert not sent
+
+
+def test_a_watchdog_that_tells_and_does_not_stop_is_not_taken_for_one(tmp_path: Path) -> None:
+    played = played_bench()
+    drive = odrive(played)
+    drive._failed = lambda error: setattr(drive, "errors", error)  # type: ignore[method-assign]
+    with host_of(two_drives(bench_file(tmp_path)), PlayedLine(played)) as bed:
+        bed.connect()
+        assert refusal(bed.arm).startswith("error[E406]: drive (node 1) still drives 50 ms after the last command")
+        assert played.off

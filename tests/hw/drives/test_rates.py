@@ -14,6 +14,7 @@ from hw.beds.can_deck import BelievedLoop, loop_warning
 from hw.drivers import check_model, opened
 from hw.drives import DIALECTS
 from hw.drives.bench_file import two_drives
+from hw.players.cia402 import PlayedCia402
 from hw.players.odrive import PlayedOdrive
 from hw.players.player import PlayedBench, PlayedLine
 from hw.ports import Port
@@ -150,6 +151,92 @@ def test_an_odrive_s_limits_of_torque_are_set_and_its_gains_are_read(tmp_path: P
         assert values["axis0.config.torque_soft_max"] == -values["axis0.config.torque_soft_min"] == pytest.approx(0.4)
         assert dict(bed.remarks)["loop"] == "of rate, the drive's own: 0.01 N*m*s/rad, 0.05 N*m/rad, at most 0.4 N*m"
         assert played.load.values["axis0.config.torque_soft_max"] == float("inf")  # type: ignore[attr-defined]
+
+
+def test_an_odrive_that_lost_its_settings_has_them_again_before_it_is_armed(tmp_path: Path) -> None:
+    """Its own are a watchdog, another mode, and a loop that may ask for all that its current gives."""
+    bed, played, line = bed_of(tmp_path, "odrive")
+    drive = played.drive
+    assert isinstance(drive, PlayedOdrive)
+    drive.saved |= {
+        "axis0.config.enable_watchdog": True,
+        "axis0.config.watchdog_timeout": 0.02,
+        "axis0.config.can.heartbeat_msg_rate_ms": 5,
+    }
+    most = 0.0
+    with bed:
+        bed.connect()
+        drive.reboot()
+        assert drive.values["axis0.config.torque_soft_max"] == float("inf")
+        bed.arm()
+        assert drive.mode == 2
+        for _ in range(40):
+            line.sleep(1e-3)
+            bed.exchange(300.0, 0.0)
+            most = max(most, drive.output.value)
+    assert 0.39 < most <= 0.4 * (1.0 + 1e-6)
+
+
+def test_a_mode_that_does_not_reach_an_odrive_is_not_that_of_the_session_before(tmp_path: Path) -> None:
+    """One that was told 60 rad/s when its host died, and is told torques by the next, whose frames of the mode are
+    lost."""
+    bed, played, line = bed_of(tmp_path, "odrive")
+    drive = played.drive
+    assert isinstance(drive, PlayedOdrive)
+    bed.connect()
+    bed.arm()
+    for _ in range(200):
+        line.sleep(1e-3)
+        bed.exchange(60.0, 0.0)
+    line.sleep(5.0)
+    assert played.off and played.shaft.rate == 0.0 and (drive.mode, drive.rate_told) == (2, pytest.approx(60.0))
+    lossy = PlayedLine(played, lambda frame, from_drive: [] if frame.id & 0x1F == 0x0B else [(0.0, frame)])
+    with host_of(two_drives(bench_file(tmp_path, "odrive")), lossy, drive="torque") as bed:
+        bed.connect()
+        bed.clear()
+        bed.arm()
+        lossy.sleep(0.01)
+        assert drive.state == 8 and drive.mode == 1 and played.shaft.rate == 0.0
+
+
+@pytest.mark.parametrize("dialect", TOLD)
+@pytest.mark.parametrize("by", ["fault", "host", "silence"])
+def test_a_drive_that_has_stopped_keeps_no_rate_that_it_was_told(tmp_path: Path, dialect: str, by: str) -> None:
+    """Else it would go on with that rate from when it is armed until its first command comes."""
+    bed, played, line = bed_of(tmp_path, dialect)
+    drive = played.drive
+    assert isinstance(drive, PlayedOdrive | PlayedCia402)
+    with bed:
+        bed.connect()
+        bed.arm()
+        for _ in range(50):
+            line.sleep(1e-3)
+            bed.exchange(60.0, 0.0)
+        assert drive.rate_told == pytest.approx(60.0, abs=0.1)
+        if by == "fault":
+            played.slip = 1.0
+            for _ in range(6):
+                line.sleep(1e-3)
+                bed.exchange(60.0, 0.0)
+        elif by == "silence":
+            line.sleep(8.0)
+            bed.read()
+            bed.clear()
+        else:
+            bed.stop()
+        line.sleep(1e-3)
+        assert played.off and drive.rate_told == 0.0
+
+
+def test_an_odrive_whose_mode_cannot_be_set_is_refused(tmp_path: Path) -> None:
+    bed, played, _ = bed_of(tmp_path, "odrive")
+    assert isinstance(played.drive, PlayedOdrive)
+    played.drive.refuses.add("axis0.controller.config.control_mode")
+    assert refusal(bed.connect) == (
+        "error[E404]: drive (node 1) cannot be driven: it does not take 2 for "
+        "`axis0.controller.config.control_mode`, which is 3\n"
+        " = help: set it by its maker's tool"
+    )
 
 
 def test_an_odrive_whose_loop_has_no_gain_is_refused(tmp_path: Path) -> None:

@@ -271,3 +271,20 @@ def test_canopen_in_its_place_is_recognised(tmp_path: Path) -> None:
     )
     words = refusal(host_of(two_drives(bench_file(tmp_path, "robstride")), line).connect)
     assert " = help: identifiers from 0x701 on are heartbeats of CANopen: `cia402`?\n" in words
+
+
+def test_one_that_runs_with_a_fault_counts_as_on(tmp_path: Path) -> None:
+    """Where it is not stopped the bed does not confirm that it is off."""
+    played = played_bench("robstride")
+    drive = played.drive
+    assert isinstance(drive, PlayedRobstride)
+    line = PlayedLine(played)
+    with host_of(two_drives(bench_file(tmp_path, "robstride")), line) as bed:
+        bed.connect()
+        bed.arm()
+        drive.faults = 4
+        stops = [frame.id for frame in bed._drives[0].idle()]
+        line.spoil = lambda frame, from_drive: [] if frame.id in stops else [(0.0, frame)]
+        assert not bed.stop()
+        line.spoil = lambda frame, from_drive: [(0.0, frame)]
+        assert bed.stop() and played.off
