@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -47,7 +48,7 @@ DIGITS = 1e-6
 """Turns, and turns/s, of the last decimal of an angle and a rate, as firmware 0.5 writes them."""
 
 STILL = 0.01
-"""Turns/s above which an answer that is the one before again is old: the shaft has turned since."""
+"""Turns/s above which an answer that is an earlier one again is old: the shaft has turned since."""
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?|[-+]?inf")
 
@@ -67,8 +68,8 @@ class OdriveAsciiDrive(OdriveAxis):
         self._errors: dict[str, int] = {}
         """Its errors, as they were answered since that state."""
         self._turn = 0
-        self._last = ""
-        """The last angle and rate, as they were answered."""
+        self._before = deque[str](maxlen=64)
+        """The last angles and rates, as they were answered."""
 
     @property
     def where(self) -> str:
@@ -188,8 +189,8 @@ class OdriveAsciiDrive(OdriveAxis):
         question, _, answer = frame.data.decode("ascii", "replace").partition("\n")
         if question.startswith("f "):
             angle, rate = (_number(each) for each in answer.split())
-            old = answer == self._last and abs(rate) > STILL
-            self._last = answer
+            old = answer in self._before and abs(rate) > STILL
+            self._before.append(answer)
             if old or not (math.isfinite(angle) and math.isfinite(rate)):
                 return False
             own = self.own(TURN * angle), self.own(TURN * rate)
