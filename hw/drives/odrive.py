@@ -136,8 +136,8 @@ class OdriveDrive(CanDrive):
         words = ".".join(str(each) for each in firmware), ".".join(str(each) for each in hardware)
         if firmware[:2] != FIRMWARE:
             raise self.other(f"its firmware is {words[0]}", "MET speaks to firmware 0.6")
-        endpoints = self._endpoints(*words)
         talk.send(self.idle())
+        endpoints = self._endpoints(*words)
         for path, value in (
             (HEARTBEAT_RATE, HEARTBEAT_MS),
             (ESTIMATES_RATE, 0),
