@@ -104,7 +104,9 @@ class CanBed(BedDriver):
         self._talk = talk = Talk(line, self._drives)
         bench, by_rate = self._bench, self._kind == "rate"
         if by_rate and not self._drives[0].takes_rates:
-            raise Problem(error("E438", f"{self._drives[0].words} of bed `{bench.name}` is told no rate"))
+            known = ", ".join(name for name, each in DIALECTS.items() if each.takes_rates)
+            message = f"{self._drives[0].words} of bed `{bench.name}` is told no rate"
+            raise Problem(error("E438", message, help=f"dialects that are told rates: {known}"))
         self._drives[0].rates = by_rate
         facts = [drive.greet(talk) for drive in self._drives]
         sides = [Side(drive, each) for drive, each in zip(self._drives, facts, strict=True)]
@@ -138,6 +140,11 @@ class CanBed(BedDriver):
         if not greeting.DEADMAN[0] <= about.deadman <= greeting.DEADMAN[1] or min(f.watchdog for f in facts) < 0.002:
             helps = "`watchdog` of the bench file: 10 to 20 ms"
             raise Problem(error("E404", f"bed `{about.name}` would stop {1e3 * about.deadman:g} ms late", help=helps))
+        coarse = max(each.rate_count for each in facts)
+        if coarse > bench.shaft["arming_rate"]:
+            helps = "a finer unit of velocity in the drive: a shaft that turns would pass for one at rest"
+            message = f"bed `{about.name}` has its rate in steps of {coarse:.3g} rad/s, more than `arming_rate`"
+            raise Problem(error("E404", message, help=helps))
         self._check_share()
         self._in_force = self._own = greeting.in_force(about)
         self._epoch = line.now()
@@ -262,10 +269,11 @@ class CanBed(BedDriver):
             drive, load = self._drives
             frames += load.told(self._kt_load * amperes * scales.current)
             frames += drive.told(self._told(volts * scales.voltage))
-        if not self._answers(frames, now):
-            return None
+        answered = self._answers(frames, now)
         if self._state == BedState.ARMED:
             self._watch()
+        if not answered and (self._state == BedState.ARMED or not armed):
+            return None
         return self._sample(refused=not armed)
 
     def read(self) -> BedSample:

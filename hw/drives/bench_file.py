@@ -52,6 +52,9 @@ FIGURES: Mapping[str, Mapping[str, tuple[str, float | None]]] = {
 }
 """The quantities of each table: their SI unit, and what they are where the file does not say; None: it has to."""
 
+LONGEST_WATCHDOG = 1.0
+"""s beyond which no watchdog's time is taken: a bed says how long it may be, and counters of drives end."""
+
 _WORDS: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "shaft": {},
     "supply": {},
@@ -232,7 +235,10 @@ class _BenchFile(TomlFile):
         if value is None and default is not None:
             return default
         try:
-            return quantity(value, unit)
+            found = quantity(value, unit)
+            if key == "watchdog" and found > LONGEST_WATCHDOG:
+                raise self.wrong(f"`watchdog` of `[{table}]` is more than a second", "10 to 20 ms", table, key)
+            return found
         except ValueError:
             message = f"`{key}` of `[{table}]` is no quantity above zero in {unit}"
             raise self.wrong(message, f'write `{key} = "1.5 {unit}"`', table, key) from None

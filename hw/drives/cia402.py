@@ -239,7 +239,8 @@ class Cia402Drive(CanDrive):
         if which == SDO_ANSWER and len(data) == 8:
             self._answer = data
         elif which == TPDO1 and len(data) == 3:
-            self._status(*struct.unpack("<Hb", data), frame.time)
+            status, mode = struct.unpack("<Hb", data)
+            self._status(status, mode, frame.time)
         elif which == TPDO2 and len(data) == 8:
             position, velocity = struct.unpack("<ii", data)
             angle, rate = position * self._step, velocity * self._rate_unit

@@ -198,7 +198,8 @@ class MoteusDrive(CanDrive):
         if not all(math.isfinite(each) for each in values):
             return False
         mode, position, velocity, self.supply, fault = values
-        self.power = found.get(POWER)
+        power = found.get(POWER, math.nan)
+        self.power = power if math.isfinite(power) else None
         self._state(int(mode), int(fault), frame.time)
         self.reading = DriveReading(frame.time, self.own(_TURN * position), self.own(_TURN * velocity))
         return True

@@ -87,8 +87,8 @@ class OdriveDrive(OdriveAxis):
         firmware = tuple(self._version[4:7])
         words = ".".join(str(each) for each in firmware), ".".join(str(each) for each in hardware)
         self._check_firmware(firmware)
-        self._numbers = self._endpoints(*words)
         talk.send(self.idle())
+        self._numbers = self._endpoints(*words)
         for path, value in zip(REPORTS, (HEARTBEAT_MS, 0, SUPPLY_MS), strict=True):
             self._write(talk, path, value)
         facts = self._described(talk, *words)

@@ -35,6 +35,7 @@ def test_its_figures_are_si_and_what_it_does_not_say_has_a_default(tmp_path: Pat
         ('"1.3e-4 kg*m^2"', '"1.3 N*m"', 8, "`inertia` of `[shaft]` is no quantity above zero in kg*m^2", "write"),
         ('"1.3e-4 kg*m^2"', "1.3e-4", 8, "`inertia` of `[shaft]` is no quantity above zero in kg*m^2", "write"),
         ('"3 A"', '"0 A"', 28, "`current_max` of `[load]` is no quantity above zero in A", "write"),
+        ("kt          =", 'watchdog = "2 s"\nkt =', 17, "`watchdog` of `[drive]` is more than a second", "10 to 20 ms"),
         ("node          = 2", "node = true", 25, "`node` of `[load]` is no number of a node", "`node = 1`: 0 to 127"),
         ("node          = 2", "node = 1", 25, "drive and load are both node 1", "each has a number of its own"),
         ("= true", "= 1", 26, "`reversed` of `[load]` is neither true nor false", "`reversed = true`"),

@@ -103,6 +103,13 @@ def test_no_transcript_is_kept_of_a_bus(tmp_path: Path) -> None:
     assert refusal(lambda: PORT.open(Opening(port))).startswith("error[E409]: no transcript is kept of a CAN bus\n")
 
 
+def test_an_interface_that_fails_in_a_way_of_its_own_is_refused() -> None:
+    """As Kvaser's does without its library: by a NameError."""
+    pytest.importorskip("can")
+    words = refusal(lambda: PythonCanLine({"interface": "kvaser", "channel": 0}))
+    assert words.startswith("error[E400]: CAN bus kvaser:0 cannot be opened: ")
+
+
 class _NeverQuiet:
     """A bus on which there is always another frame, in steps of 10 us."""
 

@@ -245,6 +245,24 @@ def test_a_watchdog_is_10_to_20_ms(on: Callable[..., Bench], time: str) -> None:
     assert refusal(bench.bed.connect).startswith(f"error[E404]: bed `paper` would stop {time.split()[0]} ms late\n")
 
 
+def test_a_drive_that_says_that_it_stopped_stops_the_other_though_that_does_not_answer(
+    on: Callable[..., Bench],
+) -> None:
+    bench = on()
+    bench.bed.connect()
+    bench.bed.arm()
+    bench.go(0.05, voltage=3.0, current=0.5)
+    load = bench.load.node << 5
+    bench.line.spoil = lambda frame, from_drive: [] if from_drive and frame.id & ~0x1F == load else [(0.0, frame)]
+    bench.drive._failed(1 << 12)
+    sample, begun = None, bench.line.now()
+    while sample is None and bench.line.now() < begun + 8e-3:
+        bench.line.sleep(1e-3)
+        sample = bench.bed.exchange(3.0, 0.5)
+    assert sample is not None and sample.state == BedState.STOPPED and sample.faults == Fault.DRIVE
+    assert bench.played.off
+
+
 def test_it_says_what_went_back_to_the_supply(on: Callable[..., Bench]) -> None:
     bench = on()
     bench.bed.connect()

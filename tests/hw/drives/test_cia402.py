@@ -175,6 +175,15 @@ def test_one_that_has_stopped_does_not_drive_again_by_itself(tmp_path: Path) -> 
             assert drive.status == 0x40
 
 
+def test_one_whose_steps_of_rate_hide_a_shaft_that_turns_is_refused(tmp_path: Path) -> None:
+    bed, _, _, drive, _ = bench(tmp_path)
+    drive.set_value(0x60A9, 0, 0x00B40300)
+    assert refusal(bed.connect) == (
+        "error[E404]: bed `paper` has its rate in steps of 6.28 rad/s, more than `arming_rate`\n"
+        " = help: a finer unit of velocity in the drive: a shaft that turns would pass for one at rest"
+    )
+
+
 def test_no_torque_is_told_that_its_frame_cannot_hold(tmp_path: Path) -> None:
     bed, line, _, drive, _ = bench(tmp_path)
     bed._kind = "torque"

@@ -47,7 +47,7 @@ def test_no_wrong_answer_of_ten_thousand_is_taken(tmp_path: Path, dialect: str, 
         ("odrive", Fault.DRIVE),
         ("damiao", Fault.DRIVE),
         ("moteus", Fault.DISAGREEMENT),
-        ("robstride", Fault.DEADMAN | Fault.DISAGREEMENT),
+        ("robstride", Fault.DEADMAN),
     ],
 )
 def test_a_drive_that_has_rebooted_stops_the_bed(tmp_path: Path, dialect: str, fault: Fault) -> None:

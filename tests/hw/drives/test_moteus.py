@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -11,7 +12,8 @@ import pytest
 from hw.bed import BedDriver, BedState, Capability, Fault
 from hw.beds.can_bed import CanBed
 from hw.drives.bench_file import two_drives
-from hw.drives.moteus import answered, asked_for, number, padded, written
+from hw.drives.frames import CanFrame
+from hw.drives.moteus import MoteusDrive, answered, asked_for, number, padded, written
 from hw.players.moteus import PlayedMoteus
 from hw.players.player import PlayedBench, PlayedLine
 from tests.hw.conftest import refusal
@@ -143,3 +145,13 @@ def test_one_whose_watchdog_does_nothing_is_not_armed(tmp_path: Path) -> None:
         load.watches = False
         assert refusal(bed.arm).startswith("error[E406]: load (node 2) still drives 50 ms after the last command")
         assert played.off
+
+
+@pytest.mark.parametrize("power", [-math.inf, math.inf, math.nan])
+def test_a_power_that_is_no_number_is_none_that_was_said(tmp_path: Path, power: float) -> None:
+    """Else a bed would tell that its drives gave infinite energy back."""
+    drive = MoteusDrive(two_drives(bench_file(tmp_path, "moteus")).drive)
+    state = struct.pack("<BBfff", 0x2F, 0x00, 10.0, 0.1, 0.2) + struct.pack("<BBf", 0x2D, 0x07, power)
+    state += struct.pack("<BBf", 0x2D, 0x0D, 24.0) + struct.pack("<BBb", 0x21, 0x0F, 0)
+    assert drive.take(CanFrame(drive.node << 8, padded(state), fd=True))
+    assert drive.supply == 24.0 and drive.power is None

@@ -146,6 +146,16 @@ def test_a_file_that_is_none_of_properties_is_refused(tmp_path: Path, text: str 
     assert words.startswith(f"error[E404]: drive (node 1) cannot be driven: FOLDER/flat_endpoints.json {said}\n")
 
 
+def test_one_that_drives_is_off_though_its_file_is_refused(tmp_path: Path) -> None:
+    played = played_bench()
+    line, path = PlayedLine(played), bench_file(tmp_path)
+    odrive(played).state = 8
+    (tmp_path / "flat_endpoints.json").unlink()
+    assert "cannot be read: no such file" in refusal(host_of(two_drives(path), line).connect)
+    line.sleep(0.01)  # what was sent arrives
+    assert played.off
+
+
 def test_a_torque_constant_that_is_not_the_file_s_is_found(tmp_path: Path) -> None:
     def other(played: PlayedBench, folder: Path) -> None:
         odrive(played).values["axis0.config.motor.torque_constant"] = 0.04

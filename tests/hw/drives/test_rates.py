@@ -265,7 +265,8 @@ def test_a_dialect_that_is_told_no_rate_is_refused_at_the_bench_s_file(tmp_path:
     check_model(f"can:{path}", experiment(tmp_path, "torques"), "shoulder")
     line = PlayedLine(played_bench("damiao"))
     assert refusal(host_of(two_drives(path), line, drive="rate").connect) == (
-        "error[E438]: drive (node 1) of bed `paper` is told no rate"
+        "error[E438]: drive (node 1) of bed `paper` is told no rate\n"
+        f" = help: dialects that are told rates: {', '.join(TOLD)}"
     )
 
 
