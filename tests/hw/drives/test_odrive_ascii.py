@@ -70,6 +70,7 @@ def test_a_line_without_a_checksum_is_none(line: bytes) -> None:
 
 def test_a_played_drive_drops_commands_whose_checksum_is_wrong_and_answers_as_it_is_asked() -> None:
     drive = PlayedOdriveAscii(1)
+    drive.receive(CanFrame(1, summed(b"w axis0.controller.config.control_mode 1")), 0.0)
     for text in (b"c 0 0.1 *1\n", b"c 0 0.1*x\n", b"c 0 0.1 *300\n"):
         assert not drive.receive(CanFrame(1, text), 0.0)
     assert drive.torque == 0.0
