@@ -256,6 +256,8 @@ class Cia402Drive(CanDrive):
         if status & 0x4F in (0x08, 0x0F):
             self.state, self.errors = DriveState.FAILED, f"error 0x{self._error:04X}"
         elif status & 0x6F == 0x27:
+            if not drove:
+                self._error = 0  # an emergency from before is not why it stops after
             self.state = DriveState.DRIVING
             self.errors = "" if mode == self._mode else f"it is in mode {mode}, and not in {self._mode}"
         elif status & 0x6F == 0x07:

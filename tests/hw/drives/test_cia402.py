@@ -10,6 +10,7 @@ import pytest
 from hw.bed import BedDriver, BedState, Fault
 from hw.beds.can_bed import CanBed
 from hw.drives.bench_file import two_drives
+from hw.drives.frames import CanFrame
 from hw.players.cia402 import PlayedCia402
 from hw.players.player import PlayedBench, PlayedLine
 from tests.hw.conftest import refusal
@@ -173,6 +174,16 @@ def test_one_that_has_stopped_does_not_drive_again_by_itself(tmp_path: Path) -> 
             line.sleep(1e-3)
             bed.exchange(1.0, 0.0)
             assert drive.status == 0x40
+
+
+def test_an_emergency_from_before_is_not_why_a_drive_stops_when_its_watchdog_is_proved(tmp_path: Path) -> None:
+    bed, line, _, _, load = bench(tmp_path)
+    with bed:
+        bed.connect()
+        assert bed._drives[1].take(CanFrame(0x80 + load.node, bytes.fromhex("2580000000000000")))
+        bed.arm()
+        line.sleep(1e-3)
+        assert bed.exchange(0.0, 0.0) is not None
 
 
 def test_one_whose_steps_of_rate_hide_a_shaft_that_turns_is_refused(tmp_path: Path) -> None:
