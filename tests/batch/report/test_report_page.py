@@ -22,7 +22,7 @@ def test_the_limits_are_those_of_the_code() -> None:
         f"the {overview.KEPT} worst",
         f"{histories.MOST_POINTS:,} points",
         f"{histories.WHERE_RUN_AGAIN:,} numbers",
-        f"{histories.MOST_VALUES:,} where cases are not run again",
+        f"{histories.MOST_VALUES:,} if cases are not run again",
         f"of {simulation.MOST_STRUCTURES} structures",
         f"{simulation.MOST_EXACT:,} bytes",
         f"{grids.MOST_LEVELS} × {grids.MOST_LEVELS} cells",
