@@ -114,7 +114,7 @@ def _numbers(numbers: OtherNumbers, of: Experiment) -> dict[str, Any]:
 
 
 def _beside(against: str | Path, file: ArchiveFile, group: ArchiveGroup, experiment: Experiment) -> dict[str, Any]:
-    """What the page shows beside the archive: of another archive all that is known of that, of a log its numbers at
+    """The data that stand beside the archive on the page: of another archive all that is known of that, of a log its numbers at
     the rows of a run."""
     name = visible(Path(against).name)
     if beside.is_archive(against):
@@ -250,7 +250,7 @@ def _program(data: Mapping[str, Any]) -> str:
 
 
 def _head(experiment: Experiment, data: Mapping[str, Any], kicker: str, by: str) -> dict[str, str]:
-    """What stands at the top of a page."""
+    """The texts at the top of a page."""
     when = "Move a slider, and the run is computed again, here," if data["count"] > 1 else "The run is computed here,"
     return {"kicker": kicker, "name": visible(experiment.name), "lede": f"{when} {by}."}
 
