@@ -114,8 +114,8 @@ def _numbers(numbers: OtherNumbers, of: Experiment) -> dict[str, Any]:
 
 
 def _beside(against: str | Path, file: ArchiveFile, group: ArchiveGroup, experiment: Experiment) -> dict[str, Any]:
-    """The data that stand beside the archive on the page: of another archive all that is known of that, of a log its numbers at
-    the rows of a run."""
+    """The data that stand beside the archive on the page: of another archive all that is known of that, of a log its
+    numbers at the rows of a run."""
     name = visible(Path(against).name)
     if beside.is_archive(against):
         with ArchiveFile(against) as other:
