@@ -129,7 +129,7 @@ def limits(run: VariedRun) -> list[dict[str, Any]]:
     count = len(paths)
 
     def broken(ends: np.ndarray) -> np.ndarray:
-        """Of cases in each of which one number is at an end, first all least and then all largest ones."""
+        """Answer for cases in each of which one number is at an end, first all least and then all largest ones."""
         cases = np.repeat(own[:, None], 2 * count, axis=1)
         for n in range(count):
             cases[n, [n, count + n]] = ends[[n, count + n]]

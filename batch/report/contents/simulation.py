@@ -83,7 +83,7 @@ def _earlier(
     sources: Sequence[Sequence[str]],
     left: int,
 ) -> tuple[SimulatedStructure | None, int]:
-    """What the other archive has of a structure's cases, and the bytes that are left; None where it has none of them or
+    """The other archive's data of a structure's cases, and the bytes that are left; None where it has none of them or
     its plan cannot be read here. number: the structure's place in the pool."""
     for place, group, matched in before.pairs:
         if place != number or group.name not in experiments:
