@@ -96,7 +96,7 @@ class _Loop:
     def give_up(self, seconds: float | None = None) -> None:
         """Run no more cases of what is shown; wait until that is so, for so long at most."""
         self._stop.set()
-        if self._cases is not None:
+        if self._cases is not None and self._cases.is_alive():  # an interrupt may have come while it was started
             self._cases.join(seconds)
 
     def _sound(self) -> bool:
