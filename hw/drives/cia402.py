@@ -104,6 +104,7 @@ class Cia402Drive(CanDrive):
             helps = "set object 60A9h to thousandths of a turn a minute, 0xFDB44700"
             raise self.wrong(f"its largest speed, {rate:.4g} rad/s, is more than 32 bits hold in its unit", helps)
         self._step = _TURN * turns / steps
+        self.steps = self._step, self._rate_unit
         self._set_up(talk)
         talk.send(self.idle())
         self.reading = None
@@ -218,6 +219,9 @@ class Cia402Drive(CanDrive):
     def asked(self) -> Sequence[CanFrame]:
         return (CanFrame(SYNC),)
 
+    def is_asked_by(self, frame: CanFrame) -> bool:
+        return frame.id == SYNC
+
     def idle(self) -> Sequence[CanFrame]:
         self._wanted = False
         return (self._pdo(OFF),)
@@ -244,6 +248,8 @@ class Cia402Drive(CanDrive):
         elif which == TPDO2 and len(data) == 8:
             position, velocity = struct.unpack("<ii", data)
             angle, rate = position * self._step, velocity * self._rate_unit
+            if self.has_said(data, rate, frame.time):
+                return False
             self.reading = DriveReading(frame.time, self.own(angle), self.own(rate))
         elif which == EMERGENCY and len(data) == 8:
             self._error = self._error or struct.unpack_from("<H", data)[0]
