@@ -72,7 +72,7 @@ class DamiaoDrive(CanDrive):
         if not 0 < self.node <= MOST_NODE:
             raise self.wrong("its number is none that its answers have room for", f"a number from 1 to {MOST_NODE}")
         version, sub = int(self._read(talk, VERSION)), int(self._read(talk, SUB_VERSION))
-        talk.send(self.idle())
+        talk.send([self._frame(DISABLE)])
         self._write(talk, MODE, MIT_MODE)
         self._write(talk, TIMEOUT, round(self.entry.figures["watchdog"] / TIMEOUT_UNIT))
         ends = [self._read(talk, each) for each in (PMAX, VMAX, TMAX)]
@@ -136,7 +136,8 @@ class DamiaoDrive(CanDrive):
         return CanFrame(self.node, data)
 
     def armed(self) -> Sequence[CanFrame]:
-        return (self._frame(ENABLE), *self.told(0.0))
+        """No torque is told before it is enabled, and after: no document says whether a drive that is off takes it."""
+        return (*self.told(0.0), self._frame(ENABLE), *self.told(0.0))
 
     def told(self, value: float) -> Sequence[CanFrame]:
         torque = count_of(self.own(value), self._torque_max, STEPS_12)
@@ -150,7 +151,8 @@ class DamiaoDrive(CanDrive):
         return refresh or frame.id == self.node
 
     def idle(self) -> Sequence[CanFrame]:
-        return (self._frame(DISABLE),)
+        """No torque is told while it still takes it, so that it has none to go on with once it is enabled."""
+        return (*self.told(0.0), self._frame(DISABLE))
 
     def halted(self) -> Sequence[CanFrame]:
         return self.idle()

@@ -123,7 +123,8 @@ class RobstrideDrive(CanDrive):
         if not talk.ask([self._frame(IDENTITY)], lambda: self._identity is not None):
             raise talk.silent(self, "what its identity is")
         assert self._identity is not None
-        talk.send(self.idle())
+        self._wanted = self._ran = False
+        talk.send([self._frame(STOP)])
         firmware = self._firmware(talk)
         self._set(talk, TIMEOUT, self._timeout)
         self._set(talk, RUN_MODE, OPERATION_MODE)
@@ -225,9 +226,10 @@ class RobstrideDrive(CanDrive):
         return self._frame(WRITE, struct.pack("<HH", number, 0) + struct.pack(LAYOUTS[number], value))
 
     def armed(self) -> Sequence[CanFrame]:
+        """No torque is told before it is enabled, and after: no manual says whether a drive that is off takes it."""
         self._wanted, self._ran = True, False
         settings = self._writes(TIMEOUT, self._timeout), self._writes(RUN_MODE, OPERATION_MODE)
-        return (*settings, self._frame(ENABLE), *self.told(0.0))
+        return (*settings, *self.told(0.0), self._frame(ENABLE), *self.told(0.0))
 
     def told(self, value: float) -> Sequence[CanFrame]:
         torque = count_of(self.own(value), self._torque_max, STEPS_16)
@@ -241,8 +243,9 @@ class RobstrideDrive(CanDrive):
         return frame.extended and frame.id & 0xFF == self.node and frame.id >> 24 in (TELL, ENABLE, STOP, WRITE)
 
     def idle(self) -> Sequence[CanFrame]:
+        """No torque is told while it still takes it, so that it has none to go on with once it is enabled."""
         self._wanted = self._ran = False
-        return (self._frame(STOP),)
+        return (*self.told(0.0), self._frame(STOP))
 
     def halted(self) -> Sequence[CanFrame]:
         return self.idle()
