@@ -25,10 +25,10 @@ from hw.bed import About, BedDriver, BedSample, BedState, Capability, Fault, Lim
 from hw.beds import can_deck, greeting
 from hw.beds.emulated import FINE, FINE_ANGLE, WIDE
 from hw.drives import DIALECTS, REFUSED
-from hw.drives.arming import begin_driving, forget, prove_watchdogs, switch_off
+from hw.drives.arming import FEED, begin_driving, forget, prove_watchdogs, switch_off
 from hw.drives.bench_file import SERIAL, TwoDrives
 from hw.drives.bus import open_bus
-from hw.drives.drive import ASKS, CanDrive, DriveReading, DriveState, Talk
+from hw.drives.drive import ASKS, OWED, CanDrive, DriveReading, DriveState, Talk
 from hw.drives.frames import FAST, NOMINAL, CanFrame, CanLine, on_bus
 from hw.drives.odrive_lines import on_lines
 from hw.drives.side import Side, agree
@@ -43,10 +43,6 @@ LONGEST_SHARE = 0.8
 
 STALE = 0.05
 """Longest time since a drive has said its state, s; an answer that is more than that behind does not count."""
-
-OWED, GRACE = 0.01, 3e-4
-"""Time after a question without an answer for which that may come yet, s; and how much longer it is listened then, so
-that it is not taken for the answer to a later question: frames have no numbers."""
 
 QUIET = 1e-3
 """Time for which what is still to come is taken before drives are asked outside of a run, s."""
@@ -149,7 +145,7 @@ class CanBed(BedDriver):
         self._in_force = self._own = greeting.in_force(about)
         self._epoch = line.now()
         self._hold(0, 0, self._epoch)
-        self._warmed, self._disagreed, self._owed_until = self._epoch, 0, self._epoch
+        self._warmed, self._disagreed = self._epoch, 0
         self._ask_both(about, agreed=False)
         readings = self._readings()
         for side, reading in zip(self._sides, readings, strict=True):
@@ -235,6 +231,9 @@ class CanBed(BedDriver):
             drive.renew(self._talk)
         self.proved = prove_watchdogs(self._talk, about.deadman)
         begin_driving(self._talk)
+        self._settle(FEED)
+        for drive in self._drives:
+            drive.owed.clear()  # what it was asked while the shaft was at rest, and has not answered
         self._state, self.confirmed = BedState.ARMED, False
         self._hold(0, 0, self._talk.line.now())
         return self._sample()
@@ -345,20 +344,34 @@ class CanBed(BedDriver):
 
     def _answers(self, commands: Sequence[CanFrame], since: float) -> bool:
         """Send commands, ask both drives, and follow what they answer. Returns False where an answer does not come in
-        time, or they do not agree."""
-        talk = self._talk
-        for drive in self._drives:
-            drive.reading = None
-        asks = [each for d in self._drives if not (commands and d.answers_commands) for each in d.asked()]
-        talk.send([*commands, *asks])
+        time, or they do not agree.
 
-        answered = talk.pump(since + self.patience, partial(self._answered, since))
-        if answered and since < self._owed_until:
-            talk.pump(
-                min(since + self.patience, talk.line.now() + GRACE)
-            )  # the later one of two is to the last question
-        if not answered:
-            self._owed_until = since + OWED
+        Frames have no numbers, and one that is late looks like the answer to a later question. So it is counted what
+        each drive was asked and has answered. One that owed nothing before it was asked can only answer this question,
+        and did so within a period of it. What the other says is as new as that, whatever it answers, where both agree;
+        it then owes what it owed before. Where both owed something, both may be late alike, and neither counts: they
+        are asked nothing then, but by commands that are answered, until what they owe has come or never will.
+        """
+        talk = self._talk
+        owed = []
+        for drive in self._drives:
+            drive.owes(since)
+            owed.append(tuple(drive.owed))
+            drive.reading = None
+        some_even, all_even = not all(owed), not any(owed)
+        asked = [d for d in self._drives if some_even and not (commands and d.answers_commands)]
+        talk.send([*commands, *dict.fromkeys(frame for d in asked for frame in d.asked())])  # one SYNC is to both
+        if not some_even:
+            self._settle(min(self.patience, self.period))
+            return False
+
+        def settled() -> bool:
+            return self._answered(since) and (all_even or self._agree())
+
+        talk.pump(since + self.patience, settled)
+        if not self._answered(since):
+            return False
+        if commands and max(each.time for each in self._readings()) > since + self.period:
             return False
         stale = talk.line.now() - min(drive.stated for drive in self._drives) > STALE
         if stale or not self._agree():
@@ -368,8 +381,17 @@ class CanBed(BedDriver):
             self._stopped(Fault.DISAGREEMENT, "")
             return True
         self._disagreed = 0
+        for drive, before in zip(self._drives, owed, strict=True):
+            if len(drive.owed) == len(before):  # answered once, and that to this question
+                drive.owed.clear()
+                drive.owed.extend(before)
         self._follow()
         return True
+
+    def _settle(self, longest: float) -> None:
+        """Take what comes until neither drive owes an answer, or for the longest time, s."""
+        line = self._talk.line
+        self._talk.pump(line.now() + longest, lambda: not any(drive.owes(line.now()) for drive in self._drives))
 
     def _agree(self) -> bool:
         return agree(self._sides, self._readings(), self._acceleration)
@@ -383,9 +405,10 @@ class CanBed(BedDriver):
         """Ask both drives again and again until both have answered, and agree. Raises Problem E402 where one does not
         answer, E406 where they do not agree."""
         talk = self._talk
-        asks = [frame for drive in self._drives for frame in drive.asked()]
+        asks = tuple(dict.fromkeys(frame for drive in self._drives for frame in drive.asked()))
         for _ in range(ASKS):
             talk.pump(talk.line.now() + QUIET)
+            self._settle(OWED)
             since = talk.line.now()
             if not talk.ask(asks, partial(self._answered, since)):
                 late = next(d for d in self._drives if d.reading is None or d.reading.time <= since)

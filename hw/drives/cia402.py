@@ -46,7 +46,11 @@ DEVICE, PRODUCT, CONSUMED, ABORT = (0x1000, 0), (0x1018, 2), (0x1016, 1), (0x600
 REVISION, MODES, MODE, RATED, MOST, SPEED = (0x1018, 3), (0x6502, 0), (0x6060, 0), (0x6076, 0), (0x6072, 0), (0x6080, 0)
 STEPS, TURNS, VELOCITY_UNIT = (0x608F, 1), (0x608F, 2), (0x60A9, 0)
 CONTROL, STATUS = (0x6040, 0), (0x6041, 0)
-"""Objects, by index and subindex."""
+OFFSETS = ((0x60B1, 0), "<i"), ((0x60B2, 0), "<h")
+"""Objects, by index and subindex; the offsets, of velocity and torque, with what they hold."""
+
+NO_OBJECT = 0x06020000
+"""Code of an SDO for an object that a drive does not have."""
 
 CONTROL_HZ = 1000.0
 """Rate at which two such drives answer on a bus of 1 Mbit/s."""
@@ -56,6 +60,11 @@ MOST_TOLD, MOST_RATE = (1 << 15) - 1, (1 << 31) - 1
 
 OFF, SHUT_DOWN, SWITCH_ON, ENABLE, RESET = 0x00, 0x06, 0x07, 0x0F, 0x80
 _TURN = 2.0 * math.pi
+
+
+def _words(which: tuple[int, int]) -> str:
+    """An object in words."""
+    return f"object {which[0]:04X}h:{which[1]}"
 
 
 class Cia402Drive(CanDrive):
@@ -104,6 +113,7 @@ class Cia402Drive(CanDrive):
             helps = "set object 60A9h to thousandths of a turn a minute, 0xFDB44700"
             raise self.wrong(f"its largest speed, {rate:.4g} rad/s, is more than 32 bits hold in its unit", helps)
         self._step = _TURN * turns / steps
+        self.steps = self._step, self._rate_unit
         self._set_up(talk)
         talk.send(self.idle())
         self.reading = None
@@ -155,10 +165,20 @@ class Cia402Drive(CanDrive):
         self._set(talk, ABORT, "<h", 1)
         self._set(talk, CONSUMED, "<I", HOST << 16 | round(1e3 * self.entry.figures["watchdog"]))
         self._set(talk, MODE, "<b", self._mode)
+        self._clear_offsets(talk)
         talk.send([CanFrame(NMT, bytes((START, self.node)))])
 
-    def _sdo(self, talk: Talk, data: bytes, what: str) -> bytes:
-        """The answer to an SDO of up to four bytes. Raises Problem E402 where none comes, E404 where it is refused."""
+    def _clear_offsets(self, talk: Talk) -> None:
+        """Set to 0 what a drive adds to the rate and the torque that it is told, where it has such offsets: they may be
+        saved. Raises Problem E404 where it keeps one."""
+        for which, layout in OFFSETS:
+            request = struct.pack("<BHB", 0x40, *which)
+            if self._sdo(talk, request, _words(which), may_lack=True) and self._read(talk, which, layout) != 0.0:
+                self._set(talk, which, layout, 0)
+
+    def _sdo(self, talk: Talk, data: bytes, what: str, *, may_lack: bool = False) -> bytes:
+        """The answer to an SDO of up to four bytes; empty where there is no such object, and may not be. Raises Problem
+        E402 where none comes, E404 where it is refused."""
         self._answer = None
         asked = data[1:4]
 
@@ -170,12 +190,14 @@ class Cia402Drive(CanDrive):
         assert self._answer is not None
         if self._answer[0] == 0x80:
             code = struct.unpack_from("<I", self._answer, 4)[0]
+            if may_lack and code == NO_OBJECT:
+                return b""
             raise self.wrong(f"it refuses {what}, 0x{code:08X}", "its documentation says whether it has that object")
         return self._answer
 
     def _read(self, talk: Talk, which: tuple[int, int], layout: str) -> float:
         """An object, read twice: a limit is not taken from one frame."""
-        what = f"object {which[0]:04X}h:{which[1]}"
+        what = _words(which)
         request = struct.pack("<BHB", 0x40, *which)
         size = struct.calcsize(layout)
         first, second = (self._sdo(talk, request, what) for _ in range(2))
@@ -186,15 +208,16 @@ class Cia402Drive(CanDrive):
     def _write(self, talk: Talk, which: tuple[int, int], layout: str, value: int) -> None:
         size = struct.calcsize(layout)
         head = 0x23 | (4 - size) << 2
-        what = f"to set object {which[0]:04X}h:{which[1]}"
+        what = f"to set {_words(which)}"
         self._sdo(talk, struct.pack("<BHB", head, *which) + struct.pack(layout, value), what)
 
     def _set(self, talk: Talk, which: tuple[int, int], layout: str, value: int) -> None:
         """Set an object, and see that it is set. Raises Problem E404 where it is not."""
         self._write(talk, which, layout, value)
         if (found := self._read(talk, which, layout)) != value:
-            what = f"object {which[0]:04X}h:{which[1]}"
-            raise self.wrong(f"it does not take {value} for {what}, which is {found:g}", "set it by its maker's tool")
+            raise self.wrong(
+                f"it does not take {value} for {_words(which)}, which is {found:g}", "set it by its maker's tool"
+            )
 
     # Frames
 
@@ -217,6 +240,9 @@ class Cia402Drive(CanDrive):
 
     def asked(self) -> Sequence[CanFrame]:
         return (CanFrame(SYNC),)
+
+    def is_asked_by(self, frame: CanFrame) -> bool:
+        return frame.id == SYNC
 
     def idle(self) -> Sequence[CanFrame]:
         self._wanted = False
@@ -244,6 +270,8 @@ class Cia402Drive(CanDrive):
         elif which == TPDO2 and len(data) == 8:
             position, velocity = struct.unpack("<ii", data)
             angle, rate = position * self._step, velocity * self._rate_unit
+            if self.has_said(data, rate, frame.time):
+                return False
             self.reading = DriveReading(frame.time, self.own(angle), self.own(rate))
         elif which == EMERGENCY and len(data) == 8:
             self._error = self._error or struct.unpack_from("<H", data)[0]

@@ -72,7 +72,7 @@ class DamiaoDrive(CanDrive):
         if not 0 < self.node <= MOST_NODE:
             raise self.wrong("its number is none that its answers have room for", f"a number from 1 to {MOST_NODE}")
         version, sub = int(self._read(talk, VERSION)), int(self._read(talk, SUB_VERSION))
-        talk.send(self.idle())
+        talk.send([self._frame(DISABLE)])
         self._write(talk, MODE, MIT_MODE)
         self._write(talk, TIMEOUT, round(self.entry.figures["watchdog"] / TIMEOUT_UNIT))
         ends = [self._read(talk, each) for each in (PMAX, VMAX, TMAX)]
@@ -82,6 +82,7 @@ class DamiaoDrive(CanDrive):
                 "what its fields or its overvoltage stand for is no number above zero", "set registers 21 to 29"
             )
         self._angle_max, self._rate_max, self._torque_max = ends
+        self.steps = 2.0 * self._angle_max / STEPS_16, 2.0 * self._rate_max / STEPS_12
         watchdog = self._read(talk, TIMEOUT) * TIMEOUT_UNIT
         self.reading = None
         if not talk.ask(self.asked(), lambda: self.reading is not None):
@@ -94,8 +95,8 @@ class DamiaoDrive(CanDrive):
             RATE_SHARE * self._rate_max,
             ANSWERS_HZ,
             torque_count=2.0 * self._torque_max / STEPS_12,
-            angle_count=2.0 * self._angle_max / STEPS_16,
-            rate_count=2.0 * self._rate_max / STEPS_12,
+            angle_count=self.steps[0],
+            rate_count=self.steps[1],
             angle_range=2.0 * self._angle_max,
             supply_max=supply,
         )
@@ -135,7 +136,8 @@ class DamiaoDrive(CanDrive):
         return CanFrame(self.node, data)
 
     def armed(self) -> Sequence[CanFrame]:
-        return (self._frame(ENABLE), *self.told(0.0))
+        """No torque is told before it is enabled, and after: no document says whether a drive that is off takes it."""
+        return (*self.told(0.0), self._frame(ENABLE), *self.told(0.0))
 
     def told(self, value: float) -> Sequence[CanFrame]:
         torque = count_of(self.own(value), self._torque_max, STEPS_12)
@@ -144,8 +146,13 @@ class DamiaoDrive(CanDrive):
     def asked(self) -> Sequence[CanFrame]:
         return (CanFrame(REGISTERS, struct.pack("<HBBI", self.node, REFRESH, 0, 0)),)
 
+    def is_asked_by(self, frame: CanFrame) -> bool:
+        refresh = frame.id == REGISTERS and frame.data[:3] == struct.pack("<HB", self.node, REFRESH)
+        return refresh or frame.id == self.node
+
     def idle(self) -> Sequence[CanFrame]:
-        return (self._frame(DISABLE),)
+        """No torque is told while it still takes it, so that it has none to go on with once it is enabled."""
+        return (*self.told(0.0), self._frame(DISABLE))
 
     def halted(self) -> Sequence[CanFrame]:
         return self.idle()
@@ -173,9 +180,12 @@ class DamiaoDrive(CanDrive):
         state = data[0] >> 4
         if state not in (0, ENABLED, *STATES):
             return False
-        self._state(state, frame.time)
         angle = value_of(data[1] << 8 | data[2], self._angle_max, STEPS_16)
         rate = value_of(data[3] << 4 | data[4] >> 4, self._rate_max, STEPS_12)
+        at_end = data[1:3] in (b"\0\0", b"\xff\xff")  # where an angle that does not begin anew stays
+        if not at_end and self.has_said((angle, rate), rate, frame.time):
+            return False
+        self._state(state, frame.time)
         self.reading = DriveReading(frame.time, self.own(angle), self.own(rate))
         return True
 

@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import enum
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections import deque
+from collections.abc import Callable, Hashable, Iterable, Sequence
 
 from hw.drives.bench_file import DriveEntry
 from hw.drives.frames import CanFrame, CanLine
@@ -25,6 +26,12 @@ from met.frozen import frozen
 
 GREETED = 2.0
 """Longest time to wait for each answer of a greeting, all asks together, s."""
+
+OWED = 0.02
+"""Time after a question for which its answer may still come, s: question and answer 10 ms late each."""
+
+REMEMBERED = 64
+"""Answers of a drive that are remembered, so that an old one is known again."""
 
 ASKS = 5
 """How often a question of a greeting is asked: a bus loses frames only where something is wrong with it."""
@@ -97,6 +104,8 @@ class CanDrive(ABC):
     supply    V of its supply, as it said last; None where it never did
     power     W that it takes from its supply, below 0 where it gives back; None where it never said so
     rates     True where it is told rates: set before it is greeted, where its dialect `takes_rates`
+    owed      times at which it was asked what is not answered yet, s of the line's clock
+    steps     rad and rad/s of the steps in which its answers tell angle and rate, once it is greeted; 0: floats
     """
 
     dialect: str
@@ -114,6 +123,10 @@ class CanDrive(ABC):
         self.starved = False
         self.supply: float | None = None
         self.power: float | None = None
+        self.owed = deque[float](maxlen=256)
+        self.steps = 0.0, 0.0
+        self._said: dict[Hashable, float] = {}
+        """When angle and rate, as its answers had them, were said last, s."""
 
     @abstractmethod
     def greet(self, talk: Talk) -> DriveFacts:
@@ -137,6 +150,10 @@ class CanDrive(ABC):
         """Frames that ask for angle, rate and state."""
 
     @abstractmethod
+    def is_asked_by(self, frame: CanFrame) -> bool:
+        """True for a frame of the host's that it answers by angle and rate, once."""
+
+    @abstractmethod
     def idle(self) -> Sequence[CanFrame]:
         """Frames that switch its output off."""
 
@@ -156,6 +173,23 @@ class CanDrive(ABC):
     @abstractmethod
     def answers(self) -> Sequence[CanFrame]:
         """Frames as long as those with which it answers an exchange, to reckon how long they take on the bus."""
+
+    def owes(self, now: float) -> bool:
+        """True where an answer to an earlier question may still come at a time of the line's clock, s."""
+        while self.owed and now - self.owed[0] > OWED:
+            self.owed.popleft()
+        return bool(self.owed)
+
+    def has_said(self, fields: Hashable, rate: float, time: float) -> bool:
+        """True for an old frame: angle and rate, as an answer has them, are those of an earlier one, and the shaft has
+        turned since by more than a step of the angle, as they say themselves. rate: rad/s;  time: of the frame, s"""
+        angle_step, rate_step = self.steps
+        before = self._said.pop(fields, time)
+        old = max(0.0, abs(rate) - rate_step) * abs(time - before) > angle_step
+        self._said[fields] = before if old else time
+        if len(self._said) > REMEMBERED:
+            del self._said[next(iter(self._said))]
+        return old
 
     @property
     def sound(self) -> bool:
@@ -186,7 +220,8 @@ class CanDrive(ABC):
 
 
 class Talk:
-    """A line with the drives on it: what comes is given to them all."""
+    """A line with the drives on it: what comes is given to them all, and it is counted what each is asked and has
+    answered."""
 
     def __init__(self, line: CanLine, drives: Sequence[CanDrive]) -> None:
         self.line, self.drives = line, drives
@@ -196,6 +231,10 @@ class Talk:
     def send(self, frames: Iterable[CanFrame]) -> None:
         for frame in frames:
             self.line.send(frame)
+            now = self.line.now()
+            for drive in self.drives:
+                if drive.is_asked_by(frame):
+                    drive.owed.append(now)
 
     def pump(self, until: float, done: Callable[[], bool] = lambda: False) -> bool:
         """Take what comes until a time of the line's clock, s, or until `done`. Returns whether it is."""
@@ -205,8 +244,17 @@ class Talk:
             late += self.line.now() > until
             if frame is None or late > LATE:
                 return done()
-            if not any(drive.take(frame) for drive in self.drives) and len(self.strange) < 64:
+            if not any(self._taken(drive, frame) for drive in self.drives) and len(self.strange) < 64:
                 self.strange[frame.id] = self.strange.get(frame.id, 0) + 1
+        return True
+
+    def _taken(self, drive: CanDrive, frame: CanFrame) -> bool:
+        """Give a frame to a drive. Returns whether it was its; an answer is to the oldest question that it owes."""
+        before = drive.reading
+        if not drive.take(frame):
+            return False
+        if drive.reading is not before and drive.owed:
+            drive.owed.popleft()
         return True
 
     def drain(self) -> None:

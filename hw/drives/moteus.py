@@ -170,6 +170,9 @@ class MoteusDrive(CanDrive):
     def asked(self) -> Sequence[CanFrame]:
         return (self._frame(_STATE),)
 
+    def is_asked_by(self, frame: CanFrame) -> bool:
+        return frame.id == ASKS_ANSWER | self.node and _STATE in frame.data
+
     def idle(self) -> Sequence[CanFrame]:
         """The drive under test brakes, the load lets go. What has failed is off, and stopping it would forget why."""
         if self.state == DriveState.FAILED:
@@ -197,7 +200,10 @@ class MoteusDrive(CanDrive):
         values = [found.get(each, math.nan) for each in (MODE, POSITION, VELOCITY, VOLTAGE, FAULT)]
         if not all(math.isfinite(each) for each in values):
             return False
-        mode, position, velocity, self.supply, fault = values
+        mode, position, velocity, supply, fault = values
+        if self.has_said((position, velocity), _TURN * velocity, frame.time):
+            return False
+        self.supply = supply
         power = found.get(POWER, math.nan)
         self.power = power if math.isfinite(power) else None
         self._state(int(mode), int(fault), frame.time)

@@ -166,6 +166,9 @@ class OdriveDrive(OdriveAxis):
     def asked(self) -> Sequence[CanFrame]:
         return (self._request(ESTIMATES),)
 
+    def is_asked_by(self, frame: CanFrame) -> bool:
+        return frame.remote and frame.id == self.node << 5 | ESTIMATES
+
     def idle(self) -> Sequence[CanFrame]:
         return (*self.told(0.0), self._frame(SET_STATE, struct.pack("<I", IDLE)))
 
@@ -189,7 +192,7 @@ class OdriveDrive(OdriveAxis):
             return False
         if command == ESTIMATES:
             angle, rate = struct.unpack("<ff", data)
-            if not (math.isfinite(angle) and math.isfinite(rate)):
+            if not (math.isfinite(angle) and math.isfinite(rate)) or self.has_said(data, TURN * rate, frame.time):
                 return False
             self.reading = DriveReading(frame.time, self.own(TURN * angle), self.own(TURN * rate))
         elif command == HEARTBEAT_ID:

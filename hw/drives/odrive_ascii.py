@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -47,9 +46,6 @@ SUPPLY_EVERY = 4
 DIGITS = 1e-6
 """Turns, and turns/s, of the last decimal of an angle and a rate, as firmware 0.5 writes them."""
 
-STILL = 0.01
-"""Turns/s above which an answer that is an earlier one again is old: the shaft has turned since."""
-
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?|[-+]?inf")
 
 
@@ -68,15 +64,13 @@ class OdriveAsciiDrive(OdriveAxis):
         self._errors: dict[str, int] = {}
         """Its errors, as they were answered since that state."""
         self._turn = 0
-        self._before = deque[str](maxlen=64)
-        """The last angles and rates, as they were answered."""
 
     @property
     def where(self) -> str:
         return self.entry.port
 
     def greet(self, talk: Talk) -> DriveFacts:
-        self._state, self._turn = None, 0
+        self._state, self._turn, self.steps = None, 0, (TURN * DIGITS, TURN * DIGITS)
         self._written.clear()
         if not isinstance(talk.line, OdriveLines):
             raise self.wrong("it is not on a serial line", '`interface = "serial"` of `[bus]`')
@@ -96,7 +90,8 @@ class OdriveAsciiDrive(OdriveAxis):
         seen = talk.line.now()
         if not talk.ask(self.asked(), lambda: self.stated > seen and self.state != DriveState.DRIVING):
             raise self._silent(talk, f"`r {STATE}`")
-        return replace(facts, angle_count=TURN * DIGITS, rate_count=TURN * DIGITS)
+        angle_step, rate_step = self.steps
+        return replace(facts, angle_count=angle_step, rate_count=rate_step)
 
     def _read(self, talk: Talk, path: str) -> float:
         """A property, read until two answers in a row are the same: the checksum lets some through that are altered."""
@@ -171,6 +166,9 @@ class OdriveAsciiDrive(OdriveAxis):
     def asked(self) -> Sequence[CanFrame]:
         return (self._text("f 0"), *(self._text(f"r {path}") for path in (STATE, ACTIVE, REASON)))
 
+    def is_asked_by(self, frame: CanFrame) -> bool:
+        return False  # its line asks one question at a time, and knows what is owed
+
     def idle(self) -> Sequence[CanFrame]:
         return (self._command(0.0), self._text(f"w {REQUESTED} {IDLE}"))
 
@@ -189,9 +187,7 @@ class OdriveAsciiDrive(OdriveAxis):
         question, _, answer = frame.data.decode("ascii", "replace").partition("\n")
         if question.startswith("f "):
             angle, rate = (_number(each) for each in answer.split())
-            old = answer in self._before and abs(rate) > STILL
-            self._before.append(answer)
-            if old or not (math.isfinite(angle) and math.isfinite(rate)):
+            if not (math.isfinite(angle) and math.isfinite(rate)) or self.has_said(answer, TURN * rate, frame.time):
                 return False
             own = self.own(TURN * angle), self.own(TURN * rate)
             self.reading = DriveReading(frame.time, *own, frame.time_unsure)

@@ -59,9 +59,9 @@ TORQUE_MOST, TORQUE_LEAST = "axis0.config.torque_soft_max", "axis0.config.torque
 RATE_GAIN, RATE_INTEGRAL = "axis0.controller.config.vel_gain", "axis0.controller.config.vel_integrator_gain"
 CONTROL_MODE, INPUT_MODE = "axis0.controller.config.control_mode", "axis0.controller.config.input_mode"
 LIMITS = (WATCHDOG_TIMEOUT, WATCHDOG_ENABLED, TORQUE_CONSTANT, CURRENT_MAX, RATE_MAX, SUPPLY_MAX)
-NEEDED = (*LIMITS, CONTROL_MODE, INPUT_MODE)
-NEEDED_FOR_RATES = (TORQUE_MOST, TORQUE_LEAST, RATE_GAIN, RATE_INTEGRAL)
-"""Properties of one that is told rates: the torque that its loop may ask for, N m; its gains, N m s/turn, N m/turn."""
+NEEDED = (*LIMITS, CONTROL_MODE, INPUT_MODE, TORQUE_MOST, TORQUE_LEAST)
+NEEDED_FOR_RATES = (RATE_GAIN, RATE_INTEGRAL)
+"""Properties of one that is told rates: its loop's gains, N m s/turn and N m/turn."""
 
 
 class OdriveAxis(CanDrive):
@@ -108,12 +108,20 @@ class OdriveAxis(CanDrive):
             raise self.other(f"its firmware is {words}", "MET speaks to firmware 0.6")
 
     def _described(self, talk: Talk, firmware: str, hardware: str) -> DriveFacts:
-        """Set its watchdog and its mode, and read its limits and what its rate loop is. Raises Problem E402 to E404."""
+        """Set its watchdog, its mode and its largest torque, and read its limits and what its rate loop is. Raises
+        Problem E402 to E404.
+
+        The largest torque is set whatever it is told, for it stays until the drive is switched off: a bench that is
+        told torques would else keep that of the one that was told rates before.
+        """
+        bears = self._bears
         for path, value in (
             (WATCHDOG_TIMEOUT, self.entry.figures["watchdog"]),
             (WATCHDOG_ENABLED, True),
             (CONTROL_MODE, self._mode),
             (INPUT_MODE, PASSTHROUGH),
+            (TORQUE_MOST, bears),
+            (TORQUE_LEAST, -bears),
         ):
             self._write(talk, path, value)
         kt, current = self._read(talk, TORQUE_CONSTANT), self._read(talk, CURRENT_MAX)
@@ -127,15 +135,17 @@ class OdriveAxis(CanDrive):
         if not all(math.isfinite(each) and each > 0.0 for each in (kt, current, rate, supply, watchdog)):
             raise self.wrong("a limit of its is no number above zero", f"{', '.join(LIMITS)}: set them")
         loop = self._rate_loop(talk) if self.rates else None
-        most = kt * current if loop is None else min(kt * current, self._read(talk, TORQUE_MOST))
+        most = kt * current
         return DriveFacts(firmware, hardware, watchdog, most, rate, CONTROL_HZ, supply_max=supply, rate_loop=loop)
 
+    @property
+    def _bears(self) -> float:
+        """The largest torque that the bench bears of it, N m."""
+        figures = self.entry.figures
+        return figures["torque_max"] if self.entry.role == "drive" else figures["kt"] * figures["current_max"]
+
     def _rate_loop(self, talk: Talk) -> tuple[float, float]:
-        """Let the drive's rate loop ask for no more torque than the bench bears. Returns its gains, N m s/rad and
-        N m/rad."""
-        most = self.entry.figures["torque_max"]
-        for path, value in ((TORQUE_MOST, most), (TORQUE_LEAST, -most)):
-            self._write(talk, path, value)
+        """Read the gains of the drive's rate loop, N m s/rad and N m/rad."""
         gain, integral = (self._read(talk, path) / TURN for path in (RATE_GAIN, RATE_INTEGRAL))
         if not (math.isfinite(gain) and math.isfinite(integral) and gain > 0.0 and integral >= 0.0):
             raise self.wrong("its rate loop has no gain above zero", f"{RATE_GAIN}, {RATE_INTEGRAL}: set them")

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import math
 import struct
-from collections import deque
 from collections.abc import Mapping, Sequence
 
 from hw.drives.bench_file import DriveEntry
@@ -92,10 +91,6 @@ ANSWERS_HZ = 1000.0
 ANGLE_TOLERANCE, TIME_TOLERANCE = 0.02, 0.02
 """By how much its angle in a frame may differ from the parameter read before: rad, at rest; and s of its rate."""
 
-
-TURNS = 0.5
-"""Least rate of a shaft that turns, rad/s: more than a step of the angle between two answers at 1 kHz."""
-
 STAYS = 10
 """Steps of the angle that it has to be told to have turned, where it is told to stand at the end of its range."""
 
@@ -116,7 +111,6 @@ class RobstrideDrive(CanDrive):
         self._wanted = self._ran = False
         """True where it was told to run, and where it was seen to since; False once it was told to stop."""
         self._faults = 0
-        self._before: deque[bytes] = deque(maxlen=64)
         self._last = -1, 0.0
         """Angle of its last answer, in counts, and its time, s."""
 
@@ -125,10 +119,12 @@ class RobstrideDrive(CanDrive):
         if not 0 < self.node <= 127:
             raise self.wrong("its number is none of a RobStride", "a number from 1 to 127")
         self._rate_max, self._torque_max = self._ranges()
+        self.steps = 2.0 * ANGLE_MAX / STEPS_16, 2.0 * self._rate_max / STEPS_16
         if not talk.ask([self._frame(IDENTITY)], lambda: self._identity is not None):
             raise talk.silent(self, "what its identity is")
         assert self._identity is not None
-        talk.send(self.idle())
+        self._wanted = self._ran = False
+        talk.send([self._frame(STOP)])
         firmware = self._firmware(talk)
         self._set(talk, TIMEOUT, self._timeout)
         self._set(talk, RUN_MODE, OPERATION_MODE)
@@ -147,8 +143,8 @@ class RobstrideDrive(CanDrive):
             RATE_SHARE * self._rate_max,
             ANSWERS_HZ,
             torque_count=2.0 * self._torque_max / STEPS_16,
-            angle_count=2.0 * ANGLE_MAX / STEPS_16,
-            rate_count=2.0 * self._rate_max / STEPS_16,
+            angle_count=self.steps[0],
+            rate_count=self.steps[1],
             angle_range=2.0 * ANGLE_MAX,
         )
 
@@ -230,9 +226,10 @@ class RobstrideDrive(CanDrive):
         return self._frame(WRITE, struct.pack("<HH", number, 0) + struct.pack(LAYOUTS[number], value))
 
     def armed(self) -> Sequence[CanFrame]:
+        """No torque is told before it is enabled, and after: no manual says whether a drive that is off takes it."""
         self._wanted, self._ran = True, False
         settings = self._writes(TIMEOUT, self._timeout), self._writes(RUN_MODE, OPERATION_MODE)
-        return (*settings, self._frame(ENABLE), *self.told(0.0))
+        return (*settings, *self.told(0.0), self._frame(ENABLE), *self.told(0.0))
 
     def told(self, value: float) -> Sequence[CanFrame]:
         torque = count_of(self.own(value), self._torque_max, STEPS_16)
@@ -242,9 +239,13 @@ class RobstrideDrive(CanDrive):
     def asked(self) -> Sequence[CanFrame]:
         return (self._writes(TIMEOUT, self._timeout), self._asks(SUPPLY))
 
+    def is_asked_by(self, frame: CanFrame) -> bool:
+        return frame.extended and frame.id & 0xFF == self.node and frame.id >> 24 in (TELL, ENABLE, STOP, WRITE)
+
     def idle(self) -> Sequence[CanFrame]:
+        """No torque is told while it still takes it, so that it has none to go on with once it is enabled."""
         self._wanted = self._ran = False
-        return (self._frame(STOP),)
+        return (*self.told(0.0), self._frame(STOP))
 
     def halted(self) -> Sequence[CanFrame]:
         return self.idle()
@@ -275,7 +276,8 @@ class RobstrideDrive(CanDrive):
             self._faults |= struct.unpack_from("<I", data)[0]
         elif kind == FEEDBACK and above >> 6 <= RUNNING:
             version = data.startswith(VERSION + b"\x56") and above >> 6 != RUNNING and self._version is None
-            if not version and self._said_before(data):
+            at_end = data[:2] in (b"\0\0", b"\xff\xff")  # where the angle of older firmware stays
+            if not (version or at_end) and self.has_said(data[:4], self._rate_of(data), frame.time):
                 return False
             self._state(above >> 6, above & 0x3F, frame.time)
             if version:
@@ -287,14 +289,9 @@ class RobstrideDrive(CanDrive):
             return False
         return True
 
-    def _said_before(self, data: bytes) -> bool:
-        """True where a shaft that turns is said to have angle and rate of an answer before the last: with 16 bits each
-        it never has, and what says so is an old frame."""
-        fields, rate = data[:4], value_of(data[2] << 8 | data[3], self._rate_max, STEPS_16)
-        if fields in self._before and fields != self._before[-1] and abs(rate) > TURNS:
-            return True
-        self._before.append(fields)
-        return False
+    def _rate_of(self, data: bytes) -> float:
+        """The rate of an answer, rad/s, in the drive's own sense."""
+        return value_of(data[2] << 8 | data[3], self._rate_max, STEPS_16)
 
     def _read_shaft(self, angle: int, rate: int, time: float) -> None:
         """Take angle and rate, in counts. One that turns and whose angle stays at an end of its range has failed: the

@@ -37,11 +37,13 @@ _OBJECTS = (
     ("steps", 0x608F, 1, 7, 65536),
     ("turns", 0x608F, 2, 7, 1),
     ("velocity unit", 0x60A9, 0, 7, 0x00B44700),
+    ("velocity offset", 0x60B1, 0, 4, 0),
+    ("torque offset", 0x60B2, 0, 3, 0),
     ("modes", 0x6502, 0, 7, 0x3ED),
 )
 """Name, index, subindex, type (CiA 301) and value of each object."""
 
-_LAYOUTS = {2: "<b", 3: "<h", 5: "<B", 6: "<H", 7: "<I"}
+_LAYOUTS = {2: "<b", 3: "<h", 4: "<i", 5: "<B", 6: "<H", 7: "<I"}
 _LAYOUT = {(index, sub): struct.Struct(_LAYOUTS[kind]) for _, index, sub, kind, _ in _OBJECTS}
 
 
@@ -50,6 +52,7 @@ class PlayedCia402(PlayedDrive):
 
     watches  False for one that does not miss the host's heartbeat
     refuses  objects that keep what they are, by index; 0x6061: it stays in the mode that it is in
+    saved    what objects are after it was switched on, by index, where it is not what is usual
     rate_gain N m s/rad and rate_integral N m/rad, of its rate loop
     """
 
@@ -85,12 +88,13 @@ class PlayedCia402(PlayedDrive):
         self._node = canopen.LocalNode(node, dictionary)
         self._node.associate_network(self._network)
         self.watches = True
+        self.saved: dict[int, int] = {}
         self.reboot()
 
     def reboot(self) -> None:
         """As after its supply came back: what was not saved is gone."""
         for _, index, sub, _, value in _OBJECTS:
-            self.set_value(index, sub, value)
+            self.set_value(index, sub, self.saved.get(index, value))
         self.status, self.torque, self.heard, self.error = 0x40, 0.0, math.inf, 0
         self.rate_told, self.integral, self.looped = 0.0, 0.0, 0.0
         self._operational = False
@@ -102,6 +106,10 @@ class PlayedCia402(PlayedDrive):
     def set_value(self, index: int, sub: int, value: int) -> None:
         """Set an object."""
         self._node.set_data(index, sub, _LAYOUT[index, sub].pack(value))
+
+    def _offset(self, index: int) -> int:
+        """An offset; 0 where it has no such object."""
+        return self.value(index) if index in self._node.object_dictionary else 0
 
     @property
     def mode(self) -> int:
@@ -187,8 +195,10 @@ class PlayedCia402(PlayedDrive):
             self.torque, self.rate_told, self.integral = 0.0, 0.0, 0.0
         elif mode == 9:
             fastest = self.value(0x6080) * 2.0 * math.pi / 60.0
+            told += self._offset(0x60B1)
             self.rate_told = min(max(told * self._rate_unit, -fastest), fastest)
         else:
+            told += self._offset(0x60B2)
             self.torque = self._limited(1e-6 * self.value(0x6076) * told) if mode == 10 else 0.0
 
     def _limited(self, torque: float) -> float:
@@ -200,7 +210,7 @@ class PlayedCia402(PlayedDrive):
         passed, self.looped = now - self.looped, now
         if self.status == 0x27 and self.mode == 9:
             error = self.rate_told - self.rate
-            wanted = self.rate_gain * error + self.integral
+            wanted = self.rate_gain * error + self.integral + 1e-6 * self.value(0x6076) * self._offset(0x60B2)
             self.torque = self._limited(wanted)
             if self.torque == wanted:  # how a maker holds the integral at the limit is no part of CiA 402
                 self.integral += self.rate_integral * passed * error

@@ -16,6 +16,8 @@ class PlayedDamiao(PlayedDrive):
     answers_as  identifier of its answers
     watches     False for one whose watchdog does nothing
     wraps       False for one whose angle stays at the end of its range
+    keeps       True for one that goes on with the torque that it was told last once it is enabled
+    takes_off   False for one that takes no torque while it is off
     registers   by number: whole numbers and floats, as they are
     """
 
@@ -24,7 +26,8 @@ class PlayedDamiao(PlayedDrive):
     ) -> None:
         super().__init__(node, sense)
         self.answers_as = 0x10 + node
-        self.watches = self.wraps = True
+        self.watches = self.wraps = self.takes_off = True
+        self.keeps = False
         self.registers: dict[int, int | float] = {7: self.answers_as, 8: node, 9: 0, 10: 2, 13: 1, 14: 5015, 36: 2}
         self.registers |= {21: angle_max, 22: rate_max, 23: torque_max, 29: 32.0}
         self.refuses: set[int] = set()
@@ -35,7 +38,8 @@ class PlayedDamiao(PlayedDrive):
         self.state, self.torque = 0, 0.0
 
     def fail(self, state: int) -> None:
-        self.state, self.torque = state, 0.0
+        self.state = state
+        self.torque *= self.keeps
 
     @property
     def bridge(self) -> Output:
@@ -57,7 +61,10 @@ class PlayedDamiao(PlayedDrive):
             elif data[7] == 0xFC and self.state == 0:
                 self.state = 1
             elif data[7] == 0xFD and self.state == 1:
-                self.state, self.torque = 0, 0.0
+                self.state = 0
+                self.torque *= self.keeps
+        elif self.registers[10] == 1 and not (self.takes_off or self.state == 1):
+            return (self._feedback(),)
         elif self.registers[10] == 1:
             most = float(self.registers[23])
             gains = (data[3] & 15) << 8 | data[4], data[5] << 4 | data[6] >> 4

@@ -21,6 +21,8 @@ class PlayedRobstride(PlayedDrive):
     rate_max, torque_max  where its fields end, rad/s and N m: those of an RS05
     watches     False for one whose watchdog does nothing
     wraps       False for one whose angle stays at the end of its range, as of older firmware
+    keeps       True for one that goes on with the torque that it was told last once it is enabled
+    takes_off   True for one that takes a torque while it is off
     angle_max   rad, where its angle's field ends
     version     of its firmware; None: it does not say
     parameters  by number, but for its angle
@@ -31,6 +33,7 @@ class PlayedRobstride(PlayedDrive):
         super().__init__(node, sense)
         self.rate_max, self.torque_max, self.angle_max = rate_max, torque_max, 4.0 * math.pi
         self.watches = self.wraps = True
+        self.keeps = self.takes_off = False
         self.version: tuple[int, ...] | None = (0, 3, 1, 44)
         self.parameters: dict[int, float] = {0x7005: 5, 0x700B: torque_max, 0x701C: 24.0, 0x7028: 0}
         self.refuses: set[int] = set()
@@ -45,7 +48,8 @@ class PlayedRobstride(PlayedDrive):
 
     def fail(self, faults: int, told: int = 0) -> None:
         """Stop by faults: bits of an answer, and of a frame of their own."""
-        self.mode, self.faults, self.torque = 0, self.faults | faults, 0.0
+        self.mode, self.faults = 0, self.faults | faults
+        self.torque *= self.keeps
         if told:
             number = 21 << 24 | self.node << 8 | _HOST
             self._said.append(CanFrame(number, struct.pack("<II", told, 0), extended=True))
@@ -64,16 +68,18 @@ class PlayedRobstride(PlayedDrive):
         if kind == 17:
             return (self._parameter(struct.unpack_from("<H", data)[0], data),)
         if kind == 1:
-            if self.mode == 2 and self.parameters[0x7005] == 0:
+            if (self.mode == 2 or self.takes_off) and self.parameters[0x7005] == 0:
                 gains = struct.unpack_from(">HH", data, 4)
                 most = self.parameters[0x700B]
                 torque = middle / 65535 * 2.0 * self.torque_max - self.torque_max
                 self.torque = min(max(torque, -most), most) if gains == (0, 0) else 0.0
         elif kind == 3:
             if not self.faults:
-                self.mode, self.torque = 2, 0.0
+                self.mode = 2
+                self.torque *= self.keeps
         elif kind == 4:
-            self.mode, self.torque = 0, 0.0
+            self.mode = 0
+            self.torque *= self.keeps
             if data[0] == 1:
                 self.faults = 0
             elif data[1] == 0xC4 and self.version is not None:
@@ -118,7 +124,8 @@ class PlayedRobstride(PlayedDrive):
     def tick(self, now: float) -> Sequence[CanFrame]:
         timeout = 5e-5 * self.parameters.get(0x7028, 0)
         if self.mode == 2 and self.watches and timeout and now - self.fed > timeout:
-            self.mode, self.torque = 0, 0.0
+            self.mode = 0
+            self.torque *= self.keeps
         if self.mode == 2 and self.parameters[0x701C] > 60.0:
             self.fail(0, 1 << 3)
         said, self._said = self._said, []

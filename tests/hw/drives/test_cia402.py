@@ -248,6 +248,53 @@ def test_one_that_is_not_known_is_found(tmp_path: Path, change: Callable[[Played
     assert refusal(bed.connect).startswith(said)
 
 
+OFFSETS = {0x60B1: 300, 0x60B2: -250}
+"""Turns a minute and thousandths of the rated torque that a drive adds to what it is told."""
+
+
+def test_offsets_that_were_saved_are_added_to_nothing(tmp_path: Path) -> None:
+    """They are set to 0 when it is greeted, and again before it is armed."""
+    for kind in ("torque", "rate"):
+        bed, line, played, drive, _ = bench(tmp_path)
+        bed._kind = kind  # type: ignore[assignment]
+        drive.saved |= OFFSETS
+        drive.reboot()
+        with bed:
+            bed.connect()
+            assert [drive.value(index) for index in OFFSETS] == [0, 0]
+            for index, value in OFFSETS.items():
+                drive.set_value(index, 0, value)
+            bed.arm()
+            assert [drive.value(index) for index in OFFSETS] == [0, 0]
+            for _ in range(20):
+                line.sleep(1e-3)
+                bed.exchange(0.0, 0.0)
+            assert played.shaft.rate == 0.0 and drive.status == 0x27
+
+
+@pytest.mark.parametrize(("index", "found"), OFFSETS.items())
+def test_an_offset_that_stays_is_refused(tmp_path: Path, index: int, found: int) -> None:
+    bed, _, _, drive, _ = bench(tmp_path)
+    drive.set_value(index, 0, found)
+    drive.refuses.add(index)
+    assert refusal(bed.connect) == (
+        "error[E404]: drive (node 1) cannot be driven: it does not take 0 for "
+        f"object {index:04X}h:0, which is {found}\n"
+        " = help: set it by its maker's tool"
+    )
+
+
+def test_a_drive_without_offsets_has_none(tmp_path: Path) -> None:
+    bed, line, played, drive, _ = bench(tmp_path)
+    for index in OFFSETS:
+        del drive._node.object_dictionary[index]
+    with bed:
+        bed.connect()
+        bed.arm()
+        line.sleep(1e-3)
+        assert bed.exchange(0.0, 0.0) is not None and played.shaft.rate == 0.0
+
+
 def test_an_object_that_it_has_not_is_named(tmp_path: Path) -> None:
     bed, _, _, drive, _ = bench(tmp_path)
     del drive._node.object_dictionary[0x6502]

@@ -150,7 +150,32 @@ def test_an_odrive_s_limits_of_torque_are_set_and_its_gains_are_read(tmp_path: P
         values = played.drive.values
         assert values["axis0.config.torque_soft_max"] == -values["axis0.config.torque_soft_min"] == pytest.approx(0.4)
         assert dict(bed.remarks)["loop"] == "of rate, the drive's own: 0.01 N*m*s/rad, 0.05 N*m/rad, at most 0.4 N*m"
-        assert played.load.values["axis0.config.torque_soft_max"] == float("inf")  # type: ignore[attr-defined]
+        assert played.load.values["axis0.config.torque_soft_max"] == pytest.approx(0.18)  # type: ignore[attr-defined]
+
+
+def test_an_odrive_s_largest_torque_is_not_that_of_a_session_before(tmp_path: Path) -> None:
+    """It stays until the drive is switched off. Here a bench of 0.1 N m was told rates, and is then one of 0.4 N m."""
+    played, path = played_bench("odrive"), bench_file(tmp_path, "odrive")
+    text = path.read_text()
+    path.write_text(text.replace('"0.4 N*m"', '"0.1 N*m"').replace('"3 A"', '"1 A"').replace('"2 A"', '"0.5 A"'))
+    with host_of(two_drives(path), PlayedLine(played), drive="rate") as bed:
+        bed.connect()
+    for each, most in zip(played.drives, (0.1, 0.06), strict=True):
+        assert isinstance(each, PlayedOdrive)
+        assert each.values["axis0.config.torque_soft_max"] == pytest.approx(most)
+    path.write_text(text)
+    line = PlayedLine(played)
+    with host_of(two_drives(path), line, drive="torque") as bed:
+        bed.connect()
+        bed.arm()
+        line.sleep(1e-3)
+        bed.exchange(-0.3, 2.5)
+        assert played.drive.output.value == pytest.approx(-0.3, rel=1e-6)
+        assert played.load.output.value == pytest.approx(2.5 * KT, rel=1e-6)
+    for each, most in zip(played.drives, (0.4, 0.18), strict=True):
+        assert isinstance(each, PlayedOdrive)
+        values = each.values
+        assert values["axis0.config.torque_soft_max"] == -values["axis0.config.torque_soft_min"] == pytest.approx(most)
 
 
 def test_an_odrive_that_lost_its_settings_has_them_again_before_it_is_armed(tmp_path: Path) -> None:

@@ -77,14 +77,16 @@ def test_what_is_no_answer_of_its_is_not_taken(frame: CanFrame) -> None:
 def test_an_old_frame_of_a_shaft_that_turns_is_not_taken() -> None:
     drive = one(1)
     drive._rate_max, drive._torque_max = drive._ranges()
+    drive.steps = 8.0 * math.pi / STEPS_16, 2.0 * 33.0 / STEPS_16
 
-    def said(angle: int, rate: int) -> bool:
+    def said(angle: int, rate: int, ms: float) -> bool:
         data = struct.pack(">HHHH", angle, rate, 0, 0)
-        return drive.take(CanFrame(0x028001FD, data, extended=True))
+        return drive.take(CanFrame(0x028001FD, data, extended=True, time=1e-3 * ms))
 
-    assert all(said(30000 + n, 40000) for n in range(10))
-    assert said(30009, 40000) and not said(30003, 40000) and said(30003, 40001)
-    assert said(100, 32768) and said(101, 32768) and said(100, 32768)  # at rest it may say the same
+    assert all(said(30000 + n, 40000, n) for n in range(10))
+    assert said(30009, 40000, 9.01)  # it turns by 0.07 mrad meanwhile, and a step is 0.38
+    assert not said(30009, 40000, 10) and not said(30003, 40000, 10) and said(30003, 40001, 10)
+    assert said(100, 32768, 11) and said(101, 32768, 12) and said(100, 32768, 13)  # at rest it may say the same
 
 
 def bench(folder: Path) -> tuple[CanBed, PlayedLine, PlayedBench, PlayedRobstride]:
