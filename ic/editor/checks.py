@@ -20,6 +20,7 @@ from ic.editor.checker_process import CheckerProcess
 from ic.editor.checking import CheckReply, CheckRequest, Crash, FoundAnswers
 from ic.editor.index import DeckIndex
 from ic.editor.positions import file_named, path_of
+from ic.editor.structure import KnownStructures
 from ic.editor.used import used_files
 from met.frozen import frozen
 
@@ -98,6 +99,7 @@ class DeckChecks:
         self._known: dict[str, Known] = {}  # findings of each deck's definitions, by what they follow from
         self._answers: dict[str, bytes] = {}  # of the analysis, of each deck's last audit
         self.indexes: dict[str, DeckIndex] = {}  # of each deck, when it could last be compiled
+        self.structures = KnownStructures(self.texts)
         self._failed: set[str] = set()  # decks whose last check has died; nothing is known of what they are now
         self._running: str | None = None
         self._outdated = False
@@ -125,6 +127,8 @@ class DeckChecks:
         self._known.pop(uri, None)
         self._answers.pop(uri, None)
         self._stale.pop(uri, None)
+        self._failed.discard(uri)
+        self.structures.forget(uri)
         self.all_changed()
         self._tell(self.decks())
 
