@@ -12,9 +12,8 @@ from ic.editor import completion
 from ic.editor.checks import CheckedDeck, DeckChecks
 from ic.editor.hover import about, markdown
 from ic.editor.index import DeckIndex
-from ic.editor.names import NameInText, NamesInTexts, deck_text
+from ic.editor.names import NameInText, NamesInTexts
 from ic.editor.positions import Texts, lines_of, uri_of
-from ic.editor.structure import DeckText
 from ic.editor.used import uses_in
 from ic.text.files import LIBRARY, Files, FoundFile, file_at
 from ic.text.lexer import NAME, Token
@@ -42,20 +41,22 @@ class Asked:
         opened = checks.texts.get(uri)
         self._path = opened.path if opened is not None else None
         current = normal(opened.text if opened is not None else "")
-        texts: dict[str, DeckText] = {}
+        texts: dict[str, str] = {}
         self._addresses: dict[str, str] = {}
         for name, source in deck.reply.sources.items() if deck is not None else ():
             where = address(deck, name) if deck is not None else None
             if where is None or (not name.rstrip(">").endswith(".ic") and where not in checks.texts):
                 continue
             now = checks.texts.get(where)
-            texts[name] = deck_text(name, source if now is None else normal(now.text))
+            texts[name] = source if now is None else normal(now.text)
             self._addresses[name] = where
         self.file = next((name for name, where in self._addresses.items() if where == uri), uri)
         self._addresses[self.file] = uri
-        self.text = texts.setdefault(self.file, deck_text(self.file, current))
+        texts.setdefault(self.file, current)
+        structures = checks.structures.of(deck.deck.uri if deck is not None else uri, texts)
+        self.text = structures[self.file]
         self.index = checks.indexes.get(deck.deck.uri, NO_INDEX) if deck is not None else NO_INDEX
-        self.names = NamesInTexts(texts.values(), self.index.made)
+        self.names = NamesInTexts(structures.values(), self.index.made)
         lines = lines_of(current)
         line = lines[position.line] if position.line < len(lines) else ""
         self.offset = self.text.offset(position.line, characters(codec, line, position.character))

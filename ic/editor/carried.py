@@ -1,7 +1,8 @@
 """Messages of the last check, carried over into texts that have changed since, until these are checked: none flickers.
 
 What stands in lines that have not changed is taken for still right, at the place where these lines are now. So while a
-check tells what it has found so far, what it has not come to yet stays on the screen.
+check tells what it has found so far, what it has not come to yet stays on the screen: of the definitions, and of the
+audit, which may take long.
 """
 
 from __future__ import annotations
@@ -64,3 +65,37 @@ def carried_over(last: CheckReply, now: CheckReply) -> CheckReply:
         except _Changed:
             continue
     return replace(now, diagnostics=(*now.diagnostics, *kept), edits=(*now.edits, *(() for _ in kept)))
+
+
+class LastAudit:
+    """The messages of a deck's last audit that its definitions had not told, kept until the next audit has ended."""
+
+    def __init__(self) -> None:
+        self._said: CheckReply | None = None
+        self._defined: CheckReply | None = None  # the reply of the definitions whose audit has not ended
+
+    def carried_into(self, reply: CheckReply) -> CheckReply:
+        """The reply of all definitions, with what the audit said of lines that are as they were. Where definitions have
+        errors nothing is added, since an audit then looks into no program, but it is kept for when they are mended."""
+        self._defined = reply
+        if self._said is not None:
+            self._said = carried_over(self._said, replace(reply, diagnostics=(), edits=()))
+        return reply if self._said is None or _has_errors(reply) else carried_over(self._said, reply)
+
+    def take(self, reply: CheckReply) -> None:
+        """Keep what an audit has said, the one that belongs to the definitions that were told last."""
+        if self._defined is not None and not _has_errors(self._defined):
+            new = [n for n, each in enumerate(reply.diagnostics) if each not in self._defined.diagnostics]
+            diagnostics, edits = (tuple(some[n] for n in new) for some in (reply.diagnostics, reply.edits))
+            self._said = replace(reply, diagnostics=diagnostics, edits=edits)
+        self._defined = None
+
+    def give_up(self) -> CheckReply | None:
+        """Forget it where the audit has died; the reply of the definitions alone. None where an audit has ended."""
+        if self._defined is not None:
+            self._said = None
+        return self._defined
+
+
+def _has_errors(reply: CheckReply) -> bool:
+    return any(each.severity == "error" for each in reply.diagnostics)

@@ -15,11 +15,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ic.editor.carried import carried_over
+from ic.editor.carried import LastAudit, carried_over
 from ic.editor.checker_process import CheckerProcess
 from ic.editor.checking import CheckReply, CheckRequest, Crash, FoundAnswers
 from ic.editor.index import DeckIndex
 from ic.editor.positions import file_named, path_of
+from ic.editor.structure import KnownStructures
 from ic.editor.used import used_files
 from met.frozen import frozen
 
@@ -97,7 +98,9 @@ class DeckChecks:
         self._stale: dict[str, None] = {}  # addresses of decks to be checked, in the order of changes
         self._known: dict[str, Known] = {}  # findings of each deck's definitions, by what they follow from
         self._answers: dict[str, bytes] = {}  # of the analysis, of each deck's last audit
+        self._audits: dict[str, LastAudit] = {}
         self.indexes: dict[str, DeckIndex] = {}  # of each deck, when it could last be compiled
+        self.structures = KnownStructures(self.texts)
         self._failed: set[str] = set()  # decks whose last check has died; nothing is known of what they are now
         self._running: str | None = None
         self._outdated = False
@@ -124,7 +127,10 @@ class DeckChecks:
         self.indexes.pop(uri, None)
         self._known.pop(uri, None)
         self._answers.pop(uri, None)
+        self._audits.pop(uri, None)
         self._stale.pop(uri, None)
+        self._failed.discard(uri)
+        self.structures.forget(uri)
         self.all_changed()
         self._tell(self.decks())
 
@@ -246,9 +252,13 @@ class DeckChecks:
                 self._take(deck, request, texts, answer)
         finally:
             self._running = None
-        if not answers and not self._outdated and uri in self.texts:
+        if self._outdated or uri not in self.texts:
+            return
+        if not answers:
             self._failed.add(uri)
             self._log(f"the check of {deck.path or uri} ended without an answer")
+        if self._auditing and (alone := self._audits[uri].give_up()) is not None:
+            self._keep(deck, request, texts, alone)
 
     def _take(self, deck: OpenText, request: CheckRequest, texts: dict[str, OpenText], answer: object) -> None:
         if isinstance(answer, Crash):
@@ -267,9 +277,15 @@ class DeckChecks:
             return
         if answer.known is not None:
             self._known[deck.uri], self._auditing = answer.known, True
-            answer = replace(answer, known=None)
+            answer = self._audits.setdefault(deck.uri, LastAudit()).carried_into(replace(answer, known=None))
+        elif self._auditing:
+            self._audits[deck.uri].take(answer)
         elif not answer.audited and deck.uri in self.checked:
             answer = carried_over(self.checked[deck.uri].reply, answer)
+        self._keep(deck, request, texts, answer)
+
+    def _keep(self, deck: OpenText, request: CheckRequest, texts: dict[str, OpenText], answer: CheckReply) -> None:
+        """Keep a reply as what is known of the deck, and tell it."""
         paths = (file_named(name, request.folder) for name in answer.sources)
         files = frozenset(os.path.realpath(path) for path in paths if path is not None)
         used = frozenset(name for text in answer.sources.values() for name in used_files(text))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import copy
-from functools import lru_cache
 from types import MappingProxyType
 
 from ic.editor.expansions import MacrosInTexts
@@ -45,12 +44,6 @@ OUTERMOST = (*DEFINED, "roof", "run", "sweep", "search", "tune", "macro", UNIT)
 """The kinds of names that are of a deck itself, and not of an arm or a run."""
 
 NOTHING_MADE: Mapping[tuple[str, str], Sequence[str]] = MappingProxyType({})
-
-
-@lru_cache(maxsize=32)
-def deck_text(name: str, text: str) -> DeckText:
-    """The structure of a text; of one that is known, the same."""
-    return DeckText(name, text)
 
 
 @frozen

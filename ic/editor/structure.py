@@ -7,7 +7,7 @@ a single text, and takes whatever there is.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -306,3 +306,32 @@ class DeckText:
         lines = self.source.text.split("\n")
         line = min(line, len(lines) - 1)
         return sum(len(each) + 1 for each in lines[:line]) + min(column, len(lines[line]))
+
+
+class KnownStructures:
+    """The structures of the texts of decks that an editor asks about, found once for each state of a text.
+
+    A deck's are those of the texts that it had when it was last asked about, so memory follows from what is open, never
+    from how often it was changed.
+    """
+
+    def __init__(self, opened: Container[str]) -> None:
+        """opened: the addresses of the decks that are open now; nothing is kept of others."""
+        self._opened = opened
+        self._of: dict[str, dict[str, DeckText]] = {}
+
+    def of(self, deck: str, texts: Mapping[str, str]) -> dict[str, DeckText]:
+        """The structures of all texts of a deck at an address, by the texts' names."""
+        known = {each.source.name: each for other in self._of.values() for each in other.values()}
+        known.update(self._of.get(deck, {}))
+        found = {}
+        for name, text in texts.items():
+            kept = known.get(name)
+            found[name] = kept if kept is not None and kept.source.text == text else DeckText(name, text)
+        if deck in self._opened:
+            self._of[deck] = found
+        return found
+
+    def forget(self, deck: str) -> None:
+        """Let go of what is known of a deck, which an editor has closed."""
+        self._of.pop(deck, None)

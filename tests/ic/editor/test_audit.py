@@ -10,8 +10,16 @@ from pathlib import Path
 import pytest
 
 from ic.editor import checking
-from ic.editor.carried import carried_over
-from ic.editor.checking import EARLY, CheckReply, CheckRequest, FoundAnswers, answers, first_replies
+from ic.editor.carried import LastAudit, carried_over
+from ic.editor.checking import (
+    EARLY,
+    CheckReply,
+    CheckRequest,
+    FoundAnswers,
+    answers,
+    compiled_with_reply,
+    first_replies,
+)
 from ic.text.files import LIBRARY
 from tests.ic.editor.client import Editor, uri
 
@@ -116,3 +124,75 @@ def test_a_change_of_another_deck_need_not_wait_for_an_audit(tmp_path: Path, edi
     editor.settle()
     assert told(editor, one)[-1] == [NO_NOISE]
     assert any("bare number" in each for each in told(editor, other)[-1])
+
+
+QUIET = DECK.replace("sweep spares", "// sweep spares")
+"""The deck without errors: its audit has one message."""
+
+
+def test_what_the_last_audit_said_of_unchanged_lines_stands_until_the_next_one_ends(
+    tmp_path: Path, editor: Editor
+) -> None:
+    deck = tmp_path / "arm.ic"
+    deck.write_text(QUIET)
+    editor.open(deck)
+    editor.settle()
+    for change in (f"// a line\n{QUIET}", f"// a line\n{QUIET}// and another\n"):
+        editor.forget()
+        editor.change(deck, change)
+        editor.settle()
+        found = [each["diagnostics"] for each in editor.published if each["uri"] == uri(deck)]
+        shown = [[(d["message"], d["range"]["start"]["line"]) for d in each] for each in found]
+        assert shown and all(each == [(NO_NOISE, 5)] for each in shown)
+    for change in (QUIET.replace("repeat 2", "repeat 3"), QUIET.replace("sweep noise", "sweep noises")):
+        editor.change(deck, change)
+        editor.settle()
+        assert told(editor, deck)[-1] == [NO_NOISE]
+
+
+def definitions(text: str) -> CheckReply:
+    return replace(all_replies(text, 0.0)[-1], known=None)
+
+
+def audit(text: str) -> CheckReply:
+    return compiled_with_reply(CheckRequest(str(LIBRARY), "", text, (), (), {}))[1]
+
+
+def messages(reply: CheckReply | None) -> list[str]:
+    assert reply is not None
+    assert len(reply.edits) == len(reply.diagnostics)
+    return [each.message for each in reply.diagnostics]
+
+
+def test_errors_of_definitions_stand_alone_and_once_mended_the_last_audit_counts_again() -> None:
+    last = LastAudit()
+    assert messages(last.carried_into(definitions(QUIET))) == []
+    last.take(audit(QUIET))
+    assert messages(last.carried_into(definitions(DECK))) == [NO_EFFECT]
+    last.take(audit(DECK))  # which has looked into no program
+    assert messages(last.carried_into(definitions(QUIET))) == [NO_NOISE]
+    last.take(audit(QUIET))
+    assert messages(last.carried_into(definitions(QUIET))) == [NO_NOISE]
+
+
+def test_what_an_audit_said_goes_with_its_line_and_with_an_audit_that_does_not_say_it() -> None:
+    last = LastAudit()
+    last.carried_into(definitions(QUIET))
+    last.take(audit(QUIET))
+    line = "sweep noise of light { repeat 2; }"
+    assert messages(last.carried_into(definitions(QUIET.replace(line, f"{line} // two")))) == []
+    assert messages(last.carried_into(definitions(QUIET))) == [], "until it is found again"
+    last.take(audit(QUIET))
+    last.carried_into(definitions(QUIET))
+    last.take(audit(QUIET.replace(line, "")))
+    assert messages(last.carried_into(definitions(QUIET))) == []
+
+
+def test_where_an_audit_dies_what_the_last_one_said_is_taken_back() -> None:
+    last = LastAudit()
+    last.carried_into(definitions(QUIET))
+    last.take(audit(QUIET))
+    assert last.give_up() is None, "it has ended"
+    assert messages(last.carried_into(definitions(QUIET))) == [NO_NOISE]
+    assert messages(last.give_up()) == []
+    assert messages(last.carried_into(definitions(QUIET))) == []

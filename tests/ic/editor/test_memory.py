@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
+from collections.abc import AsyncIterator
 from concurrent.futures import Future
+from contextlib import asynccontextmanager
+from pathlib import Path
 
 from lsprotocol import types
 from pygls.workspace import Workspace
 
+from ic.editor.checks import OpenText
 from ic.editor.server import DeckServer, make
+from ic.editor.structure import DeckText
+from ic.text.files import LIBRARY
 
+DECK = (LIBRARY / "two_link.ic").read_text()
 URI = "file:///nowhere/deck.ic"
 
 
@@ -35,3 +43,52 @@ def test_of_a_thousand_changes_of_a_text_none_is_kept() -> None:
         change(server, version)
     assert server.checks.texts[URI].text == "// 1001\n"
     assert futures() <= before
+
+
+@asynccontextmanager
+async def checking() -> AsyncIterator[DeckServer]:
+    """A server without an editor, with its process that checks."""
+    server = make()
+    server.protocol._workspace = Workspace(None)
+    server.protocol.set_writer(type("Nowhere", (), {"write": lambda self, data: None})())
+    server.process.start()
+    worker = asyncio.create_task(server.checks.work())
+    try:
+        yield server
+    finally:
+        worker.cancel()
+        server.end()
+
+
+async def edit(server: DeckServer, uri: str, edits: range) -> int:
+    """Change a deck and ask about it, each time once it is checked; how many objects there are in the end."""
+    for n in edits:
+        server.checks.change(OpenText(uri, f"{DECK}let spare_{n} = {n} kg;\n", n))
+        while server.checks.checked[uri].deck.version != n:
+            await asyncio.sleep(0.001)
+        assert "gearbox" in server.asked_about(uri, types.Position(0, 0)).names.by_name
+    await server.checks.rest()
+    gc.collect()
+    return len(gc.get_objects())
+
+
+def structures() -> int:
+    return sum(type(each) is DeckText for each in gc.get_objects())
+
+
+def test_memory_does_not_grow_with_the_number_of_edits(tmp_path: Path) -> None:
+    uri = (tmp_path / "arm.ic").as_uri()
+
+    async def objects() -> tuple[int, int]:
+        async with checking() as server:
+            server.checks.open(OpenText(uri, DECK, 0))
+            await server.checks.rest()
+            before, after = await edit(server, uri, range(1, 11)), await edit(server, uri, range(11, 21))
+            assert structures() == len(server.checks.checked[uri].reply.sources)
+            server.checks.shut(uri)
+            gc.collect()
+            assert structures() == 0, "of what is closed nothing is kept"
+            return before, after
+
+    before, after = asyncio.run(objects())
+    assert after - before < 10, "fewer than one for each edit, where each of these texts has hundreds"
