@@ -49,6 +49,9 @@ SHOWN_KEY = 8
 
 OTHER_CODE = "by other code than the archive was made with, so that numbers may differ"
 
+OWN = ("beside.js", "traces.js", "knobs.js", "view.js")
+"""Scripts of a page that simulates, in their order; `numbers.js` after them where there is a second module."""
+
 _ASSETS = Path(__file__).with_name("assets")
 _CODE = "'wasm-unsafe-eval'"
 
@@ -80,8 +83,7 @@ def view(
             data["beside"] = _beside(against, file, group, experiment)
         if numbers is not None:
             data["numbers"] = _numbers(deck_of(file, experiment, numbers, include_dirs), experiment)
-            program = f" ({_program(data)})"
-            data["head"] = _head(experiment, data, KICKER, _by(data) + program)
+            data["head"] = head_of(experiment, data, KICKER, f"{_by(data)} ({_program(data)})")
         return page_of(experiment, data)
 
 
@@ -236,7 +238,9 @@ def doubles(values: np.ndarray) -> str:
 
 def page_of(experiment: Experiment, data: dict[str, Any]) -> str:
     """The whole file of a page about an archive. The same data give the same text."""
-    return page_text(experiment, data, kicker=KICKER, by=_by(data))
+    start = f"const MET_PAGE = {script_json(data)};\nMET.simulate(MET_PAGE, null);"
+    head = data.get("head") or head_of(experiment, data, KICKER, _by(data))
+    return page_text(head, [start], own=(*OWN, "numbers.js") if "numbers" in data else OWN)
 
 
 def _by(data: Mapping[str, Any]) -> str:
@@ -249,43 +253,40 @@ def _program(data: Mapping[str, Any]) -> str:
     return f"program {data['description']['code_key'].rpartition(':')[2][:SHOWN_KEY]}"
 
 
-def _head(experiment: Experiment, data: Mapping[str, Any], kicker: str, by: str) -> dict[str, str]:
-    """The texts at the top of a page."""
+def head_of(experiment: Experiment, data: Mapping[str, Any], kicker: str, by: str) -> dict[str, str]:
+    """The texts at the top of a page. kicker, by: what stands above the name, and by what code numbers are computed."""
     when = "Move a slider, and the run is computed again, here," if data["count"] > 1 else "The run is computed here,"
     return {"kicker": kicker, "name": visible(experiment.name), "lede": f"{when} {by}."}
 
 
 def page_text(
-    experiment: Experiment,
-    data: dict[str, Any],
+    head: Mapping[str, str],
+    start: Sequence[str],
     *,
-    kicker: str,
-    by: str,
+    own: Sequence[str] = OWN,
     before: Sequence[str] = (),
-    after: Sequence[str] = (),
     style: str = "",
 ) -> str:
     """The whole file.
 
-    kicker, by     what stands above the name, and by what code its numbers are computed
-    before, after  further scripts: names of the report's, before the page's own; and texts after it
-    style          a further one
+    head    the texts at its top, as `head_of` has them
+    start   texts of scripts, after all others: what gives the page its data
+    own     names of the scripts of such pages;  before: of those of the report that come before them
+    style   a further one
     """
-    own = ("beside.js", "traces.js", "knobs.js", *(["numbers.js"] if "numbers" in data else []), "view.js")
     script = "\n".join(
         [
             inlined.licensed("uPlot.iife.min.js", "core.js", "timeline.js", *before),
             arm_scripts(),
             KERNEL_JS.read_text(encoding="utf-8"),
-            f"const MET_PAGE = {script_json(data)};",
             *((_ASSETS / name).read_text(encoding="utf-8") for name in own),
-            *after,
+            *start,
         ]
     )
     style = "\n".join([inlined.style(), arm_style(), (_ASSETS / "view.css").read_text(encoding="utf-8"), style])
-    head = page_head(experiment.name, generator=GENERATOR, style=style, script=script, allowed=_CODE)
-    top = data.get("head") or _head(experiment, data, kicker, by)
-    header = el("header", el("p", top["kicker"], cls="kicker"), el("h1", top["name"]), el("p", top["lede"], cls="lede"))
+    top = page_head(head["name"], generator=GENERATOR, style=style, script=script, allowed=_CODE)
+    kicker, lede = (el("p", head[name], cls=name) for name in ("kicker", "lede"))
+    header = el("header", kicker, el("h1", head["name"]), lede)
     none = el("p", "This page needs scripts and WebAssembly, which this reader does not run.")
     body = lines([header, el("main", none), Html(f"<script>{script}</script>")])
-    return f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{head}\n</head>\n<body>\n{body}\n</body>\n</html>\n'
+    return f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{top}\n</head>\n<body>\n{body}\n</body>\n</html>\n'

@@ -17,10 +17,10 @@ import numpy as np
 
 from batch.archive.in_memory import GroupInMemory
 from batch.modules.description import MOST_CASES
-from batch.portable.page import data_of, doubles, page_text
+from batch.portable.page import data_of, doubles, head_of
 from batch.queries.pool import ENDED, Pool
 from batch.report.contents.overview import overview
-from batch.report.html.payload import overview_data
+from batch.report.html.payload import overview_data, script_json
 from ic.driver.compile import asked_definitions, compile_deck
 from ic.language import EXPERIMENTS
 from ic.meaning.definitions.resolve import Definitions
@@ -37,11 +37,7 @@ from met.outputs import quoted
 from met.plan import Experiment, Plan
 from met.run import DONE, Prepared, Run, results
 
-ASSETS = Path(__file__).with_name("assets")
-
 KICKER = "A deck that is watched"
-BY_CASE = ("points.js", "overview.js", "cells.js", "map.js")
-"""Scripts of the report that draw a sweep's cases as points and maps."""
 
 NOT_YET = -1
 """Status of a case that has yet to be run."""
@@ -158,7 +154,7 @@ def _words(diagnostics: Any, sources: Mapping[str, str]) -> str:
 
 
 def page(answer: DeckAnswer, prepared: Prepared) -> str:
-    """The page of the run that is shown, before its cases are run."""
+    """What the page of the run that is shown is given, before its cases are run: JSON."""
     experiment, plan = prepared.experiment, answer.plan
     assert plan is not None
     rows = shown_rows(experiment)
@@ -168,9 +164,8 @@ def page(answer: DeckAnswer, prepared: Prepared) -> str:
     by = "by the code of `met run`"
     if experiment.cases.count > len(rows):
         by += f"; of {experiment.cases.count:,} cases these are the first {len(rows):,}"
-    after = (ASSETS / "kept.js").read_text(encoding="utf-8")
-    style = (ASSETS / "kept.css").read_text(encoding="utf-8")
-    return page_text(experiment, data, kicker=KICKER, by=by, before=BY_CASE, after=[after], style=style)
+    data["head"] = head_of(experiment, data, KICKER, by)
+    return script_json(data)
 
 
 def kind_of(experiment: Experiment) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 KEPT = 4
-"""Pages, and numbers, that can still be fetched: the last ones."""
+"""Pages, each as the data of its run, and numbers, that can still be fetched: the last ones."""
 
 
 class Board:

@@ -1,7 +1,7 @@
 """The page around the run of a deck that is watched: what `met check` says, which run is shown, how far it is.
 
-The run is a page of its own in it. When there is a new one, it is made ready behind the old one, put where that was
-looked at, and then takes its place.
+The run is a page of its own in it, which has all scripts, and no run at first. Each run that there is to show is given
+to it as data, takes the place of the one before, and is seen from where that was.
 """
 
 from __future__ import annotations
@@ -9,10 +9,15 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
+from batch.portable.page import page_text
 from batch.report.html import inlined
 from batch.report.html.markup import Html, el, lines
 
 _ASSETS = Path(__file__).with_name("assets")
+
+
+BY_CASE = ("points.js", "overview.js", "cells.js", "map.js")
+"""Scripts of the report that draw a sweep's cases as points and maps."""
 
 
 def _asset(name: str) -> str:
@@ -41,6 +46,13 @@ def frame() -> tuple[str, str]:
     body = lines([none, Html(f"<script>{script}</script>")])
     text = f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{head}\n</head>\n<body>\n{body}\n</body>\n</html>\n'
     return text, policy
+
+
+@cache
+def page_of_runs() -> str:
+    """The whole text of the page in the frame, the same for each run; `assets/kept.js` gives it one after another."""
+    empty = {"kicker": "", "name": "", "lede": ""}
+    return page_text(empty, [_asset("kept.js")], before=BY_CASE, style=_asset("kept.css"))
 
 
 FRAME_POLICY = "default-src 'none'; frame-ancestors 'none'"

@@ -3,7 +3,7 @@
 Others use the machine too, and their browsers and programs reach every port of it; and any page in one's own browser
 can send requests there. So each request is refused that does not know the token in the address, that names another
 host than this one (a name that somebody has made lead here), or that another page has sent. Nothing of the disk is
-served: what can be asked for is four names.
+served: what can be asked for is five names.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from typing import Any
 from urllib.parse import parse_qs
 
 from batch.watching.board import Board
-from batch.watching.frame import FRAME_POLICY, frame
+from batch.watching.frame import FRAME_POLICY, frame, page_of_runs
 from met.diagnostic import Problem, error
 
 HOST = "127.0.0.1"
@@ -137,7 +137,7 @@ class _InTime(io.RawIOBase):
 
 
 class _Request(BaseHTTPRequestHandler):
-    """One request: GET of the frame, the page in it, its numbers, events; POST of a choice."""
+    """One request: GET of the frame, the page in it, a run's data, numbers of its cases, events; POST of a choice."""
 
     server: PageServer
     server_version, sys_version = "met", ""
@@ -155,8 +155,9 @@ class _Request(BaseHTTPRequestHandler):
         elif what == "events":
             self._events()
         elif what in ("page", "numbers") and (found := self.server.board.text(what, number)) is not None:
-            kind = "text/html; charset=utf-8" if what == "page" else "application/json"
-            self._send(found, kind, INNER_POLICY if what == "page" else FRAME_POLICY)
+            self._send(found, "application/json", FRAME_POLICY)
+        elif what == "run":
+            self._send(page_of_runs().encode(), "text/html; charset=utf-8", INNER_POLICY)
         elif what is not None:
             self._refuse(HTTPStatus.NOT_FOUND)
 

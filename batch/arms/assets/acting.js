@@ -157,7 +157,10 @@ MET.acting = (() => {
     // The recorded forces of joints as arrows.
     const reacting = (t, numbers) => (forces && on.force ? arm.arrows(numbers, forces.at(t), (LONGEST * arm.reach) / forces.most) : []);
 
-    return { box, show, tell, say, solids, nozzles, forces: reacting, shown: (kind) => on[kind],
+    // No further rows are looked at.
+    const close = () => { seen++; };
+
+    return { box, show, close, tell, say, solids, nozzles, forces: reacting, shown: (kind) => on[kind],
       key: (key) => Object.keys(KINDS).find((kind) => KINDS[kind][2] === key && !chips[kind].box.hidden && (press(kind), true)) !== undefined,
       kept: () => ({ ...on }), resume: (before) => Object.keys(on).forEach((kind) => { if (before && before[kind] !== undefined && before[kind] !== on[kind]) press(kind); }),
       reactions: (t) => (forces ? forces.at(t) : []), looked: () => !taken || taken.look(0), now: (t) => (taken ? made.acts(taken.at(t)) : []), most };

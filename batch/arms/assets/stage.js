@@ -26,9 +26,20 @@ MET.stage = (() => {
     return power * [1, 2, 5, 10].reduce((a, b) => (Math.abs(b * power - wanted) < Math.abs(a * power - wanted) ? b : a));
   }
 
+  // What an arm is drawn on; null where there is no WebGL.
+  function surfaceOf(canvas) {
+    try {
+      const renderer = MET.webgl.make(canvas);
+      return renderer && { canvas, renderer };
+    } catch {
+      return null;  // a driver that cannot; SVG can
+    }
+  }
+
   // scene: as `batch.arms.scene.scene_json` has it. seen: is told of each instant that is shown. acting: as
-  // `batch.arms.acting.acting_json` has it.
-  function make(root, scene, { seen = () => {}, acting = null } = {}) {
+  // `batch.arms.acting.acting_json` has it. surface: what the view was drawn on whose place it takes.
+  function make(root, scene, { seen = () => {}, acting = null, surface = null } = {}) {
+    surface ||= surfaceOf(node("canvas"));
     const arm = MET.arm.make(scene);
     const camera = MET.camera.make();
     const step = stepOf(arm.reach);
@@ -40,7 +51,6 @@ MET.stage = (() => {
     const acts = acting ? MET.acting.make(acting, arm) : null;
     const fingers = new Map();  // and mice: places where the view is held, by pointer
 
-    const canvas = node("canvas");
     const paper = node("div", { class: "paper" });
     const told = node("div", { class: "told" });
     const scaled = node("div", { class: "scaled" }, `grid ${number(step)} m`);
@@ -60,7 +70,7 @@ MET.stage = (() => {
     const keys = node("dl", { class: "keys", hidden: true }, KEYS.map(([key, does]) => [node("dt", null, key), node("dd", null, does)]));
     const triad = MET.triad.make(arm, scene.gravity);
     const view = node("div", { class: "view", tabindex: 0, role: "application", "aria-label": "The arm in 3D. Space plays, comma and full stop step, arrows turn, with shift they move, plus and minus zoom, 0 shows all." },
-      canvas, paper, told, scaled, triad.box, node("div", { class: "tools" }, withTwin, withOthers, withFrames, whole, help), keys);
+      surface?.canvas, paper, told, scaled, triad.box, node("div", { class: "tools" }, withTwin, withOthers, withFrames, whole, help), keys);
     const sign = node("path", { d: "M3 1.5 L14 8 L3 14.5 Z" });
     const play = node("button", { type: "button", class: "play", "aria-label": "Play", click: () => run(!playing) }, node("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, sign));
     const scrub = node("input", { type: "range", min: 0, max: 1, step: "any", "aria-label": "Time", input: () => { run(false); seek(Number(scrub.value) * end); } });
@@ -68,15 +78,13 @@ MET.stage = (() => {
     const speed = node("select", { "aria-label": "Speed", change: () => { rate = Number(speed.value); } }, SPEEDS.map((each) => node("option", { value: each }, `${number(each)} ×`)));
     const film = node("div", { class: "film printed" });
     root.append(node("div", { class: "stage" }, view, node("div", { class: "transport" }, play, scrub, clock, speed), legend.box, ...[MET.acting.note(acting)].filter(Boolean), film));
-    let renderer = null;
-    try {
-      renderer = MET.webgl.make(canvas);
-    } catch {
-      renderer = null;  // a driver that cannot; SVG can
-    }
-    canvas.hidden = !renderer;
-    if (renderer && renderer.software) view.classList.add("plain");
-    canvas.addEventListener("webglcontextlost", () => { renderer = null; canvas.hidden = true; redraw(); });
+    const ending = new AbortController();
+    if (surface?.renderer.software) view.classList.add("plain");
+    surface?.canvas.addEventListener("webglcontextlost", () => {
+      surface.canvas.remove();
+      surface = null;
+      redraw();
+    }, { signal: ending.signal });
 
     function inksOf() {
       const mine = palette();
@@ -138,6 +146,7 @@ MET.stage = (() => {
 
     // Dots of the canvas; fine: as many as make edges smooth.
     function sized(fine) {
+      const { canvas, renderer } = surface;
       const dots = Math.min((devicePixelRatio || 1) * (fine ? (renderer.software ? 2 : 1) : coarse), 2);
       const [w, h] = [view.clientWidth, view.clientHeight].map((side) => Math.round(side * dots));
       if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
@@ -151,9 +160,9 @@ MET.stage = (() => {
       camera.aspect = wide / high;
       if (fresh && !(fresh = false)) home();
       const shown = picture(time);
-      if (renderer) {
+      if (surface) {
         sized(still);
-        renderer.draw(shown);
+        surface.renderer.draw(shown);
       } else paper.replaceChildren(MET.painter.draw(shown, wide, high));
       legend.say(shown.words);
       triad.turn(camera.axes());
@@ -175,7 +184,7 @@ MET.stage = (() => {
 
     function seek(to, quietly = false) {
       time = Math.min(Math.max(to, 0), end);
-      if (!quietly && (!playing || time >= end || performance.now() - saidAt >= (renderer && !renderer.software ? 0 : PAUSE))) {
+      if (!quietly && (!playing || time >= end || performance.now() - saidAt >= (surface && !surface.renderer.software ? 0 : PAUSE))) {
         saidAt = performance.now();
         seen(time);
       }
@@ -306,7 +315,6 @@ MET.stage = (() => {
       redraw();
     }
 
-    const ending = new AbortController();
     addEventListener("beforeprint", () => {
       if (!chosen) return;
       const { distance, target, aspect } = camera;
@@ -321,13 +329,14 @@ MET.stage = (() => {
     const anew = () => { inks = null; legend.tell(); redraw(); };
     MET.drawn.push(anew);
 
-    // Another view takes this one's place: it stops, and holds nothing.
+    // Another view takes this one's place: it stops, and gives back what it was drawn on.
     function close() {
       [playing, chosen] = [false, null];
       ending.abort();
       sides.disconnect();
+      legend.close();
       MET.drawn.splice(MET.drawn.indexOf(anew), 1);
-      if (renderer) renderer.close();
+      return surface;
     }
 
     // Where it is seen from and at which instant; and back there, on a page that takes another's place.
@@ -350,15 +359,15 @@ MET.stage = (() => {
 
     // How long a picture of many takes, ms, everything drawn.
     function measure(count = 20) {
-      if (renderer) sized(false);
+      if (surface) sized(false);
       const begun = performance.now();
       for (let n = 0; n < count; n++) {
         const made = picture((end * n) / count, true, false);
-        if (renderer) { renderer.draw(made); renderer.finish(); } else MET.painter.draw(made, view.clientWidth, view.clientHeight);
+        if (surface) { surface.renderer.draw(made); surface.renderer.finish(); } else MET.painter.draw(made, view.clientWidth, view.clientHeight);
       }
       return (performance.now() - begun) / count;
     }
-    return { take: arm.take, takeActing: acts && acts.take, legend, around: () => { const { solids, clear } = legend.solids(time, chosen.at(time)); return [...solids, ...clear]; }, show, haunt, accompany, settle, seek, kept, resume, close, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, finish: () => renderer && renderer.finish(), ghosts: () => others.length, drawsBy: () => (renderer ? "webgl" : "svg") };
+    return { take: arm.take, takeActing: acts && acts.take, legend, around: () => { const { solids, clear } = legend.solids(time, chosen.at(time)); return [...solids, ...clear]; }, show, haunt, accompany, settle, seek, kept, resume, close, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, finish: () => surface?.renderer.finish(), ghosts: () => others.length, drawsBy: () => (surface ? "webgl" : "svg") };
   }
 
   return { make };

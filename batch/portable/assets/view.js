@@ -3,8 +3,9 @@
 // Texts of a deck come into the page as text nodes alone.
 "use strict";
 
-// data: as `batch.portable.page` wrote it; back: of a second module, the archive's; seen: where the arm was looked at from.
-MET.simulate = (data, back, seen) => {
+// data: as `batch.portable.page` wrote it; back: of a second module, the archive's. Of the simulation whose place it takes,
+// seen: where the arm was looked at from; surface: what it was drawn on.
+MET.simulate = (data, back, { seen = null, surface = null } = {}) => {
   const { node, number } = MET;
   const { description: told } = data;
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -22,6 +23,7 @@ MET.simulate = (data, back, seen) => {
   const MOST_VALUES = 4;  // that the list of cases shows of each
   const SLICE = 24;  // ms of work between which the page answers
   const others = [];
+  const ending = new AbortController();
   let turn = 0;  // of computing them
   const addressed = Boolean(data.report) && cases.length > 1;  // the page's address says which case is shown
   let [noted, moved] = [0, false];
@@ -30,6 +32,7 @@ MET.simulate = (data, back, seen) => {
   let pale = [];  // of what stands beside, under them
   let theirs = null;  // metrics of what stands beside, by name, SI
   let measured = [];  // metrics of what is shown; not a number where it failed
+  let again = () => {};  // says again whose numbers these are
   const other = data.beside ? MET.beside.make(data.beside, data, time) : null;
   const free = data.limits ? data.free || (data.free = MET.numbers.make(data, (found) => data.give(found))) : null;
   data.give = (found) => { values = found; update(); };
@@ -103,7 +106,7 @@ MET.simulate = (data, back, seen) => {
     knobs.forEach((knob) => knob.put(false));
     measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
     traces.show(lines, pale, (m, requirement) => (Number.isNaN(measured[m]) ? null : { value: measured[m], met: judged(requirement, measured[m]) }));
-    tell(which, found.outputs, failed, tick, took);
+    (again = () => tell(which, found.outputs, failed, tick, took))();
     if (stage && rows) stage.show(taken(values, found.rows, rows), free ? (free.isOwn() ? "the deck's numbers" : "other numbers") : which < 0 ? `not in the ${source}` : `case #${data.positions[which]}`, { reactions: reactions(found.rows, rows), around: around(values, found.rows, rows) });
     if (stage) stage.haunt(others.filter((each) => each.n !== which));
   }
@@ -123,7 +126,8 @@ MET.simulate = (data, back, seen) => {
   }
 
   // The arm: the case that is shown, and the archive's others, which are computed here one after another.
-  const stage = data.arm.scene ? MET.stage.make(room, data.arm.scene, { seen: point, acting: data.arm.acting }) : null;
+  const stage = data.arm.scene ? MET.stage.make(room, data.arm.scene, { seen: point, acting: data.arm.acting, surface }) : null;
+  if (!stage && surface) surface.renderer.close();
   if (!stage) room.append(node("p", { class: "note" }, `The arm is not shown, for the run does not record ${data.arm.lacking.join(", ")}: `, node("code", null, `record += [${data.arm.lacking.join(", ")}];`)));
 
   // What is drawn of a case: a function of its inputs, its time and columns, given these.
@@ -151,6 +155,7 @@ MET.simulate = (data, back, seen) => {
   }
 
   function haunt() {
+    if (ending.signal.aborted) return;
     const count = Math.min(cases.length, MOST_GHOSTS + 1);
     const chosen = Array.from({ length: count }, (_, n) => Math.floor((n * cases.length) / count));
     const mine = ++turn;
@@ -250,6 +255,7 @@ MET.simulate = (data, back, seen) => {
   }
 
   const heads = other && other.hasMetrics ? [node("thead", null, node("tr", null, ["", "this", other.name, `${other.name} − this`, "", ""].map((head) => node("th", null, head))))] : [];
+  delete document.documentElement.dataset.haunted;
   main.replaceChildren(room,
     ...(back || data.numbers ? [node("p", null, node("label", null, node("input", { type: "checkbox", class: "other-numbers", checked: Boolean(back), change: () => leave() }), " other numbers"))] : []),
     ...(free ? [node("div", { class: "knobs" }, free.box)] : []),
@@ -265,7 +271,7 @@ MET.simulate = (data, back, seen) => {
   else document.documentElement.dataset.haunted = "yes";
   MET.shown = stage;
   // For who puts a page in the place of another, or has numbers later: batch/watching/assets/kept.js.
-  MET.page = { data, inputs: () => told.inputs, values: () => values, position, plots: traces.plots, put: place, arrive };
+  MET.page = { data, inputs: () => told.inputs, values: () => values, position, plots: traces.plots, put: place, arrive, close };
 
   function place(given) {
     values = given;
@@ -277,19 +283,22 @@ MET.simulate = (data, back, seen) => {
     Object.assign(data, found);
     archived = data.metrics.map((text) => new Float64Array(bytes(text).buffer));
     list();
-    update();
+    again();
     if (stage && told.not_computed.length && cases.length > 1) haunt();
   }
-  const ending = new AbortController();
-  function leave() {
+
+  // Another simulation takes this one's place: it ends, and hands over what that goes on with.
+  function close() {
     turn++;
     clearTimeout(noted);
     ending.abort();
     traces.close();
+    return stage ? { seen: stage.kept(), surface: stage.close() } : {};
+  }
+
+  function leave() {
     data.stood = values;
-    const from = stage && stage.kept();
-    if (stage) stage.close();
-    MET.simulate(back || data.numbers, back ? null : data, from);
+    MET.simulate(back || data.numbers, back ? null : data, close());
   }
 
   function entitle({ kicker, name, lede }) {
@@ -299,5 +308,3 @@ MET.simulate = (data, back, seen) => {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", traces.draw, { signal: ending.signal });
   addEventListener("resize", traces.draw, { signal: ending.signal });
 };
-
-MET.simulate(MET_PAGE, null, null);

@@ -1,9 +1,9 @@
-// The page around the run of a deck that is watched. It hears what is new, makes the new run ready behind the old one,
-// puts it where that was looked at, and lets it take its place. Texts of a deck come in as text nodes alone.
+// The page around the run of a deck that is watched. It hears what is new, fetches it, and gives it to the page of the runs.
+// Texts of a deck come in as text nodes alone.
 "use strict";
 
 (() => {
-  const READY = 400;  // ms, in which a page that nobody sees draws nothing, and is shown as it is
+  const READY = 400;  // ms, in which a page that nobody sees draws nothing
   const make = (tag, about = {}, ...children) => {
     const made = Object.assign(document.createElement(tag), about);
     made.append(...children);
@@ -22,7 +22,8 @@
   document.body.append(make("header", { className: "deck-bar" }, name, ofRun, ofGroup, doing), make("main", {}, messages, room));
 
   let state = { page: 0, numbers: 0 };
-  let [shown, coming] = [null, null];  // {frame, page, numbers}
+  let run = null;  // the page of the runs
+  let coming = 0;  // the number of the run that was asked for last
   let gone = false;
 
   async function choose(chosen) {
@@ -85,54 +86,56 @@
   function take(news) {
     state = news;
     tell();
-    if (state.page && state.page !== (coming || shown || {}).page) load(state.page);
+    if (state.page && state.page !== coming) load(state.page);
     deliver();
   }
 
-  // The new page, behind the one that is seen.
-  function load(page) {
-    if (coming) coming.frame.remove();
-    const frame = make("iframe", { src: `page/${page}`, title: "The run", className: "coming" });
-    const mine = { frame, page, numbers: 0 };
-    coming = mine;
-    frame.addEventListener("load", () => {
-      if (coming !== mine) return;
-      const { metKept } = frame.contentWindow;
-      if (!metKept) return;  // it was gone before it was fetched: another comes
-      const standing = () => (shown ? JSON.stringify(shown.frame.contentWindow.metKept.take()) : "");
-      const stood = standing();
-      if (shown) metKept.put(JSON.parse(stood));
-      deliver();
-      let done = false;
-      const swap = () => {
-        if (done || coming !== mine) return;
-        done = true;
-        if (shown) {
-          if (standing() !== stood) metKept.put(JSON.parse(standing()));  // it was moved meanwhile
-          if (document.activeElement === shown.frame) frame.contentWindow.focus();
-          shown.frame.remove();
-        }
-        frame.className = "";
-        [shown, coming] = [mine, null];
-        document.documentElement.dataset.shown = page;
-      };
-      frame.contentWindow.requestAnimationFrame(() => frame.contentWindow.requestAnimationFrame(swap));
-      setTimeout(swap, READY);
-    });
-    room.append(frame);
+  // The page of the runs, until it can be given one; {frame, ready: what it is told by, page, numbers: of what it shows}.
+  function begin() {
+    const frame = make("iframe", { src: "run", title: "The run", className: "coming" });
+    const ready = new Promise((done) => frame.addEventListener("load", () => done(frame.contentWindow.metKept)));
+    room.replaceChildren(frame);
+    return { frame, ready, page: 0, numbers: 0 };
+  }
+
+  // A new run takes the place of the one that is seen.
+  async function load(page) {
+    coming = page;
+    run ||= begin();
+    const { frame, ready } = run;
+    const [kept, answer] = await Promise.all([ready, fetch(`page/${page}`)]);
+    const data = answer.ok && await answer.json();
+    if (coming !== page) return;
+    if (!kept || !data) {  // it was gone before it was fetched: another comes
+      [coming, run] = [0, kept ? run : null];
+      return;
+    }
+    const before = run;
+    run = null;  // where it fails, the next one begins anew
+    kept.become(data);
+    run = Object.assign(before, { page, numbers: 0 });
+    frame.className = "";
+    deliver();
+    let drawn = false;
+    const done = () => {
+      if (!drawn && run?.page === page) document.documentElement.dataset.shown = page;
+      drawn = true;
+    };
+    frame.contentWindow.requestAnimationFrame(() => frame.contentWindow.requestAnimationFrame(done));
+    setTimeout(done, READY);
   }
 
   // What came of the cases, to the page that they are of.
   async function deliver() {
-    const to = [shown, coming].find((each) => each && each.page === state.page && each.frame.contentWindow.metKept);
     const { numbers } = state;
-    if (!to || !numbers || to.numbers === numbers) return;
+    if (!run || run.page !== state.page || !numbers || run.numbers === numbers) return;
+    const to = run;
     to.numbers = numbers;
     const answer = await fetch(`numbers/${numbers}`);
-    if (answer.ok && to.frame.isConnected) {
-      to.frame.contentWindow.metKept.arrive(await answer.json());
-      document.documentElement.dataset.numbers = numbers;
-    }
+    const found = answer.ok && await answer.json();
+    if (!found || run !== to || to.numbers !== numbers) return;
+    to.frame.contentWindow.metKept.arrive(found);
+    document.documentElement.dataset.numbers = numbers;
   }
 
   // A browser opens six connections to a server: so of all its tabs one hears what is new, and tells the others. When that

@@ -39,10 +39,7 @@ WATCHED = ("-q",)
 
 def page_data(view: View) -> dict[str, object]:
     """What the script of the page that is shown is given."""
-    text = view.ask(f"page/{view.state['page']}").body.decode()
-    found = re.search(r"^const MET_PAGE = (.*);$", text, re.MULTILINE)
-    assert found is not None
-    data: dict[str, object] = json.loads(found[1])
+    data: dict[str, object] = json.loads(view.ask(f"page/{view.state['page']}").body)
     return data
 
 

@@ -23,7 +23,7 @@ def server() -> Iterator[PageServer]:
     """A server whose board has a page and numbers."""
     board = Board("deck.ic")
     board.tell(names=["one", "two"], groups=["one.a", "one.b"])
-    board.show("page", "<p>page")
+    board.show("page", '{"count": 2}')
     board.show("numbers", '{"done": 3}')
     made = PageServer(board)
     made.begin()
@@ -36,10 +36,11 @@ def get(server: PageServer, what: str, **words: str | None) -> Answer:
 
 
 def test_what_there_is_is_served_and_may_be_nobody_elses(server: PageServer) -> None:
-    frame, page, numbers = (get(server, what) for what in ("", "page/1", "numbers/1"))
-    assert (frame.status, page.status, numbers.status) == (200, 200, 200)
-    assert page.body == b"<p>page" and json.loads(numbers.body) == {"done": 3}
-    for answer in (frame, page, numbers):
+    frame, runs, page, numbers = (get(server, what) for what in ("", "run", "page/1", "numbers/1"))
+    assert [each.status for each in (frame, runs, page, numbers)] == [200] * 4
+    assert json.loads(page.body) == {"count": 2} and json.loads(numbers.body) == {"done": 3}
+    assert [each.headers["Content-Type"] for each in (page, numbers)] == ["application/json"] * 2
+    for answer in (frame, runs, page, numbers):
         assert answer.headers["Cache-Control"] == "no-store"
         assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin"
         assert answer.headers["Referrer-Policy"] == "no-referrer"
@@ -47,7 +48,11 @@ def test_what_there_is_is_served_and_may_be_nobody_elses(server: PageServer) -> 
         assert "Access-Control-Allow-Origin" not in answer.headers and "Python" not in str(answer.headers)
     policy = frame.headers["Content-Security-Policy"]
     assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy and "unsafe" not in policy
-    assert page.headers["Content-Security-Policy"] == "frame-ancestors 'self'"
+    assert runs.headers["Content-Security-Policy"] == "frame-ancestors 'self'"
+    of_runs = runs.body.decode().partition('http-equiv="Content-Security-Policy" content="')[2].partition('"')[0]
+    assert "default-src 'none'" in of_runs and "connect-src" not in of_runs and "unsafe-inline" not in of_runs
+    for data in (page, numbers):
+        assert data.headers["Content-Security-Policy"] == "default-src 'none'; frame-ancestors 'none'"
     assert get(server, "", Host=f"localhost:{server.server_port}").status == 200
 
 
@@ -111,7 +116,7 @@ def test_two_names_are_refused(server: PageServer) -> None:
 )
 def test_what_another_page_sends_is_refused(server: PageServer, origin: str) -> None:
     named = origin.format(port=server.server_port)
-    for what in ("", "page/1", "numbers/1", "events"):
+    for what in ("", "run", "page/1", "numbers/1", "events"):
         assert get(server, what, Origin=named).status == 403
     assert get(server, "choose", method="POST", body="run=two", Origin=named).status == 403
     assert not server.board.is_chosen()
@@ -204,7 +209,7 @@ def test_a_page_hears_what_is_now_and_then_what_changes(server: PageServer) -> N
         state = json.loads(told.readline().removeprefix(b"data: "))
         assert (state["name"], state["page"], state["numbers"]) == ("deck.ic", 1, 1)
         assert told.readline() == b"\n"
-        threading.Timer(0.05, lambda: server.board.show("page", "<p>other", numbers=0)).start()
+        threading.Timer(0.05, lambda: server.board.show("page", '{"count": 3}', numbers=0)).start()
         state = json.loads(told.readline().removeprefix(b"data: "))
         assert (state["page"], state["numbers"]) == (2, 0)
 
