@@ -48,13 +48,16 @@ PROFILE = Profile(
     name="pulse",
     doc=__doc__,
     parameters=(
-        Parameter(name="start", unit="command", default=0.0, doc="value before and after"),
-        Parameter(name="to", unit="command", doc="value that is held between"),
+        Parameter(name="start", unit="command", default=0.0, doc="value before and after the pulse"),
+        Parameter(name="to", unit="command", doc="value that is held during the pulse"),
         Parameter(
-            name="slope", unit="command/s", above=0.0, doc="how fast it goes up and down: of a rate, acceleration"
+            name="slope",
+            unit="command/s",
+            above=0.0,
+            doc="rate of change at the beginning and the end of the pulse; an acceleration for a rate command",
         ),
-        Parameter(name="over", unit="s", above=0.0, doc="how long the whole takes, both ways included"),
-        Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which it begins"),
+        Parameter(name="over", unit="s", above=0.0, doc="duration of the whole pulse, with its rise and its fall"),
+        Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which the pulse begins"),
     ),
     course=course,
     content=content,

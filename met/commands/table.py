@@ -25,9 +25,9 @@ PROFILE = Profile(
     name="table",
     doc=__doc__,
     parameters=(
-        Parameter(name="times", unit="s", shape="list", rises=True, doc="times of the points, rising"),
+        Parameter(name="times", unit="s", shape="list", rises=True, doc="times of the points, in ascending order"),
         Parameter(
-            name="values", unit="command", shape="list", as_many_as="times", doc="values at those times, as many"
+            name="values", unit="command", shape="list", as_many_as="times", doc="values at `times`, one for each"
         ),
     ),
     course=course,

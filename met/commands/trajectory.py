@@ -38,15 +38,17 @@ PROFILE = Profile(
     from_file=True,
     parameters=(
         Parameter(name="times", unit="s", shape="list", doc="times of the rows, rising"),
-        Parameter(name="values", unit="command", shape="list", doc="values at those times, as many"),
+        Parameter(name="values", unit="command", shape="list", doc="values at `times`, one for each"),
         Parameter(
             name="interpolation",
             shape="word",
             words=("linear", "cubic"),
             default="linear",
-            doc="the curve between the rows",
+            doc="interpolation between the rows: straight lines, or a cubic spline",
         ),
-        Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="when the file's time 0 is"),
+        Parameter(
+            name="begin", unit="s", default=0.0, at_least=0.0, doc="time of the run at which the file's time 0 lies"
+        ),
     ),
     course=course,
     content=content,

@@ -52,8 +52,13 @@ PROFILE = Profile(
     parameters=(
         Parameter(name="start", unit="command", default=0.0, doc="value before the move"),
         Parameter(name="to", unit="command", doc="value after the move"),
-        Parameter(name="max_rate", unit="command/s", above=0.0, doc="rate that is not exceeded"),
-        Parameter(name="max_acceleration", unit="command/s^2", above=0.0, doc="acceleration at both ends"),
+        Parameter(name="max_rate", unit="command/s", above=0.0, doc="largest rate"),
+        Parameter(
+            name="max_acceleration",
+            unit="command/s^2",
+            above=0.0,
+            doc="acceleration at the start, and deceleration at the end",
+        ),
         Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which the move begins"),
     ),
     course=course,

@@ -34,8 +34,13 @@ ENVIRONMENT = Environment(
     name="brake",
     doc=__doc__,
     parameters=(
-        Parameter(name="joint", shape="word", names="joint", doc="joint that it is on"),
-        Parameter(name="torque", unit="effort", at_least=0.0, doc="most that it holds, and slows down with"),
+        Parameter(name="joint", shape="word", names="joint", doc="joint that the brake acts on"),
+        Parameter(
+            name="torque",
+            unit="effort",
+            at_least=0.0,
+            doc="largest torque that the brake holds, and torque with which it slows the joint down",
+        ),
         *WINDOW,
     ),
     loads=loads,

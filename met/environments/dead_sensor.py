@@ -30,12 +30,18 @@ ENVIRONMENT = Environment(
     name="dead_sensor",
     doc=__doc__,
     parameters=(
-        Parameter(name="joint", shape="word", names="joint", doc="joint whose law does not see"),
+        Parameter(name="joint", shape="word", names="joint", doc="joint whose control law does not see the quantity"),
         Parameter(
-            name="of", shape="word", doc="quantity that is not seen: q, qd, or a state of the servo such as motor_rate"
+            name="of",
+            shape="word",
+            doc="quantity that the control law does not see: `q`, `qd`, or a state of the servo such as `motor_rate`",
         ),
         Parameter(
-            name="reads", shape="word", words=("zero", "last"), default="zero", doc="what the law sees in its stead"
+            name="reads",
+            shape="word",
+            words=("zero", "last"),
+            default="zero",
+            doc="what the control law sees instead: 0, or the value at its last tick before the failure",
         ),
         *WINDOW,
     ),

@@ -111,13 +111,13 @@ ENVIRONMENT = Environment(
     name="gravity_gradient",
     doc=__doc__,
     parameters=(
-        Parameter(name="radius", unit="m", above=0.0, doc="of the orbit, from the centre of attraction"),
+        Parameter(name="radius", unit="m", above=0.0, doc="radius of the orbit, from the centre of attraction"),
         Parameter(
             name="mu",
             unit="m^3/s^2",
             default=3.986004418e14,
             above=0.0,
-            doc="gravitational parameter",
+            doc="gravitational parameter of the central body",
             source="Earth: WGS 84",
         ),
         Parameter(
@@ -125,13 +125,14 @@ ENVIRONMENT = Environment(
             unit="rad",
             shape="vector",
             default=ZEROS,
-            doc="turns of the orbit's axes about fixed x, y, z of the world's: x up, y along the flight, z the normal",
+            doc="rotation of the orbit's axes about the world's fixed x, then y, then z axis; x points up, y along "
+            "the flight, z along the normal",
         ),
         Parameter(
             name="frame",
             shape="word",
             words=("inertial", "orbital"),
-            doc="whether the world keeps its directions, or turns with the orbit",
+            doc="`inertial`: the world's axes keep their directions; `orbital`: they turn with the orbit",
         ),
     ),
     loads=loads,

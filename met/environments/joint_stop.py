@@ -50,22 +50,30 @@ ENVIRONMENT = Environment(
     name="joint_stop",
     doc=__doc__,
     parameters=(
-        Parameter(name="joint", shape="word", names="joint", doc="joint that is stopped"),
+        Parameter(name="joint", shape="word", names="joint", doc="joint whose range the stops limit"),
         Parameter(
             name="lower",
             unit="joint",
             default=-math.inf,
             less_than="upper",
-            doc="position of the lower end; none unless written",
+            doc="position of the lower stop; by default there is none",
         ),
-        Parameter(name="upper", unit="joint", default=math.inf, doc="position of the upper end; none unless written"),
-        Parameter(name="stiffness", unit="effort/joint", at_least=0.0, doc="torque per way into a stop"),
+        Parameter(
+            name="upper", unit="joint", default=math.inf, doc="position of the upper stop; by default there is none"
+        ),
+        Parameter(
+            name="stiffness",
+            unit="effort/joint",
+            at_least=0.0,
+            doc="stiffness of the stops: torque per displacement into a stop",
+        ),
         Parameter(
             name="dissipation",
             unit="s/joint",
             default=0.0,
             at_least=0.0,
-            doc="share by which a stop pushes more for each unit of the rate of going in; 0: it gives all energy back",
+            doc="share by which the torque of a stop is larger per unit of the rate of penetration; 0: no energy is "
+            "lost",
         ),
     ),
     loads=loads,

@@ -33,7 +33,11 @@ ENVIRONMENT = Environment(
     parameters=(
         Parameter(name="joint", shape="word", names="joint", doc="joint whose drive runs away"),
         Parameter(
-            name="level", default=1.0, at_least=-1.0, at_most=1.0, doc="share of full drive, negative the other way"
+            name="level",
+            default=1.0,
+            at_least=-1.0,
+            at_most=1.0,
+            doc="share of full drive; negative in the other direction",
         ),
         *WINDOW,
     ),

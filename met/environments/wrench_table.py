@@ -91,16 +91,22 @@ ENVIRONMENT = Environment(
     doc=__doc__,
     from_file=True,
     parameters=(
-        Parameter(name="link", shape="word", names="link", doc="link that it acts on"),
-        Parameter(name="point", unit="m", shape="vector", default=ZEROS, doc="where the force acts, link frame"),
+        Parameter(name="link", shape="word", names="link", doc="link that force and moment act on"),
+        Parameter(
+            name="point",
+            unit="m",
+            shape="vector",
+            default=ZEROS,
+            doc="point at which the force acts, in the link's frame",
+        ),
         Parameter(
             name="axes",
             shape="word",
             words=("world", "link"),
             default="world",
-            doc="axes of force and moment: the world's, or the link's, which turn with it",
+            doc="axes of force and moment: those of the world, or those of the link, which turn with it",
         ),
-        Parameter(name="begin", unit="s", default=0.0, doc="when the table's time 0 is"),
+        Parameter(name="begin", unit="s", default=0.0, doc="time of the run at which the table's time 0 lies"),
         Parameter(name="times", unit="s", shape="list", rises=True, doc="times of the rows"),
         *(
             Parameter(
@@ -109,7 +115,7 @@ ENVIRONMENT = Environment(
                 shape="list",
                 as_many_as="times",
                 default=(),
-                doc=f"{name[-1]} of the {name[:-2]} at those times",
+                doc=f"{name[-1]} component of the {name[:-2]} at `times`",
             )
             for name in NAMES
         ),

@@ -118,45 +118,64 @@ GUIDE = Guide(
     doc=__doc__,
     parameters=(
         Parameter(name="link", shape="word", names="link", doc="link that is guided"),
-        Parameter(name="point", unit="m", shape="vector", default=ZEROS, doc="point of it that is guided, link frame"),
-        Parameter(name="guides", shape="word", words=tuple(GUIDED), default="pose", doc="which components are guided"),
+        Parameter(
+            name="point", unit="m", shape="vector", default=ZEROS, doc="guided point of the link, in the link's frame"
+        ),
+        Parameter(
+            name="guides",
+            shape="word",
+            words=tuple(GUIDED),
+            default="pose",
+            doc="guided components: position and attitude (`pose`), the position, or two of its coordinates",
+        ),
         Parameter(
             name="max_damping",
             unit="m",
             at_least=0.0,
-            doc="lambda at a singularity; 0: none",
+            doc="damping lambda at a singularity; 0: no damping",
             source="Nakamura and Hanafusa 1986; how it grows: Chiaverini, IEEE Trans. Robotics Autom. 13, 1997",
         ),
-        Parameter(name="threshold", unit="m", at_least=0.0, doc="singular value of J below which it is damped"),
-        Parameter(name="gain", unit="1/s", default=1.0, at_least=0.0, doc="rate per error of the path"),
-        Parameter(name="length", unit="m", default=1.0, above=0.0, doc="way that counts as much as a turn of 1 rad"),
+        Parameter(
+            name="threshold",
+            unit="m",
+            at_least=0.0,
+            doc="smallest singular value of J below which the rates are damped",
+        ),
+        Parameter(name="gain", unit="1/s", default=1.0, at_least=0.0, doc="gain of the guide: rate per path error"),
+        Parameter(
+            name="length", unit="m", default=1.0, above=0.0, doc="length that counts as much as a rotation of 1 rad"
+        ),
         Parameter(
             name="loop",
             shape="word",
             words=("closed", "open"),
             default="closed",
-            doc="the joints that the law goes by: where they are, or where it has asked them to be",
+            doc="joint positions that the guide starts from: the actual ones (`closed`), or those that it has "
+            "commanded (`open`)",
         ),
         Parameter(
             name="jacobian",
             shape="word",
             words=("arm", "generalized"),
             default="arm",
-            doc="on a free base: as if it were held, or with its answer to the arm",
+            doc="on a free base: J as if the base were held (`arm`), or with the base's reaction to the arm "
+            "(`generalized`)",
             source="generalized: Umetani and Yoshida, IEEE Trans. Robotics Autom. 5, 1989",
         ),
     ),
-    of_joint=(
-        Parameter(name="max_rate", unit="joint/s", default=float("inf"), above=0.0, doc="rate that is not exceeded"),
-    ),
+    of_joint=(Parameter(name="max_rate", unit="joint/s", default=float("inf"), above=0.0, doc="largest rate"),),
     components=components,
     commands=("rate", "position"),
     memory=(
-        Memory(name="error", unit="m", doc="distance of the point from the path, guided components"),
-        Memory(name="turn_error", unit="rad", doc="angle between the link and the path; 0 where it is not guided"),
+        Memory(name="error", unit="m", doc="distance of the guided point from the path, in the guided components"),
+        Memory(
+            name="turn_error",
+            unit="rad",
+            doc="angle between the attitude of the link and that of the path; 0 if the attitude is not guided",
+        ),
         Memory(name="manipulability", unit="m", doc="smallest singular value of J, or up to 7 % less"),
-        Memory(name="damping", unit="m", doc="lambda, the damping of the rates"),
-        Memory(name="share", unit="1", doc="share of the rates that the joints' limits leave"),
+        Memory(name="damping", unit="m", doc="damping lambda of the joint rates"),
+        Memory(name="share", unit="1", doc="share of the joint rates that remains within the limits `max_rate`"),
     ),
     error="error",
     fastest=fastest,

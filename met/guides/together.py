@@ -57,8 +57,8 @@ GUIDE = Guide(
     parameters=(Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which the move begins"),),
     of_joint=(
         Parameter(name="to", unit="joint", doc="position after the move"),
-        Parameter(name="max_rate", unit="joint/s", above=0.0, doc="rate that is not exceeded"),
-        Parameter(name="max_acceleration", unit="joint/s^2", above=0.0, doc="acceleration that is not exceeded"),
+        Parameter(name="max_rate", unit="joint/s", above=0.0, doc="largest rate"),
+        Parameter(name="max_acceleration", unit="joint/s^2", above=0.0, doc="largest acceleration"),
     ),
     commands=("position",),
     idle=idle,

@@ -37,7 +37,7 @@ METRIC = Metric(
     unit="s",
     condition=True,
     over_joints=EVERY_JOINT,
-    parameters=(Parameter(name="time", unit="s", above=0.0, doc="how long it is to hold"), *WINDOW),
+    parameters=(Parameter(name="time", unit="s", above=0.0, doc="time for which the condition should hold"), *WINDOW),
     memory=(
         Memory(name="steps", unit="1", doc="samples of the present stretch behind its first; -1 outside", start=-1.0),
         Memory(name="longest", unit="s", doc="longest stretch so far", start=-math.inf),

@@ -38,7 +38,7 @@ METRIC = Metric(
     least=0.0,
     target="target",
     undefined=lambda p, first: "it begins on its target" if first == p.target else "",
-    parameters=(Parameter(name="target", unit="of", doc="value to be reached"),),
+    parameters=(Parameter(name="target", unit="of", doc="target value of the signal"),),
     memory=(
         Memory(name="first", unit="of", doc="first value"),
         Memory(name="beyond", unit="of", doc="furthest beyond the target so far, below 0 short of it", start=-math.inf),

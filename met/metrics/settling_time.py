@@ -34,16 +34,22 @@ def update_between(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str
 
 
 PARAMETERS = (
-    Parameter(name="target", unit="of", doc="value to be reached"),
+    Parameter(name="target", unit="of", doc="target value of the signal"),
     Parameter(
         name="band",
         unit="1",
         default=0.02,
         at_least=0.0,
         share=True,
-        doc="half width of the band, share of the target",
+        doc="half width of the band around the target, as a share of the target",
     ),
-    Parameter(name="within", unit="of", default=0.0, at_least=0.0, doc="half width of the band, added to it"),
+    Parameter(
+        name="within",
+        unit="of",
+        default=0.0,
+        at_least=0.0,
+        doc="half width of the band around the target that is added to the share `band`",
+    ),
 )
 
 SINCE = Memory(name="since", unit="s", doc="start of the stretch inside the band; infinite outside", start=math.inf)

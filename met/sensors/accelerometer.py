@@ -48,7 +48,9 @@ SENSOR = Sensor(
     doc=__doc__,
     parameters=(
         LINK,
-        Parameter(name="at", unit="m", shape="vector", default=ZEROS, doc="where it is, in the link's frame"),
+        Parameter(
+            name="at", unit="m", shape="vector", default=ZEROS, doc="position of the sensor, in the link's frame"
+        ),
         ALONG,
         butterworth.cutoff(),
         SCALE,

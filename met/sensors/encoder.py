@@ -28,7 +28,7 @@ def read(p: Any, held: Any, states: Any, sensed: Sensed) -> Reading:
 SENSOR = Sensor(
     name="encoder",
     doc=__doc__,
-    parameters=(Parameter(name="step", unit="of", above=0.0, doc="from one line to the next"), DELAY),
+    parameters=(Parameter(name="step", unit="of", above=0.0, doc="distance from one line to the next"), DELAY),
     memory=PAST,
     begin=begin,
     read=read,

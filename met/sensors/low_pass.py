@@ -31,8 +31,8 @@ def read(p: Any, held: Any, states: Any, sensed: Sensed) -> Reading:
 SENSOR = Sensor(
     name="low_pass",
     doc=__doc__,
-    parameters=(Parameter(name="cutoff", unit="Hz", above=0.0, doc="cut-off of the filter"),),
-    states=(State(name="filtered", unit="of", doc="what is behind the filter"),),
+    parameters=(Parameter(name="cutoff", unit="Hz", above=0.0, doc="cut-off frequency of the filter"),),
+    states=(State(name="filtered", unit="of", doc="output of the filter"),),
     fastest=fastest,
     follow=follow,
     begin=begin,

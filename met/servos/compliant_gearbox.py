@@ -110,7 +110,13 @@ def swing(p: Any, by_law: Real) -> tuple[Real, Real]:
 
 JOINT_FRICTION = (
     Parameter(name="f_c_joint", unit="effort", default=0.0, at_least=0.0, doc="Coulomb friction at the joint"),
-    Parameter(name="f_v_joint", unit="effort*s/joint", default=0.0, at_least=0.0, doc="viscous friction at the joint"),
+    Parameter(
+        name="f_v_joint",
+        unit="effort*s/joint",
+        default=0.0,
+        at_least=0.0,
+        doc="viscous friction at the joint: torque per joint rate",
+    ),
 )
 MOTOR_RATE = State(name="motor_rate", unit="rad/s", doc="rate of the motor's shaft")
 GEAR_TORQUE = Signal(name="gear_torque", unit="effort", doc="torque of the gear on the joint")

@@ -38,7 +38,7 @@ SERVO = Servo(
             unit="s",
             default=math.inf,
             at_least=0.0,
-            doc="time at which the joint is set free; never unless written",
+            doc="time at which the joint is released; by default never",
         ),
     ),
     drive=drive,

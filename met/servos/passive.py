@@ -27,22 +27,30 @@ SERVO = Servo(
     name="passive",
     doc=__doc__,
     parameters=(
-        Parameter(name="damping", unit="effort*s/joint", default=0.0, at_least=0.0, doc="torque per joint rate"),
-        Parameter(name="friction", unit="effort", default=0.0, at_least=0.0, doc="dry friction, which sticks"),
+        Parameter(
+            name="damping", unit="effort*s/joint", default=0.0, at_least=0.0, doc="damping: torque per joint rate"
+        ),
+        Parameter(
+            name="friction",
+            unit="effort",
+            default=0.0,
+            at_least=0.0,
+            doc="dry friction, under which the joint can stick",
+        ),
         Parameter(
             name="stiffness",
             unit="effort/joint",
             default=0.0,
             at_least=0.0,
-            doc="torque of the spring per way from its rest",
+            doc="stiffness of the spring: torque per displacement from `rest`",
         ),
-        Parameter(name="rest", unit="joint", default=0.0, doc="position at which the spring does nothing"),
+        Parameter(name="rest", unit="joint", default=0.0, doc="joint position at which the spring has no torque"),
         Parameter(
             name="rotor",
             unit="effort*s^2/joint",
             default=0.0,
             at_least=0.0,
-            doc="inertia that moves with the joint and is not the arm's",
+            doc="inertia that moves with the joint and is not part of the arm",
         ),
     ),
     drive=drive,

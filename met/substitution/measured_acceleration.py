@@ -37,9 +37,15 @@ LAW = Law(
     name="measured_acceleration",
     doc=__doc__,
     parameters=(
-        Parameter(name="low_pass", unit="Hz", default=math.inf, above=1e-9, doc="cut-off of a low-pass; inf: none"),
+        Parameter(
+            name="low_pass",
+            unit="Hz",
+            default=math.inf,
+            above=1e-9,
+            doc="cut-off frequency of a low-pass on the acceleration; inf: no filter",
+        ),
     ),
     balance="none",
-    memory=(Memory(name="acceleration", unit="rad/s^2", doc="acceleration of the shaft, as measured"),),
+    memory=(Memory(name="acceleration", unit="rad/s^2", doc="measured acceleration of the shaft"),),
     give=give,
 )

@@ -54,19 +54,23 @@ BED = BedModel(
     doc=__doc__,
     drive="rate",
     parameters=(
-        Parameter(name="kp", unit="V*s/rad", at_least=0.0, of_servo="kp", doc="gain of the drive's loop on its error"),
-        Parameter(name="ki", unit="V/rad", at_least=0.0, of_servo="ki", doc="gain on the error's integral"),
-        Parameter(name="v_max", unit="V", above=0.0, of_servo="v_max", doc="largest voltage of the drive"),
+        Parameter(
+            name="kp", unit="V*s/rad", at_least=0.0, of_servo="kp", doc="proportional gain of the drive's rate loop"
+        ),
+        Parameter(name="ki", unit="V/rad", at_least=0.0, of_servo="ki", doc="integral gain of the drive's rate loop"),
+        Parameter(name="v_max", unit="V", above=0.0, of_servo="v_max", doc="largest voltage of the drive's amplifier"),
         *emulated_shaft.ARMATURE,
         emulated_shaft.TAU_MAX,
         *emulated_shaft.SHAFT,
         *emulated_shaft.REST,
-        Parameter(name="converter_rate", unit="rad/s", at_least=0.0, default=0.0, doc="resolution of the rate told"),
+        Parameter(
+            name="converter_rate", unit="rad/s", at_least=0.0, default=0.0, doc="resolution of the commanded rate"
+        ),
         emulated_shaft.CURRENT,
     ),
     memory=(
         *emulated_shaft.MEMORY,
-        Memory(name="integral", unit="rad", doc="integral of the rate's error, the drive's own"),
+        Memory(name="integral", unit="rad", doc="integral of the rate error in the drive's own loop"),
         TORQUE,
     ),
     begin=begin,

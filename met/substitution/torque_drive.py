@@ -54,13 +54,21 @@ BED = BedModel(
     drive="torque",
     parameters=(
         emulated_shaft.TAU_MAX,
-        Parameter(name="gain", above=0.0, default=1.0, doc="torque that the drive gives for what it is told"),
         Parameter(
-            name="bandwidth", unit="Hz", above=0.0, default=math.inf, doc="of the drive's current loop; inf: at once"
+            name="gain", above=0.0, default=1.0, doc="torque of the drive divided by the torque that it is commanded"
+        ),
+        Parameter(
+            name="bandwidth",
+            unit="Hz",
+            above=0.0,
+            default=math.inf,
+            doc="bandwidth of the drive's current loop; inf: the torque follows at once",
         ),
         *emulated_shaft.SHAFT,
         *emulated_shaft.REST,
-        Parameter(name="converter_torque", unit="N*m", at_least=0.0, default=0.0, doc="resolution of the torque told"),
+        Parameter(
+            name="converter_torque", unit="N*m", at_least=0.0, default=0.0, doc="resolution of the commanded torque"
+        ),
         emulated_shaft.CURRENT,
     ),
     memory=(*emulated_shaft.MEMORY, TORQUE),

@@ -34,7 +34,12 @@ LAW = Law(
     name="velocity_tracking",
     doc=__doc__,
     parameters=(
-        Parameter(name="gain", default=0.3, at_least=0.0, doc="gain on the rate's error, as a share of J_bed/T"),
+        Parameter(
+            name="gain",
+            default=0.3,
+            at_least=0.0,
+            doc="gain on the rate error, as a share of J_bed/T: the inertia of the shaft divided by the tick",
+        ),
         BAND,
         *OBSERVER,
     ),

@@ -30,8 +30,8 @@ from met.trace import Real, Scalar, atan2, cos, sin
 NUMBERS = (
     Parameter(name="a", unit="m", default=0.0, doc="length of the link, along x"),
     Parameter(name="alpha", unit="rad", default=0.0, doc="twist of the link, about x"),
-    Parameter(name="d", unit="m", default=0.0, doc="offset along z; q is added where the joint is prismatic"),
-    Parameter(name="theta", unit="rad", default=0.0, doc="angle about z; q is added where the joint is revolute"),
+    Parameter(name="d", unit="m", default=0.0, doc="offset along z; q is added to it if the joint is prismatic"),
+    Parameter(name="theta", unit="rad", default=0.0, doc="angle about z; q is added to it if the joint is revolute"),
 )
 OTHER_NAMES = {"standard": "classic", "distal": "classic", "modified": "craig", "proximal": "craig"}
 USAGE = "write `dh = classic(a = ..., alpha = ..., d = ..., theta = ...)`, or `craig(...)`"
