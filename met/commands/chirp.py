@@ -1,11 +1,11 @@
-"""A sine about an offset whose frequency goes from `f0` to `f1` in the time `over`.
+"""A sine about an offset whose frequency changes from `f0` to `f1` in the time `over`.
 
     value = offset + amplitude sin(2 pi turns(t - begin) + phase), turns the integral of the frequency f
     linear        f = f0 + (f1 - f0) s/over         as many hertz in each second
     exponential   f = f0 (f1/f0)^(s/over)           as many octaves in each second
 
-Before `begin` the first value is held, and after `over` the last one, whatever that is, with slope zero. The slope's
-amplitude grows with the frequency.
+Before `begin` the first value is held, and after `over` the last one, whatever it is, with slope zero. The amplitude of
+the slope grows with the frequency.
 """
 
 from __future__ import annotations

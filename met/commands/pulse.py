@@ -1,10 +1,12 @@
-"""From a held value to another, which is held, and back again, with one slope up and down: `over` is the whole time.
+"""From a held value to another, which is held, and back again, with the same slope up and down; `over` is the whole
+time.
 
-Made for rate commands, whose slope is an acceleration: the joint speeds up, goes on at `to` and slows down. The value
-is a trapezoid in time; with the shortest `over`, 2 |to - start|/slope, it is a triangle, and a shorter one is an error.
-From zero and back the integral, the way of the joint, is to (over - |to|/slope).
+It is made for rate commands, whose slope is an acceleration: the joint speeds up, moves on at `to` and slows down. The
+value is a trapezoid in time; with the shortest `over`, 2 |to - start|/slope, it is a triangle, and a shorter one is an
+error. From zero and back, the integral, which is the way of the joint, is to (over - |to|/slope).
 
-Not a limiter: it knows neither the joint's state nor what the servo can do. The slope jumps at the corners.
+It is not a limiter: it knows neither the state of the joint nor the limits of the servo. The slope jumps at the
+corners.
 """
 
 from __future__ import annotations

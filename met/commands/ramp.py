@@ -1,4 +1,4 @@
-"""A straight line in time between two held values: `start` until `begin`, `to` a time `over` later."""
+"""A straight line in time between two held values: `start` until `begin`, and `to` from a time `over` later."""
 
 from __future__ import annotations
 

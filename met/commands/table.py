@@ -1,4 +1,4 @@
-"""Straight lines through points in time; the first value before the first point, the last after the last."""
+"""Straight lines through points in time; the value is held before the first point and after the last."""
 
 from __future__ import annotations
 

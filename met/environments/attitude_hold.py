@@ -1,10 +1,11 @@
-"""Attitude hold: a moment on a link, the base unless another is named, that turns it to an attitude and damps its rate.
+"""Attitude hold: a moment on a link, by default the base, that turns it to an attitude and damps its rate.
 
     moment = clip(-stiffness e - damping w, +-limit), axis by axis, in the link's axes or the world's
     e = 2 sin(phi/2) n      the link is turned from the wanted attitude by phi about the axis n
 
-For small angles e is the rotation vector phi n. It is largest at half a turn, where the way back changes over. As of
-thrusters, the moment comes from outside: momentum is not kept. No integral, no dead band, and no propellant.
+For small angles e is the rotation vector phi n. It is largest at half a turn, where the direction of the way back
+changes. The moment is external, like that of thrusters: momentum is not conserved. There is no integral, no dead band,
+and no propellant.
 """
 
 from __future__ import annotations

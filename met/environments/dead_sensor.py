@@ -1,9 +1,10 @@
-"""A sensor that is dead for a time: the joint's law sees nothing of a quantity, or what it saw last.
+"""A sensor that fails for a time: the control law of a joint does not see a quantity, but zero or the last value.
 
     zero   the law sees 0
     last   the law sees what it saw at its last tick before
 
-at times from <= t < until. It is the last thing on the way to the law: behind the servo's own sensor, if it has one.
+at times from <= t < until. The failure is the last element on the way to the law: it comes after the servo's own
+sensor, if there is one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Viscous damping at every joint, as of grease outside the servo: torque = -damping qd, force = -sliding qd."""
+"""Viscous damping at every joint, as by grease outside the servo: torque = -damping qd, force = -sliding qd."""
 
 from __future__ import annotations
 

@@ -1,35 +1,39 @@
-"""A thruster's plume on a rectangular plate that is fixed to a link: force and moment of its gas, while it fires.
+"""A thruster's plume on a rectangular plate that is fixed to a link: force and moment of the gas while the thruster
+fires.
 
-The gas goes straight from a point in all directions before the nozzle, at one speed, with the dynamic pressure
+The gas moves straight from a point in all directions in front of the nozzle, at one speed, with the dynamic pressure
 
     q = K cos(theta)^n / r^2,     K = (n + 2) share thrust/(4 pi),     theta the angle from the nozzle's axis     (P1)
 
-and none behind the nozzle's plane. K makes the momentum that the plume carries along the axis `share` times the thrust:
-the integral of 2 q cos(theta) over the half space is 4 pi K/(n + 2). On a surface whose normal N is turned towards the
-nozzle, with u the direction of the gas there and s = -u.N the sine of its incidence, the force on an area A is
+and none behind the nozzle's plane. With this K, the momentum that the plume carries along the axis is `share` times the
+thrust: the integral of 2 q cos(theta) over the half space is 4 pi K/(n + 2). On a surface whose normal N is turned
+towards the nozzle, with u the direction of the gas there and s = -u.N the sine of its incidence, the force on an area A
+is
 
     A q s [2 sigma_t (u + s N) - (2 (2 - sigma_n) s + sqrt(pi) sigma_n reemission) N]                              (P2)
 
-free molecular flow so fast that its own thermal motion does not count (Schaaf and Chambre 1961), with accommodation
+free molecular flow, so fast that its own thermal motion does not matter (Schaaf and Chambre 1961), with accommodation
 coefficients sigma_n, sigma_t for normal and tangential momentum. sigma_n = 1, sigma_t = 0 is Newton's law of dense
-hypersonic flow. The plate is a rectangle about the origin of its frame, `at` and `rpy` in the link's, width along x and
-height along y, and its front looks along z.
+hypersonic flow. The plate is a rectangle around the origin of its frame, which `at` and `rpy` place in the link's
+frame; its width is along x, its height along y, and its front looks along z.
 
-The sum over the plate is one over the directions in which the nozzle sees it: s dA/r^2 is the solid angle, so nothing
-grows however near the plate is. With d the nozzle's distance from the plate's plane, D that from the plate along z and
-y alone, x = D tan(a) the way from the nozzle along the plate's x, and b the gas's angle to the plane across y,
+The sum over the plate is taken over the directions in which the nozzle sees it: s dA/r^2 is the solid angle, so nothing
+grows without bound, however near the plate is. With d the distance of the nozzle from the plate's plane, D its distance
+from the plate along z and y only, x = D tan(a) the distance from the nozzle along the plate's x, and b the angle of the
+gas to the plane across y,
 
     s dA/r^2 = d (D^2 + x^2)/(D (d^2 + x^2)) cos(b) da db                                                         (P3)
 
-Each side is cut into `cells`, narrow where the plume is dense: even in k = z/sqrt(1 + z^2), z the angle, a or b, from
-where the plate is nearest to the plume's axis, over 3/sqrt(n + 1). Each has a point of Gauss's rule. Of the plume's
-momentum 6 cells leave at most 3 % out, however near the plate is (docs/environments.md).
+Each side is divided into `cells`, narrow where the plume is dense: even in k = z/sqrt(1 + z^2), with z the angle, a or
+b, from the direction in which the plate is nearest to the plume's axis, divided by 3/sqrt(n + 1). Each cell has a point
+of Gauss's rule. 6 cells leave out at most 3 % of the plume's momentum, however near the plate is
+(docs/environments.md).
 
-`switches` may stand in a CSV file, `file = "fire.csv"`, whose one column `time` has them row by row.
+`switches` may stand in a CSV file, `file = "fire.csv"`, in its only column, `time`, one in each row.
 
-Nothing stands in the gas's way: no part of the arm shades another, and what is turned back hits nothing. Not for a
-plate so near that the plume does not look as if it came from a point, nor for gas so dense that it piles up before the
-plate. The link's own velocity does not count against the gas's.
+Nothing is in the way of the gas: no part of the arm shades another, and gas that is turned back hits nothing. The model
+is not made for a plate so near that the plume does not seem to come from a point, nor for gas so dense that it
+accumulates in front of the plate. The velocity of the link is neglected against that of the gas.
 """
 
 from __future__ import annotations

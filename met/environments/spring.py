@@ -1,10 +1,10 @@
-"""A straight spring and damper between a point of a link and a point of another, or of the ground.
+"""A linear spring and damper between a point of a link and a point of another, or of the ground.
 
     T = stiffness (d - length) + damping d'
 
-along the line between the points, d their distance: each is pulled towards the other by T, and pushed where T is below
-zero. `acts = pull` is a rope: no force while d <= length, and none that pushes. Where both points are in one place
-there is no line, and no force. Not a spring that bends or has mass.
+along the line between the points, with d their distance: T pulls the points towards each other, and pushes them apart
+if it is below zero. `acts = pull` is a rope: no force while d <= length, and none that pushes. If both points are in
+one place there is no line, and no force. The spring does not bend, and has no mass.
 """
 
 from __future__ import annotations

@@ -4,11 +4,12 @@
     0,        0,           0
     0.5,      12.5,        -3
 
-Before its first row the first holds, after its last the last. A component that is not given is zero. The force acts at
-`point` of the link, which moves along with it; `axes = link`: force and moment turn with the link too. In the deck a
-component is a list of as many numbers as `times` has; in a file, which has the lists' place, it is a column of its
-name, and `time` is one. The table is read at every stage of a step; a step within which a row lies sees its mean over
-the step at all of its stages, so the impulse is right however close together the rows are.
+Before the first row the values of the first row hold, and after the last row those of the last. A component that is not
+given is zero. The force acts at `point` of the link, which moves with the link; with `axes = link`, force and moment
+turn with the link too. In a deck, a component is a list with as many numbers as `times`; in a file, which takes the
+place of the lists, it is a column of its name, and the times are the column `time`. The table is read at every stage of
+a step. A step that contains a row gets the mean over the step at all of its stages, so the impulse is right however
+close together the rows are.
 """
 
 from __future__ import annotations

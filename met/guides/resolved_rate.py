@@ -1,24 +1,27 @@
-"""Resolved rate: the joints' rates that take a point of a link, and the link's attitude, along a path in the world.
+"""Resolved rate: the joint rates that move a point of a link, and the attitude of the link, along a path in the world.
 
     v      = path's rate + gain * (path - where it is) - what it does with these joints at rest
     qd     = J' (J J' + lambda^2 I)^-1 v                           (Whitney 1969; damped, met/guides/damped.py)
     lambda^2 = max_damping^2 (1 - (sigma/threshold)^2)  where sigma < threshold, else 0
-    qd     is made shorter as a whole, where a joint would go faster than its `max_rate`
+    qd     is made smaller as a whole, if a joint would move faster than its `max_rate`
 
-Turns count as the way of a point `length` away, and a prismatic joint's way as a turn of it over `length`: so J is in
-metres, and sigma, its smallest singular value, is the velocity of the end in its worst direction for one rad/s. Below
-the threshold the task gives way, so that rates stay small through a singularity, by as much as `error` shows; the gain
-brings the point back. With max_damping = threshold no joint motion exceeds |v|/threshold. 0 is the pseudo-inverse.
+A rotation counts as the way of a point at the distance `length`, and the way of a prismatic joint as a rotation by that
+way over `length`. So J is in metres, and sigma, its smallest singular value, is the velocity of the end in its worst
+direction for one rad/s. Below the threshold the rates are damped, so that they stay small through a singularity; the
+point then leaves the path by as much as `error` shows, and the gain brings it back. With max_damping = threshold no
+joint motion exceeds |v|/threshold. With max_damping = 0, the inverse is the pseudo-inverse.
 
-The path is given by the components that are written, in world axes, as offsets from where point and link begin: x, y,
-z of the point; roll, pitch, yaw of the link, R = Rz(yaw) Ry(pitch) Rx(roll). Those left out stay 0, so a link that
-begins anyhow is held so. `guides = position` leaves the attitude free; `xy` and the like guide two components alone.
+The path is given by the components that are written, in world axes, as offsets from where point and link begin: x, y, z
+of the point; roll, pitch, yaw of the link, R = Rz(yaw) Ry(pitch) Rx(roll). Components that are left out stay 0, so the
+link is held in the attitude in which it begins. `guides = position` leaves the attitude free; `xy` and the like guide
+two components only.
 
-The path's error falls as exp(-gain t), but for the lag of the servos, the tick (by a part that is proportional to its
-period) and what limits and damping leave undone. At a singularity itself no joint moves the point along the direction
+The error of the path decays as exp(-gain t), but for the lag of the servos, the tick (by a part that is proportional to
+its period) and the effect of limits and damping. At a singularity itself no joint moves the point along the direction
 that is lost: a path that begins there in that direction does not begin; without damping the case fails.
 
-Not a planner: it knows neither joint stops nor collisions, and of a redundant arm's motions takes the smallest.
+It is not a planner: it knows neither joint stops nor collisions, and of the motions of a redundant arm it takes the
+smallest.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Analog low-pass of order 1: y' = 2 pi cutoff (x - y). A continuous law can see it; a run begins with it settled."""
+"""Analog low-pass of order 1: y' = 2 pi cutoff (x - y). A continuous law can read it. A run begins with the filter
+settled.
+"""
 
 from __future__ import annotations
 

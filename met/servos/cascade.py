@@ -1,4 +1,4 @@
-"""Cascaded servo, as robots have it: a position loop around a rate loop around a current loop, with feed-forward.
+"""Cascaded servo, as robots have: a position loop around a rate loop around a current loop, with feed-forward.
 
     u = feed_forward N r' + k_position (N r - theta) - w      position command r, with its rate r'
     u = N r - w                                               rate command r
@@ -11,10 +11,12 @@
                                                               compliant_gearbox
     tau = N (tau_m - friction), and N^2 J_m moves with q      gear = rigid: w = N q', theta = N q
 
-A torque command asks i* = r/(N Kt), open loop. theta and w are the motor's: the loops see its encoder and tachometer.
+A torque command sets i* = r/(N Kt), open loop. theta and w are the angle and rate of the motor: the loops see its
+encoder and tachometer.
 
-The current loop is fast: ki_current/R or sqrt(ki_current/L) often wants a step of the dynamics below 0.1 ms. Where it
-does not matter, `rigid_gearbox` and `compliant_gearbox` have an armature without inductance, and a voltage.
+The current loop is fast: ki_current/R or sqrt(ki_current/L) often needs a step of the dynamics below 0.1 ms. If the
+current loop does not matter, use `rigid_gearbox` or `compliant_gearbox`, which have an armature without inductance, and
+a voltage.
 """
 
 from __future__ import annotations

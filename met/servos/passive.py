@@ -1,9 +1,10 @@
-"""Passive joint: no motor and no command; damping, dry friction that sticks, a spring, and what turns with it.
+"""Passive joint: no motor and no command; damping, dry friction that sticks, a spring, and an inertia that moves with
+the joint.
 
     tau = -damping qd - stiffness (q - rest) - s friction,  s in {0, +1, -1} (stuck, forward, backward)
 
-With all parameters left at zero it is a joint without a servo. It has no bound of its own on how fast the joint moves,
-since that depends on the inertia behind it: nothing warns of a spring or damper that is too stiff for the step.
+With all parameters at zero it is a joint without a servo. How fast the joint can move depends on the inertia behind it,
+so the model has no bound of its own on that, and no warning tells of a spring or damper that is too stiff for the step.
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
-"""A drive with a rate loop of its own, emulated: it is told the rate of the shaft, as drives in velocity mode are.
+"""A drive with a rate loop of its own, emulated: its command is the rate of the shaft, as for drives in velocity mode.
 
     J w' = tau_m(V, w) + Kt_load i - F_v w - s F_c + unevenness
     e = w_told - w,  V = clip(Kp e + Ki I, +-V_max),  dI/dt = e, held while V is limited and e would push it further
 
-The servo's law above its rate loop is ours: its command, and its position loop. What is tried is all below, the drive's
-loop and its motor. The loop is the servo's own, with gains of its own where they are written, on the shaft's rate
-itself, and runs once in each substep, at 4 kHz or more; shaft, friction and faults are those of `emulated`.
+The servo's law above its rate loop is computed by MET: its command, and its position loop. What is tried is all below,
+the drive's loop and its motor. The loop is that of the servo, with gains of its own if they are written. It acts on the
+rate of the shaft itself, and runs once in each substep, at 4 kHz or more; shaft, friction and faults are those of
+`emulated`.
 """
 
 from __future__ import annotations

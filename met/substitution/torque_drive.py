@@ -1,11 +1,12 @@
-"""A drive with a current loop of its own, emulated: it is told the torque of the motor, as most drives on a CAN are.
+"""A drive with a current loop of its own, emulated: its command is the torque of the motor, as for most drives on a CAN
+bus.
 
     J w' = tau_m + Kt_load i - F_v w - s F_c + unevenness,   tau_m' = 2 pi bandwidth (gain tau_told - tau_m)
 
-The servo's law up to the motor's torque is ours: its voltage, the motor's resistance and back-EMF are computed, and the
-drive is told the mean torque of the coming tick. What is tried is the drive's torque: how fast it comes (`bandwidth`),
-how true it is (`gain`), where it ends (`tau_max`), besides the shaft, its friction and faults, which are those of
-`emulated`.
+The servo's law down to the motor's torque is computed by MET, with its voltage and the motor's resistance and back-EMF,
+and the drive is commanded the mean torque of the coming tick. What is tried is the drive's torque: how fast it follows
+(`bandwidth`), how true it is (`gain`), where it ends (`tau_max`), besides the shaft, its friction and faults, which are
+those of `emulated`.
 """
 
 from __future__ import annotations

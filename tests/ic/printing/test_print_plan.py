@@ -148,9 +148,10 @@ links.camera.inertia.yz  = 0 kg*m^2     written      swing.ic:6:44
 
 DOC_METRIC = """\
 metric settling_time
-  The time from which the channel stays within a band about its target, to the end of the run.
+  The time from which the signal stays within a band around its target, until the end of the run.
 
-  Infinite where it is outside at the end. The band is `band` of the target's size, plus `within`.
+  It is infinite if the signal is outside the band at the end. The half width of the band is `band` times the size of the
+  target, plus `within`.
 
 In a deck: metric NAME = settling_time { of = CHANNEL; ... }, in a run
 Unit of the result: s
