@@ -42,7 +42,7 @@ DECK = click.argument("deck")
     "form",
     type=click.Choice(["text", *PROGRAM_FORMS]),
     default="text",
-    help="How to print; json and sarif for programs, github for the workflows of GitHub.",
+    help="Form of the output: text for people, json and sarif for programs, github for GitHub workflows.",
 )
 @loudness_options
 def check(
@@ -54,10 +54,10 @@ def check(
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """Find all that is wrong with decks.
+    """Find all mistakes in decks.
 
-    Every run and sweep of a deck is compiled to its plan; nothing is run. A plan file is read, and what it holds is
-    said.
+    Every run and sweep of a deck is compiled to its plan; nothing is run. A plan file is read, and its contents are
+    listed.
     """
     for deck in decks:
         check_options(deck, defines=defines, include_dirs=include_dirs, settings=settings)
@@ -157,7 +157,7 @@ def _whoever_includes(part: object) -> object:
 @DECK
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck.")
-@click.option("-o", "output", metavar="FILE", help="Write the plan to this file (JSON); `met run FILE` runs it.")
+@click.option("-o", "output", metavar="FILE", help="Write the plan to this file (JSON), which `met run FILE` runs.")
 @deck_options
 @format_option
 @loudness_options
@@ -175,8 +175,8 @@ def plan(
 ) -> None:
     """Show what a deck means, and write its plan.
 
-    The arm as a tree, rates and steps, channels, cases, sizes; of the runs and sweeps NAME, or else of the only one or
-    the default.
+    The output has the arm as a tree, rates and steps, channels, cases and sizes, of the runs and sweeps NAME, or else
+    of the only one or the default.
     """
     from met.plan import file as plan_file
 
@@ -202,7 +202,7 @@ def plan(
 @click.command()
 @DECK
 @click.argument("names", nargs=-1, metavar="[SWEEP]...")
-@click.option("--all", "everything", is_flag=True, help="Every row, however many there are.")
+@click.option("--all", "everything", is_flag=True, help="Print every row, however many there are.")
 @deck_options
 @format_option
 @loudness_options
@@ -217,9 +217,10 @@ def cases(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """List the cases of a sweep: position, id and what varies.
+    """List the cases of a sweep: position, id and varied values.
 
-    Of SWEEP, or else of all sweeps of the deck. `met run --case` takes a position (`#3`) or the beginning of an id.
+    Without SWEEP, the cases of all sweeps of the deck are listed. `met run --case` takes a position (`#3`) or the
+    beginning of an id.
     """
     from ic.printing.cases import cases_json, print_cases
 
@@ -239,7 +240,7 @@ def cases(
 @click.command()
 @DECK
 @click.argument("path")
-@click.option("--run", "name", metavar="NAME", help="The run or sweep to look in, where it is not the default one.")
+@click.option("--run", "name", metavar="NAME", help="The run or sweep to look in, if it is not the default one.")
 @deck_options
 @format_option
 @loudness_options
@@ -254,7 +255,7 @@ def explain(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """Say where a value comes from: who wrote it, and over what.
+    """Show where a value comes from: the line that wrote it, and the values that it replaced.
 
     PATH is a parameter (elbow.servo.kt), the beginning of several (elbow.servo), one of a definition (gearbox.kp), or a
     setting of the run (rates.dynamics).
@@ -276,16 +277,16 @@ def explain(
 
 @click.command()
 @click.argument("words", nargs=-1, metavar="[KIND] [MODEL]")
-@click.option("--markdown", is_flag=True, help="All of MET's own models as one page, docs/reference.md.")
+@click.option("--markdown", is_flag=True, help="Print all of MET's own models as one page, docs/reference.md.")
 @format_option
 def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
-    """Show the models there are and what each declares.
+    """Show the models, and everything that each of them declares.
 
-    KIND is servo, command, environment, metric, integrator, bed or law; MODEL one of them by name. Also: the blocks of
-    a deck, such as `met doc run` or `joint`; `channels`, what can be recorded; `dh`, Denavit-Hartenberg numbers;
-    `shapes`, of links; `units`; `functions`; `designs` and `distributions` of samples; the code of a message, as
-    in `met doc D060`; an entry of a block, such as `allow`; and a word of the glossary, such as `shard`.
-    `met doc language --format json` is all of it for programs.
+    KIND is servo, sensor, command, environment, guide, metric, integrator, bed or law; MODEL is the name of one model.
+    Other words are the blocks of a deck, as in `met doc run` or `met doc joint`; `channels`, the signals that can be
+    recorded; `dh`, Denavit-Hartenberg numbers; `shapes` of links; `units`; `functions`; `designs` and `distributions`
+    of samples; the code of a message, as in `met doc D060`; an entry of a block, such as `allow`; and a word of the
+    glossary, such as `shard`. `met doc language --format json` prints all of it for programs.
     """
     from ic.language import BLOCKS
     from ic.printing import models as print_models
@@ -306,7 +307,7 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
     if len(words) == 1 and is_code(words[0]):
         if form == "json":
             raise click.UsageError("what a code means is text: it has no --format")
-        _print(print_code(words[0]))
+        _print_text(print_code(words[0]))
         return
     if words == ("language",):
         from ic.printing.description import description, print_overview
@@ -314,14 +315,14 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
         if form == "json":
             _print_json(description())
         else:
-            _print(print_overview())
+            _print_text(print_overview())
         return
     if len(words) == 1 and words[0] in SUBJECTS:
         text, data = SUBJECTS[words[0]]
         if form == "json":
             _print_json(data())
         else:
-            _print(text())
+            _print_text(text())
         return
     try:
         found = print_models.selected_models(words)
@@ -334,20 +335,20 @@ def doc(words: tuple[str, ...], markdown: bool, form: str) -> None:
             raise
         if form == "json":
             raise click.UsageError("what a word means is text: it has no --format") from None
-        _print(lines)
+        _print_text(lines)
         return
     if form == "json":
         _print_json([print_models.model_json(kind, model) for kind, model in found])
     elif not words or (words[0].removesuffix("s") in models.GROUPS and len(words) == 1):
         kind = words[0].removesuffix("s") if words else ""
         if kind in BLOCKS:
-            _print([*print_block(BLOCKS[kind]), ""])
-        _print(print_models.print_list(found))
+            _print_text([*print_block(BLOCKS[kind]), ""])
+        _print_text(print_models.print_list(found))
     else:
         for position, (kind, model) in enumerate(found):
             if position:
                 click.echo()
-            _print(print_models.print_model(kind, model))
+            _print_text(print_models.print_model(kind, model))
 
 
 @click.command()
@@ -363,7 +364,7 @@ def dump(
     include_dirs: tuple[str, ...],
     settings: tuple[str, ...],
 ) -> None:
-    """Show what one stage of the way hands to the next.
+    """Show the output of one stage on the way from a deck to machine code.
 
     STAGE is tokens, syntax, model, plan, program, kernel or assembly.
     """
@@ -441,6 +442,13 @@ def _plan_in_file(path: str, names: tuple[str, ...]) -> Plan:
 def _print(lines: Iterable[str]) -> None:
     for line in lines:
         say(line)
+
+
+def _print_text(lines: Iterable[str]) -> None:
+    """Lines of text, filled to the width of a terminal."""
+    from ic.printing.wrapping import fitted, terminal_width
+
+    _print(fitted(lines, width=terminal_width()))
 
 
 def _print_json(value: object) -> None:

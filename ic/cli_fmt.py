@@ -11,18 +11,20 @@ from met.messages.visible import say
 
 @click.command()
 @click.argument("paths", nargs=-1, required=True, metavar="PATH...")
-@click.option("--check", is_flag=True, help="Write nothing; exit with 1 where a deck would change.")
+@click.option("--check", is_flag=True, help="Write nothing; exit with 1 if a deck would change.")
 @click.option("--diff", is_flag=True, help="Write nothing; print what would change.")
-@click.option("--upgrade", is_flag=True, help="Make them decks of edition 2, which mean what they meant; proved first.")
+@click.option(
+    "--upgrade", is_flag=True, help="Convert the decks to edition 2; it is proved first that they keep their meaning."
+)
 @loudness_options
 def fmt(paths: tuple[str, ...], check: bool, diff: bool, upgrade: bool, quiet: bool, verbose: bool) -> int:
-    """Lay out decks: indentation, blanks, alignment.
+    """Format decks: indentation, blanks, alignment.
 
     PATH is a deck, a folder (all `.ic` files in it and in its folders), or `-`: from standard input to standard output.
-    Where lines break and what is aligned is yours; tokens, comments and preprocessor lines stay as they are. A deck
-    that is broken is left alone. --upgrade writes the line `deck 2;`, and brackets where the editions read a text
-    otherwise; all runs and sweeps have the same plans and keys, or the file stays as it is. Exit status: 0 done, or
-    nothing to do; 1 with --check: some would change; 2 a deck cannot be formatted, or upgraded.
+    Line breaks, and the choice of what is aligned, are yours; tokens, comments and preprocessor lines stay as they are.
+    A deck with a syntax error is not changed. --upgrade writes the line `deck 2;`, and brackets where the editions read
+    a text differently; all runs and sweeps keep their plans and keys, or else the file is not changed. Exit status: 0
+    done, or nothing to do; 1 with --check: some decks would change; 2 a deck cannot be formatted or upgraded.
     """
     from ic.driver.upgrade import Upgrades, upgrades
     from ic.formatting.files import STDIN, decks, lay_out, write

@@ -11,12 +11,14 @@ from met.diagnostic import Problem, error
 from met.messages.visible import say
 
 
-@click.command("import", short_help="Make a deck of a robot's URDF file.")
+@click.command("import", short_help="Make a deck from a robot's URDF file.")
 @click.argument("file")
-@click.option("-o", "output", metavar="DECK", help="Write the deck to this file; printed where left out.")
-@click.option("--force", is_flag=True, help="Write over a file that is there.")
+@click.option("-o", "output", metavar="DECK", help="Write the deck to this file, instead of printing it.")
+@click.option("--force", is_flag=True, help="Overwrite an existing file.")
 @click.option(
-    "--mimic", type=click.Choice(["free", "fixed"]), help="What joints that follow others do here: move, or stay at 0."
+    "--mimic",
+    type=click.Choice(["free", "fixed"]),
+    help="Joints that follow other joints in the file: make them `free` to move, or `fixed` at 0.",
 )
 @loudness_options
 def import_(file: str, output: str | None, force: bool, mimic: str | None, quiet: bool, verbose: bool) -> None:

@@ -17,14 +17,14 @@ KINDS = ["deck", "servo", "sensor", "environment", "command", "guide", "metric",
 @click.command()
 @click.argument("kind", type=click.Choice(KINDS))
 @click.argument("name")
-@click.option("-o", "output", metavar="PATH", help="The deck's file, or the model's folder; else it is named NAME.")
-@click.option("--force", is_flag=True, help="Write over what is there.")
+@click.option("-o", "output", metavar="PATH", help="The deck's file, or the model's folder [named after NAME].")
+@click.option("--force", is_flag=True, help="Overwrite existing files.")
 @loudness_options
 def new(kind: str, name: str, output: str | None, force: bool, quiet: bool, verbose: bool) -> None:
     """Write a deck or a model to begin from.
 
-    It runs as it is: change what you need. `deck` is an arm of two links with servos, a run and a sweep. All others
-    are models: a folder with the Python file, a deck to try it in, and what makes it an installable package.
+    It runs as it is; change what you need. `deck` is an arm of two links with servos, a run and a sweep. All others are
+    models: a folder with the Python file, a deck to try it in, and the files that make it an installable package.
     """
     from ic.beginnings import files
     from ic.printing.columns import columns

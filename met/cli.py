@@ -139,7 +139,8 @@ def deck_options(face: Face) -> Face:
         expose_value=False,
         is_eager=True,  # before --set, which takes it in
         callback=_keep_varied,
-        help="Sweep the run over this, as `vary` does: 'gearbox.kp=0.01..0.1 by 0.01 V*s/rad'; several are combined.",
+        help="Sweep the run over these values, as `vary` does: 'gearbox.kp=0.01..0.1 by 0.01 V*s/rad'; several are "
+        "combined.",
     )(face)
     face = click.option(
         "--set",
@@ -147,7 +148,7 @@ def deck_options(face: Face) -> Face:
         multiple=True,
         metavar="PATH=VALUE",
         callback=_with_varied,
-        help="Set what `vary` names, as if the deck said so: 'gearbox.kp=0.02 V*s/rad'; may be repeated.",
+        help="Replace the value of a path that `vary` can name: 'gearbox.kp=0.02 V*s/rad'; may be repeated.",
     )(face)
     face = click.option(
         "-I",
@@ -155,10 +156,10 @@ def deck_options(face: Face) -> Face:
         multiple=True,
         metavar="DIR",
         type=click.Path(exists=True, file_okay=False),
-        help="Look for included files here too; may be repeated.",
+        help="Also look for included files here; may be repeated.",
     )(face)
     return click.option(
-        "-D", "defines", multiple=True, metavar="NAME[=VALUE]", help="Define a macro as #define does; may be repeated."
+        "-D", "defines", multiple=True, metavar="NAME[=VALUE]", help="Define a macro, as #define does; may be repeated."
     )(face)
 
 
@@ -208,14 +209,18 @@ PROGRAM_FORMS = ("json", "sarif", "github")
 def format_option(face: Face) -> Face:
     """--format: text for people or JSON for programs, diagnostics included; given on as `form`."""
     return click.option(
-        "--format", "form", type=click.Choice(["text", "json"]), default="text", help="How to print; json for programs."
+        "--format",
+        "form",
+        type=click.Choice(["text", "json"]),
+        default="text",
+        help="Form of the output: text for people, json for programs.",
     )(face)
 
 
 def loudness_options(face: Face) -> Face:
     """-q and -v, given on as `quiet` and `verbose`."""
-    face = click.option("-v", "--verbose", is_flag=True, help="Say more; show tracebacks.")(face)
-    return click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")(face)
+    face = click.option("-v", "--verbose", is_flag=True, help="Print more, and tracebacks.")(face)
+    return click.option("-q", "--quiet", is_flag=True, help="Print only errors.")(face)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -58,14 +58,14 @@ class FiniteRange(click.FloatRange):
         return float(found)
 
 
-PORT = click.option("--port", "word", metavar="[JOINT=]PORT", required=True, help="Where the bed is.")
+PORT = click.option("--port", "word", metavar="[JOINT=]PORT", required=True, help="The port of the bed.")
 BAUD = click.option(
     "--baud",
     type=click.IntRange(1, 2**31 - 1),
     default=921600,
     show_default=True,
     metavar="BAUD",
-    help="Of a serial line.",
+    help="Baud rate of a serial line.",
 )
 
 
@@ -80,12 +80,12 @@ class BedCommands(click.Group):
         super().format_epilog(ctx, formatter)
 
 
-@click.group(cls=BedCommands, short_help="Drive a motor bed: probe it, measure its line, run a deck's joint on it.")
+@click.group(cls=BedCommands, short_help="Work with a motor bed: probe it, measure its line, run a deck's joint on it.")
 def bed() -> None:
-    """Work with a motor bed at one of the ports below: a real one, a simulated one, or a transcript."""
+    """Work with a motor bed at one of the ports below: a real bed, a simulated one, or a transcript."""
 
 
-@bed.command(short_help="Say who is at a port, and what its sensors read.")
+@bed.command(short_help="Print which bed is at a port, and the readings of its sensors.")
 @click.argument("source", metavar="[DECK|PLAN.json]", required=False)
 @click.argument("names", nargs=-1, metavar="[NAME]")
 @PORT
@@ -94,10 +94,11 @@ def bed() -> None:
 @format_option
 @loudness_options
 def probe(word: str, source: str | None, names: tuple[str, ...], **options: Any) -> int:
-    """Greet a bed and read its sensors: its name, firmware, limits and scales, faults that are latched, and for which
-    rates the line is fast enough. It is not armed. A simulated bed, such as `emulated`, is the one of DECK.
+    """Connect to a bed and read its sensors: print its name, firmware, limits and scales, the faults that it has
+    latched, and the rates for which the line is fast enough. The bed is not armed. A simulated bed, such as `emulated`,
+    is that of DECK.
 
-    Exit status: 0 it answers; 2 it does not, or the input is wrong.
+    Exit status: 0 the bed answers; 2 it does not, or the input is wrong.
     """
     from batch.beds.probe import probe_and_tell
 
@@ -106,16 +107,16 @@ def probe(word: str, source: str | None, names: tuple[str, ...], **options: Any)
     return YES
 
 
-@bed.command(short_help="Have a bed forget faults that it has latched.")
+@bed.command(short_help="Clear the faults that a bed has latched.")
 @PORT
 @BAUD
 @format_option
 @loudness_options
 def clear(word: str, **options: Any) -> int:
-    """A bed that stopped itself does not arm again until it is told to forget why. This prints what it was, waits until
-    the shaft has come to rest, and clears it. Find the cause first.
+    """Clear the faults that a bed has latched. A bed that has stopped itself does not arm again before that. This
+    command prints the faults, waits until the shaft is at rest, and clears them. Find the cause first.
 
-    Exit status: 0 nothing is latched any more; 2 the bed does not answer, or its shaft turns on.
+    Exit status: 0 no fault is latched any more; 2 the bed does not answer, or its shaft does not stop.
     """
     from batch.beds.clearing import clear_and_tell
 
@@ -123,30 +124,32 @@ def clear(word: str, **options: Any) -> int:
     return YES
 
 
-@bed.command(short_help="Measure how well exchanges with a bed keep their time.")
+@bed.command(short_help="Measure how punctual the exchanges with a bed are.")
 @click.argument("source", metavar="[DECK|PLAN.json]", required=False)
 @click.argument("names", nargs=-1, metavar="[NAME]")
 @PORT
 @BAUD
-@click.option("--rate", type=Hertz(), metavar="RATE", help="Of exchanges [the deck's, else 1 kHz].")
-@click.option("--duration", type=SECONDS, metavar="TIME", default=10.0, show_default="10 s", help="For so long.")
+@click.option("--rate", type=Hertz(), metavar="RATE", help="Rate of the exchanges [that of the deck, else 1 kHz].")
+@click.option(
+    "--duration", type=SECONDS, metavar="TIME", default=10.0, show_default="10 s", help="Duration of the measurement."
+)
 @click.option(
     "--joints",
     type=click.IntRange(min=1, max=64),
     metavar="N",
     default=1,
     show_default=True,
-    help="So many exchanges each period, one after another, as joints on such beds would need.",
+    help="Exchanges in each period, one after another, as for this number of joints on beds.",
 )
 @deck_options
 @format_option
 @loudness_options
 def jitter(word: str, source: str | None, names: tuple[str, ...], **options: Any) -> int:
-    """Read a bed's sensors at a steady rate, as a run exchanges with it, and print how late exchanges began and how
-    long they took. The bed is not armed. Shared computers have hard times that no measurement has seen.
+    """Read a bed's sensors at a steady rate, as a run does, and print how late the exchanges began and how long they
+    took. The bed is not armed. A shared computer may at other times be slower than in any measurement.
 
-    Exit status: 0 a run would not have been stopped; 1 it would have, by five periods of lateness or silence; 2 the
-    bed does not answer, or the input is wrong.
+    Exit status: 0 a run would not have been stopped; 1 it would have been, by five periods of lateness or silence; 2
+    the bed does not answer, or the input is wrong.
     """
     from batch.beds.jitter import jitter_and_tell
 
@@ -162,17 +165,17 @@ def _check(source: str | None, names: tuple[str, ...], options: dict[str, Any]) 
         check_options(source, names, False, options["defines"], options["include_dirs"], options["settings"])
 
 
-@bed.command(short_help="Find a bed's parameters by guided moves, as a deck to include.")
+@bed.command(short_help="Identify a bed's parameters from moves, and write them as a deck to include.")
 @click.argument("source", metavar="DECK|PLAN.json")
 @click.argument("names", nargs=-1, metavar="[NAME]")
 @PORT
 @BAUD
-@click.option("--lock-step", is_flag=True, help="Of simulated firmware: it has no time of its own.")
+@click.option("--lock-step", is_flag=True, help="For simulated firmware: its time advances with the exchanges only.")
 @click.option(
     "--kt-load",
     type=Amount("N*m/A"),
     metavar="CONSTANT",
-    help="Torque constant of the load motor, by which torques are measured [the deck's bed's].",
+    help="Torque constant of the load motor, by which torques are measured [that of the deck's bed].",
 )
 @click.option(
     "--kt-load-error",
@@ -180,21 +183,30 @@ def _check(source: str | None, names: tuple[str, ...], options: dict[str, Any]) 
     metavar="PERCENT",
     default=0.0,
     show_default=True,
-    help="Half of its 95 % interval; it widens what is measured by it.",
+    help="Half width of the 95 % interval of --kt-load; it widens the intervals of the results that depend on it.",
 )
-@click.option("--voltage", type=Amount("V"), metavar="VOLTAGE", help="Most of the moves [the servo's v_max].")
-@click.option("--current", type=Amount("A"), metavar="CURRENT", help="Most of the moves [what balances the drive].")
-@click.option("--rate", type=Amount("rad/s"), metavar="RATE", help="Above it a move is over [0.8 of the bed's limit].")
-@click.option("-o", "--output", metavar="FILE.ic", help="The deck [JOINT.identified.ic, in this folder].")
+@click.option(
+    "--voltage", type=Amount("V"), metavar="VOLTAGE", help="Largest voltage of the moves [the servo's v_max]."
+)
+@click.option(
+    "--current",
+    type=Amount("A"),
+    metavar="CURRENT",
+    help="Largest current of the moves [the one that balances the drive].",
+)
+@click.option(
+    "--rate", type=Amount("rad/s"), metavar="RATE", help="Rate above which a move ends [0.8 of the bed's limit]."
+)
+@click.option("-o", "--output", metavar="FILE.ic", help="The deck to write [JOINT.identified.ic, in this folder].")
 @deck_options
 @format_option
 @loudness_options
 def identify(word: str, source: str, names: tuple[str, ...], **options: Any) -> int:
-    """Lead a bed through a minute of moves, and find its resistance, torque constant, largest torque, friction and
-    inertia, each with its 95 % interval. DECK has what is believed before: the servo's motor is the data sheet.
+    """Move a bed for a minute, and estimate its resistance, torque constant, largest torque, friction and inertia, each
+    with its 95 % interval. DECK has the values that are assumed before: the servo's motor is the data sheet.
 
-    Nothing but the load motor may be on the shaft, which turns both ways at up to its full voltage. Exit status: 0
-    found; 2 the bed stopped, is not what the model is, or the input is wrong.
+    Only the load motor may be on the shaft, which turns in both directions at up to its full voltage. Exit status: 0
+    the values were found; 2 the bed stopped, does not behave as its model, or the input is wrong.
     """
     from batch.beds.identifying import identify_and_tell
 
@@ -203,32 +215,36 @@ def identify(word: str, source: str, names: tuple[str, ...], **options: Any) -> 
     return YES
 
 
-@bed.command(short_help="Say what the two motors of a bed must do, and which can.")
+@bed.command(short_help="Say what the two motors of a bed must provide, and which motors suffice.")
 @click.argument("source", metavar="DECK|PLAN.json|ARCHIVE.h5")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
-@click.option("--joint", metavar="JOINT", help="That is to be on the bed [the one that is on one in the deck].")
+@click.option(
+    "--joint", metavar="JOINT", help="The joint whose motor is on the bed [the one that is on a bed in the deck]."
+)
 @click.option(
     "--margin",
     type=FiniteRange(1.0, 100.0),
     metavar="FACTOR",
     default=1.5,
     show_default=True,
-    help="Order so many times what is asked.",
+    help="Factor by which the motors should exceed what the cases need.",
 )
-@click.option("--drive", metavar="PART", help="A motor to be held against it, in the joint's motor's place.")
-@click.option("--load", metavar="PART", help="A motor to be held against it, as the load.")
-@click.option("--parts", metavar="FILE.toml", help="Motors of your own, besides those that come with MET.")
+@click.option("--drive", metavar="PART", help="A motor to check in the place of the joint's motor.")
+@click.option("--load", metavar="PART", help="A motor to check as the load motor.")
+@click.option(
+    "--parts", metavar="FILE.toml", help="A file with motors of your own, in addition to those that come with MET."
+)
 @deck_options
 @format_option
 @loudness_options
 def size(source: str, names: tuple[str, ...], **options: Any) -> int:
-    """Run all cases of a deck's only run or sweep, of the one marked `default`, or of these NAMEs, and say what a bed
-    for one of its joints must do: torque, rate, power, current and voltage of both motors, what they return, the
-    inertia that the load stands for, line and filter. Then which motors can: those of --drive and --load, or all known.
-    Of an archive, the cases that it has are run again.
+    """Run all cases of a deck's only run or sweep, of the one marked `default`, or of these NAMEs, and print what a bed
+    for one of its joints must provide: torque, rate, power, current and voltage of both motors, what they feed back,
+    the inertia that the load stands for, line and filter. Then say which motors suffice: those of --drive and --load,
+    or all known ones. Of an archive, its cases are run again.
 
-    Nothing is written. -v adds torque-speed curves. Exit status: 0 the motors that were named fit; 1 one does not, or
-    it is not known; 2 the input is wrong.
+    Nothing is written. -v adds torque-speed curves. Exit status: 0 the motors that were named fit; 1 one of them does
+    not, or this is not known; 2 the input is wrong.
     """
     from batch.beds.size import size_and_tell
 
@@ -236,18 +252,18 @@ def size(source: str, names: tuple[str, ...], **options: Any) -> int:
     return YES if size_and_tell(source, names, **options) else NO
 
 
-@bed.command(short_help="Write the image of a bed's board, to be dragged onto it.")
+@bed.command(short_help="Build the firmware of a bed's board, a file to drag onto it.")
 @click.argument("bench", metavar="[BENCH.toml]", required=False)
 @click.option("--board", type=click.Choice(["pico"]), required=True, help="The board: a Raspberry Pi Pico.")
-@click.option("-o", "--output", metavar="FILE.uf2", help="The image [the bench's name, in this folder].")
-@click.option("--show", is_flag=True, help="Print the bench's file instead, to change it.")
+@click.option("-o", "--output", metavar="FILE.uf2", help="The file to write [the bench's name, in this folder].")
+@click.option("--show", is_flag=True, help="Print the bench's file instead, as a file to change.")
 @loudness_options
 def firmware(bench: str | None, board: str, output: str | None, show: bool, quiet: bool, verbose: bool) -> int:
-    """Build the firmware of a bed whose numbers are in BENCH.toml, or of the one that the documentation wires, as a
-    UF2 file: hold the board's button while it is plugged in, and drag the file onto the drive that appears. The same
+    """Build the firmware of the bed in BENCH.toml, or of the one that the documentation wires, as a UF2 file. To load
+    it, hold the board's button while you plug the board in, and drag the file onto the drive that appears. The same
     bench gives the same bytes.
 
-    Exit status: 0 it is written; 2 the bench is none, or there is no compiler.
+    Exit status: 0 the file is written; 2 BENCH.toml is not a valid bench, or there is no compiler.
     """
     from batch.beds.flashing import firmware_and_tell
 
@@ -266,36 +282,42 @@ def firmware(bench: str | None, board: str, output: str | None, show: bool, quie
     multiple=True,
     metavar="[JOINT=]PORT",
     required=True,
-    help="Where the bed is; of several beds each.",
+    help="The port of the bed; with several beds, the port of each.",
 )
 @BAUD
 @click.option(
     "--lock-step",
     is_flag=True,
-    help="Of simulated firmware: it has no time of its own, so that a run has the same bits each time.",
+    help="For simulated firmware: its time advances with the exchanges only, so a run has the same bits each time.",
 )
-@click.option("--rest", type=SECONDS, metavar="TIME", help="Let the motors cool between cases (`30 s`).")
-@click.option("--transcripts", metavar="DIR", help="Write what goes over the lines into files in this folder.")
+@click.option("--rest", type=SECONDS, metavar="TIME", help="Time for the motors to cool between cases (`30 s`).")
+@click.option("--transcripts", metavar="DIR", help="Write all messages on the lines into files in this folder.")
 @click.option(
     "--clear",
     is_flag=True,
-    help="Before each case, clear what its bed has latched: a sweep then goes on "
-    "after a case whose bed stopped itself.",
+    help="Before each case, clear the faults that its bed has latched: a sweep then goes on after a case whose bed "
+    "stopped itself.",
 )
-@click.option("--force", is_flag=True, help="Arm the bed also where a law has no margin of stability.")
-@click.option("-o", "--output", metavar="FILE", help="The archive [as `met run` calls it].")
-@click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'.")
-@click.option("--fresh", is_flag=True, help="Start over, rather than drive what is missing.")
+@click.option("--force", is_flag=True, help="Arm the bed even if a law has no margin of stability.")
+@click.option("-o", "--output", metavar="FILE", help="The archive to write [with the name that `met run` gives it].")
+@click.option(
+    "--case",
+    "cases",
+    multiple=True,
+    metavar="ID",
+    help="Only this case: the beginning of its id, or its position, as '#0'.",
+)
+@click.option("--fresh", is_flag=True, help="Start over, instead of running only what is missing.")
 @click.option("--no-picture", is_flag=True, help="Draw no picture beside the archive.")
 @deck_options
 @loudness_options
 def run(source: str, names: tuple[str, ...], **options: Any) -> int:
     """Run a deck's only run or sweep, the one marked `default`, or those of these NAMEs: the arm is simulated in real
-    time, and the motor of each substituted joint is on its bed. Cases follow one another.
+    time, and the motor of each substituted joint is on its bed. Cases run one after another.
 
-    The archive is like any other: `met diff` compares it with the simulation's. A case whose bed stops is a failed
-    case, and says why. Exit status: 0 all cases reached their end and met the requirements; 1 not all; 2 the input is
-    wrong.
+    The archive is like any other, and `met diff` compares it with that of a simulation. A case whose bed stops is a
+    failed case, with the reason as its cause. Exit status: 0 all cases reached their end and met the requirements; 1
+    not all did; 2 the input is wrong.
     """
     from batch.beds.running import run_and_tell
     from batch.executors.termination import TERMINATED, Terminated, terminable

@@ -14,23 +14,37 @@ if TYPE_CHECKING:
     from batch.terminal.chosen_deck import ChosenDeck
 
 
-@click.command(short_help="Say which of the designs of a sweep to use.")
+@click.command(short_help="Choose the best of the designs of a sweep.")
 @click.argument("archive", metavar="ARCHIVE")
-@click.option("--run", "experiment", metavar="NAME", help="The sweep, where the archive holds several.")
-@click.option("--over", multiple=True, metavar="PATH", help="Not chosen, but to be borne: hold designs against it.")
-@click.option("--choose", multiple=True, metavar="PATH", help="Chosen, though drawn, or of a link, a payload, ...")
+@click.option("--run", "experiment", metavar="NAME", help="The sweep, if the archive holds several.")
+@click.option(
+    "--over",
+    multiple=True,
+    metavar="PATH",
+    help="A parameter that is not chosen: a design must withstand all of its values.",
+)
+@click.option(
+    "--choose",
+    multiple=True,
+    metavar="PATH",
+    help="A parameter that is chosen, although it is drawn at random, or one of a link, a payload, ...",
+)
 @click.option(
     "--by",
     multiple=True,
     metavar="METRIC",
-    help="The least METRIC, or expression of metrics, in the worst case; METRIC:largest, as is meant of a margin; "
-    "METRIC:smallest. Repeated: then by the next. "
-    "Without it: farthest from the border of what meets all requirements.",
+    help="Prefer the smallest METRIC, or expression of metrics, in the worst case; METRIC:largest prefers the "
+    "largest, which is the default for margins; METRIC:smallest. Repeated: equal designs by the next one. "
+    "Without it: the design that is farthest from missing a requirement.",
 )
-@click.option("--front", multiple=True, metavar="METRIC", help="Also the trade-off of two such: name each.")
+@click.option(
+    "--front", multiple=True, metavar="METRIC", help="Also show the trade-off between two such metrics: name each."
+)
 @click.option("--diff", is_flag=True, help="Show what --write would change in the deck's text.")
 @click.option("--write", is_flag=True, help="Write the chosen values into the deck's text, and show what changed.")
-@click.option("-o", "output", metavar="FILE", help="With these: into a copy of the deck, a new file.")
+@click.option(
+    "-o", "output", metavar="FILE", help="With --diff or --write: a new file, for a changed copy of the deck."
+)
 @format_option
 def best(
     archive: str,
@@ -44,17 +58,18 @@ def best(
     output: str | None,
     form: str,
 ) -> int:
-    """Choose among what a sweep chooses (`vary`, `zip`, `from`), held against what the arm must bear: a design that
-    meets all requirements in all of its cases, far from where one is missed.
+    """Choose the best design of a sweep: the values of its axes (`vary`, `zip`, `from`) with which all requirements are
+    met in all cases that the design must withstand, and with the largest distance from missing one.
 
-    Of a search or a tuning it says the answer.
+    For a search or a tuning, the command prints its answer.
 
-    It must bear what is drawn, what is of links, payloads, the environment or the start, and what --over names.
+    A design must withstand the values that are drawn at random, those of links, payloads, the environment and the
+    initial state, and those that --over names.
 
-    --write puts the chosen values into the deck that was swept, where they stand or as entries of their definitions,
-    once it is proved that the run means the same as with --set.
+    --write puts the chosen values into the deck that was swept, where the old ones stand or as entries of their
+    definitions, after it is proved that the run means the same as with --set.
 
-    Exit status: 0 a design meets all; 1 none does; 2 the input is wrong.
+    Exit status: 0 a design meets all requirements; 1 none does; 2 the input is wrong.
     """
     import shutil
 

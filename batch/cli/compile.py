@@ -14,7 +14,7 @@ from met.messages.visible import say
 @click.command(short_help="Compile a run or sweep to WebAssembly, for pages and node.")
 @click.argument("source", metavar="DECK|PLAN.json|ARCHIVE.h5")
 @click.argument("name", metavar="[NAME]", required=False)
-@click.option("-o", "--output", metavar="FILE.wasm", help="The module [NAME.wasm, in this folder].")
+@click.option("-o", "--output", metavar="FILE.wasm", help="The module to write [NAME.wasm, in this folder].")
 @deck_options
 @format_option
 @loudness_options
@@ -27,12 +27,12 @@ def compile(
     verbose: bool,
     **options: Any,
 ) -> int:
-    """Compile a deck's only run or sweep, the one marked `default`, or NAME, to a module of WebAssembly; or that of an
-    archive, which is then the module of what was run.
+    """Compile a deck's only run or sweep, the one marked `default`, or NAME, to a WebAssembly module. Of an archive,
+    what was run is compiled.
 
-    The module has the bits of `met run`, wherever it runs. FILE.json beside it says what stands where in its memory:
-    inputs, recorded numbers, metrics; and the inputs of the cases. What a sweep varies is an input; all else is in the
-    code. Written over is only what this command wrote.
+    The module computes the bits of `met run`, wherever it runs. FILE.json beside it describes the places of inputs,
+    recorded numbers and metrics in its memory, and has the inputs of the cases. What a sweep varies is an input; all
+    else is constant in the code. Only files that this command wrote are overwritten.
     """
     import json
 

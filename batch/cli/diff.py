@@ -8,7 +8,7 @@ from met.cli import NO, YES, format_option
 from met.messages.visible import line, say
 
 
-@click.command(short_help="Say what changed between two archives, case by case.")
+@click.command(short_help="Show what changed between two archives, case by case.")
 @click.argument("a", metavar="A.h5")
 @click.argument("b", metavar="B.h5")
 @click.option(
@@ -16,25 +16,28 @@ from met.messages.visible import line, say
     "tolerances",
     multiple=True,
     metavar="LIST",
-    help="How much may differ: qd=1e-6rad/s,rel=1e-9,time=1ms; may be repeated. Nothing may, unless it is given.",
+    help="Differences to accept: qd=1e-6rad/s,rel=1e-9,time=1ms; may be repeated. Without a tolerance, none is "
+    "accepted.",
 )
 @click.option(
     "--require",
     type=click.Choice(["identical", "equivalent"]),
     default="equivalent",
     show_default=True,
-    help="What is asked for.",
+    help="Result that exit status 0 requires.",
 )
-@click.option("--distributions", is_flag=True, help="Compare metrics as distributions too, as where seeds differ.")
-@click.option("--all", "every", is_flag=True, help="Show all that is found, not the first of each kind alone.")
+@click.option(
+    "--distributions", is_flag=True, help="Also compare metrics as distributions, as for archives with different seeds."
+)
+@click.option("--all", "every", is_flag=True, help="Show everything that is found, not only the first of each kind.")
 @format_option
 def diff(a: str, b: str, tolerances: tuple[str, ...], require: str, distributions: bool, every: bool, form: str) -> int:
-    """Compare two campaigns: one case or a million, of two versions of a deck, of its models, or of MET.
+    """Compare two archives: one case or a million, of two versions of a deck, of its models, or of MET.
 
-    Cases are matched by what is varied in them. First what made the two: the decks' lines, what they change and what
-    follows from that. Then status, then signals and metrics:
-    identical to the bit, equivalent within a tolerance, different, or incomparable. Exit status: 0 they are as
-    required; 1 they differ, require something else, or cannot be compared; 2 the input is wrong.
+    Cases are matched by their varied values. The output begins with the changed lines of the decks, the parameters that
+    they change, and what follows from these. Then come the status of cases, signals and metrics: identical to the bit,
+    equivalent within a tolerance, different, or incomparable. Exit status: 0 the archives are as required; 1 they
+    differ, have other requirements, or cannot be compared; 2 the input is wrong.
     """
     import json
 

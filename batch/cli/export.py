@@ -16,39 +16,40 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Write an archive for Foxglove (MCAP), or as a table (CSV, Parquet).")
 @click.argument("archive", metavar="ARCHIVE")
-@click.option("-o", "--output", metavar="FILE", help="The file; its ending says the format [ARCHIVE.mcap].")
-@click.option("--to", "kind", type=click.Choice(list(FORMATS)), help="The format, for any name.")
+@click.option("-o", "--output", metavar="FILE", help="The file to write; its ending selects the format [ARCHIVE.mcap].")
+@click.option("--to", "kind", type=click.Choice(list(FORMATS)), help="The format, whatever the name of the file.")
 @click.option("--run", "runs", multiple=True, metavar="NAME", help="This run or sweep [the first]; may be repeated.")
 @click.option(
     "--case",
     "cases",
     multiple=True,
     metavar="ID",
-    help="Only this case: the beginning of its id, or '#0'; may be repeated, and the first is then drawn solid.",
+    help="Only this case: the beginning of its id, or its position, as '#0'; may be repeated, and the first is then "
+    "drawn solid.",
 )
-@click.option("--signals", multiple=True, metavar="LIST", help="Only these: qd,elbow.q; may be repeated [all].")
+@click.option("--signals", multiple=True, metavar="LIST", help="Only these signals: qd,elbow.q; may be repeated [all].")
 @click.option(
     "--histories/--metrics",
     "histories",
     default=None,
-    help="Of a table, a row an instant or a row a case "
-    "[a case of a sweep; an instant where --case or --signals is given].",
+    help="Of a table: a row for each instant, or a row for each case [a case of a sweep; an instant with --case or "
+    "--signals].",
 )
 @click.option(
     "--evidence",
     is_flag=True,
-    help="Of a table, a row a requirement at a design point: share, bounds, worst case, margin, verdict; "
-    "of all runs unless --run names some.",
+    help="Of a table: a row for each requirement at each design point, with share, bounds, worst case, margin and "
+    "verdict; of all runs unless --run names some.",
 )
 @click.option(
     "--units",
     type=click.Choice(["si", "deck"]),
     default="si",
     show_default=True,
-    help="Of a table: metrics and what is varied in SI, or as the deck writes them; signals are in SI.",
+    help="Of a table: metrics and varied values in SI units, or in those of the deck; signals are in SI units.",
 )
-@click.option("--layout", is_flag=True, help="Also write how Foxglove shows it, in FILE.layout.json.")
-@click.option("--force", is_flag=True, help="Write over a file that is there, whatever it is.")
+@click.option("--layout", is_flag=True, help="Also write a layout for Foxglove, FILE.layout.json.")
+@click.option("--force", is_flag=True, help="Overwrite an existing file, whatever it is.")
 @format_option
 @loudness_options
 def export(
@@ -69,9 +70,10 @@ def export(
 ) -> int:
     """Write an archive for other tools.
 
-    MCAP opens in Foxglove and Lichtblick: the arm moves in 3D, without a URDF, beside its signals and what was said of
-    it; several cases are overlaid. CSV and Parquet are tables: of a sweep a row a case, with what is varied and its
-    metrics; of a run, or with --histories, a row an instant, with the signals; with --evidence, a row a requirement.
+    MCAP opens in Foxglove and Lichtblick: the arm moves in 3D, without a URDF, beside its signals and messages; several
+    cases are overlaid. CSV and Parquet are tables: of a sweep, a row for each case, with its varied values and metrics;
+    of a run, or with --histories, a row for each instant, with the signals; with --evidence, a row for each
+    requirement.
     """
     import json
 

@@ -17,41 +17,49 @@ EQUILIBRIUM = "write `2 s`; a `linear` block of the run has `at = equilibrium;`,
 @click.command(short_help="Linearise the program that runs: poles, modes, margins of loops, A B C D.")
 @click.argument("source", metavar="DECK|PLAN.json")
 @click.argument("name", metavar="[NAME]", required=False)
-@click.option("--of", metavar="LINEAR", help="Ask what a `linear` block of the run does. [its only one]")
+@click.option("--of", metavar="LINEAR", help="Answer this `linear` block of the run. [its only one]")
 @click.option(
-    "--at", type=Instant(equilibrium=EQUILIBRIUM), metavar="TIME", help="The instant of the run, `2 s`. [0 s]"
-)
-@click.option("--case", metavar="ID", help="The case of a sweep: the beginning of its id, or '#7'. [#0]")
-@click.option(
-    "--all-cases", is_flag=True, help="All cases of a sweep, a row each: margins of opened loops, else damping."
+    "--at", type=Instant(equilibrium=EQUILIBRIUM), metavar="TIME", help="The instant of the run, such as `2 s`. [0 s]"
 )
 @click.option(
-    "--input", "inputs", multiple=True, metavar="SIGNAL", help="A column of B: `pan.servo.command`; may be repeated."
+    "--case", metavar="ID", help="The case of a sweep: the beginning of its id, or its position, as '#7'. [#0]"
 )
 @click.option(
-    "--output", "outputs", multiple=True, metavar="SIGNAL", help="Rows of C: `pan.q`, `tau`; may be repeated."
+    "--all-cases", is_flag=True, help="All cases of a sweep, a row for each: margins of opened loops, or else damping."
+)
+@click.option(
+    "--input",
+    "inputs",
+    multiple=True,
+    metavar="SIGNAL",
+    help="A column of B, such as `pan.servo.command`; may be repeated.",
+)
+@click.option(
+    "--output", "outputs", multiple=True, metavar="SIGNAL", help="Rows of C, such as `pan.q` or `tau`; may be repeated."
 )
 @click.option(
     "--open",
     "opened",
     multiple=True,
     metavar="SIGNAL",
-    help="Open the loop here: `pan.servo.voltage`; may be repeated.",
+    help="Open the loop at this output of a control law, such as `pan.servo.voltage`; may be repeated.",
 )
-@click.option("-o", "--to", "output", metavar="FILE", help="Write A, B, C, D with names: .npz, .h5 or .csv.")
+@click.option(
+    "-o", "--to", "output", metavar="FILE", help="Write A, B, C, D with their names to this file: .npz, .h5 or .csv."
+)
 @click.option(
     "--picture",
     metavar="FILE",
-    help="Draw loops (Bode, Nichols) and steps, of all cases a root locus: .png, .svg or .pdf.",
+    help="Draw loops (Bode, Nichols) and step responses, of all cases a root locus: .png, .svg or .pdf.",
 )
 @deck_options
 @format_option
 def linear(source: str, name: str | None, form: str, **options: Any) -> int:
-    """Linearise a deck's only run or sweep, the one marked `default`, or NAME, where it is at an instant.
+    """Linearise a deck's only run or sweep, the one marked `default`, or NAME, at an instant.
 
-    The derivative is exact, and of the program that runs: sampling, held values and delays are in it. What sticks is
-    held. Without a question of its own, what the run's only `linear` block asks. Exit status: 0; 1 an opened loop is
-    unstable as it is; 2 the input is wrong, or an event is on the way.
+    The derivative is exact, and that of the program that runs, with its sampling, held values and delays. Joints that
+    stick are held. Without a question in the options, the run's only `linear` block is answered. Exit status: 0 done; 1
+    a loop that was opened is unstable as it is; 2 the input is wrong, or there is an event in the period.
     """
     import json
 

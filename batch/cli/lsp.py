@@ -18,30 +18,32 @@ from met.host.files import whole_file
 from met.outputs import cannot_write, check_overwrite, check_place, quoted
 
 
-@click.command(short_help="Serve an editor: messages as you type, completion, what a word means.")
+@click.command(short_help="Serve an editor: messages as you type, completion, meanings of words.")
 @click.option(
     "-I",
     "include_dirs",
     multiple=True,
     metavar="DIR",
     type=click.Path(exists=True, file_okay=False),
-    help="Look for included files here too; may be repeated.",
+    help="Also look for included files here; may be repeated.",
 )
 @click.option(
-    "-D", "defines", multiple=True, metavar="NAME[=VALUE]", help="Define a macro as #define does; may be repeated."
+    "-D", "defines", multiple=True, metavar="NAME[=VALUE]", help="Define a macro, as #define does; may be repeated."
 )
-@click.option("--stdio", is_flag=True, help="As editors ask for it: it is the only way there is.")
+@click.option(
+    "--stdio", is_flag=True, help="Standard input and output, as editors ask for them; there is no other way."
+)
 @click.option(
     "--vscode",
     metavar="FILE.vsix",
     type=click.Path(dir_okay=False, path_type=Path),
-    help="Write the extension for VS Code into this file, and serve nobody.",
+    help="Write the extension for VS Code to this file, and end.",
 )
 def lsp(include_dirs: tuple[str, ...], defines: tuple[str, ...], stdio: bool, vscode: Path | None) -> None:
     """Serve an editor by the Language Server Protocol, on standard input and output.
 
-    An editor starts it and asks; docs/editors.md has settings for Neovim, Helix, Emacs and VS Code. It needs the
-    package pygls, which MET's extra `editor` names.
+    The editor starts this command; docs/editors.md has settings for Neovim, Helix, Emacs and VS Code. The command needs
+    the package pygls, which MET's extra `editor` installs.
     """
     if vscode is not None:
         write_extension(vscode)

@@ -12,36 +12,42 @@ from met.messages.visible import say
 @click.command(short_help="Draw signals, metrics and maps of an archive: PNG, SVG, PDF.")
 @click.argument("archive", metavar="ARCHIVE")
 @click.argument("names", nargs=-1, metavar="[SIGNAL|METRIC]...")
-@click.option("-o", "--output", metavar="FILE", help="The picture; its ending says PNG, SVG or PDF [ARCHIVE.png].")
+@click.option(
+    "-o", "--output", metavar="FILE", help="The picture to write; its ending selects PNG, SVG or PDF [ARCHIVE.png]."
+)
 @click.option("--run", metavar="NAME", help="The run or sweep to draw [the first].")
 @click.option(
     "--case",
     "cases",
     multiple=True,
     metavar="ID",
-    help="Only this case: the beginning of its id, or '#0'; may be repeated.",
+    help="Only this case: the beginning of its id, or its position, as '#0'; may be repeated.",
 )
 @click.option(
     "--over",
     metavar="A[,B[,C]]",
     default="",
-    help="What metrics are drawn over: points over one parameter, a map over two, one for each value of a third.",
+    help="Parameters over which metrics are drawn: points over one, a map over two, a map for each value of a third.",
 )
 @click.option(
     "--against",
     metavar="OTHER.h5",
-    help="Another archive's cases of the same values under these; in a map the difference.",
+    help="Also draw the cases of another archive that have the same values; a map shows the difference.",
 )
 @click.option(
     "--size",
     default="",
     metavar="WIDTH[xHEIGHT]",
-    help="For a paper: 8.5cm, or 8.5x6cm, with letters of 8 pt and no title.",
+    help="Size for a paper: 8.5cm, or 8.5x6cm, with letters of 8 pt and no title.",
 )
-@click.option("--dpi", type=int, metavar="N", help="Dots of a PNG to the inch [144; with --size 300].")
-@click.option("--arm", is_flag=True, help="The arm itself, at some instants, and the path of its tip.")
+@click.option("--dpi", type=int, metavar="N", help="Dots per inch of a PNG [144; 300 with --size].")
+@click.option("--arm", is_flag=True, help="Draw the arm at some instants, and the path of its tip.")
 @click.option(
-    "--at", multiple=True, type=Instant(), metavar="TIME", help="With --arm: an instant, `2 s`; may be repeated."
+    "--at",
+    multiple=True,
+    type=Instant(),
+    metavar="TIME",
+    help="With --arm: an instant, such as `2 s`; may be repeated.",
 )
 @loudness_options
 def plot(
@@ -59,10 +65,10 @@ def plot(
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """Draw SIGNALs over time (`qd`, `elbow.q`) or METRICs over what is varied (`settle`); all where none is named.
+    """Draw SIGNALs over time (`qd`, `elbow.q`), or METRICs over varied parameters (`settle`); by default all of them.
 
-    Signals: a panel each, joints as lines, cases overlaid, many of them as a fan. Metrics: cases as points, or as a map
-    where two parameters make a grid.
+    Each signal has a panel, with joints as lines and cases overlaid, many of them as a fan. A metric is drawn with
+    cases as points, or as a map if two parameters form a grid.
     """
     from batch.plotting import plot
 

@@ -10,19 +10,21 @@ from met.messages.visible import say
 
 @click.command(short_help="Make one HTML page of an archive, to open anywhere and to send.")
 @click.argument("archive", metavar="ARCHIVE")
-@click.option("-o", "--output", metavar="FILE", help="The page [ARCHIVE.html].")
+@click.option("-o", "--output", metavar="FILE", help="The page to write [ARCHIVE.html].")
 @click.option("--run", "experiments", multiple=True, metavar="NAME", help="Only this run or sweep of the archive.")
-@click.option("--against", metavar="BEFORE.h5", help="An earlier archive: the page says what changed since.")
+@click.option("--against", metavar="BEFORE.h5", help="An earlier archive: the page shows what has changed since.")
 @click.option(
     "--tol",
     "tolerances",
     multiple=True,
     metavar="LIST",
-    help="How much may differ from it, as `met diff` has it: qd=1e-6rad/s,rel=1e-9,time=1ms; may be repeated.",
+    help="Differences from --against to accept, as for `met diff`: qd=1e-6rad/s,rel=1e-9,time=1ms; may be repeated.",
 )
-@click.option("--title", default="", metavar="TEXT", help="What stands above it [names of deck, runs and sweeps].")
+@click.option("--title", default="", metavar="TEXT", help="Title of the page [names of deck, runs and sweeps].")
 @click.option(
-    "--no-simulation", is_flag=True, help="Only what the archive has: the page runs no case again, and draws no arm."
+    "--no-simulation",
+    is_flag=True,
+    help="Only the contents of the archive: the page runs no case again, and draws no arm.",
 )
 @loudness_options
 def report(
@@ -36,11 +38,11 @@ def report(
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """Write what an archive holds as one page: verdict, cases, worst cases, signals, parameters and where they come
-    from.
+    """Write the contents of an archive as one page: verdict, cases, worst cases, signals, and parameters with their
+    origins.
 
-    The page is whole in one file, opens without a network, and prints. Nothing is written over but a report of MET.
-    Exit status: 0 it is written, whatever it says; 2 the input is wrong.
+    The page is a single file, opens without a network, and can be printed. Only a report of MET is overwritten. Exit
+    status: 0 the page is written, whatever it says; 2 the input is wrong.
     """
     from batch.report import report as make
     from ic.printing.columns import size

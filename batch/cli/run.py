@@ -37,8 +37,8 @@ ROWS = click.option(
     "--rows",
     default="all",
     metavar="WHICH",
-    help="Cases that have a row in the archive: all, or a `summary` of them with the few rows that it names, or "
-    "worst:N:METRIC, the N worst besides. [all]",
+    help="Cases that have a row in the archive: all; or those few that a `summary` of all cases names; or "
+    "worst:N:METRIC, the N worst in addition. [all]",
 )
 
 VERIFY = click.option(
@@ -46,8 +46,8 @@ VERIFY = click.option(
     type=click.Choice(["auto", "none", "some", "all"]),
     default="auto",
     metavar="WHICH",
-    help="Cases to run again at half and a quarter of the step, for errors of metrics: none, some, all, "
-    "or auto: some where that is cheap. [auto]",
+    help="Cases to run again with half and a quarter of the step, to estimate the errors of metrics: none, some, "
+    "all, or auto, which is some if that is cheap. [auto]",
 )
 
 
@@ -69,40 +69,50 @@ def measured(value: Any, si: str) -> float:
 @click.command(short_help="Run the cases of a deck or a plan into an archive.")
 @click.argument("source", metavar="DECK|PLAN.json|ARCHIVE.h5")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
-@click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck; all cases of an archive.")
+@click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck, or all cases of the archive.")
 @click.option(
     "-o",
     "--output",
     metavar="FILE",
-    help="The archive [DECK.h5, or DECK.NAME.h5, in this folder]; "
+    help="The archive to write [DECK.h5, or DECK.NAME.h5, in this folder]; "
     f"FILE{endings(' or ')}: FILE.h5, and an export of it.",
 )
-@click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'.")
-@click.option("--failed", is_flag=True, help="Of an archive: run the cases again that did not reach their end.")
+@click.option(
+    "--case",
+    "cases",
+    multiple=True,
+    metavar="ID",
+    help="Only this case: the beginning of its id, or its position, as '#0'.",
+)
+@click.option("--failed", is_flag=True, help="Of an archive: run again the cases that did not reach their end.")
 @click.option(
     "--histories",
     multiple=True,
     metavar="WHICH",
-    help="Whose signals to keep besides metrics: all, none, every:N, failed, worst:N:METRIC, or a case; "
-    "several together. [all, while the archive stays below 1 GiB]",
+    help="Cases whose signals are kept: all, none, every:N, failed, worst:N:METRIC, or a case; may be combined. "
+    "Metrics are always kept. [all, while the archive stays below 1 GiB]",
 )
-@click.option("--float32", is_flag=True, help="Keep signals as numbers of four bytes.")
-@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads, of each process [one a core].")
+@click.option("--float32", is_flag=True, help="Keep signals as 32-bit numbers.")
+@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads of each process [one per core].")
 @click.option(
     "--processes",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Run in N processes: a case that kills its process is found out, and the others are done.",
+    help="Run in N processes: a case that kills its process is identified, and all others are completed.",
 )
-@click.option("--dask", metavar="ADDRESS", help="Run on the workers of this Dask scheduler, or of a `local` one.")
+@click.option(
+    "--dask", metavar="ADDRESS", help="Run on the workers of the Dask scheduler at this address, or of a `local` one."
+)
 @click.option(
     "--timeout",
     type=SECONDS,
     metavar="TIME",
-    help="Give up a case that makes no progress for so long (`90 s`, `5 min`); in processes.",
+    help="Give up a case that makes no progress for this time (`90 s`, `5 min`); cases then run in processes.",
 )
-@click.option("--max-failures", type=click.IntRange(min=0), metavar="N", help="Stop when more cases have failed.")
-@click.option("--fresh", is_flag=True, help="Start over, rather than run what is missing.")
+@click.option(
+    "--max-failures", type=click.IntRange(min=0), metavar="N", help="Stop when more than N cases have failed."
+)
+@click.option("--fresh", is_flag=True, help="Start over, instead of running only what is missing.")
 @VERIFY
 @ROWS
 @click.option("--no-picture", is_flag=True, help="Draw no picture beside the archive.")
@@ -112,9 +122,9 @@ def measured(value: Any, si: str) -> float:
 def run(source: str, names: tuple[str, ...], form: str, **options: Any) -> int:
     """Run a deck's only run or sweep, else the one marked `default`; or those of these NAMEs.
 
-    The archive opens in xarray as it is; a picture of it lies beside it. A run that was interrupted or killed goes on
-    where it was. Of an archive, cases are run again, to the same bits. Exit status: 0 all cases reached their end and
-    met the requirements; 1 not all; 2 the input is wrong, and nothing was written.
+    The archive opens directly in xarray, and a picture is drawn beside it. A run that was interrupted or killed is
+    resumed. Of an archive, cases are run again, to the same bits. Exit status: 0 all cases reached their end and met
+    the requirements; 1 not all did; 2 the input is wrong, and nothing was written.
     """
     from batch.executors.termination import TERMINATED, Terminated, terminable
     from batch.terminal.running import run_and_tell
@@ -130,35 +140,46 @@ def run(source: str, names: tuple[str, ...], form: str, **options: Any) -> int:
         return TERMINATED
 
 
-@click.command(short_help="Hand the cases of a deck or a plan to a cluster's queue.")
+@click.command(short_help="Submit the cases of a deck or a plan to a cluster's queue.")
 @click.argument("source", metavar="DECK|PLAN.json")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
-@click.option("--slurm", is_flag=True, required=True, help="To SLURM, by sbatch: a job array, and a job that merges.")
-@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Jobs of the array [16].")
+@click.option(
+    "--slurm",
+    is_flag=True,
+    required=True,
+    help="Submit to SLURM, by sbatch: a job array, and a job that merges the results.",
+)
+@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Number of jobs in the array [16].")
 @click.option(
     "--sbatch",
     "options",
     multiple=True,
     metavar="WORD",
-    help="A further word for sbatch, such as --partition=long; may be repeated.",
+    help="Another option for sbatch, such as --partition=long; may be repeated.",
 )
 @click.option("--all", "everything", is_flag=True, help="All runs and sweeps of the deck.")
-@click.option("-o", "--output", metavar="FILE", help="The archive [as `met run` calls it].")
-@click.option("--case", "cases", multiple=True, metavar="ID", help="Only this case: the beginning of its id, or '#0'.")
-@click.option("--histories", multiple=True, metavar="WHICH", help="Whose signals to keep, as of `met run`.")
-@click.option("--float32", is_flag=True, help="Keep signals as numbers of four bytes.")
-@click.option("--timeout", type=SECONDS, metavar="TIME", help="Give up a case that makes no progress for so long.")
-@click.option("--fresh", is_flag=True, help="Start over, rather than submit what is missing.")
+@click.option("-o", "--output", metavar="FILE", help="The archive to write [with the name that `met run` gives it].")
+@click.option(
+    "--case",
+    "cases",
+    multiple=True,
+    metavar="ID",
+    help="Only this case: the beginning of its id, or its position, as '#0'.",
+)
+@click.option("--histories", multiple=True, metavar="WHICH", help="Cases whose signals are kept, as for `met run`.")
+@click.option("--float32", is_flag=True, help="Keep signals as 32-bit numbers.")
+@click.option("--timeout", type=SECONDS, metavar="TIME", help="Give up a case that makes no progress for this time.")
+@click.option("--fresh", is_flag=True, help="Start over, instead of submitting only what is missing.")
 @VERIFY
 @ROWS
 @deck_options
 @format_option
 @loudness_options
 def submit(source: str, names: tuple[str, ...], slurm: bool, form: str, **options: Any) -> int:
-    """Submit what is missing of a campaign as a job array: on a file system that all nodes see, this folder's.
+    """Submit the missing cases of a campaign as a job array. This folder must be on a file system that all nodes see.
 
-    The archive is there when the last job has ended; `met status ARCHIVE` says how far it is. What a cancelled job has
-    not done, the same command submits again, or `met run` runs here.
+    The archive is complete when the last job has ended; `met status ARCHIVE` shows the progress. The same command
+    submits again what a cancelled job has not done, or `met run` runs it here.
     """
     from batch.terminal.running import submit_and_tell
 
@@ -169,13 +190,14 @@ def submit(source: str, names: tuple[str, ...], slurm: bool, form: str, **option
     return YES
 
 
-@click.command(short_help="Say how far a campaign is that runs, waits or was interrupted.")
+@click.command(short_help="Show the progress of a campaign that runs, waits or was interrupted.")
 @click.argument("where", metavar="ARCHIVE|FOLDER")
 @format_option
 def status(where: str, form: str) -> int:
-    """Say how far a campaign is, from any shell: ARCHIVE as it will be called, or its folder ARCHIVE.campaign.
+    """Show the progress of a campaign, from any shell. ARCHIVE is the archive that it will write, or its folder
+    ARCHIVE.campaign.
 
-    Exit status: 0 all of it is done; 1 not yet; 2 there is no such campaign.
+    Exit status: 0 the campaign is complete; 1 not yet; 2 there is no such campaign.
     """
     import json
     import time

@@ -8,7 +8,7 @@ from met.cli import YES, format_option
 from met.messages.visible import line, say
 
 
-@click.command(short_help="Say which varied parameters explain a metric, a failure, or a change.")
+@click.command(short_help="Show which varied parameters explain a metric, a failure, or a change.")
 @click.argument("archive", metavar="ARCHIVE")
 @click.argument("metrics", nargs=-1, metavar="[METRIC]...")
 @click.option("--run", "experiments", multiple=True, metavar="NAME", help="Only this run or sweep of the archive.")
@@ -17,12 +17,12 @@ from met.messages.visible import line, say
 def sensitivity(
     archive: str, metrics: tuple[str, ...], experiments: tuple[str, ...], against: str | None, form: str
 ) -> int:
-    """Rank what is varied by the share of each METRIC's variance that it explains: all metrics by default, and
-    `failure` where some cases fail.
+    """Rank the varied parameters by the share of each METRIC's variance that they explain: of all metrics by default,
+    and of `failure` if some cases fail.
 
-    Alone: the first-order index. With others: the total index, as far as two inputs act together. Both with intervals
-    of 95 %. Any cases do whose parameters vary independently; those of `sample saltelli(n)` are estimated as they were
-    made.
+    The first-order index is the share of a parameter alone. The total index adds its share with others, as far as two
+    inputs act together. Both have 95 % intervals. Any cases will do whose parameters vary independently; those of
+    `sample saltelli(n)` are used with the estimators that they are made for.
     """
     import json
     from contextlib import ExitStack

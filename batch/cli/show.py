@@ -18,23 +18,25 @@ if TYPE_CHECKING:
 @click.argument("archive", metavar="ARCHIVE")
 @click.argument("signals", nargs=-1, metavar="[SIGNAL]...")
 @click.option("--run", "experiments", multiple=True, metavar="NAME", help="Only this run or sweep of the archive.")
-@click.option("--case", metavar="ID", help="All about this case alone: the beginning of its id, or '#0'.")
-@click.option("--all-cases", is_flag=True, help="All rows of the table of cases, not the first 20 alone.")
+@click.option(
+    "--case", metavar="ID", help="Only this case, in full: the beginning of its id, or its position, as '#0'."
+)
+@click.option("--all-cases", is_flag=True, help="All rows of the table of cases, not only the first 20.")
 @click.option(
     "--sort",
     multiple=True,
     metavar="NAME",
-    help="Cases by this metric or varied parameter, smallest first; "
-    "NAME:largest: largest first. Repeated: equal ones by the next.",
+    help="Sort cases by this metric or varied parameter, smallest first; NAME:largest sorts largest first. Repeated: "
+    "equal cases by the next NAME.",
 )
-@click.option("--reverse", is_flag=True, help="Of --sort: largest first, by each NAME that does not say it itself.")
+@click.option("--reverse", is_flag=True, help="With --sort: largest first, for each NAME that does not say it itself.")
 @click.option(
-    "--where", metavar="CONDITION", help="Only cases in which it holds: 'settle < 4 s and gearbox.kp > 0.02 V*s/rad'."
+    "--where", metavar="CONDITION", help="Only cases in which this holds: 'settle < 4 s and gearbox.kp > 0.02 V*s/rad'."
 )
-@click.option("--over", multiple=True, metavar="PATH", help="Of these that differ in PATH alone, the worst.")
-@click.option("--met", is_flag=True, help="Only cases, of these, that meet all requirements.")
-@click.option("--no-plots", is_flag=True, help="Numbers only.")
-@click.option("--evidence", is_flag=True, help="The table of requirements alone: share, bounds, worst case, margin.")
+@click.option("--over", multiple=True, metavar="PATH", help="Of the cases that differ only in PATH, show the worst.")
+@click.option("--met", is_flag=True, help="Only those of the cases that meet all requirements.")
+@click.option("--no-plots", is_flag=True, help="Print numbers only, without plots.")
+@click.option("--evidence", is_flag=True, help="Only the table of requirements: share, bounds, worst case, margin.")
 @format_option
 def show(
     archive: str,
@@ -51,9 +53,9 @@ def show(
     evidence: bool,
     form: str,
 ) -> int:
-    """Show what an archive holds: what was run, how it went, metrics, requirements, and SIGNALs (`qd`, `elbow.q`).
+    """Show the contents of an archive: what was run, its outcome, metrics, requirements, and SIGNALs (`qd`, `elbow.q`).
 
-    Of a sweep, also which cases failed or missed a requirement, worst first, or by what --sort names.
+    Of a sweep, also the cases that failed or missed a requirement, the worst first, or in the order of --sort.
     """
     import shutil
     import sys
@@ -114,8 +116,9 @@ def profile(
 ) -> int:
     """Measure the kernel of a deck's only run or sweep, of the one marked `default`, or of these NAMEs, on one core.
 
-    Operations, flops and time of each part of a step, the share of what the core can do, what is folded into the code
-    and what is an input, and how the kernel was made. Nothing is written but the cache.
+    The output has operations, flops and time of each part of a step, the share of what the core can do, the parameters
+    that are folded into the code and those that are inputs, and how the kernel was made. Nothing is written but the
+    cache.
     """
     from batch.terminal.profile import profile_lines
     from met.analysis.profile import as_data
@@ -126,7 +129,7 @@ def profile(
     return YES
 
 
-@click.command(short_help="Say whether a law keeps a motor on a bed stable, and with what margin.")
+@click.command(short_help="Predict whether a law keeps a motor on a bed stable, and with what margin.")
 @click.argument("source", metavar="DECK|PLAN.json")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @deck_options
@@ -141,7 +144,7 @@ def margin(
 ) -> int:
     """Predict, for each joint whose motor is on a bed, how heavy the arm may be for its law, rate and delay.
 
-    Bed, servo and law are linearised over a tick of the servo with arms of any inertia, and their poles are looked at.
+    Bed, servo and law are linearised over a tick of the servo, with arms of any inertia, and judged by their poles.
     Exit status: 0 all joints are stable in all cases; 1 one is not; 2 the input is wrong, or no joint is on a bed.
     """
     from batch.terminal.margin import as_data, margin_lines

@@ -14,10 +14,10 @@ from met.host.sources import names_archive, names_plan
 from met.messages.visible import say
 
 
-@click.command(short_help="Make a page that runs an archive's cases again under sliders, or watch a deck on one.")
+@click.command(short_help="Make a page that runs an archive's cases again with sliders, or watch a deck on one.")
 @click.argument("source", metavar="ARCHIVE|DECK")
 @click.argument("name", metavar="[NAME]", required=False)
-@click.option("-o", "--output", metavar="FILE", help="Of an archive: the page [ARCHIVE.view.html].")
+@click.option("-o", "--output", metavar="FILE", help="Of an archive: the page to write [ARCHIVE.view.html].")
 @click.option(
     "--against",
     metavar="FILE",
@@ -26,10 +26,10 @@ from met.messages.visible import say
 @click.option(
     "--numbers",
     metavar="DECK",
-    help="Of an archive: its deck, whose numbers can be dragged then, by a second module.",
+    help="Of an archive: also show its deck, whose numbers can then be dragged; this takes a second module.",
 )
 @click.option(
-    "--port", type=click.IntRange(1, 65535), metavar="N", help="Of a deck: the port of 127.0.0.1 [a free one]."
+    "--port", type=click.IntRange(1, 65535), metavar="N", help="Of a deck: the port on 127.0.0.1 [a free one]."
 )
 @deck_options
 @loudness_options
@@ -46,15 +46,15 @@ def view(
     quiet: bool,
     verbose: bool,
 ) -> int:
-    """Write an archive's only run or sweep, or NAME, as a page with a slider for each number that is varied. Or watch a
-    deck: the page of its run, or NAME, is new each time the deck is saved.
+    """Write an archive's only run or sweep, or NAME, as a page with a slider for each varied number. Or watch a deck:
+    the page of its run, or of NAME, is renewed each time the deck is saved.
 
-    Whoever opens the page moves a slider, and the run is computed there, with the bits of the archive; where the
-    archive has the case, the page compares. It is whole in one file and opens without a network.
+    When a slider is moved, the page itself computes the run, with the bits of the archive; where the archive has the
+    case, the page compares. The page is a single file and opens without a network.
 
-    The page of a deck is served on 127.0.0.1, to who has the address that is printed, until Ctrl-C or until the
-    terminal is closed. A mistake in the deck is shown beside the last run without one. A file that is no deck, and a
-    NAME that the deck does not have, are refused (exit status 2).
+    The page of a deck is served on 127.0.0.1, to those who have the printed address, until Ctrl-C or until the terminal
+    is closed. A mistake in the deck is shown beside the last run without one. A file that is not a deck, and a NAME
+    that the deck does not have, are refused (exit status 2).
     """
     of_archive = () if numbers is not None else include_dirs
     check_options(source, () if name is None else (name,), False, defines, of_archive, settings)

@@ -251,7 +251,7 @@ def _opened_port(opening: Opening) -> EmulatedBed:
 
 PORT = PortKind(
     scheme="emulated",
-    doc="The deck's bed in this process, in lock-step.",
+    doc="The deck's bed, emulated in this process, in lock-step.",
     open=_opened_port,
     simulated=True,
     needs=tuple(each for each in SIMULATION_PARAMETERS if each.name == "i_max"),

@@ -154,7 +154,7 @@ def _opened_port(opening: Opening) -> ReplayBed:
 
 PORT = PortKind(
     address="FILE",
-    doc="A transcript of an earlier run: what its bed answered then.",
+    doc="The transcript of an earlier run, whose bed's answers are replayed.",
     open=_opened_port,
     lock_step=_was_in_lock_step,
     replays=True,

@@ -185,14 +185,14 @@ def _opened_port(opening: Opening, kind: Literal["firmware", "qemu"]) -> Simulat
 
 FIRMWARE = PortKind(
     scheme="firmware",
-    doc="The bed's firmware with the deck's bed as its plant, a program of its own on this machine.",
+    doc="The bed's firmware as a program on this machine, with the deck's bed as its plant.",
     open=partial(_opened_port, kind="firmware"),
     simulated=True,
     needs=SIMULATION_PARAMETERS,
 )
 QEMU = PortKind(
     scheme="qemu",
-    doc="The same as it runs on a Cortex-M3, in an emulator.",
+    doc="The bed's firmware for a Cortex-M3 in an emulator, with the deck's bed as its plant.",
     open=partial(_opened_port, kind="qemu"),
     simulated=True,
     needs=SIMULATION_PARAMETERS,

@@ -7,12 +7,12 @@ from ic.language.declaration import BlockDeclaration, Entry
 ANYWHERE = BlockDeclaration(
     name="anywhere",
     written="",
-    doc="what may stand wherever entries may",
+    doc="entries that may stand in any block of a deck",
     entries=(
         Entry(
             name="for", form="statement", written="for i in 1 .. 6 by 1 { ... }",
-            doc="its block once for each whole number, or for each name of `for side in [left, right] { ... }`; "
-            "`seg_{i}` is the name `seg_1` in the first turn, and in values `i` is the number",
+            doc="repeats its block for each whole number, or for each name as in `for side in [left, right] { ... }`; "
+            "`seg_{i}` is then the name `seg_1`, `seg_2` and so on, and `i` in a value is the number",
             default="none",
         ),
         Entry(
@@ -23,7 +23,7 @@ ANYWHERE = BlockDeclaration(
         ),
         Entry(
             name="*", form="statement", written="* = SERVO;",
-            doc="in `servos`: the servo of every joint that has none of its own", default="none",
+            doc="in `servos`: the servo of every joint that is given none by its name", default="none",
         ),
     ),
 )  # fmt: skip

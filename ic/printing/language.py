@@ -12,6 +12,7 @@ from typing import Any
 
 from ic.language import BLOCKS, BlockDeclaration, Entry
 from ic.printing.columns import columns, exactly
+from ic.printing.wrapping import described, terminal_width
 from met.parameter import Parameter
 
 PAGE = Path(__file__).parents[2] / "docs" / "deck.md"
@@ -26,7 +27,7 @@ def print_block(block: BlockDeclaration) -> Iterator[str]:
     yield f"In a deck: {block.written}" + (f", in {_an(block.within)}" if block.within else "")
     yield ""
     rows = [(each.written, default(each), each.doc) for each in block.entries]
-    yield from columns([("written", "default", "meaning"), *rows])
+    yield from described([("written", "default", "meaning"), *rows], width=terminal_width(), head=True)
     if block.free:
         yield ""
         yield f"Also {block.free}."

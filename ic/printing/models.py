@@ -9,8 +9,9 @@ from dataclasses import fields
 from typing import Any, get_args
 
 from ic.language import BLOCKS
-from ic.printing.columns import columns, exactly
+from ic.printing.columns import exactly
 from ic.printing.glossary import entries
+from ic.printing.wrapping import described, paragraphs, terminal_width
 from met import models
 from met.diagnostic import Problem, did_you_mean, error
 from met.parameter import Parameter
@@ -19,16 +20,18 @@ from met.plan.channel import watched_unit
 KINDS: tuple[models.Kind, ...] = get_args(models.Kind)
 WHERE_WRITTEN = {
     "servo": "servo NAME { model = MODEL; ... }",
-    "sensor": "sensor QUANTITY = MODEL { ... }, in a servo: of q, qd or a state of the servo; of a link in a run",
-    "command": "command = rate(MODEL(...)), position(...), torque(...) or acceleration(...), in a servo",
+    "sensor": "sensor QUANTITY = MODEL { ... }, in a servo, for `q`, `qd` or a state of it; on a link: "
+    "`sensor NAME = MODEL { link = LINK; ... }`, in a run",
+    "command": "command = rate(MODEL(...)), in a servo; also `position(...)`, `torque(...)` and `acceleration(...)`",
     "environment": "environment { NAME = MODEL { ... } }, in a run",
-    "guide": "guide NAME = MODEL { ... }, in a run; command = rate(NAME) or position(NAME) in servos",
+    "guide": "guide NAME = MODEL { ... }, in a run; its servos have `command = rate(NAME)` or `position(NAME)`",
     "metric": "metric NAME = MODEL { of = CHANNEL; ... }, in a run",
     "integrator": "integrator = MODEL, in a run",
     "bed": "substitute JOINT { bed = MODEL(...); ... }, in a run",
     "law": "substitute JOINT { law = MODEL(...); ... }, in a run",
 }
 
+IN_SERVO = "sensor QUANTITY = MODEL { ... }, in a servo, for `q`, `qd` or a state of the servo"
 ON_LINK = "sensor NAME = MODEL { link = LINK; ... }, in a run"
 
 OF_LANGUAGE = tuple(name for name in BLOCKS if name not in KINDS)
@@ -40,14 +43,17 @@ OTHERS = (*OF_LANGUAGE, "channels", "designs", "dh", "distributions", "functions
 FIELDS = tuple(field.name for field in fields(Parameter))
 """The fields of a parameter that `met doc --format json` gives."""
 
-MEANING_OF_OF = {"metric": "the unit of the channel that the metric watches", "sensor": "the unit of what is sensed"}
+MEANING_OF_OF = {
+    "metric": "the unit of the signal that the metric evaluates",
+    "sensor": "the unit of the quantity that is sensed",
+}
 """The meaning of the word `of` in units, by kind of model."""
 
 UNIT_WORDS = {
     "joint": "rad, or m on a prismatic joint",
     "effort": "N*m, or N on a prismatic joint",
-    "of": "the unit of what is watched, or sensed",
-    "command": "the unit of what is commanded",
+    "of": "the unit of the signal that is evaluated, or of the quantity that is sensed",
+    "command": "the unit of the commanded quantity",
 }
 
 
@@ -78,9 +84,9 @@ def print_list(found: list[tuple[models.Kind, Any]]) -> Iterator[str]:
         listed = [(model.name, summary(model)) for k, model in found if k == kind]
         if listed:
             yield f"{kind}: {WHERE_WRITTEN[kind]}"
-            yield from columns(listed)
+            yield from described(listed, width=terminal_width())
             yield ""
-    yield "`met doc MODEL` says all that one declares; `met doc channels` what can be recorded."
+    yield "`met doc MODEL` shows everything that a model declares, `met doc channels` everything that can be recorded."
     yield f"Blocks of a deck: {', '.join(OF_LANGUAGE)}."
     others = [each for each in OTHERS if each not in OF_LANGUAGE and each != "channels"]
     yield f"Also: {', '.join(others)}; and the code of a message, as in `met doc D060`."
@@ -89,7 +95,9 @@ def print_list(found: list[tuple[models.Kind, Any]]) -> Iterator[str]:
 def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
     """All that a model declares."""
     yield f"{kind} {model.name}"
-    yield from (f"  {line}".rstrip() for line in textwrap.dedent(model.doc).strip().splitlines())
+    width = terminal_width()
+    doc = paragraphs(textwrap.dedent(model.doc).strip(), width=None if width is None else width - 2)
+    yield from (f"  {line}".rstrip() for line in doc)
     yield ""
     yield f"In a deck: {where_written(kind, model)}"
     yield from declared_facts(kind, model)
@@ -97,12 +105,13 @@ def print_model(kind: models.Kind, model: Any) -> Iterator[str]:
     if parameters:
         yield ""
         yield "Parameters"
-        yield from columns(rows(parameters))
+        yield from described(rows(parameters), width=width, head=True)
+    yield from (f"  {line}" for line in sources(parameters))
     yield from (f"  {word}: {text}" for word, text in words_in(kind, parameters))
     for text, parts in recorded_channels(kind, model):
         yield ""
         yield text
-        yield from columns(parts)
+        yield from described(parts, width=width)
 
 
 def model_json(kind: models.Kind, model: Any) -> dict[str, Any]:
@@ -125,7 +134,9 @@ def rows(parameters: Iterable[Parameter]) -> list[tuple[str, str, str, str, str]
 
 def where_written(kind: models.Kind, model: Any) -> str:
     """The place in a deck where this model is written, in words."""
-    usage = ON_LINK if kind == "sensor" and model.measures is not None else WHERE_WRITTEN[kind]
+    usage = WHERE_WRITTEN[kind]
+    if kind == "sensor":
+        usage = IN_SERVO if model.measures is None else ON_LINK
     if kind == "metric" and model.condition:
         usage = usage.replace("CHANNEL", "CONDITION")
     return usage.replace("MODEL", model.name)
@@ -134,39 +145,39 @@ def where_written(kind: models.Kind, model: Any) -> str:
 def recorded_channels(kind: models.Kind, model: Any) -> Iterator[tuple[str, list[tuple[str, str, str]]]]:
     """Channels of a servo, guide, sensor of a link, bed or law: in words, then name, unit and meaning of each."""
     for words, text in (
-        ("outputs", "Given by its law, at its ticks"),
-        ("integrals", "Integrated by its law"),
-        ("states", "Integrated with the motion"),
-        ("signals", "Shown at every instant"),
+        ("outputs", "Outputs of the control law, updated at each tick of the servo"),
+        ("integrals", "Integrals of the control law"),
+        ("states", "States of the servo, integrated with the motion of the arm"),
+        ("signals", "Signals computed at every instant"),
     ):
         parts = getattr(model, words, ())
         if parts and kind == "servo":
             yield f"{text}; recorded as JOINT.servo.NAME", [(p.name, unit_in_words(p.unit), p.doc) for p in parts]
     if kind == "guide" and model.memory:
         rows = [(p.name, unit_in_words(p.unit), p.doc) for p in model.memory]
-        yield "Given by its law, at its ticks; recorded as guides.NAME.NAME", rows
+        yield "Outputs of the guide, updated at each of its ticks; recorded as guides.NAME.NAME", rows
     if kind == "sensor" and model.measures is not None:
         rows = [(p.name, unit_in_words(watched_unit(p.unit, model.unit)), p.doc) for p in model.states]
-        yield "Integrated with the motion; recorded as sensors.NAME.NAME, what it reads as sensors.NAME", rows
+        yield "States of the sensor, recorded as sensors.NAME.NAME; its reading is recorded as sensors.NAME", rows
     shown = list(model.shown if kind in ("bed", "law") else ())
     if shown:
         rows = [(name, unit_in_words(unit), doc) for name, unit, doc in shown]
-        yield f"Held from tick to tick; recorded as JOINT.{kind}.NAME", rows
+        yield f"Values of the {kind}, updated at each tick of the servo; recorded as JOINT.{kind}.NAME", rows
 
 
 def declared_facts(kind: models.Kind, model: Any) -> Iterator[str]:
     """Further facts that a model declares, in a line each."""
     for words, text in (
-        ("commands", "Commands it takes"),
+        ("commands", "Kinds of command"),
         ("order", "Order"),
-        ("real_limit", "Stable while step times rate constant is below"),
+        ("real_limit", "Stable as long as the step times the rate of a decay (1/s) is below"),
     ):
         value = getattr(model, words, None)
         if value:
-            text = "Commands it gives" if kind == "guide" else text
+            text = "Kinds of command that it gives" if kind == "guide" else text
             yield f"{text}: {', '.join(value) if isinstance(value, tuple) else exactly(value)}"
     if kind == "sensor" and model.unit:
-        yield f"Unit of what it reads: {model.unit}"
+        yield f"Unit of the reading: {model.unit}"
     if kind == "metric":
         meant = UNIT_WORDS | {"of": MEANING_OF_OF["metric"]}
         yield f"Unit of the result: {meant.get(model.unit, unit_in_words(model.unit))}"
@@ -219,8 +230,17 @@ def range_(parameter: Parameter) -> str:
 
 
 def meaning(parameter: Parameter) -> str:
-    """A parameter's description, where its number comes from, and the word that it depends on."""
-    only = "" if parameter.only is None else f"; with {parameter.only[0]} = {' or '.join(parameter.only[1])}"
-    shape = {"vector": "three numbers; ", "list": "a list; ", "text": "in quotes; "}.get(parameter.shape, "")
+    """A parameter's description, with its shape and the word that it depends on."""
+    only = "" if parameter.only is None else f"; only with {parameter.only[0]} = {' or '.join(parameter.only[1])}"
+    shape = {"vector": "three numbers; ", "list": "a list; ", "text": "a text in quotes; "}.get(parameter.shape, "")
     shape = "the same in all cases; " if parameter.decides else shape
-    return f"{shape}{parameter.doc}{only}" + (f" ({parameter.source})" if parameter.source else "")
+    return f"{shape}{parameter.doc}{only}"
+
+
+def sources(parameters: Iterable[Parameter]) -> list[str]:
+    """Where parameters and their numbers come from, a line for each source: `Source of kp, ki: ...`."""
+    named: dict[str, list[str]] = {}
+    for each in parameters:
+        if each.source and each.name not in named.setdefault(each.source, []):
+            named[each.source].append(each.name)
+    return [f"Source of {', '.join(names)}: {source}" for source, names in named.items()]

@@ -18,6 +18,7 @@ from ic.printing.models import (
     default,
     recorded_channels,
     rows,
+    sources,
     unit_in_words,
     where_written,
     words_in,
@@ -27,11 +28,13 @@ from met import models
 HEAD = """\
 # Models, their parameters, channels, units
 
-`met doc --markdown` writes this page from what the models declare, and a test holds that it is up to date. `met doc`
-prints the same in a terminal, of models from other packages too; how to write one is in [models](models.md), how they
-stand in a deck in [Writing decks](deck.md).
+This page lists everything that a deck can contain: the blocks of the deck language, the models with their parameters
+and channels, and the units, functions and distributions. [Writing decks](deck.md) explains how to use them, and
+[models](models.md) how to add a model. `met doc` prints the same in a terminal, also for models of other packages.
+`met doc --markdown` writes this page from the declarations in the code, and a test keeps it up to date.
 
-Defaults and bounds are in SI. `needed` is what the deck must write; `-` is a pure number.
+Defaults and ranges are in SI units. A parameter whose default is `needed` must be written. The unit `-` means a pure
+number.
 """
 
 
@@ -105,6 +108,9 @@ def _model(kind: models.Kind, model: Any) -> Iterator[str]:
     if parameters:
         yield ""
         yield from _table(rows(parameters))
+    for source in sources(parameters):
+        yield ""
+        yield _escaped(source)
     words = [f"`{word}`: {_escaped(text)}" for word, text in words_in(kind, parameters)]
     if words:
         yield ""
@@ -146,8 +152,7 @@ def _channels() -> Iterator[str]:
     yield ""
     yield f"## {TITLES['channels']}"
     yield ""
-    yield "What can be recorded, and watched by a metric. Without `JOINT.` it is that of all joints that have it; with"
-    yield "`.x`, one component of a vector."
+    yield f"The signals that a run can record and a metric can evaluate. {subjects.SHORT_FORMS}"
     yield ""
     found = subjects.channels()
     rows = [
@@ -198,9 +203,9 @@ def _cell(text: str) -> str:
 
 
 def _code(text: str) -> str:
-    return f"`{text.replace(', in a run', '').replace(', in a servo', '')}`" + (
-        ", in a run" if text.endswith("in a run") else ", in a servo" if text.endswith("in a servo") else ""
-    )
+    """A usage of `where_written`: what a deck writes as code, and the words behind it."""
+    code, where, words = text.partition(", in a ")
+    return f"`{code}`{where}{words}"
 
 
 def _prose(doc: str) -> Iterator[str]:

@@ -16,19 +16,30 @@ from ic.printing.columns import columns, exactly
 from ic.printing.language import block_json, print_block
 from ic.printing.models import FIELDS, OF_LANGUAGE, UNIT_WORDS, default, rows, summary, unit_in_words
 from ic.printing.sweeps import print_words, words_json
+from ic.printing.wrapping import described, paragraphs, terminal_width
 from met import models, units
 from met.plan import channel
 from met.plan.linear_uses import FIGURES
 
 OF_ANY = (
-    ("JOINT.servo.NAME", "what a servo holds, integrates and shows: `met doc` and the name of its model"),
-    ("JOINT.servo.command", "what the servo was asked at its last tick, in the command's unit"),
-    ("JOINT.bed.NAME, JOINT.law.NAME", "of a joint whose motor is on a bed: `met doc bed`, `met doc law`"),
+    (
+        "JOINT.servo.NAME",
+        "an output, state or signal of the joint's servo; `met doc` and the name of its model lists them",
+    ),
+    ("JOINT.servo.command", "setpoint of the servo at its last tick, in the unit of the command"),
+    (
+        "JOINT.bed.NAME, JOINT.law.NAME",
+        "values of the motor bed of a joint and of the law of its load motor: `met doc beds`, `met doc laws`",
+    ),
     (
         "sensors.NAME, sensors.NAME.NAME",
-        "what a sensor of a link reads, and its states; `sensors`: what all of them read",
+        "reading of a sensor on a link, and a state of its filter; `sensors` is short for the readings of all sensors",
     ),
 )
+
+
+SHORT_FORMS = "`q` without `JOINT.` is that channel of all joints; `.x` behind a vector is one component of it."
+"""The forms of a channel that are shorter or longer than its path."""
 
 
 def channels() -> list[dict[str, str]]:
@@ -51,27 +62,26 @@ def channels() -> list[dict[str, str]]:
 
 JOINT, LINK, PAYLOAD = "JOINT.", "links.LINK.", "payloads.PAYLOAD."
 MORE_WORDS = {
-    word: f"{channel.TURNING[word]}, or {channel.SLIDING[word]} of a prismatic joint"
+    word: f"{channel.TURNING[word]}, or {channel.SLIDING[word]} on a prismatic joint"
     for word in ("inertia", "angular", "linear")
 }
 
 
 def print_channels() -> Iterator[str]:
-    yield "What can be recorded, and watched by a metric: record = [q, JOINT.reaction, links.LINK.position, energy];"
+    yield "channels: the signals that a run can record and a metric can evaluate"
+    yield ""
+    yield "In a deck: record = [q, JOINT.reaction, links.LINK.position, energy];"
     yield ""
     found = channels()
-    rows = [("channel", "unit", "components", "meaning", "axes")]
-    yield from columns(
-        rows
-        + [
-            (each["path"], unit_in_words(each["unit"]), each["components"], each["meaning"], each["frame"])
-            for each in found
-        ]
-    )
+    rows = [("channel", "unit", "components", "meaning; axes")]
+    for each in found:
+        meaning = "; ".join(filter(None, (each["meaning"], each["frame"])))
+        rows.append((each["path"], unit_in_words(each["unit"]), each["components"], meaning))
+    yield from described(rows, width=terminal_width(), head=True)
     yield ""
-    yield from columns(list(OF_ANY))
+    yield from described(list(OF_ANY), width=terminal_width())
     yield ""
-    yield "Without `JOINT.` it is that of all joints that have it; with `.x`, one component of a vector."
+    yield SHORT_FORMS
     yield from (f"  {word}: {text}" for word, text in words_of(found))
 
 
@@ -83,16 +93,20 @@ def words_of(found: list[dict[str, str]]) -> list[tuple[str, str]]:
 
 def print_dh() -> Iterator[str]:
     yield "dh: the frame of a joint by Denavit-Hartenberg numbers"
-    yield from (f"  {line}".rstrip() for line in textwrap.dedent(dh.__doc__ or "").strip().splitlines())
+    width = terminal_width()
+    doc = paragraphs(textwrap.dedent(dh.__doc__ or "").strip(), width=None if width is None else width - 2)
+    yield from (f"  {line}".rstrip() for line in doc)
     yield ""
     yield "In a deck: joint NAME revolute { parent = ...; child = ...; dh = classic(a = 0.4 m, alpha = 90 deg); }"
     yield ""
     yield "Numbers"
-    yield from columns(
+    yield from described(
         [
             ("name", "unit", "default", "meaning"),
             *((each.name, each.unit, default(each), each.doc) for each in dh.NUMBERS),
-        ]
+        ],
+        width=width,
+        head=True,
     )
 
 
@@ -109,7 +123,7 @@ def print_shapes() -> Iterator[str]:
     for name, shape in shapes.SHAPES.items():
         yield ""
         yield name
-        yield from columns(rows(shape.parameters))
+        yield from described(rows(shape.parameters), width=terminal_width(), head=True)
 
 
 BEGIN = (shapes.__doc__ or "").strip().split("\n\n", 1)[1]
@@ -127,27 +141,29 @@ def print_substitute() -> Iterator[str]:
     yield from print_block(BLOCKS["substitute"])
     for kind, usual in DEFAULTS.items():
         yield ""
-        yield f"{kind}s; {usual} unless written"
-        yield from columns([(name, summary(model)) for name, model in models.available(kind).items()])
+        yield f"Models of a {kind}; the default is {usual}"
+        listed = [(name, summary(model)) for name, model in models.available(kind).items()]
+        yield from described(listed, width=terminal_width())
     yield ""
-    yield "Parameters of a bed that are the servo's unless they are written"
-    yield from columns(
+    yield "Parameters of a bed that have the value of the servo unless they are written"
+    yield from described(
         [
             (name, p.name, f"the servo's {p.of_servo}", p.doc)
             for name, model in models.available("bed").items()
             for p in model.parameters
             if p.of_servo
-        ]
+        ],
+        width=terminal_width(),
     )
     yield ""
-    yield "`met doc emulated`, and so for every bed and law, says what it takes and what of it can be recorded."
+    yield "`met doc` and the name of a bed or law lists its parameters, and its channels, which can be recorded."
 
 
 def print_linear() -> Iterator[str]:
     yield from print_block(BLOCKS["linear"])
     yield ""
-    yield "Figures, as metrics: metric NAME = FIGURE { of = LINEAR; }, or require FIGURE(LINEAR) > LIMIT;"
-    yield from columns([(each.name, each.unit, each.doc) for each in FIGURES.values()])
+    yield "Figures that a metric can be: metric NAME = FIGURE { of = LINEAR; }, or require FIGURE(LINEAR) > LIMIT;"
+    yield from described([(each.name, each.unit, each.doc) for each in FIGURES.values()], width=terminal_width())
 
 
 def figures_json() -> list[dict[str, Any]]:
@@ -167,11 +183,11 @@ def unit_table() -> list[dict[str, Any]]:
 
 
 def print_units() -> Iterator[str]:
-    yield "units: those that a deck may write, behind a number, joined by * / ^ and brackets"
+    yield "units: the units that a deck may write behind a number, combined by * / ^ and brackets"
     yield ""
     yield from columns([("name", "word", "is"), *((each["name"], each["word"], in_si(each)) for each in unit_table())])
     yield ""
-    yield "A rate of turning is no frequency: 60 rpm is 2 pi rad/s, and 1 Hz is 1/s. There are no further prefixes."
+    yield "An angular rate is not a frequency: 60 rpm is 2 pi rad/s, but 1 Hz is 1/s. There are no other prefixes."
 
 
 def in_si(unit: Mapping[str, Any]) -> str:

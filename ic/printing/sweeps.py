@@ -10,7 +10,8 @@ from types import MappingProxyType
 
 from ic.meaning.definitions.row_tables import CSV
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS, USAGE
-from ic.printing.columns import columns, exactly
+from ic.printing.columns import exactly
+from ic.printing.wrapping import described, terminal_width
 from ic.sweeps.designs import AT_MOST, DESIGNS, DIGITS, DISTRIBUTIONS, UNTIL_SHOWN
 from met.frozen import frozen
 
@@ -18,32 +19,47 @@ Row = tuple[str, str, str]
 """A name, how it is written, what it is."""
 
 OF_FUNCTIONS: Mapping[str, str] = MappingProxyType({
-    "sqrt": "root; the unit's too", "sin": "of an angle, or of a bare number of radians", "cos": "the same",
-    "min": "least of values of one dimension, two or more", "max": "greatest of values of one dimension, two or more",
+    "sqrt": "square root of a value and of its unit",
+    "sin": "sine of an angle, or of a pure number in radians",
+    "cos": "cosine of an angle, or of a pure number in radians",
+    "min": "smallest of two or more values of one dimension",
+    "max": "largest of two or more values of one dimension",
     "linspace": "evenly spaced values, both ends included",
-    "logspace": "values in one ratio, both ends included (ends, not exponents)",
-    "abs": "size, whatever the sign", "tan": "of an angle, as sin", "asin": "angle of a sine", "acos": "of a cosine",
-    "atan": "of a tangent", "atan2": "angle of the point (x, y), both of one dimension",
-    "exp": "of a pure number, as log and tanh", "log": "natural logarithm", "tanh": "hyperbolic tangent",
-    "floor": "greatest whole number not above a pure number", "ceil": "least whole number not below it",
-    "round": "nearest whole number, halves away from zero", "sign": "1, 0 or -1, of any value",
+    "logspace": "values with a constant ratio, both ends included; `from` and `to` are values, not exponents",
+    "abs": "absolute value",
+    "tan": "tangent of an angle, or of a pure number in radians",
+    "asin": "angle whose sine is x",
+    "acos": "angle whose cosine is x",
+    "atan": "angle whose tangent is x",
+    "atan2": "angle of the point (x, y), whose coordinates have the same dimension",
+    "exp": "exponential function of a pure number",
+    "log": "natural logarithm of a pure number",
+    "tanh": "hyperbolic tangent of a pure number",
+    "floor": "largest whole number not above the pure number x",
+    "ceil": "smallest whole number not below the pure number x",
+    "round": "whole number nearest to the pure number x; halves are rounded away from zero",
+    "sign": "sign of a value of any dimension: 1, 0 or -1",
 })  # fmt: skip
 
 OF_DESIGNS: Mapping[str, str] = MappingProxyType(
     {
-        "lhs": "a Latin hypercube: each range in n equal parts, one value from each; more samples are other ones",
-        "sobol": "a scrambled Sobol sequence, evenly spread; n a power of 2; more samples change no old case",
-        "saltelli": "n times the d + 2 cases for the indices of d parameters (`met sensitivity`); n a power of 2; more "
-        "samples change no old case",
-        "random": "independent draws; neither more samples nor more parameters change an old case",
+        "lhs": "Latin hypercube: each range is divided into n equal parts with one value in each; another n draws "
+        "other values",
+        "sobol": "scrambled Sobol sequence, which covers the ranges evenly; n is a power of 2; a larger n keeps all "
+        "earlier cases",
+        "saltelli": "the n (d + 2) cases for sensitivity indices of d parameters (`met sensitivity`); n is a power "
+        "of 2; a larger n keeps all earlier cases",
+        "random": "independent random draws; a larger n keeps all earlier cases, and more parameters keep all "
+        "earlier values",
     }
 )
 
-OF_UNTIL_SHOWN = "the same draws, up to the first that decides all requirements with a confidence; at most n"
+OF_UNTIL_SHOWN = "draws of random(n), until all requirements that have a confidence are decided; at most n"
 
 OF_DISTRIBUTIONS: Mapping[str, str] = MappingProxyType({
-    "uniform": "evenly between two values", "loguniform": "evenly in the logarithm", "normal": "normal, without bounds",
-    "truncated": "normal, cut off on either side",
+    "uniform": "uniform between two values", "loguniform": "uniform in the logarithm between two values",
+    "normal": "normal, without bounds, by its mean and standard deviation",
+    "truncated": "normal, by its mean and standard deviation, cut off at two values",
 })  # fmt: skip
 
 
@@ -52,7 +68,7 @@ def _functions() -> list[Row]:
     table = (
         CSV,
         f"{CSV}({', '.join(USAGE[CSV])})",
-        "of a `let`: values by the names of rows and columns, NAME.ROW.COLUMN",
+        "table of a CSV file, for a `let NAME`; its values are NAME.ROW.COLUMN, by the names of rows and columns",
     )
     return [*calls, table, *((name, name, exactly(value)) for name, value in CONSTANTS.items())]
 
@@ -79,22 +95,22 @@ class Subject:
 SUBJECTS: Mapping[str, Subject] = MappingProxyType(
     {
         "functions": Subject(
-            "What values may call, and the constants",
+            "The functions and constants that values may use",
             "let step = max(1 mm, sqrt(2) * 3 mm);",
             _functions,
-            "The arguments bear units, or the whole has one behind its bracket: `linspace(1, 2, 5) kg`.",
+            "Each argument has its unit, or one unit for all stands behind the bracket: `linspace(1, 2, 5) kg`.",
         ),
         "designs": Subject(
-            "How the points of a sweep's sample lie",
+            "The ways to choose the points of a sample in a sweep",
             "sample lhs(200) { PATH = normal(20, 1) kg; }",
             _designs,
-            "What values the points become, `met doc distributions` says.",
+            "`met doc distributions` lists the distributions from which the points get their values.",
         ),
         "distributions": Subject(
-            "What a parameter of a sample is drawn from",
+            "The probability distributions of a parameter in a sample",
             "sample lhs(200) { PATH = uniform(0.09, 0.11) N*m/A; }",
             _distributions,
-            f"The unit behind the brackets is for all numbers inside. Values are rounded to {DIGITS} digits in it.",
+            f"A unit behind the brackets applies to all numbers inside. Values are rounded to {DIGITS} digits in it.",
         ),
     }
 )
@@ -106,7 +122,7 @@ def print_words(name: str) -> Iterator[str]:
     yield ""
     yield f"In a deck: {subject.example}"
     yield ""
-    yield from columns([(written, text) for _, written, text in subject.rows()])
+    yield from described([(written, text) for _, written, text in subject.rows()], width=terminal_width())
     yield ""
     yield subject.more
 

@@ -1,11 +1,11 @@
-"""A sine about an offset whose frequency goes from `f0` to `f1` in the time `over`.
+"""A sine about an offset whose frequency changes from `f0` to `f1` in the time `over`.
 
     value = offset + amplitude sin(2 pi turns(t - begin) + phase), turns the integral of the frequency f
     linear        f = f0 + (f1 - f0) s/over         as many hertz in each second
     exponential   f = f0 (f1/f0)^(s/over)           as many octaves in each second
 
-Before `begin` the first value is held, and after `over` the last one, whatever that is, with slope zero. The slope's
-amplitude grows with the frequency.
+Before `begin` the first value is held, and after `over` the last one, whatever it is, with slope zero. The amplitude of
+the slope grows with the frequency.
 """
 
 from __future__ import annotations
@@ -60,14 +60,20 @@ PROFILE = Profile(
     name="chirp",
     doc=__doc__,
     parameters=(
-        Parameter(name="amplitude", unit="command", doc="half of the way from trough to crest"),
-        Parameter(name="f0", unit="Hz", above=0.0, doc="frequency at the beginning, cycles per second"),
-        Parameter(name="f1", unit="Hz", above=0.0, doc="frequency at the end"),
-        Parameter(name="over", unit="s", above=0.0, doc="how long the frequency changes"),
-        Parameter(name="growth", shape="word", words=("linear", "exponential"), default="linear", doc="how it changes"),
-        Parameter(name="offset", unit="command", default=0.0, doc="value about which it swings"),
-        Parameter(name="phase", unit="rad", default=0.0, doc="angle at the beginning"),
-        Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which it begins"),
+        Parameter(name="amplitude", unit="command", doc="amplitude: half of the distance from trough to crest"),
+        Parameter(name="f0", unit="Hz", above=0.0, doc="frequency at the start, in cycles per second"),
+        Parameter(name="f1", unit="Hz", above=0.0, doc="frequency at the end, in cycles per second"),
+        Parameter(name="over", unit="s", above=0.0, doc="time during which the frequency changes"),
+        Parameter(
+            name="growth",
+            shape="word",
+            words=("linear", "exponential"),
+            default="linear",
+            doc="change of the frequency: by equal steps (`linear`) or by equal ratios (`exponential`) in equal times",
+        ),
+        Parameter(name="offset", unit="command", default=0.0, doc="value about which the command oscillates"),
+        Parameter(name="phase", unit="rad", default=0.0, doc="phase angle at the start"),
+        Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which the oscillation begins"),
     ),
     course=course,
     content=content,

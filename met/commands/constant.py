@@ -16,7 +16,7 @@ def course(p: Any, t: Real) -> tuple[Real, Real]:
 PROFILE = Profile(
     name="constant",
     doc=__doc__,
-    parameters=(Parameter(name="value", unit="command", doc="the value"),),
+    parameters=(Parameter(name="value", unit="command", doc="value of the command at all times"),),
     course=course,
     jumps="none",
 )

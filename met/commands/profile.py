@@ -15,7 +15,7 @@ from met.parameter import Limit, Parameter
 from met.trace import Real
 
 FILE = Parameter(name="file", shape="text", doc="CSV file")
-COLUMN = Parameter(name="column", shape="text", default="the joint's", doc="name of its column")
+COLUMN = Parameter(name="column", shape="text", default="the joint's", doc="name of the column")
 
 
 Jump = Literal["value", "rate", "none"]

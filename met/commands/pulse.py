@@ -1,10 +1,12 @@
-"""From a held value to another, which is held, and back again, with one slope up and down: `over` is the whole time.
+"""From a held value to another, which is held, and back again, with the same slope up and down; `over` is the whole
+time.
 
-Made for rate commands, whose slope is an acceleration: the joint speeds up, goes on at `to` and slows down. The value
-is a trapezoid in time; with the shortest `over`, 2 |to - start|/slope, it is a triangle, and a shorter one is an error.
-From zero and back the integral, the way of the joint, is to (over - |to|/slope).
+It is made for rate commands, whose slope is an acceleration: the joint speeds up, moves on at `to` and slows down. The
+value is a trapezoid in time; with the shortest `over`, 2 |to - start|/slope, it is a triangle, and a shorter one is an
+error. From zero and back, the integral, which is the way of the joint, is to (over - |to|/slope).
 
-Not a limiter: it knows neither the joint's state nor what the servo can do. The slope jumps at the corners.
+It is not a limiter: it knows neither the state of the joint nor the limits of the servo. The slope jumps at the
+corners.
 """
 
 from __future__ import annotations
@@ -48,13 +50,16 @@ PROFILE = Profile(
     name="pulse",
     doc=__doc__,
     parameters=(
-        Parameter(name="start", unit="command", default=0.0, doc="value before and after"),
-        Parameter(name="to", unit="command", doc="value that is held between"),
+        Parameter(name="start", unit="command", default=0.0, doc="value before and after the pulse"),
+        Parameter(name="to", unit="command", doc="value that is held during the pulse"),
         Parameter(
-            name="slope", unit="command/s", above=0.0, doc="how fast it goes up and down: of a rate, acceleration"
+            name="slope",
+            unit="command/s",
+            above=0.0,
+            doc="rate of change at the beginning and the end of the pulse; an acceleration for a rate command",
         ),
-        Parameter(name="over", unit="s", above=0.0, doc="how long the whole takes, both ways included"),
-        Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which it begins"),
+        Parameter(name="over", unit="s", above=0.0, doc="duration of the whole pulse, with its rise and its fall"),
+        Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which the pulse begins"),
     ),
     course=course,
     content=content,

@@ -1,4 +1,4 @@
-"""A straight line in time between two held values: `start` until `begin`, `to` a time `over` later."""
+"""A straight line in time between two held values: `start` until `begin`, and `to` from a time `over` later."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PROFILE = Profile(
         Parameter(name="start", unit="command", default=0.0, doc="value before the ramp"),
         Parameter(name="to", unit="command", doc="value after the ramp"),
         Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which the ramp begins"),
-        Parameter(name="over", unit="s", above=0.0, doc="how long the ramp lasts"),
+        Parameter(name="over", unit="s", above=0.0, doc="duration of the ramp"),
     ),
     course=course,
     content=content,

@@ -1,4 +1,4 @@
-"""Straight lines through points in time; the first value before the first point, the last after the last."""
+"""Straight lines through points in time; the value is held before the first point and after the last."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ PROFILE = Profile(
     name="table",
     doc=__doc__,
     parameters=(
-        Parameter(name="times", unit="s", shape="list", rises=True, doc="times of the points, rising"),
+        Parameter(name="times", unit="s", shape="list", rises=True, doc="times of the points, in ascending order"),
         Parameter(
-            name="values", unit="command", shape="list", as_many_as="times", doc="values at those times, as many"
+            name="values", unit="command", shape="list", as_many_as="times", doc="values at `times`, one for each"
         ),
     ),
     course=course,

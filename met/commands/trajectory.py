@@ -1,15 +1,16 @@
-"""The motion of one joint from a CSV file: a curve through its rows, the first row before it and the last after it.
+"""The motion of one joint from a CSV file: a curve through its rows; the first row holds before it, the last after it.
 
     time [s], shoulder [deg], elbow [deg]
     0,        0,              10
     0.5,      12.5,           20
 
-The first line names the columns and their units, `time` is one of them, and its times rise. A command takes the column
-of its joint's name unless `column` says another. The file is looked for beside the deck that names it, then in the
-folders of `-I`. Its rows are read when the deck is compiled, and go into the plan: a plan file needs no CSV file.
+The first line names the columns and their units; one of them is `time`, whose values rise. A command takes the column
+of its joint's name, unless `column` names another. The file is looked for in the folder of the deck that names it, then
+in the folders of `-I`. Its rows are read when the deck is compiled, and become part of the plan: a plan file needs no
+CSV file.
 
-linear: straight lines, whose slope jumps at the rows. cubic: the clamped cubic spline, at rest at both ends, with slope
-and second derivative continuous between them; where rows jump it swings beyond them.
+linear: straight lines, whose slope jumps at the rows. cubic: the clamped cubic spline, which is at rest at both ends
+and has a continuous slope and second derivative between them; where rows jump, it swings beyond them.
 """
 
 from __future__ import annotations
@@ -38,15 +39,17 @@ PROFILE = Profile(
     from_file=True,
     parameters=(
         Parameter(name="times", unit="s", shape="list", doc="times of the rows, rising"),
-        Parameter(name="values", unit="command", shape="list", doc="values at those times, as many"),
+        Parameter(name="values", unit="command", shape="list", doc="values at `times`, one for each"),
         Parameter(
             name="interpolation",
             shape="word",
             words=("linear", "cubic"),
             default="linear",
-            doc="the curve between the rows",
+            doc="interpolation between the rows: straight lines, or a cubic spline",
         ),
-        Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="when the file's time 0 is"),
+        Parameter(
+            name="begin", unit="s", default=0.0, at_least=0.0, doc="time of the run at which the file's time 0 lies"
+        ),
     ),
     course=course,
     content=content,

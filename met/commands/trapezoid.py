@@ -1,10 +1,12 @@
 """From one held value to another in the least time that a rate limit and an acceleration limit allow.
 
-The rate is a trapezoid in time: it rises with `max_acceleration`, stays at `max_rate` and falls again; where the way is
-short it is a triangle, whose peak is sqrt(max_acceleration * way). So the value is C1: parabola, line, parabola. Made
-for position commands; of another command it limits the first and second derivative just so.
+The rate is a trapezoid in time: it rises with `max_acceleration`, stays at `max_rate` and falls again; for a short way
+it is a triangle, whose peak is sqrt(max_acceleration * way). So the value and its rate are continuous: a parabola, a
+line, a parabola. It is made for position commands; for another command it limits the first and second derivative in the
+same way.
 
-Not a limiter: it knows neither the joint's state nor what the servo can do. The acceleration jumps at the corners.
+It is not a limiter: it knows neither the state of the joint nor the limits of the servo. The acceleration jumps at the
+corners.
 """
 
 from __future__ import annotations
@@ -52,8 +54,13 @@ PROFILE = Profile(
     parameters=(
         Parameter(name="start", unit="command", default=0.0, doc="value before the move"),
         Parameter(name="to", unit="command", doc="value after the move"),
-        Parameter(name="max_rate", unit="command/s", above=0.0, doc="rate that is not exceeded"),
-        Parameter(name="max_acceleration", unit="command/s^2", above=0.0, doc="acceleration at both ends"),
+        Parameter(name="max_rate", unit="command/s", above=0.0, doc="largest rate"),
+        Parameter(
+            name="max_acceleration",
+            unit="command/s^2",
+            above=0.0,
+            doc="acceleration at the start, and deceleration at the end",
+        ),
         Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which the move begins"),
     ),
     course=course,

@@ -1,10 +1,11 @@
-"""Attitude hold: a moment on a link, the base unless another is named, that turns it to an attitude and damps its rate.
+"""Attitude hold: a moment on a link, by default the base, that turns it to an attitude and damps its rate.
 
     moment = clip(-stiffness e - damping w, +-limit), axis by axis, in the link's axes or the world's
     e = 2 sin(phi/2) n      the link is turned from the wanted attitude by phi about the axis n
 
-For small angles e is the rotation vector phi n. It is largest at half a turn, where the way back changes over. As of
-thrusters, the moment comes from outside: momentum is not kept. No integral, no dead band, and no propellant.
+For small angles e is the rotation vector phi n. It is largest at half a turn, where the direction of the way back
+changes. The moment is external, like that of thrusters: momentum is not conserved. There is no integral, no dead band,
+and no propellant.
 """
 
 from __future__ import annotations
@@ -69,15 +70,21 @@ ENVIRONMENT = Environment(
     name="attitude_hold",
     doc=__doc__,
     parameters=(
-        Parameter(name="link", shape="word", names="link", default="base", doc="link that is held"),
-        Parameter(name="rpy", unit="rad", shape="vector", default=ZERO, doc="wanted attitude, fixed x-y-z, world axes"),
+        Parameter(name="link", shape="word", names="link", default="base", doc="link whose attitude is held"),
+        Parameter(
+            name="rpy",
+            unit="rad",
+            shape="vector",
+            default=ZERO,
+            doc="wanted attitude: rotations about the world's fixed x, then y, then z axis",
+        ),
         Parameter(
             name="stiffness",
             unit="N*m/rad",
             shape="vector",
             default=ZERO,
             at_least=0.0,
-            doc="moment for each radian of error, about x, y and z",
+            doc="moment per radian of attitude error, about x, y and z",
         ),
         Parameter(
             name="damping",
@@ -85,7 +92,7 @@ ENVIRONMENT = Environment(
             shape="vector",
             default=ZERO,
             at_least=0.0,
-            doc="moment for each rad/s, about x, y and z",
+            doc="moment per rad/s of angular velocity, about x, y and z",
         ),
         Parameter(
             name="limit",
@@ -93,14 +100,14 @@ ENVIRONMENT = Environment(
             shape="vector",
             default=(math.inf, math.inf, math.inf),
             at_least=0.0,
-            doc="largest moment about x, y and z; none unless written",
+            doc="largest moment about x, y and z; by default unlimited",
         ),
         Parameter(
             name="axes",
             shape="word",
             words=("link", "world"),
             default="link",
-            doc="axes of stiffness, damping and limit: the link's, as those of thrusters, or the world's",
+            doc="axes of stiffness, damping and limit: those of the link, as for thrusters, or those of the world",
         ),
     ),
     loads=loads,

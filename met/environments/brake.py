@@ -1,13 +1,13 @@
-"""A brake on a joint: dry friction that holds it, and slows it down where it moves, while the brake is on.
+"""A brake on a joint: dry friction that holds the joint, and slows it down if it moves, while the brake is on.
 
     torque = -s torque,  s in {0, +1, -1} (held, forward, backward)
 
-Held means that the joint does not move at all, as long as what pulls at it is no more than `torque`. It adds to the
-friction of the joint's servo. It acts at times t with from <= t < until; a step that lies in this window in part sees
-the share of the torque that does.
+Held means that the joint does not move at all, as long as the load on it is no more than `torque`. The friction of the
+joint's servo adds to that of the brake. The brake acts at times t with from <= t < until; in a step that is partly in
+this window, the same share of the torque acts.
 
-On the joint's side: a brake on the motor's shaft holds N times its torque, but not against a gear that winds up. Not a
-lock, which holds anything: see the servo `locked`.
+The brake is on the joint's side. A brake on the motor's shaft holds N times its torque, but not against a gear that
+winds up. It is not a lock, which holds any torque: see the servo `locked`.
 """
 
 from __future__ import annotations
@@ -34,8 +34,13 @@ ENVIRONMENT = Environment(
     name="brake",
     doc=__doc__,
     parameters=(
-        Parameter(name="joint", shape="word", names="joint", doc="joint that it is on"),
-        Parameter(name="torque", unit="effort", at_least=0.0, doc="most that it holds, and slows down with"),
+        Parameter(name="joint", shape="word", names="joint", doc="joint that the brake acts on"),
+        Parameter(
+            name="torque",
+            unit="effort",
+            at_least=0.0,
+            doc="largest torque that the brake holds, and torque with which it slows the joint down",
+        ),
         *WINDOW,
     ),
     loads=loads,

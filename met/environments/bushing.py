@@ -1,17 +1,19 @@
-"""A bushing: a spring and damper with six freedoms between a frame of a link and a frame of another, or of the ground.
+"""A bushing: a spring and damper with six degrees of freedom between a frame on a link and a frame on another, or on
+the ground.
 
-With x the origin of the link's frame in the other's, phi its rotation vector there (axis times angle) and w its
-angular velocity against it, all in the axes of the other frame,
+With x the origin of the link's frame in the other frame, phi its rotation vector there (axis times angle) and w its
+angular velocity relative to it, all along the axes of the other frame,
 
     F = -stiffness x - damping x'                                  on the link, at the origin of its frame
     M = -(turning phi + phi x (turning phi)/2 + g phi x (phi x (turning phi))) - turning_damping w
 
-where g = (1 - a/tan(a))/(4 a^2), a half of the angle. The other link feels the opposite, on the same line. Each vector
-holds three numbers, along or about the axes of the other frame.
+where g = (1 - a/tan(a))/(4 a^2), with a half of the angle. The opposite force and moment act on the other link, along
+the same line. Each vector holds three numbers, along or about the axes of the other frame.
 
-M is what the energy phi' turning phi/2 asks for, at any angle short of half a turn, so that nothing is gained by going
-round; for small angles it is -turning phi. At half a turn the rotation vector changes its sign, and M jumps: what may
-go there wants another model. Not for rubber whose stiffness depends on load or frequency.
+M follows from the energy phi' turning phi/2 at any angle below half a turn, so a motion that returns to its start gains
+no energy; for small angles M is -turning phi. At half a turn the rotation vector changes its sign, and M jumps: motions
+that may reach this angle need another model. The model is not made for rubber whose stiffness depends on load or
+frequency.
 """
 
 from __future__ import annotations
@@ -96,14 +98,20 @@ ENVIRONMENT = Environment(
     name="bushing",
     doc=__doc__,
     parameters=(
-        Parameter(name="link", shape="word", names="link", doc="link at one side"),
-        Parameter(name="at", unit="m", shape="vector", default=ZEROS, doc="origin of its frame, link frame"),
+        Parameter(name="link", shape="word", names="link", doc="link on one side of the bushing"),
+        Parameter(
+            name="at",
+            unit="m",
+            shape="vector",
+            default=ZEROS,
+            doc="origin of the bushing's frame on that link, in the link's frame",
+        ),
         Parameter(
             name="rpy",
             unit="rad",
             shape="vector",
             default=ZEROS,
-            doc="turns of its frame about fixed x, y, z of the link's",
+            doc="rotation of the bushing's frame on `link`, about the link's fixed x, then y, then z axis",
         ),
         Parameter(
             name="to",
@@ -111,15 +119,22 @@ ENVIRONMENT = Environment(
             names="link",
             words=(WORLD,),
             default=WORLD,
-            doc="link at the other side",
+            doc="link on the other side of the bushing, or `world`: the ground",
         ),
-        Parameter(name="to_at", unit="m", shape="vector", default=ZEROS, doc="origin of its frame, frame of that link"),
+        Parameter(
+            name="to_at",
+            unit="m",
+            shape="vector",
+            default=ZEROS,
+            doc="origin of the bushing's frame on `to`, in the frame of that link",
+        ),
         Parameter(
             name="to_rpy",
             unit="rad",
             shape="vector",
             default=ZEROS,
-            doc="turns of its frame about fixed x, y, z of that link's; its axes are those of what follows",
+            doc="rotation of the bushing's frame on `to`, about that link's fixed x, then y, then z axis; stiffness "
+            "and damping are along its axes",
         ),
         _three("stiffness", "N/m", "force per displacement along each axis"),
         _three("damping", "N*s/m", "force per velocity along each axis"),

@@ -1,9 +1,10 @@
-"""A sensor that is dead for a time: the joint's law sees nothing of a quantity, or what it saw last.
+"""A sensor that fails for a time: the control law of a joint does not see a quantity, but zero or the last value.
 
     zero   the law sees 0
     last   the law sees what it saw at its last tick before
 
-at times from <= t < until. It is the last thing on the way to the law: behind the servo's own sensor, if it has one.
+at times from <= t < until. The failure is the last element on the way to the law: it comes after the servo's own
+sensor, if there is one.
 """
 
 from __future__ import annotations
@@ -30,12 +31,18 @@ ENVIRONMENT = Environment(
     name="dead_sensor",
     doc=__doc__,
     parameters=(
-        Parameter(name="joint", shape="word", names="joint", doc="joint whose law does not see"),
+        Parameter(name="joint", shape="word", names="joint", doc="joint whose control law does not see the quantity"),
         Parameter(
-            name="of", shape="word", doc="quantity that is not seen: q, qd, or a state of the servo such as motor_rate"
+            name="of",
+            shape="word",
+            doc="quantity that the control law does not see: `q`, `qd`, or a state of the servo such as `motor_rate`",
         ),
         Parameter(
-            name="reads", shape="word", words=("zero", "last"), default="zero", doc="what the law sees in its stead"
+            name="reads",
+            shape="word",
+            words=("zero", "last"),
+            default="zero",
+            doc="what the control law sees instead: 0, or the value at its last tick before the failure",
         ),
         *WINDOW,
     ),

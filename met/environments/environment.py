@@ -117,7 +117,7 @@ class Jet:
     plate: Plate
 
 
-FILE = Parameter(name="file", shape="text", default="none", doc="CSV file whose columns the lists are, in their stead")
+FILE = Parameter(name="file", shape="text", default="none", doc="CSV file whose columns take the place of the lists")
 
 
 @old_fields(

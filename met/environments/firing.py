@@ -16,13 +16,20 @@ from met.trace import Real, floor, maximum, minimum, where
 
 FIRING = (
     *WINDOW,
-    Parameter(name="period", unit="s", default=1.0, above=0.0, doc="time from pulse to pulse, the first at `from`"),
+    Parameter(
+        name="period",
+        unit="s",
+        default=1.0,
+        above=0.0,
+        doc="time from one pulse to the next; the first pulse starts at `from`",
+    ),
     Parameter(
         name="duty",
         default=1.0,
         above=0.0,
         at_most=1.0,
-        doc="share of the period that a pulse lasts, from its beginning; 1: no pulses, it fires steadily",
+        doc="share of the period for which a pulse lasts, from the start of the period; 1: the thruster fires "
+        "without pulses",
     ),
     Parameter(
         name="switches",
@@ -30,7 +37,7 @@ FIRING = (
         shape="list",
         rises=True,
         default=(),
-        doc="times at which it is switched on, off, on and so forth; left out: on from the beginning",
+        doc="times at which the thruster is switched on, off, on and so on; without them it is on from the start",
     ),
 )
 

@@ -1,10 +1,10 @@
-"""A joint that swings freely for a time: its drive has let go of it, and neither drives, holds nor brakes it.
+"""A joint that swings freely for a time: its drive is disconnected, and neither drives, holds nor brakes it.
 
-Torque, dry friction and acceleration of the joint's servo do not reach the joint at times t with from <= t < until; of
-a step that lies in this window in part, in proportion. What inertia of the rotor moves with the joint still does;
-behind an elastic gear the motor is let go too, and turns by itself, and the gear unwinds within a few steps. It takes
-hold again with nothing wound up, wherever motor and joint are by then; of other rates, with a blow. Nothing is aligned:
-a position loop finds the joint where it is.
+Torque, dry friction and acceleration of the joint's servo do not reach the joint at times t with from <= t < until; in
+a step that is partly in this window, they act in proportion. The inertia of a rotor that moves with the joint still
+does. Behind an elastic gear the motor is disconnected too, and turns by itself, and the gear unwinds within a few
+steps. The drive engages again with an unwound gear, wherever motor and joint are by then; if their rates differ, with
+an impact. Nothing is realigned: a position loop finds the joint where it is.
 """
 
 from __future__ import annotations

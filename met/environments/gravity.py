@@ -15,7 +15,7 @@ def loads(p: Any, world: World) -> Loads:
 ENVIRONMENT = Environment(
     name="gravity",
     doc=__doc__,
-    parameters=(Parameter(name="g", unit="m/s^2", shape="vector", doc="acceleration of free fall, world axes"),),
+    parameters=(Parameter(name="g", unit="m/s^2", shape="vector", doc="acceleration of free fall, in world axes"),),
     loads=loads,
     alone=lambda p: "gravity" if any(p.g) else "",
 )

@@ -1,24 +1,27 @@
-"""How gravity differs over an arm in orbit: forces and moments on every link, beside the free fall of the orbit itself.
+"""Gravity gradient on an arm in orbit: forces and moments on every link, in addition to the free fall of the orbit
+itself.
 
-The world's origin goes round on a circular orbit of the radius R, in free fall. rpy turns the orbit's axes in the
-world: x away from the centre of attraction, y along the flight, z normal to the orbit; n = sqrt(mu/R^3). Gravity to
-first order in the way from the origin: a part dm of a link at x feels dm T x, with
+The world's origin moves on a circular orbit of the radius R, in free fall. rpy rotates the orbit's axes in the world: x
+points away from the centre of attraction, y along the flight, z along the normal of the orbit; n = sqrt(mu/R^3).
+Gravity is of first order in the distance from the origin: a part dm of a link at x feels dm T x, with
 
     T = n^2 (3 r r' - 1),     r the direction away from the centre
 
-so a link of mass m, centre c, and second moments J = integral of y y' dm = tr(I)/2 - I about its centre, feels the
-force m T c there and the moment of T J, which is 3 n^2 r x I r.
+so a link of mass m, with its centre at c and the second moments J = integral of y y' dm = tr(I)/2 - I about the centre,
+feels the force m T c there and the moment of T J, which is 3 n^2 r x I r.
 
-`frame = inertial`: the world does not turn, rpy is how the orbit's axes stand at t = 0, and they turn about z by n t.
-`frame = orbital`: the world turns with the orbit, as Hill's axes do, and stands still seen from there: what its turning
-does is added, as apparent forces on every part, so that a free body follows the equations of Clohessy and Wiltshire,
+`frame = inertial`: the world does not turn; rpy is the orientation of the orbit's axes at t = 0, and they turn about z
+by n t. `frame = orbital`: the world turns with the orbit, as Hill's axes do, and the orbit's axes stand still in it.
+The rotation of the world is then included as apparent forces on every part, so that a free body follows the equations
+of Clohessy and Wiltshire,
 
     x'' = 3 n^2 x + 2 n y',     y'' = -2 n x',     z'' = -n^2 z     (in the orbit's axes)
 
-and rates are those against the turning world. There the base of a station that keeps its attitude to the Earth stands.
+and rates are relative to the turning world. In it, the base of a station that keeps its attitude to the Earth is at
+rest.
 
-Not an orbit that is not circular, not the flattening of the Earth, nor the second order (of arms of tens of metres it
-is some 1e-6 of this), and no attraction between links.
+The orbit is circular. The flattening of the Earth, terms of second order (for arms of tens of metres some 1e-6 of
+these), and the attraction between links are left out.
 """
 
 from __future__ import annotations
@@ -111,13 +114,13 @@ ENVIRONMENT = Environment(
     name="gravity_gradient",
     doc=__doc__,
     parameters=(
-        Parameter(name="radius", unit="m", above=0.0, doc="of the orbit, from the centre of attraction"),
+        Parameter(name="radius", unit="m", above=0.0, doc="radius of the orbit, from the centre of attraction"),
         Parameter(
             name="mu",
             unit="m^3/s^2",
             default=3.986004418e14,
             above=0.0,
-            doc="gravitational parameter",
+            doc="gravitational parameter of the central body",
             source="Earth: WGS 84",
         ),
         Parameter(
@@ -125,13 +128,14 @@ ENVIRONMENT = Environment(
             unit="rad",
             shape="vector",
             default=ZEROS,
-            doc="turns of the orbit's axes about fixed x, y, z of the world's: x up, y along the flight, z the normal",
+            doc="rotation of the orbit's axes about the world's fixed x, then y, then z axis; x points up, y along "
+            "the flight, z along the normal",
         ),
         Parameter(
             name="frame",
             shape="word",
             words=("inertial", "orbital"),
-            doc="whether the world keeps its directions, or turns with the orbit",
+            doc="`inertial`: the world's axes keep their directions; `orbital`: they turn with the orbit",
         ),
     ),
     loads=loads,

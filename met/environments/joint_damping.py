@@ -1,4 +1,4 @@
-"""Viscous damping at every joint, as of grease outside the servo: torque = -damping qd, force = -sliding qd."""
+"""Viscous damping at every joint, as by grease outside the servo: torque = -damping qd, force = -sliding qd."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ENVIRONMENT = Environment(
             default=0.0,
             at_least=0.0,
             joints="revolute",
-            doc="torque per joint rate, the same at all revolute joints",
+            doc="torque per joint rate, the same for all revolute joints",
         ),
         Parameter(
             name="sliding",
@@ -31,7 +31,7 @@ ENVIRONMENT = Environment(
             default=0.0,
             at_least=0.0,
             joints="prismatic",
-            doc="force per joint rate, the same at all prismatic joints",
+            doc="force per joint rate, the same for all prismatic joints",
         ),
     ),
     loads=loads,

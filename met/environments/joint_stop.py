@@ -1,19 +1,20 @@
-"""Stops at the ends of a joint's way: a spring on each side that the joint runs into, and that takes energy from it.
+"""Stops at the ends of a joint's range: a spring on each side, which the joint runs into and which takes energy from
+it.
 
-With d how far the joint is beyond a stop, and d' how fast it goes further,
+With d the depth of the joint in a stop, and d' the rate at which it goes deeper,
 
     torque = -stiffness d max(0, 1 + dissipation d')        back from the stop, where d > 0; else none
 
-the law of Hunt and Crossley (1975) with a straight spring. It never pulls. Its force begins at zero where the joint
-comes in, whatever its rate, so an integrator of order 2 keeps its order over contacts; one of order 4 has order 2. A
-spring beside a damper would begin with a jump, and pull when the joint leaves.
+the law of Hunt and Crossley (1975) with a linear spring. A stop never pulls. Its force begins at zero when the joint
+meets it, whatever the rate, so an integrator of order 2 keeps its order over contacts; one of order 4 has order 2. A
+spring with a damper beside it would begin with a jump, and pull when the joint leaves.
 
-A joint that comes in at the rate v, with nothing else that acts on it, goes out at the rate v' with
+A joint that meets the stop at the rate v, with nothing else acting on it, leaves it at the rate v' with
 
     a v - ln(1 + a v) = -a v' - ln(1 - a v'),     a the dissipation
 
-whatever stiffness and inertia: v' = v (1 - 2/3 a v) while a v is small, and below 1/a always. Stiffness wants steps
-that are short against sqrt(inertia/stiffness). The stop moves the link against its parent; the servo does not know it.
+for any stiffness and inertia: v' = v (1 - 2/3 a v) if a v is small, and always below 1/a. The step should be short
+compared with sqrt(inertia/stiffness). The stop acts between the link and its parent; the servo does not know of it.
 """
 
 from __future__ import annotations
@@ -50,22 +51,30 @@ ENVIRONMENT = Environment(
     name="joint_stop",
     doc=__doc__,
     parameters=(
-        Parameter(name="joint", shape="word", names="joint", doc="joint that is stopped"),
+        Parameter(name="joint", shape="word", names="joint", doc="joint whose range the stops limit"),
         Parameter(
             name="lower",
             unit="joint",
             default=-math.inf,
             less_than="upper",
-            doc="position of the lower end; none unless written",
+            doc="position of the lower stop; by default there is none",
         ),
-        Parameter(name="upper", unit="joint", default=math.inf, doc="position of the upper end; none unless written"),
-        Parameter(name="stiffness", unit="effort/joint", at_least=0.0, doc="torque per way into a stop"),
+        Parameter(
+            name="upper", unit="joint", default=math.inf, doc="position of the upper stop; by default there is none"
+        ),
+        Parameter(
+            name="stiffness",
+            unit="effort/joint",
+            at_least=0.0,
+            doc="stiffness of the stops: torque per displacement into a stop",
+        ),
         Parameter(
             name="dissipation",
             unit="s/joint",
             default=0.0,
             at_least=0.0,
-            doc="share by which a stop pushes more for each unit of the rate of going in; 0: it gives all energy back",
+            doc="share by which the torque of a stop is larger per unit of the rate of penetration; 0: no energy is "
+            "lost",
         ),
     ),
     loads=loads,

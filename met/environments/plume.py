@@ -1,35 +1,39 @@
-"""A thruster's plume on a rectangular plate that is fixed to a link: force and moment of its gas, while it fires.
+"""A thruster's plume on a rectangular plate that is fixed to a link: force and moment of the gas while the thruster
+fires.
 
-The gas goes straight from a point in all directions before the nozzle, at one speed, with the dynamic pressure
+The gas moves straight from a point in all directions in front of the nozzle, at one speed, with the dynamic pressure
 
     q = K cos(theta)^n / r^2,     K = (n + 2) share thrust/(4 pi),     theta the angle from the nozzle's axis     (P1)
 
-and none behind the nozzle's plane. K makes the momentum that the plume carries along the axis `share` times the thrust:
-the integral of 2 q cos(theta) over the half space is 4 pi K/(n + 2). On a surface whose normal N is turned towards the
-nozzle, with u the direction of the gas there and s = -u.N the sine of its incidence, the force on an area A is
+and none behind the nozzle's plane. With this K, the momentum that the plume carries along the axis is `share` times the
+thrust: the integral of 2 q cos(theta) over the half space is 4 pi K/(n + 2). On a surface whose normal N is turned
+towards the nozzle, with u the direction of the gas there and s = -u.N the sine of its incidence, the force on an area A
+is
 
     A q s [2 sigma_t (u + s N) - (2 (2 - sigma_n) s + sqrt(pi) sigma_n reemission) N]                              (P2)
 
-free molecular flow so fast that its own thermal motion does not count (Schaaf and Chambre 1961), with accommodation
+free molecular flow, so fast that its own thermal motion does not matter (Schaaf and Chambre 1961), with accommodation
 coefficients sigma_n, sigma_t for normal and tangential momentum. sigma_n = 1, sigma_t = 0 is Newton's law of dense
-hypersonic flow. The plate is a rectangle about the origin of its frame, `at` and `rpy` in the link's, width along x and
-height along y, and its front looks along z.
+hypersonic flow. The plate is a rectangle around the origin of its frame, which `at` and `rpy` place in the link's
+frame; its width is along x, its height along y, and its front looks along z.
 
-The sum over the plate is one over the directions in which the nozzle sees it: s dA/r^2 is the solid angle, so nothing
-grows however near the plate is. With d the nozzle's distance from the plate's plane, D that from the plate along z and
-y alone, x = D tan(a) the way from the nozzle along the plate's x, and b the gas's angle to the plane across y,
+The sum over the plate is taken over the directions in which the nozzle sees it: s dA/r^2 is the solid angle, so nothing
+grows without bound, however near the plate is. With d the distance of the nozzle from the plate's plane, D its distance
+from the plate along z and y only, x = D tan(a) the distance from the nozzle along the plate's x, and b the angle of the
+gas to the plane across y,
 
     s dA/r^2 = d (D^2 + x^2)/(D (d^2 + x^2)) cos(b) da db                                                         (P3)
 
-Each side is cut into `cells`, narrow where the plume is dense: even in k = z/sqrt(1 + z^2), z the angle, a or b, from
-where the plate is nearest to the plume's axis, over 3/sqrt(n + 1). Each has a point of Gauss's rule. Of the plume's
-momentum 6 cells leave at most 3 % out, however near the plate is (docs/environments.md).
+Each side is divided into `cells`, narrow where the plume is dense: even in k = z/sqrt(1 + z^2), with z the angle, a or
+b, from the direction in which the plate is nearest to the plume's axis, divided by 3/sqrt(n + 1). Each cell has a point
+of Gauss's rule. 6 cells leave out at most 3 % of the plume's momentum, however near the plate is
+(docs/environments.md).
 
-`switches` may stand in a CSV file, `file = "fire.csv"`, whose one column `time` has them row by row.
+`switches` may stand in a CSV file, `file = "fire.csv"`, in its only column, `time`, one in each row.
 
-Nothing stands in the gas's way: no part of the arm shades another, and what is turned back hits nothing. Not for a
-plate so near that the plume does not look as if it came from a point, nor for gas so dense that it piles up before the
-plate. The link's own velocity does not count against the gas's.
+Nothing is in the way of the gas: no part of the arm shades another, and gas that is turned back hits nothing. The model
+is not made for a plate so near that the plume does not seem to come from a point, nor for gas so dense that it
+accumulates in front of the plate. The velocity of the link is neglected against that of the gas.
 """
 
 from __future__ import annotations
@@ -160,16 +164,17 @@ ENVIRONMENT = Environment(
     from_file=True,
     parameters=(
         Parameter(name="link", shape="word", names="link", doc="link that the plate is fixed to"),
-        Parameter(name="at", unit="m", shape="vector", default=ZEROS, doc="middle of the plate, link frame"),
+        Parameter(name="at", unit="m", shape="vector", default=ZEROS, doc="middle of the plate, in the link's frame"),
         Parameter(
             name="rpy",
             unit="rad",
             shape="vector",
             default=ZEROS,
-            doc="turns of the plate's frame about fixed x, y, z of the link's; z is the normal of its front",
+            doc="rotation of the plate's frame about the link's fixed x, then y, then z axis; its z axis is the "
+            "normal of the plate's front",
         ),
-        Parameter(name="width", unit="m", above=0.0, doc="side of the plate along its x"),
-        Parameter(name="height", unit="m", above=0.0, doc="side of the plate along its y"),
+        Parameter(name="width", unit="m", above=0.0, doc="length of the plate along its x axis"),
+        Parameter(name="height", unit="m", above=0.0, doc="length of the plate along its y axis"),
         Parameter(
             name="cells",
             default=6.0,
@@ -177,21 +182,21 @@ ENVIRONMENT = Environment(
             at_most=40.0,
             whole=True,
             decides=True,
-            doc="parts that each side is cut into, as the nozzle sees it",
+            doc="number of parts into which each side of the plate is divided, as seen from the nozzle",
         ),
         Parameter(
             name="sides",
             shape="word",
             words=("front", "both"),
             default="front",
-            doc="whether gas that comes from behind the plate pushes it too",
+            doc="sides of the plate on which gas acts: `front` only, or `both`",
         ),
         Parameter(
             name="sigma_n",
             default=1.0,
             at_least=0.0,
             at_most=1.0,
-            doc="accommodation of normal momentum: 0 thrown back as by a mirror, 1 let go anew",
+            doc="accommodation of normal momentum: 0 for reflection as by a mirror, 1 for diffuse re-emission",
             source="assumption",
         ),
         Parameter(
@@ -199,14 +204,14 @@ ENVIRONMENT = Environment(
             default=1.0,
             at_least=0.0,
             at_most=1.0,
-            doc="accommodation of tangential momentum: 0 none is left behind, 1 all",
+            doc="accommodation of tangential momentum: 0 if none of it stays on the plate, 1 if all of it does",
             source="assumption",
         ),
         Parameter(
             name="reemission",
             default=0.0,
             at_least=0.0,
-            doc="most probable thermal speed at the plate's temperature, sqrt(2 R T), over the gas's speed",
+            doc="most probable thermal speed at the plate's temperature, sqrt(2 R T), divided by the speed of the gas",
         ),
         Parameter(
             name="nozzle_link",
@@ -214,40 +219,42 @@ ENVIRONMENT = Environment(
             names="link",
             words=(WORLD,),
             default=WORLD,
-            doc="link that the nozzle is fixed to",
+            doc="link that the nozzle is fixed to, or `world`: the ground",
         ),
-        Parameter(name="nozzle", unit="m", shape="vector", doc="the nozzle, in the frame of that link"),
+        Parameter(name="nozzle", unit="m", shape="vector", doc="position of the nozzle, in the frame of `nozzle_link`"),
         Parameter(
             name="axis",
             shape="vector",
             direction=True,
-            doc="where the plume goes to, in the axes of that link",
+            doc="direction of the plume, in the axes of `nozzle_link`",
         ),
-        Parameter(name="thrust", unit="N", at_least=0.0, doc="thrust while it fires"),
+        Parameter(name="thrust", unit="N", at_least=0.0, doc="thrust while the thruster fires"),
         Parameter(
             name="exponent",
             at_least=0.0,
-            doc="n of the cosine law: (pi/(2 theta_limit))^2 2/(gamma - 1) fits the law of Simons 1972 near the axis",
+            doc="exponent n of the cosine law; (pi/(2 theta_limit))^2 2/(gamma - 1) fits the law of Simons (1972) "
+            "near the axis",
         ),
         Parameter(
             name="share",
             default=1.0,
             at_least=0.0,
-            doc="momentum of the plume over the thrust; 4 pi q r^2/((n + 2) thrust) of a q measured on the axis at r",
+            doc="momentum of the plume divided by the thrust; 4 pi q r^2/((n + 2) thrust) if q is measured on the "
+            "axis at the distance r",
         ),
         Parameter(
             name="closest",
             unit="m",
             default=0.01,
             above=0.0,
-            doc="distance from the nozzle within which the pressure grows no more",
+            doc="distance from the nozzle within which the pressure does not increase further",
         ),
         Parameter(
             name="reaction",
             shape="word",
             words=("off", "on"),
             default="off",
-            doc="whether the thruster pushes the link that it is on; the ground does not feel it",
+            doc="whether the thrust also acts on `nozzle_link`; it has no effect on the ground",
         ),
         *firing.FIRING,
     ),

@@ -1,10 +1,11 @@
-"""A drive that runs away for a time: whatever its law gives, full drive comes out, one way or the other.
+"""A drive that runs away for a time: whatever its control law commands, the output is full drive, in one direction or
+the other.
 
     output = level * what the servo's limits allow        at times from <= t < until
 
-Of a law that is sampled, from its first tick in this window on. Voltage of `rigid_gearbox` and `compliant_gearbox` is
-then level v_max, current asked of `cascade` level i_max, which must be finite. Integrals go on as if nothing had
-failed.
+With a sampled law this holds from its first tick in the window on. The voltage of `rigid_gearbox` and
+`compliant_gearbox` is then level v_max, and the commanded current of `cascade` is level i_max, which must be finite.
+Integrals go on as if nothing had failed.
 """
 
 from __future__ import annotations
@@ -33,7 +34,11 @@ ENVIRONMENT = Environment(
     parameters=(
         Parameter(name="joint", shape="word", names="joint", doc="joint whose drive runs away"),
         Parameter(
-            name="level", default=1.0, at_least=-1.0, at_most=1.0, doc="share of full drive, negative the other way"
+            name="level",
+            default=1.0,
+            at_least=-1.0,
+            at_most=1.0,
+            doc="share of full drive; negative in the other direction",
         ),
         *WINDOW,
     ),

@@ -1,10 +1,10 @@
-"""A straight spring and damper between a point of a link and a point of another, or of the ground.
+"""A linear spring and damper between a point of a link and a point of another, or of the ground.
 
     T = stiffness (d - length) + damping d'
 
-along the line between the points, d their distance: each is pulled towards the other by T, and pushed where T is below
-zero. `acts = pull` is a rope: no force while d <= length, and none that pushes. Where both points are in one place
-there is no line, and no force. Not a spring that bends or has mass.
+along the line between the points, with d their distance: T pulls the points towards each other, and pushes them apart
+if it is below zero. `acts = pull` is a rope: no force while d <= length, and none that pushes. If both points are in
+one place there is no line, and no force. The spring does not bend, and has no mass.
 """
 
 from __future__ import annotations
@@ -42,26 +42,38 @@ ENVIRONMENT = Environment(
     name="spring",
     doc=__doc__,
     parameters=(
-        Parameter(name="link", shape="word", names="link", doc="link at one end"),
-        Parameter(name="point", unit="m", shape="vector", default=ZEROS, doc="its point, link frame"),
+        Parameter(name="link", shape="word", names="link", doc="link at one end of the spring"),
+        Parameter(
+            name="point",
+            unit="m",
+            shape="vector",
+            default=ZEROS,
+            doc="attachment point of the spring on `link`, in the link's frame",
+        ),
         Parameter(
             name="to",
             shape="word",
             names="link",
             words=(WORLD,),
             default=WORLD,
-            doc="link at the other end",
+            doc="link at the other end of the spring, or `world`: the ground",
         ),
-        Parameter(name="to_point", unit="m", shape="vector", default=ZEROS, doc="its point, frame of that link"),
-        Parameter(name="stiffness", unit="N/m", at_least=0.0, doc="force per length that it is longer"),
-        Parameter(name="damping", unit="N*s/m", default=0.0, at_least=0.0, doc="force per rate at which it grows"),
-        Parameter(name="length", unit="m", default=0.0, at_least=0.0, doc="its length without load"),
+        Parameter(
+            name="to_point",
+            unit="m",
+            shape="vector",
+            default=ZEROS,
+            doc="attachment point of the spring on `to`, in the frame of that link",
+        ),
+        Parameter(name="stiffness", unit="N/m", at_least=0.0, doc="stiffness: force per elongation"),
+        Parameter(name="damping", unit="N*s/m", default=0.0, at_least=0.0, doc="damping: force per rate of elongation"),
+        Parameter(name="length", unit="m", default=0.0, at_least=0.0, doc="length of the spring without load"),
         Parameter(
             name="acts",
             shape="word",
             words=("both", "pull"),
             default="both",
-            doc="whether it pulls and pushes, or pulls alone, as a rope",
+            doc="`both`: the spring pulls and pushes; `pull`: it only pulls, as a rope does",
         ),
     ),
     loads=loads,

@@ -22,8 +22,8 @@ class Step(Protocol):
 
 
 WINDOW = (
-    Parameter(name="from", unit="s", default=0.0, doc="time at which it begins"),
-    Parameter(name="until", unit="s", default=math.inf, doc="time at which it ends; never unless written"),
+    Parameter(name="from", unit="s", default=0.0, doc="time at which the effect begins"),
+    Parameter(name="until", unit="s", default=math.inf, doc="time at which the effect ends; by default never"),
 )
 
 

@@ -1,9 +1,9 @@
-"""A constant force and moment on a link, in world axes or the link's, for a time or always.
+"""A constant force and moment on a link, in the axes of the world or of the link, for a time or always.
 
-The force acts at `point` of the link, which moves along with it. `axes = link`: force and moment turn with the link
-too. It acts at times t with from <= t < until; where `until` is the earlier, never. A step of the dynamics that lies
-within this window in part sees the force times the share that does, at all of its stages: so the impulse is right, and
-a window that begins and ends with steps is met exactly.
+The force acts at `point` of the link, which moves with the link. With `axes = link`, force and moment turn with the
+link too. They act at times t with from <= t < until; if `until` is the earlier of the two, never. In a step of the
+dynamics that is partly in this window, the same share of the force acts, at all of its stages: so the impulse is right,
+and a window that begins and ends with steps is met exactly.
 """
 
 from __future__ import annotations
@@ -36,16 +36,28 @@ ENVIRONMENT = Environment(
     name="wrench",
     doc=__doc__,
     parameters=(
-        Parameter(name="link", shape="word", names="link", doc="link that it acts on"),
+        Parameter(name="link", shape="word", names="link", doc="link that force and moment act on"),
         Parameter(name="force", unit="N", shape="vector", default=ZEROS, doc="force"),
-        Parameter(name="moment", unit="N*m", shape="vector", default=ZEROS, doc="moment, besides that of the force"),
-        Parameter(name="point", unit="m", shape="vector", default=ZEROS, doc="where the force acts, link frame"),
+        Parameter(
+            name="moment",
+            unit="N*m",
+            shape="vector",
+            default=ZEROS,
+            doc="moment on the link, in addition to the moment of the force",
+        ),
+        Parameter(
+            name="point",
+            unit="m",
+            shape="vector",
+            default=ZEROS,
+            doc="point at which the force acts, in the link's frame",
+        ),
         Parameter(
             name="axes",
             shape="word",
             words=("world", "link"),
             default="world",
-            doc="axes of force and moment: the world's, or the link's, which turn with it",
+            doc="axes of force and moment: those of the world, or those of the link, which turn with it",
         ),
         *WINDOW,
     ),

@@ -4,11 +4,12 @@
     0,        0,           0
     0.5,      12.5,        -3
 
-Before its first row the first holds, after its last the last. A component that is not given is zero. The force acts at
-`point` of the link, which moves along with it; `axes = link`: force and moment turn with the link too. In the deck a
-component is a list of as many numbers as `times` has; in a file, which has the lists' place, it is a column of its
-name, and `time` is one. The table is read at every stage of a step; a step within which a row lies sees its mean over
-the step at all of its stages, so the impulse is right however close together the rows are.
+Before the first row the values of the first row hold, and after the last row those of the last. A component that is not
+given is zero. The force acts at `point` of the link, which moves with the link; with `axes = link`, force and moment
+turn with the link too. In a deck, a component is a list with as many numbers as `times`; in a file, which takes the
+place of the lists, it is a column of its name, and the times are the column `time`. The table is read at every stage of
+a step. A step that contains a row gets the mean over the step at all of its stages, so the impulse is right however
+close together the rows are.
 """
 
 from __future__ import annotations
@@ -91,16 +92,22 @@ ENVIRONMENT = Environment(
     doc=__doc__,
     from_file=True,
     parameters=(
-        Parameter(name="link", shape="word", names="link", doc="link that it acts on"),
-        Parameter(name="point", unit="m", shape="vector", default=ZEROS, doc="where the force acts, link frame"),
+        Parameter(name="link", shape="word", names="link", doc="link that force and moment act on"),
+        Parameter(
+            name="point",
+            unit="m",
+            shape="vector",
+            default=ZEROS,
+            doc="point at which the force acts, in the link's frame",
+        ),
         Parameter(
             name="axes",
             shape="word",
             words=("world", "link"),
             default="world",
-            doc="axes of force and moment: the world's, or the link's, which turn with it",
+            doc="axes of force and moment: those of the world, or those of the link, which turn with it",
         ),
-        Parameter(name="begin", unit="s", default=0.0, doc="when the table's time 0 is"),
+        Parameter(name="begin", unit="s", default=0.0, doc="time of the run at which the table's time 0 lies"),
         Parameter(name="times", unit="s", shape="list", rises=True, doc="times of the rows"),
         *(
             Parameter(
@@ -109,7 +116,7 @@ ENVIRONMENT = Environment(
                 shape="list",
                 as_many_as="times",
                 default=(),
-                doc=f"{name[-1]} of the {name[:-2]} at those times",
+                doc=f"{name[-1]} component of the {name[:-2]} at `times`",
             )
             for name in NAMES
         ),

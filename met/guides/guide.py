@@ -111,4 +111,4 @@ class Guide:
     @property
     def written(self) -> tuple[Parameter, ...]:
         """The parameters as a deck writes them: those of each joint too."""
-        return (*self.parameters, *(replace(p, doc=f"of each joint: {p.doc}") for p in self.of_joint))
+        return (*self.parameters, *(replace(p, doc=f"for each joint: {p.doc}") for p in self.of_joint))

@@ -1,24 +1,27 @@
-"""Resolved rate: the joints' rates that take a point of a link, and the link's attitude, along a path in the world.
+"""Resolved rate: the joint rates that move a point of a link, and the attitude of the link, along a path in the world.
 
     v      = path's rate + gain * (path - where it is) - what it does with these joints at rest
     qd     = J' (J J' + lambda^2 I)^-1 v                           (Whitney 1969; damped, met/guides/damped.py)
     lambda^2 = max_damping^2 (1 - (sigma/threshold)^2)  where sigma < threshold, else 0
-    qd     is made shorter as a whole, where a joint would go faster than its `max_rate`
+    qd     is made smaller as a whole, if a joint would move faster than its `max_rate`
 
-Turns count as the way of a point `length` away, and a prismatic joint's way as a turn of it over `length`: so J is in
-metres, and sigma, its smallest singular value, is the velocity of the end in its worst direction for one rad/s. Below
-the threshold the task gives way, so that rates stay small through a singularity, by as much as `error` shows; the gain
-brings the point back. With max_damping = threshold no joint motion exceeds |v|/threshold. 0 is the pseudo-inverse.
+A rotation counts as the way of a point at the distance `length`, and the way of a prismatic joint as a rotation by that
+way over `length`. So J is in metres, and sigma, its smallest singular value, is the velocity of the end in its worst
+direction for one rad/s. Below the threshold the rates are damped, so that they stay small through a singularity; the
+point then leaves the path by as much as `error` shows, and the gain brings it back. With max_damping = threshold no
+joint motion exceeds |v|/threshold. With max_damping = 0, the inverse is the pseudo-inverse.
 
-The path is given by the components that are written, in world axes, as offsets from where point and link begin: x, y,
-z of the point; roll, pitch, yaw of the link, R = Rz(yaw) Ry(pitch) Rx(roll). Those left out stay 0, so a link that
-begins anyhow is held so. `guides = position` leaves the attitude free; `xy` and the like guide two components alone.
+The path is given by the components that are written, in world axes, as offsets from where point and link begin: x, y, z
+of the point; roll, pitch, yaw of the link, R = Rz(yaw) Ry(pitch) Rx(roll). Components that are left out stay 0, so the
+link is held in the attitude in which it begins. `guides = position` leaves the attitude free; `xy` and the like guide
+two components only.
 
-The path's error falls as exp(-gain t), but for the lag of the servos, the tick (by a part that is proportional to its
-period) and what limits and damping leave undone. At a singularity itself no joint moves the point along the direction
+The error of the path decays as exp(-gain t), but for the lag of the servos, the tick (by a part that is proportional to
+its period) and the effect of limits and damping. At a singularity itself no joint moves the point along the direction
 that is lost: a path that begins there in that direction does not begin; without damping the case fails.
 
-Not a planner: it knows neither joint stops nor collisions, and of a redundant arm's motions takes the smallest.
+It is not a planner: it knows neither joint stops nor collisions, and of the motions of a redundant arm it takes the
+smallest.
 """
 
 from __future__ import annotations
@@ -118,45 +121,64 @@ GUIDE = Guide(
     doc=__doc__,
     parameters=(
         Parameter(name="link", shape="word", names="link", doc="link that is guided"),
-        Parameter(name="point", unit="m", shape="vector", default=ZEROS, doc="point of it that is guided, link frame"),
-        Parameter(name="guides", shape="word", words=tuple(GUIDED), default="pose", doc="which components are guided"),
+        Parameter(
+            name="point", unit="m", shape="vector", default=ZEROS, doc="guided point of the link, in the link's frame"
+        ),
+        Parameter(
+            name="guides",
+            shape="word",
+            words=tuple(GUIDED),
+            default="pose",
+            doc="guided components: position and attitude (`pose`), the position, or two of its coordinates",
+        ),
         Parameter(
             name="max_damping",
             unit="m",
             at_least=0.0,
-            doc="lambda at a singularity; 0: none",
+            doc="damping lambda at a singularity; 0: no damping",
             source="Nakamura and Hanafusa 1986; how it grows: Chiaverini, IEEE Trans. Robotics Autom. 13, 1997",
         ),
-        Parameter(name="threshold", unit="m", at_least=0.0, doc="singular value of J below which it is damped"),
-        Parameter(name="gain", unit="1/s", default=1.0, at_least=0.0, doc="rate per error of the path"),
-        Parameter(name="length", unit="m", default=1.0, above=0.0, doc="way that counts as much as a turn of 1 rad"),
+        Parameter(
+            name="threshold",
+            unit="m",
+            at_least=0.0,
+            doc="smallest singular value of J below which the rates are damped",
+        ),
+        Parameter(name="gain", unit="1/s", default=1.0, at_least=0.0, doc="gain of the guide: rate per path error"),
+        Parameter(
+            name="length", unit="m", default=1.0, above=0.0, doc="length that counts as much as a rotation of 1 rad"
+        ),
         Parameter(
             name="loop",
             shape="word",
             words=("closed", "open"),
             default="closed",
-            doc="the joints that the law goes by: where they are, or where it has asked them to be",
+            doc="joint positions that the guide starts from: the actual ones (`closed`), or those that it has "
+            "commanded (`open`)",
         ),
         Parameter(
             name="jacobian",
             shape="word",
             words=("arm", "generalized"),
             default="arm",
-            doc="on a free base: as if it were held, or with its answer to the arm",
+            doc="on a free base: J as if the base were held (`arm`), or with the base's reaction to the arm "
+            "(`generalized`)",
             source="generalized: Umetani and Yoshida, IEEE Trans. Robotics Autom. 5, 1989",
         ),
     ),
-    of_joint=(
-        Parameter(name="max_rate", unit="joint/s", default=float("inf"), above=0.0, doc="rate that is not exceeded"),
-    ),
+    of_joint=(Parameter(name="max_rate", unit="joint/s", default=float("inf"), above=0.0, doc="largest rate"),),
     components=components,
     commands=("rate", "position"),
     memory=(
-        Memory(name="error", unit="m", doc="distance of the point from the path, guided components"),
-        Memory(name="turn_error", unit="rad", doc="angle between the link and the path; 0 where it is not guided"),
+        Memory(name="error", unit="m", doc="distance of the guided point from the path, in the guided components"),
+        Memory(
+            name="turn_error",
+            unit="rad",
+            doc="angle between the attitude of the link and that of the path; 0 if the attitude is not guided",
+        ),
         Memory(name="manipulability", unit="m", doc="smallest singular value of J, or up to 7 % less"),
-        Memory(name="damping", unit="m", doc="lambda, the damping of the rates"),
-        Memory(name="share", unit="1", doc="share of the rates that the joints' limits leave"),
+        Memory(name="damping", unit="m", doc="damping lambda of the joint rates"),
+        Memory(name="share", unit="1", doc="share of the joint rates that remains within the limits `max_rate`"),
     ),
     error="error",
     fastest=fastest,

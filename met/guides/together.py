@@ -1,12 +1,13 @@
-"""Point to point together: every joint goes its way, all begin and all arrive at once, as fast as their limits allow.
+"""Synchronous point-to-point motion: all joints begin and arrive together, as fast as their limits allow.
 
     q = begins + s(t) (to - begins)       s from 0 to 1, its rate a trapezoid in time (met/commands/trapezoid.py)
 
 The limits of s are those of the joint that has the least for its way: max_rate/|way| and max_acceleration/|way|, each
-the smallest of all joints (KinematicPTP of the Modelica Standard Library does the same). So the arm goes a straight
-line in its joints' coordinates, and the slowest joint sets the time. A joint whose `to` is where it begins stays.
+the smallest of all joints (KinematicPTP of the Modelica Standard Library does the same). So the arm moves on a straight
+line in joint coordinates, and the slowest joint sets the time. A joint whose `to` is where it begins stays there.
 
-Not a limiter: it knows neither where the joints are nor what their servos can do. The acceleration jumps at corners.
+It is not a limiter: it knows neither the positions of the joints nor the limits of their servos. The acceleration jumps
+at the corners.
 """
 
 from __future__ import annotations
@@ -57,8 +58,8 @@ GUIDE = Guide(
     parameters=(Parameter(name="begin", unit="s", default=0.0, at_least=0.0, doc="time at which the move begins"),),
     of_joint=(
         Parameter(name="to", unit="joint", doc="position after the move"),
-        Parameter(name="max_rate", unit="joint/s", above=0.0, doc="rate that is not exceeded"),
-        Parameter(name="max_acceleration", unit="joint/s^2", above=0.0, doc="acceleration that is not exceeded"),
+        Parameter(name="max_rate", unit="joint/s", above=0.0, doc="largest rate"),
+        Parameter(name="max_acceleration", unit="joint/s^2", above=0.0, doc="largest acceleration"),
     ),
     commands=("position",),
     idle=idle,

@@ -1,10 +1,10 @@
-"""Midpoint: the step is made with the slope at its middle, order 2.
+"""Midpoint rule: the step is made with the slope at its middle; order 2.
 
     y+ = y + h f(t + h/2, y + h/2 f(t, y))
 
-Two evaluations a step. Not Heun's trapezoid (`modified_euler`), which takes the mean of the slopes at both ends, and
-not the implicit midpoint rule. Under a servo that ticks faster than the dynamics it sees what the computer holds at
-the middle of the step: the mean of the first tick's value and the last one's.
+It takes two evaluations per step. It is neither Heun's trapezoid (`modified_euler`), which takes the mean of the slopes
+at both ends, nor the implicit midpoint rule. With a servo that ticks faster than the dynamics, it sees what the
+computer holds at the middle of the step: the mean of the first tick's value and the last one's.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
     y* = y + h f(t, y),  y+ = y + h/2 (f(t, y) + f(t + h, y*))
 
-Two evaluations a step. Not the midpoint rule, which some books also call modified Euler.
+It takes two evaluations per step. It is not the midpoint rule, which some books also call modified Euler.
 """
 
 from __future__ import annotations

@@ -3,9 +3,10 @@
     k1 = f(t, y),  k2 = f(t + h/2, y + h/2 k1),  k3 = f(t + h/2, y + h/2 k2),  k4 = f(t + h, y + h k3)
     y+ = y + h/6 (k1 + 2 k2 + 2 k3 + k4)
 
-Four evaluations a step, of one length: not a method that controls its step. Order 4 where the motion is smooth in
-every step. A step that dry friction splits is found on a parabola, and a stuck joint breaks away at the start of a
-step: with such events it is of order 2. W. Kutta, Zeitschrift fuer Mathematik und Physik 46, 1901, 435-453.
+It takes four evaluations per step. All steps have one length: it does not control its step. It is of order 4 if the
+motion is smooth in every step. The instant at which dry friction splits a step is found on a parabola, and a stuck
+joint breaks away at the start of a step: with such events it is of order 2. W. Kutta, Zeitschrift fuer Mathematik und
+Physik 46, 1901, 435-453.
 """
 
 from __future__ import annotations

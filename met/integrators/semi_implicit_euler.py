@@ -2,12 +2,12 @@
 
     qd+ = qd + h qdd(t, y),  q+ = q + h qd+,  x+ = x + h xd(t, y)        x: states of servos
 
-One evaluation a step: the cheapest there is. Also called symplectic Euler: where inertia does not depend on the pose
-and forces not on rates, energy stays within a band of the step's size instead of drifting away. An arm of several
-joints is seldom so, and then it promises no such thing. Not the explicit Euler rule, which moves the positions with the
-old rates and gains energy; and not an implicit method: nothing is solved for, and it is stable no further than the
-explicit ones. A damped spring with both roots at -w, such as `ideal` under a position command, is stable below
-h w = 2 sqrt(2) - 2 = 0.83.
+It takes one evaluation per step, and is the cheapest method. It is also called symplectic Euler: if inertia does not
+depend on the pose and forces do not depend on rates, the energy stays within a band of the size of the step instead of
+drifting away. An arm of several joints is seldom so, and then there is no such promise. It is not the explicit Euler
+rule, which moves the positions with the old rates and gains energy; and it is not an implicit method: nothing is solved
+for, and it is stable no further than the explicit ones. A damped spring with both roots at -w, such as `ideal` under a
+position command, is stable below h w = 2 sqrt(2) - 2 = 0.83.
 """
 
 from __future__ import annotations

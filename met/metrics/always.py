@@ -1,7 +1,7 @@
-"""The least margin of a condition in a window of the run: at least 0 where the condition holds at every sample of it.
+"""The smallest margin of a condition in a window of the run: at least 0 if the condition holds at every sample in it.
 
 This is the robustness of `G_[after, after + within]` in signal temporal logic over the samples: how far every value may
-move, in the condition's unit, before the answer changes. Not a number where the window has no sample.
+move, in the unit of the condition, before the answer changes. It is not a number if the window has no sample.
 
 A. Donze, O. Maler, Robust satisfaction of temporal logic over real-valued signals, FORMATS 2010; G. E. Fainekos, G. J.
 Pappas, Robustness of temporal logic specifications for continuous-time signals, Theoretical Computer Science 410, 2009.

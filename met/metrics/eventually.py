@@ -1,7 +1,8 @@
-"""The greatest margin of a condition in a window of the run: at least 0 where it holds at one sample of it, or more.
+"""The largest margin of a condition in a window of the run: at least 0 if the condition holds at one sample in it, or
+more.
 
 This is the robustness of `F_[after, after + within]` in signal temporal logic over the samples (met/metrics/always.py
-names the sources). Not a number where the window has no sample.
+names the sources). It is not a number if the window has no sample.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The value at the end of the run."""
+"""The value of the signal at the end of the run."""
 
 from __future__ import annotations
 

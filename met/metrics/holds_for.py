@@ -1,9 +1,9 @@
-"""How much longer than `time` a condition holds without a break, in a window of the run, at its longest.
+"""The longest time for which a condition holds without a break in a window of the run, minus `time`.
 
-At least 0 where it holds at all samples of a stretch of that length: `F G_[0, time]` in signal temporal logic over the
-samples (met/metrics/always.py names the sources). The margin is one of time, not of the condition: the other, the
-greatest of the least margins of all such stretches, would need the memory of a whole stretch in each case. Not a number
-where the window has no sample.
+It is at least 0 if the condition holds at all samples of a stretch of that length: `F G_[0, time]` in signal temporal
+logic over the samples (met/metrics/always.py names the sources). The margin is one of time, not of the condition: the
+latter, the largest of the smallest margins of all such stretches, would need the memory of a whole stretch in each
+case. It is not a number if the window has no sample.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ METRIC = Metric(
     unit="s",
     condition=True,
     over_joints=EVERY_JOINT,
-    parameters=(Parameter(name="time", unit="s", above=0.0, doc="how long it is to hold"), *WINDOW),
+    parameters=(Parameter(name="time", unit="s", above=0.0, doc="time for which the condition should hold"), *WINDOW),
     memory=(
         Memory(name="steps", unit="1", doc="samples of the present stretch behind its first; -1 outside", start=-1.0),
         Memory(name="longest", unit="s", doc="longest stretch so far", start=-math.inf),

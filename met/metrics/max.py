@@ -1,4 +1,4 @@
-"""The largest value."""
+"""The largest value of the signal in the run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The smallest value."""
+"""The smallest value of the signal in the run."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""By how much a condition is missed at least in a window of the run: at least 0 where it holds at no sample of it.
+"""The least amount by which a condition is missed in a window of the run: at least 0 if it holds at no sample in it.
 
-This is the least margin of the condition's opposite, `G_[after, after + within] not` in signal temporal logic over the
-samples (met/metrics/always.py names the sources). Not a number where the window has no sample.
+This is the smallest margin of the condition's opposite, `G_[after, after + within] not` in signal temporal logic over
+the samples (met/metrics/always.py names the sources). It is not a number if the window has no sample.
 """
 
 from __future__ import annotations

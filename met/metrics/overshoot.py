@@ -1,7 +1,7 @@
-"""How far the channel goes beyond its target, as a share of the way from its first value to the target.
+"""The largest excursion of the signal beyond its target, as a share of the way from its first value to the target.
 
-Zero where it comes within 2 % of the way and never passes the target, infinite where it does not come so near: what
-has not arrived has not overshot. Not a number where it starts on the target.
+It is zero if the signal comes within 2 % of the way and never passes the target, and infinite if it does not come so
+near: a signal that has not arrived has not overshot. It is not a number if the signal starts on the target.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ METRIC = Metric(
     least=0.0,
     target="target",
     undefined=lambda p, first: "it begins on its target" if first == p.target else "",
-    parameters=(Parameter(name="target", unit="of", doc="value to be reached"),),
+    parameters=(Parameter(name="target", unit="of", doc="target value of the signal"),),
     memory=(
         Memory(name="first", unit="of", doc="first value"),
         Memory(name="beyond", unit="of", doc="furthest beyond the target so far, below 0 short of it", start=-math.inf),

@@ -1,4 +1,4 @@
-"""The largest size, whatever its sign."""
+"""The largest absolute value of the signal in the run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Root of the mean square over the samples."""
+"""The root mean square of the signal over its samples."""
 
 from __future__ import annotations
 

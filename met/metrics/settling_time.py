@@ -1,6 +1,7 @@
-"""The time from which the channel stays within a band about its target, to the end of the run.
+"""The time from which the signal stays within a band around its target, until the end of the run.
 
-Infinite where it is outside at the end. The band is `band` of the target's size, plus `within`.
+It is infinite if the signal is outside the band at the end. The half width of the band is `band` times the size of the
+target, plus `within`.
 """
 
 from __future__ import annotations
@@ -34,16 +35,22 @@ def update_between(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str
 
 
 PARAMETERS = (
-    Parameter(name="target", unit="of", doc="value to be reached"),
+    Parameter(name="target", unit="of", doc="target value of the signal"),
     Parameter(
         name="band",
         unit="1",
         default=0.02,
         at_least=0.0,
         share=True,
-        doc="half width of the band, share of the target",
+        doc="half width of the band around the target, as a share of the target",
     ),
-    Parameter(name="within", unit="of", default=0.0, at_least=0.0, doc="half width of the band, added to it"),
+    Parameter(
+        name="within",
+        unit="of",
+        default=0.0,
+        at_least=0.0,
+        doc="half width of the band around the target that is added to the share `band`",
+    ),
 )
 
 SINCE = Memory(name="since", unit="s", doc="start of the stretch inside the band; infinite outside", start=math.inf)

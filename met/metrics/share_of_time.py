@@ -1,6 +1,6 @@
-"""The share of a window of the run in which a condition holds: of its samples, those with a margin of at least 0.
+"""The share of a window of the run in which a condition holds: the share of its samples with a margin of at least 0.
 
-Not a number where the window has no sample.
+It is not a number if the window has no sample.
 """
 
 from __future__ import annotations

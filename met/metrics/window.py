@@ -14,8 +14,10 @@ from met.metrics.metric import OverJoints
 from met.parameter import Parameter
 from met.trace import Real, Truth, both, maximum, minimum
 
-AFTER = Parameter(name="after", unit="s", default=0.0, at_least=0.0, doc="beginning of the window")
-WITHIN = Parameter(name="within", unit="s", default=math.inf, at_least=0.0, doc="length of the window")
+AFTER = Parameter(name="after", unit="s", default=0.0, at_least=0.0, doc="start of the time window that is evaluated")
+WITHIN = Parameter(
+    name="within", unit="s", default=math.inf, at_least=0.0, doc="length of the time window that is evaluated"
+)
 WINDOW = (AFTER, WITHIN)
 
 EVERY_JOINT = OverJoints("every", lambda margins: reduce(minimum, margins))

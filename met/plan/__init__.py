@@ -348,7 +348,7 @@ VELOCITY_PRODUCTS = RunKey(
         shape="word",
         words=("on", "off"),
         default="on",
-        doc="Coriolis, centrifugal and gyroscopic torques",
+        doc="whether Coriolis, centrifugal and gyroscopic torques act",
     ),
     true="on",
     listed=False,
@@ -360,7 +360,8 @@ BALANCED = RunKey(
         shape="word",
         words=("unloaded", "balanced"),
         default="unloaded",
-        doc="whether servos begin with what keeps their joints from accelerating",
+        doc="`balanced`: servos begin in equilibrium, so that their joints do not accelerate; `unloaded`: with zero "
+        "current, zero integral and an unloaded gear",
     ),
     true="balanced",
 )

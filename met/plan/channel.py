@@ -65,30 +65,42 @@ DIMENSIONS = {XYZ: "axis", WXYZ: "quaternion"}
 
 JOINT_AXIS = "about or along the joint's axis"
 WORLD_AXES = "world axes"
-CONTINUOUS = "to world axes, continuous from w >= 0"
+CONTINUOUS = "to world axes; w >= 0 at the start, then without jumps"
 
 # Name, unit, meaning, components, frame.
 OF_JOINT = (
-    ("tau_load", "effort", "what the arm takes of the torque", (), JOINT_AXIS),
-    ("J_eff", "inertia", "inertia of the arm at the joint", (), JOINT_AXIS),
-    ("b", "effort", "tau_load less J_eff qdd", (), JOINT_AXIS),
-    ("mode", "1", "1 torque given, 0 acceleration given", (), ""),
-    ("reaction.moment", "N*m", "moment of the joint on its link", XYZ, "link axes, about the link frame's origin"),
-    ("reaction.force", "N", "force of the joint on its link", XYZ, "link axes"),
+    ("tau_load", "effort", "part of the joint's torque that goes into the arm", (), JOINT_AXIS),
+    ("J_eff", "inertia", "effective inertia of the arm at the joint", (), JOINT_AXIS),
+    ("b", "effort", "rest of the load on the joint: tau_load - J_eff qdd", (), JOINT_AXIS),
+    ("mode", "1", "1 if the joint's torque is given, 0 if its acceleration is given, as in stiction", (), ""),
+    (
+        "reaction.moment",
+        "N*m",
+        "moment that the joint exerts on its link",
+        XYZ,
+        "link axes, about the link frame's origin",
+    ),
+    ("reaction.force", "N", "force that the joint exerts on its link", XYZ, "link axes"),
 )
 OF_LINK = (
-    ("position", "m", "origin of the link's frame", XYZ, WORLD_AXES),
-    ("orientation", "1", "unit quaternion of the link's frame", WXYZ, f"from link axes {CONTINUOUS}"),
+    ("position", "m", "position of the origin of the link's frame", XYZ, WORLD_AXES),
+    ("orientation", "1", "orientation of the link's frame, a unit quaternion", WXYZ, f"from link axes {CONTINUOUS}"),
     ("velocity", "m/s", "velocity of the link frame's origin", XYZ, WORLD_AXES),
     ("rate", "rad/s", "angular velocity of the link", XYZ, WORLD_AXES),
 )
 OF_PAYLOAD = (
-    ("position", "m", "origin of the payload's frame", XYZ, WORLD_AXES),
-    ("orientation", "1", "unit quaternion of the payload's frame", WXYZ, f"from payload axes {CONTINUOUS}"),
+    ("position", "m", "position of the origin of the payload's frame", XYZ, WORLD_AXES),
+    (
+        "orientation",
+        "1",
+        "orientation of the payload's frame, a unit quaternion",
+        WXYZ,
+        f"from payload axes {CONTINUOUS}",
+    ),
     ("velocity", "m/s", "velocity of the payload frame's origin", XYZ, WORLD_AXES),
     ("rate", "rad/s", "angular velocity of the payload", XYZ, WORLD_AXES),
-    ("distance", "m", "from its point of the link to the payload's frame", (), ""),
-    ("carried", "1", "1 while the link carries it, 0 while it flies", (), ""),
+    ("distance", "m", "distance of the payload's frame from its place on the link", (), ""),
+    ("carried", "1", "1 while the link carries the payload, 0 while it flies freely", (), ""),
 )
 JOINT_LIMITS = {"q_min": "joint", "q_max": "joint", "qd_max": "joint/s", "tau_max": "effort"}
 """Limits that a joint may have, with their declared units."""
@@ -96,22 +108,22 @@ JOINT_LIMITS = {"q_min": "joint", "q_max": "joint", "qd_max": "joint/s", "tau_ma
 LIMIT_MARGIN = (
     "limit_margin",
     "1",
-    "room to the nearest of its limits, as a share of the range, rate or torque; below 0 beyond",
+    "distance to the nearest of the joint's limits, as a share of the range, rate or torque; negative beyond it",
     (),
     "",
 )
 """As `OF_JOINT` has it: of joints with limits alone."""
 
 JACOBIAN = (
-    ("jacobian.angular", "angular", "rate of the link by the joint's rate"),
-    ("jacobian.linear", "linear", "velocity of the link by the joint's rate"),
+    ("jacobian.angular", "angular", "angular velocity of the link per unit of the joint's rate"),
+    ("jacobian.linear", "linear", "velocity of the link frame's origin per unit of the joint's rate"),
 )
 OF_ARM = (
-    ("energy.kinetic", "J", "kinetic energy, rotors and motors included", (), ""),
-    ("energy.potential", "J", "potential energy in gravity, and of gears that are wound up", (), ""),
-    ("limits.margin", "1", "the smallest `limit_margin` of all joints that have limits", (), ""),
-    ("momentum.linear", "kg*m/s", "momentum", XYZ, WORLD_AXES),
-    ("momentum.angular", "kg*m^2/s", "angular momentum about the origin", XYZ, WORLD_AXES),
+    ("energy.kinetic", "J", "kinetic energy, including that of rotors and motors", (), ""),
+    ("energy.potential", "J", "potential energy of gravity and of wound-up gears", (), ""),
+    ("limits.margin", "1", "smallest `limit_margin` of all joints that have limits", (), ""),
+    ("momentum.linear", "kg*m/s", "linear momentum", XYZ, WORLD_AXES),
+    ("momentum.angular", "kg*m^2/s", "angular momentum about the world's origin", XYZ, WORLD_AXES),
 )
 
 FAMILIES = {

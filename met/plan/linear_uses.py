@@ -66,17 +66,21 @@ class LinearFigure:
 FIGURES: Mapping[str, LinearFigure] = {
     each.name: each
     for each in (
-        LinearFigure("gain_margin", "1", "times by which the gain may rise or fall; 1 of a loop that is unstable",
+        LinearFigure("gain_margin", "1", "factor by which the loop's gain may rise or fall; 1 if the loop is unstable",
                      least=1.0, one_rate=False, unstable=1.0),
-        LinearFigure("phase_margin", "rad", "by which the loop may turn, either way; 0 of one that is unstable",
+        LinearFigure("phase_margin", "rad", "angle by which the loop's phase may change in either direction; 0 if "
+                                            "the loop is unstable",
                      least=0.0),
-        LinearFigure("delay_margin", "s", "by which what the law puts out may come later; 0 of one that is unstable",
+        LinearFigure("delay_margin", "s", "time by which the output of the control law may come later; 0 if the loop "
+                                          "is unstable",
                      least=0.0),
-        LinearFigure("disk_margin", "1", "alpha of the disk of gain and phase at once; 0 of one that is unstable",
+        LinearFigure("disk_margin", "1", "size alpha of the disk of simultaneous changes of gain and phase; 0 if the "
+                                         "loop is unstable",
                      least=0.0),
-        LinearFigure("damping", "1", "the least damping of all poles that do not stay; below 0 of one that grows",
+        LinearFigure("damping", "1", "smallest damping ratio of all poles that decay or grow; negative if one grows",
                      least=-1.0, of_loops=False, one_rate=False),
-        LinearFigure("decay_time", "s", "time in which the slowest mode decays by e; infinite where one grows",
+        LinearFigure("decay_time", "s", "time in which the slowest mode decays by a factor of e; infinite if a mode "
+                                        "grows",
                      least=0.0, of_loops=False, one_rate=False, margin=False),
     )
 }  # fmt: skip

@@ -4,14 +4,15 @@
     y''      = w^2 (x - y) - sqrt(2) w y',  w = 2 pi cutoff                 of order 2, integrated with the arm
     reading  scale y + bias + noise n_k, to the nearest step of the converter, `delay` ticks late
 
-So at rest under gravity it reads +9.81 m/s^2 upwards, and in free fall nothing. g is all of gravitation: uniform
-`gravity`, and what a `gravity_gradient` makes of it at that point: on board of what is in orbit, an accelerometer away
-from the centre of mass does feel the difference. The filter is always there: a real one has a bandwidth, and the
-acceleration at a tick is not known before what acts from that tick on.
+So at rest under gravity it reads +9.81 m/s^2 upwards, and in free fall zero. g is all of gravitation: uniform
+`gravity`, and the share of a `gravity_gradient` at that point. In orbit, an accelerometer away from the centre of mass
+therefore does feel the difference. The filter is always present: a real sensor has a bandwidth, and the acceleration at
+a tick is not known before the loads that act from that tick on.
 
-A run begins with the filter settled on joints that do not accelerate, and a free base that falls freely. The noise is
-white from tick to tick. Rates that jump, as where a payload is grappled, are no acceleration here: a real one rings.
-Not a triad: for three axes write three. It has no range, and its axis is as written: there is no misalignment.
+A run begins with the filter settled, for joints that do not accelerate and a free base in free fall. The noise is white
+from tick to tick. A jump of the rates, as at a grapple of a payload, is not an acceleration here; a real sensor would
+ring. The sensor has one axis; for three axes, write three sensors. It has no limited range, and its axis is exactly the
+one that is written: there is no misalignment.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ SENSOR = Sensor(
     doc=__doc__,
     parameters=(
         LINK,
-        Parameter(name="at", unit="m", shape="vector", default=ZEROS, doc="where it is, in the link's frame"),
+        Parameter(
+            name="at", unit="m", shape="vector", default=ZEROS, doc="position of the sensor, in the link's frame"
+        ),
         ALONG,
         butterworth.cutoff(),
         SCALE,

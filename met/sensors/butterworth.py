@@ -12,14 +12,14 @@ from met.trace import Real
 
 def cutoff(only: Only | None = None) -> Parameter:
     """Its parameter."""
-    return Parameter(name="cutoff", unit="Hz", above=0.0, only=only, doc="cut-off of the filter")
+    return Parameter(name="cutoff", unit="Hz", above=0.0, only=only, doc="cut-off frequency of the filter")
 
 
 def states(only: Only | None = None) -> tuple[State, ...]:
     """Its output, and the slope of that."""
     return (
-        State(name="filtered", unit="of", only=only, doc="what is behind the filter"),
-        State(name="filtered_slope", unit="of/s", only=only, doc="its slope"),
+        State(name="filtered", unit="of", only=only, doc="output of the filter"),
+        State(name="filtered_slope", unit="of/s", only=only, doc="rate of change of the filter's output"),
     )
 
 

@@ -12,9 +12,13 @@ from met.trace import Real, rint, where
 MOST = 3
 """Ticks of delay that there is room for."""
 
-NOISE = Parameter(name="noise", unit="of", default=0.0, at_least=0.0, doc="noise at each tick, rms")
+NOISE = Parameter(name="noise", unit="of", default=0.0, at_least=0.0, doc="white noise that is added at each tick, rms")
 RESOLUTION = Parameter(
-    name="resolution", unit="of", default=0.0, at_least=0.0, doc="step of the converter, to the nearest; 0: it has none"
+    name="resolution",
+    unit="of",
+    default=0.0,
+    at_least=0.0,
+    doc="step of the converter, to the nearest of which it rounds; 0: no rounding",
 )
 DELAY = Parameter(
     name="delay",
@@ -22,7 +26,7 @@ DELAY = Parameter(
     at_least=0.0,
     at_most=float(MOST),
     whole=True,
-    doc="ticks from reading to what is seen",
+    doc="ticks by which the reading is late",
 )
 PAST = tuple(Memory(name=f"past_{n}", unit="of", doc=f"reading {n} ticks before the last") for n in range(MOST))
 

@@ -1,9 +1,9 @@
-"""Encoder: it counts lines, and knows the last one that was passed.
+"""Encoder: it counts lines, and reads the last one that was passed.
 
     reading = step floor(x/step),  `delay` ticks late
 
-so it reads half a step too little on average. Not an encoder that is misread: no count is lost. A rate that is found
-from counts is not in this model.
+so the reading is half a step too small on average. No count is ever lost. A rate that is found from counts is not part
+of this model.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def read(p: Any, held: Any, states: Any, sensed: Sensed) -> Reading:
 SENSOR = Sensor(
     name="encoder",
     doc=__doc__,
-    parameters=(Parameter(name="step", unit="of", above=0.0, doc="from one line to the next"), DELAY),
+    parameters=(Parameter(name="step", unit="of", above=0.0, doc="distance from one line to the next"), DELAY),
     memory=PAST,
     begin=begin,
     read=read,

@@ -1,13 +1,13 @@
-"""Rate gyroscope: the angular velocity of a link about one direction, through a filter or none, digitized.
+"""Rate gyroscope: the angular velocity of a link about one direction, through an optional filter, digitized.
 
     x        along . w               w: angular velocity against directions that do not turn
     filter = none          y = x
     filter = butterworth   y'' = w_c^2 (x - y) - sqrt(2) w_c y',  w_c = 2 pi cutoff  of order 2, integrated with the arm
     reading  scale y + bias + noise n_k, to the nearest step of the converter, `delay` ticks late
 
-Where the world itself turns, as with a `gravity_gradient` whose frame is orbital, its turning is in the reading. A run
-begins with the filter settled. The noise is white from tick to tick; the bias stays what it is: there is no drift.
-Not an angle: it does not integrate. It does not feel accelerations.
+If the world itself turns, as with a `gravity_gradient` whose frame is orbital, its rotation is included in the reading.
+A run begins with the filter settled. The noise is white from tick to tick; the bias is constant: there is no drift. The
+sensor does not integrate the rate to an angle, and does not feel accelerations.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Analog low-pass of order 1: y' = 2 pi cutoff (x - y). A continuous law can see it; a run begins with it settled."""
+"""Analog low-pass of order 1: y' = 2 pi cutoff (x - y). A continuous law can read it. A run begins with the filter
+settled.
+"""
 
 from __future__ import annotations
 
@@ -31,8 +33,8 @@ def read(p: Any, held: Any, states: Any, sensed: Sensed) -> Reading:
 SENSOR = Sensor(
     name="low_pass",
     doc=__doc__,
-    parameters=(Parameter(name="cutoff", unit="Hz", above=0.0, doc="cut-off of the filter"),),
-    states=(State(name="filtered", unit="of", doc="what is behind the filter"),),
+    parameters=(Parameter(name="cutoff", unit="Hz", above=0.0, doc="cut-off frequency of the filter"),),
+    states=(State(name="filtered", unit="of", doc="output of the filter"),),
     fastest=fastest,
     follow=follow,
     begin=begin,

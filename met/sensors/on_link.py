@@ -10,12 +10,19 @@ from met.sensors.sensor import Reading, Sensed
 from met.trace import Real, sqrt
 from met.vectors import Vector, dot, scale
 
-LINK = Parameter(name="link", shape="word", names="link", words=(BASE,), doc="link that it is fixed to")
+LINK = Parameter(name="link", shape="word", names="link", words=(BASE,), doc="link that the sensor is fixed to")
 ALONG = Parameter(
-    name="along", shape="vector", direction=True, doc="direction in the link's frame; its length does not count"
+    name="along",
+    shape="vector",
+    direction=True,
+    doc="measured direction, in the link's frame; the length of the vector does not matter",
 )
-SCALE = Parameter(name="scale", default=1.0, doc="reading for each unit of what there is: 1.01 reads one percent more")
-BIAS = Parameter(name="bias", unit="of", default=0.0, doc="reading where there is nothing")
+SCALE = Parameter(
+    name="scale",
+    default=1.0,
+    doc="reading per unit of the measured quantity: with 1.01 the sensor reads one per cent more",
+)
+BIAS = Parameter(name="bias", unit="of", default=0.0, doc="reading at zero of the measured quantity")
 
 
 def component(along: Vector, vector: Vector) -> Real:

@@ -13,7 +13,11 @@ from met.trace import Real
 _THERE = ("filter", ("butterworth",))
 
 FILTER = Parameter(
-    name="filter", shape="word", words=("none", "butterworth"), default="none", doc="the filter behind it"
+    name="filter",
+    shape="word",
+    words=("none", "butterworth"),
+    default="none",
+    doc="analog filter between the quantity and the reading",
 )
 CUTOFF = butterworth.cutoff(_THERE)
 STATES = butterworth.states(_THERE)

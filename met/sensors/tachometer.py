@@ -4,8 +4,9 @@
     filter = butterworth   y'' = w^2 (x - y) - sqrt(2) w y',  w = 2 pi cutoff       of order 2, integrated with the arm
     reading                y + noise n_k, to the nearest step of the converter, `delay` ticks late
 
-x is the quantity that it is of, a rate or any other. The noise is white from tick to tick, so its share below some
-frequency depends on the servo's rate. A run begins with the filter settled. Not a resolver: it has no ripple.
+x is the quantity that is sensed, a rate or any other. The noise is white from tick to tick, so its share below a given
+frequency depends on the servo's rate. A run begins with the filter settled. There is no ripple, as a resolver would
+have.
 """
 
 from __future__ import annotations

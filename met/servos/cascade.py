@@ -1,4 +1,4 @@
-"""Cascaded servo, as robots have it: a position loop around a rate loop around a current loop, with feed-forward.
+"""Cascaded servo, as robots have: a position loop around a rate loop around a current loop, with feed-forward.
 
     u = feed_forward N r' + k_position (N r - theta) - w      position command r, with its rate r'
     u = N r - w                                               rate command r
@@ -11,10 +11,12 @@
                                                               compliant_gearbox
     tau = N (tau_m - friction), and N^2 J_m moves with q      gear = rigid: w = N q', theta = N q
 
-A torque command asks i* = r/(N Kt), open loop. theta and w are the motor's: the loops see its encoder and tachometer.
+A torque command sets i* = r/(N Kt), open loop. theta and w are the angle and rate of the motor: the loops see its
+encoder and tachometer.
 
-The current loop is fast: ki_current/R or sqrt(ki_current/L) often wants a step of the dynamics below 0.1 ms. Where it
-does not matter, `rigid_gearbox` and `compliant_gearbox` have an armature without inductance, and a voltage.
+The current loop is fast: ki_current/R or sqrt(ki_current/L) often needs a step of the dynamics below 0.1 ms. If the
+current loop does not matter, use `rigid_gearbox` or `compliant_gearbox`, which have an armature without inductance, and
+a voltage.
 """
 
 from __future__ import annotations
@@ -156,14 +158,20 @@ SERVO = Servo(
             default=0.0,
             at_least=0.0,
             needed_for=("position",),
-            doc="gain from position error to rate asked, used under a position command alone",
+            doc="gain of the position loop: commanded rate per position error; used only under a position command",
         ),
-        Parameter(name="feed_forward", default=1.0, doc="share of the rate of a position command that is asked ahead"),
-        Parameter(name="kp", unit="A*s/rad", at_least=0.0, doc="gain on the motor's rate error"),
-        Parameter(name="ki", unit="A/rad", at_least=0.0, doc="gain on the rate error's integral"),
-        Parameter(name="i_max", unit="A", default=math.inf, above=0.0, doc="largest current that is asked"),
-        Parameter(name="k_current", unit="V/A", default=0.0, at_least=0.0, doc="gain on the current's error"),
-        Parameter(name="ki_current", unit="V/(A*s)", at_least=0.0, doc="gain on the current error's integral"),
+        Parameter(
+            name="feed_forward",
+            default=1.0,
+            doc="feed-forward: share of the position command's rate that is added to the commanded rate",
+        ),
+        Parameter(name="kp", unit="A*s/rad", at_least=0.0, doc="proportional gain Kp on the error of the motor's rate"),
+        Parameter(name="ki", unit="A/rad", at_least=0.0, doc="integral gain Ki on the error of the motor's rate"),
+        Parameter(
+            name="i_max", unit="A", default=math.inf, above=0.0, doc="largest current that the control law commands"
+        ),
+        Parameter(name="k_current", unit="V/A", default=0.0, at_least=0.0, doc="proportional gain of the current loop"),
+        Parameter(name="ki_current", unit="V/(A*s)", at_least=0.0, doc="integral gain of the current loop"),
         Parameter(name="v_max", unit="V", default=math.inf, above=0.0, doc="largest voltage of the amplifier"),
         *ARMATURE,
         Parameter(name="inductance", unit="H", above=0.0, doc="armature inductance L"),
@@ -175,16 +183,16 @@ SERVO = Servo(
             shape="word",
             words=("elastic", "rigid"),
             default="elastic",
-            doc="whether the gear winds up, or motor and joint are one inertia",
+            doc="`elastic`: the gear winds up between motor and joint; `rigid`: motor and joint are one inertia",
         ),
         *gear.parameters(ELASTIC),
         *JOINT_FRICTION,
     ),
-    outputs=(Memory(name="current_cmd", unit="A", doc="current to be driven", limit="i_max"),),
+    outputs=(Memory(name="current_cmd", unit="A", doc="commanded current", limit="i_max"),),
     integrals=(State(name="integral", unit="rad", doc="integral of the motor's rate error"),),
     states=(
         State(name="current", unit="A", doc="current in the armature"),
-        State(name="amplifier", unit="V", doc="integral of the current loop, as a voltage"),
+        State(name="amplifier", unit="V", doc="integral part of the current loop, as a voltage"),
         gear.deflection(ELASTIC),
         replace(compliant_gearbox.MOTOR_RATE, only=ELASTIC),
         BRISTLE,

@@ -1,4 +1,4 @@
-"""Compliant gearbox servo: motor and joint are two inertias, joined by a gear that winds up; the rate loop is as in
+"""Compliant gearbox servo: motor and joint are two inertias, connected by an elastic gear; the rate loop is as in
 `rigid_gearbox`, on the motor's side.
 
     d = theta/N - q,  d' = w/N - qd                   winding of the gear, at the joint; theta, w: of the motor
@@ -7,12 +7,12 @@
     J_m w' = tau_m - T/N - friction                   tau_m as in rigid_gearbox, at the motor's own rate w
     friction = F_v w + s (F_c + loss |T|/N)           sticks too; or Stribeck's, or LuGre's (met/servos/friction.py)
 
-The rotor's inertia is not the joint's: with the joint held the motor swings at sqrt(k1/(N^2 J_m)), and against a joint
-of inertia J at sqrt(k1 (1/(N^2 J_m) + 1/J)). The loop sees the motor's tachometer and encoder, not the joint. A run
-begins with the gear not wound up, the motor turning with the joint: what gravity pulls at sinks in, unless servos begin
-balanced.
+The rotor's inertia is not part of the joint's. With the joint held, the motor oscillates at sqrt(k1/(N^2 J_m)), and
+against a joint of inertia J at sqrt(k1 (1/(N^2 J_m) + 1/J)). The loop sees the motor's tachometer and encoder, not the
+joint. A run begins with an unwound gear and the motor turning with the joint, so an arm under gravity sags at first,
+unless the servos begin balanced.
 
-Not a gear whose ratio wavers, and not a harmonic drive's hysteresis.
+The gear has no variation of its ratio, and not the hysteresis of a harmonic drive.
 """
 
 from __future__ import annotations
@@ -110,7 +110,13 @@ def swing(p: Any, by_law: Real) -> tuple[Real, Real]:
 
 JOINT_FRICTION = (
     Parameter(name="f_c_joint", unit="effort", default=0.0, at_least=0.0, doc="Coulomb friction at the joint"),
-    Parameter(name="f_v_joint", unit="effort*s/joint", default=0.0, at_least=0.0, doc="viscous friction at the joint"),
+    Parameter(
+        name="f_v_joint",
+        unit="effort*s/joint",
+        default=0.0,
+        at_least=0.0,
+        doc="viscous friction at the joint: torque per joint rate",
+    ),
 )
 MOTOR_RATE = State(name="motor_rate", unit="rad/s", doc="rate of the motor's shaft")
 GEAR_TORQUE = Signal(name="gear_torque", unit="effort", doc="torque of the gear on the joint")

@@ -38,12 +38,20 @@ PARAMETERS = (
         shape="word",
         words=("coulomb", "stribeck", "lugre"),
         default="coulomb",
-        doc="law of the friction at the motor",
+        doc="friction law of the motor's shaft: that of Coulomb, Stribeck or LuGre",
     ),
-    Parameter(name="f_s", unit="N*m", at_least=0.0, only=CURVED, doc="friction that breaks away, F_s"),
-    Parameter(name="rate_s", unit="rad/s", above=0.0, only=CURVED, doc="motor rate at which it has mostly fallen, w_s"),
-    Parameter(name="sigma_0", unit="N*m/rad", above=0.0, only=LUGRE, doc="stiffness of the bristles"),
-    Parameter(name="sigma_1", unit="N*m*s/rad", default=0.0, at_least=0.0, only=LUGRE, doc="damping of the bristles"),
+    Parameter(name="f_s", unit="N*m", at_least=0.0, only=CURVED, doc="breakaway friction F_s on the motor's shaft"),
+    Parameter(
+        name="rate_s",
+        unit="rad/s",
+        above=0.0,
+        only=CURVED,
+        doc="Stribeck rate w_s: motor rate at which dry friction has mostly fallen from F_s to F_c",
+    ),
+    Parameter(name="sigma_0", unit="N*m/rad", above=0.0, only=LUGRE, doc="stiffness sigma_0 of the bristles"),
+    Parameter(
+        name="sigma_1", unit="N*m*s/rad", default=0.0, at_least=0.0, only=LUGRE, doc="damping sigma_1 of the bristles"
+    ),
 )
 SHAFT = (
     J_M,
@@ -58,13 +66,13 @@ LOSS = Parameter(
     default=0.0,
     at_least=0.0,
     below=1.0,
-    doc="share of the gear's torque by which dry friction at the motor is higher",
+    doc="share of the gear's torque that is added to the dry friction on the motor's shaft",
 )
 
 BLOW = 10.0
 """As many times what its motor gives at most a gear is thought to transmit."""
 
-BRISTLE = State(name="bristle", unit="rad", only=LUGRE, doc="by how much the bristles of friction are bent")
+BRISTLE = State(name="bristle", unit="rad", only=LUGRE, doc="deflection of the bristles of the friction law")
 
 
 @frozen

@@ -20,7 +20,11 @@ def parameters(only: Only | None = None) -> tuple[Parameter, ...]:
     """Parameters of a servo with such a gear."""
     return (
         Parameter(
-            name="stiffness", unit="effort/joint", above=0.0, only=only, doc="stiffness k1 of the gear, at the joint"
+            name="stiffness",
+            unit="effort/joint",
+            above=0.0,
+            only=only,
+            doc="stiffness k1 of the gear, seen at the joint",
         ),
         Parameter(
             name="hardening",
@@ -28,23 +32,30 @@ def parameters(only: Only | None = None) -> tuple[Parameter, ...]:
             default=0.0,
             at_least=0.0,
             only=only,
-            doc="k3: torque of the gear with the third power of its winding",
+            doc="cubic stiffness k3 of the gear, seen at the joint",
         ),
-        Parameter(name="backlash", unit="joint", default=0.0, at_least=0.0, only=only, doc="play, from end to end"),
+        Parameter(
+            name="backlash",
+            unit="joint",
+            default=0.0,
+            at_least=0.0,
+            only=only,
+            doc="play of the gear from end to end, seen at the joint",
+        ),
         Parameter(
             name="damping",
             unit="effort*s/joint",
             default=0.0,
             at_least=0.0,
             only=only,
-            doc="damping c of the gear, at the joint",
+            doc="damping c of the gear, seen at the joint",
         ),
     )
 
 
 def deflection(only: Only | None = None) -> State:
     """The state that winds the gear up."""
-    doc = "motor's angle over the ratio, less the joint's"
+    doc = "winding of the gear: the motor's angle divided by the ratio, minus the joint's position"
     return State(name="deflection", unit="joint", in_transmission=True, only=only, doc=doc)
 
 

@@ -1,18 +1,18 @@
-"""Ideal servo: the joint follows its command whatever the arm, and the torque that this takes is what comes out.
+"""Ideal servo: the joint follows its command whatever the arm does, and tau is the torque that this takes.
 
     r(t) = value + slope (t - since)                  the command, carried on along its slope from the tick at `since`
     rate            qdd = slope + w (r - qd)
     position        qdd = 2 w (slope - qd) + w^2 (r - q)
     acceleration    qdd = r
 
-Value and slope are taken at the servo's ticks and held, or at every stage where it is continuous; the law below is
-evaluated at every stage. w is `bandwidth`: an
-error dies away as exp(-w t), without overshoot, and at a step of a command the joint goes there so. The second
-derivative of a position command is not known, so a position whose rate changes is followed (its acceleration)/w^2
-behind. tau is from inverse dynamics, the rotor's share included; there is no limit.
+Value and slope are taken at the servo's ticks and held, or at every stage if the servo is continuous; the law above is
+evaluated at every stage. w is `bandwidth`: an error decays as exp(-w t), without overshoot, and so does the error after
+a step of the command. The second derivative of a position command is not known, so the joint lags behind a position
+command whose rate changes by (its acceleration)/w^2. tau comes from inverse dynamics and includes the share of the
+rotor; it has no limit.
 
-Not a motor, and not a controller: no torque in the world is needed to be this good. A joint that is moved so shakes
-the other joints like any other, but nothing shakes it.
+This is neither a motor nor a controller: no torque in the world would be enough to be this good. A joint that is moved
+in this way shakes the other joints like any other, but nothing shakes it.
 """
 
 from __future__ import annotations
@@ -59,20 +59,20 @@ SERVO = Servo(
             at_least=0.0,
             needed_for=("rate", "position"),
             above_where_needed=0.0,
-            doc="how fast an error dies away, used under a rate or position command",
+            doc="errors decay as exp(-bandwidth t); used only under a rate or position command",
         ),
         Parameter(
             name="rotor",
             unit="effort*s^2/joint",
             default=0.0,
             at_least=0.0,
-            doc="inertia of the drive, seen at the joint: its share of tau",
+            doc="inertia of the drive seen at the joint; tau includes the torque that accelerates it",
         ),
     ),
     outputs=(
-        Memory(name="value", unit="command", doc="what was asked"),
-        Memory(name="slope", unit="command/s", doc="its rate of change"),
-        Memory(name="since", unit="s", doc="time at which it was asked"),
+        Memory(name="value", unit="command", doc="value of the command at the servo's last tick"),
+        Memory(name="slope", unit="command/s", doc="rate of change of the command at the servo's last tick"),
+        Memory(name="since", unit="s", doc="time of the servo's last tick"),
     ),
     control=control,
     drive=drive,

@@ -3,10 +3,11 @@
     t < release     qdd = 0; tau is what the lock takes
     afterwards      tau = 0
 
-It begins at rest where its case begins locked. The mode is one for each step of the dynamics: locked in all that begin
-before `release`, so a release between two steps waits for the next one.
+A case that begins locked begins at rest. The mode is the same for a whole step of the dynamics: the joint is locked in
+all steps that begin before `release`, so a release between two steps takes effect at the next one.
 
-Not a brake: it holds any torque, and does not slow down what moves. For that see the friction of `passive`.
+This is not a brake: it holds any torque, and does not slow down a joint that moves. For that, see the friction of
+`passive`.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ SERVO = Servo(
             unit="s",
             default=math.inf,
             at_least=0.0,
-            doc="time at which the joint is set free; never unless written",
+            doc="time at which the joint is released; by default never",
         ),
     ),
     drive=drive,

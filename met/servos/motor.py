@@ -9,22 +9,44 @@ from met.trace import Real, clip
 TABLE_1 = "Hill, Hopping, Price 1989, table 1"
 
 RATIO = Parameter(
-    name="ratio", unit="rad/joint", above=0.0, source=TABLE_1, doc="gear ratio N: motor turns per joint turn"
+    name="ratio",
+    unit="rad/joint",
+    above=0.0,
+    source=TABLE_1,
+    doc="gear ratio N: angle of the motor divided by that of the joint",
 )
 SHAFT = (
-    Parameter(name="j_m", unit="kg*m^2", above=0.0, source=TABLE_1, doc="inertia of the motor's shaft J_m"),
-    Parameter(name="f_c", unit="N*m", default=0.0, at_least=0.0, source=TABLE_1, doc="Coulomb friction at the motor"),
+    Parameter(name="j_m", unit="kg*m^2", above=0.0, source=TABLE_1, doc="inertia J_m of the motor's shaft"),
     Parameter(
-        name="f_v", unit="N*m*s/rad", default=0.0, at_least=0.0, source=TABLE_1, doc="viscous friction at the motor"
+        name="f_c",
+        unit="N*m",
+        default=0.0,
+        at_least=0.0,
+        source=TABLE_1,
+        doc="Coulomb friction F_c on the motor's shaft",
+    ),
+    Parameter(
+        name="f_v",
+        unit="N*m*s/rad",
+        default=0.0,
+        at_least=0.0,
+        source=TABLE_1,
+        doc="viscous friction F_v on the motor's shaft: torque per shaft rate",
     ),
 )
 ARMATURE = (
     Parameter(name="resistance", unit="ohm", above=0.0, source=TABLE_1, doc="armature resistance R"),
     Parameter(
-        name="kt", unit="N*m/A", above=0.0, source=TABLE_1, doc="torque constant, and back-EMF constant in V s/rad"
+        name="kt",
+        unit="N*m/A",
+        above=0.0,
+        source=TABLE_1,
+        doc="torque constant Kt, which is also the back-EMF constant in V s/rad",
     ),
 )
-TAU_MAX = Parameter(name="tau_max", unit="N*m", above=0.0, source=TABLE_1, doc="largest motor torque, before friction")
+TAU_MAX = Parameter(
+    name="tau_max", unit="N*m", above=0.0, source=TABLE_1, doc="largest torque of the motor, before friction"
+)
 """Limit of the motor's torque; with `RATIO`, `SHAFT` and `ARMATURE` the parameters of a servo with a motor."""
 
 

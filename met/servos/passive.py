@@ -1,9 +1,10 @@
-"""Passive joint: no motor and no command; damping, dry friction that sticks, a spring, and what turns with it.
+"""Passive joint: no motor and no command; damping, dry friction that sticks, a spring, and an inertia that moves with
+the joint.
 
     tau = -damping qd - stiffness (q - rest) - s friction,  s in {0, +1, -1} (stuck, forward, backward)
 
-With all parameters left at zero it is a joint without a servo. It has no bound of its own on how fast the joint moves,
-since that depends on the inertia behind it: nothing warns of a spring or damper that is too stiff for the step.
+With all parameters at zero it is a joint without a servo. How fast the joint can move depends on the inertia behind it,
+so the model has no bound of its own on that, and no warning tells of a spring or damper that is too stiff for the step.
 """
 
 from __future__ import annotations
@@ -27,22 +28,30 @@ SERVO = Servo(
     name="passive",
     doc=__doc__,
     parameters=(
-        Parameter(name="damping", unit="effort*s/joint", default=0.0, at_least=0.0, doc="torque per joint rate"),
-        Parameter(name="friction", unit="effort", default=0.0, at_least=0.0, doc="dry friction, which sticks"),
+        Parameter(
+            name="damping", unit="effort*s/joint", default=0.0, at_least=0.0, doc="damping: torque per joint rate"
+        ),
+        Parameter(
+            name="friction",
+            unit="effort",
+            default=0.0,
+            at_least=0.0,
+            doc="dry friction, under which the joint can stick",
+        ),
         Parameter(
             name="stiffness",
             unit="effort/joint",
             default=0.0,
             at_least=0.0,
-            doc="torque of the spring per way from its rest",
+            doc="stiffness of the spring: torque per displacement from `rest`",
         ),
-        Parameter(name="rest", unit="joint", default=0.0, doc="position at which the spring does nothing"),
+        Parameter(name="rest", unit="joint", default=0.0, doc="joint position at which the spring has no torque"),
         Parameter(
             name="rotor",
             unit="effort*s^2/joint",
             default=0.0,
             at_least=0.0,
-            doc="inertia that moves with the joint and is not the arm's",
+            doc="inertia that moves with the joint and is not part of the arm",
         ),
     ),
     drive=drive,

@@ -20,16 +20,24 @@ from met.trace import Real, both, clip, either, maximum, sqrt, where
 COMMANDS = ("rate", "position", "torque")
 
 PARAMETERS = (
-    Parameter(name="kp", unit="V*s/rad", at_least=0.0, source=TABLE_1, doc="gain on the motor's rate error"),
-    Parameter(name="ki", unit="V/rad", at_least=0.0, source=TABLE_1, doc="gain on the rate error's integral"),
-    Parameter(name="v_max", unit="V", above=0.0, source=TABLE_1, doc="largest voltage of the drive's amplifier"),
+    Parameter(
+        name="kp",
+        unit="V*s/rad",
+        at_least=0.0,
+        source=TABLE_1,
+        doc="proportional gain Kp on the error of the motor's rate",
+    ),
+    Parameter(
+        name="ki", unit="V/rad", at_least=0.0, source=TABLE_1, doc="integral gain Ki on the error of the motor's rate"
+    ),
+    Parameter(name="v_max", unit="V", above=0.0, source=TABLE_1, doc="largest voltage V_max of the drive's amplifier"),
     Parameter(
         name="k_position",
         unit="1/s",
         default=0.0,
         at_least=0.0,
         needed_for=("position",),
-        doc="gain from position error to rate asked, used under a position command alone",
+        doc="gain of the position loop: commanded rate per position error; used only under a position command",
     ),
 )
 

@@ -7,14 +7,15 @@
     tau_m = clip(Kt (V - Kt w)/R, +-tau_max)          at every stage; tau_max does not stop the integral
     tau = N (tau_m - friction),  friction = s F_c + F_v w,  s in {0, +1, -1} (stuck, forward, backward)
 
-Or friction is Stribeck's, or LuGre's (met/servos/friction.py).
+Friction may also follow the law of Stribeck or that of LuGre (met/servos/friction.py).
 
-The rotor's inertia N^2 J_m moves with the joint. Figure 3 and table 1 of Hill, Hopping and Price (1989).
-Not a gearbox with compliance. What the rotor's turning does to the link that carries it is computed on a free base
-alone.
+The rotor's inertia N^2 J_m moves with the joint. The model is that of figure 3 and table 1 of Hill, Hopping and Price
+(1989). Its gearbox has no compliance. The reaction of the turning rotor on the link that carries it is computed on a
+free base only.
 
-A position command is followed by asking the rate loop for qd_cmd = d(q_cmd)/dt + k_position (q_cmd - q). A torque
-command sets the voltage that gives this torque at the rate seen, without friction's share; it is open loop.
+Under a position command, the rate loop gets qd_cmd = d(q_cmd)/dt + k_position (q_cmd - q). Under a torque command, the
+voltage is the one that gives this torque at the rate that the law sees, without the share of friction; this is open
+loop.
 """
 
 from __future__ import annotations

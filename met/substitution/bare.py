@@ -1,7 +1,7 @@
-"""Torque balance as eq. 10 of the paper stands: friction is left out of the balance.
+"""Torque balance exactly as in eq. 10 of the paper: friction is left out of the balance.
 
-The bed's friction then acts 1 + r times too strongly, r = J_eff/(N^2 J_m). Here to show it; `torque_balance` has it
-right.
+The bed's friction then acts 1 + r times too strongly, with r = J_eff/(N^2 J_m). The law is here to show this;
+`torque_balance` has it right.
 """
 
 from __future__ import annotations

@@ -36,8 +36,8 @@ DriveCommand = Literal["voltage", "torque", "rate"]
 
 DRIVES: Mapping[DriveCommand, tuple[str, str]] = {
     "voltage": ("V", "all of the servo's law is ours: its voltage is on the drive motor"),
-    "torque": ("N*m", "the drive has a current loop of its own: it is told the torque of the motor"),
-    "rate": ("rad/s", "the drive has a rate loop of its own: it is told the rate of the shaft"),
+    "torque": ("N*m", "the drive has a current loop of its own: it takes the torque of the motor as its command"),
+    "rate": ("rad/s", "the drive has a rate loop of its own: it takes the rate of the shaft as its command"),
 }
 """Unit of each, and what the drive then does itself."""
 
@@ -86,8 +86,8 @@ model may have `shaft_angle` (rad), which is then what a simulated bed's encoder
 
 def of_bed(drive: DriveCommand) -> tuple[tuple[str, str, str], ...]:
     """Name, unit and meaning of what the engine holds of a bed, besides the memory of its model."""
-    meaning = "voltage that is on the drive motor" if drive == "voltage" else f"{drive} that the drive is told"
-    return (f"drive_{drive}", DRIVES[drive][0], meaning), ("load_current", "A", "current that is in the load motor")
+    meaning = "voltage on the drive motor" if drive == "voltage" else f"{drive} that the drive is commanded"
+    return (f"drive_{drive}", DRIVES[drive][0], meaning), ("load_current", "A", "current in the load motor")
 
 
 @frozen(kw_only=True)

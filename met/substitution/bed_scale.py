@@ -21,9 +21,13 @@ from met.parameter import Parameter
 from met.trace import Real
 
 PARAMETERS = (
-    Parameter(name="torque", default=1.0, above=0.0, doc="torque of the joint's motor over that of the bed's"),
-    Parameter(name="rate", default=1.0, above=0.0, doc="rate of the joint's motor over that of the bed's"),
-    Parameter(name="voltage", default=1.0, above=0.0, doc="voltage on the joint's motor over that on the bed's"),
+    Parameter(
+        name="torque", default=1.0, above=0.0, doc="torque of the joint's motor divided by that of the bed's motor"
+    ),
+    Parameter(name="rate", default=1.0, above=0.0, doc="rate of the joint's motor divided by that of the bed's motor"),
+    Parameter(
+        name="voltage", default=1.0, above=0.0, doc="voltage on the joint's motor divided by that on the bed's motor"
+    ),
 )
 """The scales that a deck may write; their paths are `JOINT.bed.scale.NAME`."""
 

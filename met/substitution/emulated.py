@@ -1,11 +1,11 @@
-"""The emulated bed: two motors on a shaft, a tachometer behind a filter, converters, and faults of each.
+"""The emulated bed: two motors on a shaft, a tachometer with a filter, converters, and the faults of each.
 
     J w' = tau_m(V, w) + Kt_load i - F_v w - s F_c + unevenness,   s as friction sticks
 
-The drive motor stands behind a voltage amplifier, the load motor behind a current amplifier; the rest is in
-emulated_shaft.py. Faults: the load torque is uneven (`unevenness` of it, `lobes` a turn), the motors are out of line
-(`once` and `twice` a turn), the tachometer is noisy (`tachometer`, rms, a new value each tick), converters have a
-resolution (0: none).
+The drive motor is fed by a voltage amplifier, the load motor by a current amplifier; the rest is in emulated_shaft.py.
+The faults are a ripple of the load torque (`unevenness` of it, `lobes` periods per turn), misaligned motors (`once` and
+`twice` per turn), noise of the tachometer (`tachometer`, rms, a new value at each tick), and the resolution of the
+converters (0: none).
 """
 
 from __future__ import annotations
@@ -43,7 +43,13 @@ BED = BedModel(
         emulated_shaft.TAU_MAX,
         *emulated_shaft.SHAFT,
         *emulated_shaft.REST,
-        Parameter(name="converter_voltage", unit="V", at_least=0.0, default=0.0, doc="resolution of the voltage"),
+        Parameter(
+            name="converter_voltage",
+            unit="V",
+            at_least=0.0,
+            default=0.0,
+            doc="resolution of the converter for the voltage",
+        ),
         emulated_shaft.CURRENT,
     ),
     memory=emulated_shaft.MEMORY,

@@ -73,19 +73,23 @@ def read(p: Any, held: Any) -> Real:
     return converted(held.filtered, p.converter_in)
 
 
-ASSUMED = "assumed: of the size that such motors have"
+ASSUMED = "assumption, of the size that such motors have"
 
 ARMATURE = (
-    Parameter(name="kt", unit="N*m/A", above=0.0, of_servo="kt", doc="torque constant of the drive motor there is"),
-    Parameter(name="resistance", unit="ohm", above=0.0, of_servo="resistance", doc="its armature resistance"),
+    Parameter(
+        name="kt", unit="N*m/A", above=0.0, of_servo="kt", doc="torque constant of the drive motor that is on the bed"
+    ),
+    Parameter(
+        name="resistance", unit="ohm", above=0.0, of_servo="resistance", doc="armature resistance of the drive motor"
+    ),
 )
 
-TAU_MAX = Parameter(name="tau_max", unit="N*m", above=0.0, of_servo="tau_max", doc="its largest torque")
+TAU_MAX = Parameter(name="tau_max", unit="N*m", above=0.0, of_servo="tau_max", doc="largest torque of the drive motor")
 
 SHAFT = (
     Parameter(name="f_c", unit="N*m", at_least=0.0, of_servo="f_c", doc="Coulomb friction of the shaft"),
     Parameter(name="f_v", unit="N*m*s/rad", at_least=0.0, of_servo="f_v", doc="viscous friction of the shaft"),
-    Parameter(name="inertia", unit="kg*m^2", above=0.0, of_servo="j_m", doc="inertia of the shaft, both rotors"),
+    Parameter(name="inertia", unit="kg*m^2", above=0.0, of_servo="j_m", doc="inertia of the shaft with both rotors"),
 )
 
 REST = (
@@ -97,9 +101,21 @@ REST = (
         source=TABLE_1,
         doc="torque constant of the load motor",
     ),
-    Parameter(name="i_max", unit="A", default=3.0, above=0.0, source=ASSUMED, doc="limit of the load's amplifier"),
     Parameter(
-        name="f_cut", unit="Hz", default=50.0, above=0.0, source=TABLE_1, doc="cut-off of the tachometer's filter"
+        name="i_max",
+        unit="A",
+        default=3.0,
+        above=0.0,
+        source=ASSUMED,
+        doc="largest current of the load motor's amplifier",
+    ),
+    Parameter(
+        name="f_cut",
+        unit="Hz",
+        default=50.0,
+        above=0.0,
+        source=TABLE_1,
+        doc="cut-off frequency of the tachometer's filter",
     ),
     Parameter(
         name="delay",
@@ -107,30 +123,57 @@ REST = (
         at_least=0.0,
         at_most=3.0,
         whole=True,
-        doc="whole ticks from reading the rate to acting on it; 1 for most hardware",
+        doc="whole ticks from the reading of the rate to the response to it; 1 for most hardware",
     ),
     Parameter(
         name="faults",
         shape="text",
         default="none",
-        doc="`none` or `typical`: what the faults are that are not written one by one",
+        doc="size of all faults that are not written one by one: `none` or `typical`",
     ),
-    Parameter(name="unevenness", at_least=0.0, default=0.0, doc="share of the load torque that comes and goes"),
-    Parameter(name="lobes", above=0.0, default=7.0, source=ASSUMED, doc="how often a turn it does"),
-    Parameter(name="once", unit="N*m", at_least=0.0, default=0.0, doc="misalignment, once a turn"),
-    Parameter(name="twice", unit="N*m", at_least=0.0, default=0.0, doc="misalignment, twice a turn"),
+    Parameter(
+        name="unevenness",
+        at_least=0.0,
+        default=0.0,
+        doc="amplitude of the torque ripple, as a share of the load torque",
+    ),
+    Parameter(
+        name="lobes", above=0.0, default=7.0, source=ASSUMED, doc="periods of the torque ripple per turn of the shaft"
+    ),
+    Parameter(
+        name="once",
+        unit="N*m",
+        at_least=0.0,
+        default=0.0,
+        doc="amplitude of the misalignment torque with one period per turn",
+    ),
+    Parameter(
+        name="twice",
+        unit="N*m",
+        at_least=0.0,
+        default=0.0,
+        doc="amplitude of the misalignment torque with two periods per turn",
+    ),
     Parameter(name="tachometer", unit="rad/s", at_least=0.0, default=0.0, doc="noise of the tachometer, rms"),
-    Parameter(name="converter_in", unit="rad/s", at_least=0.0, default=0.0, doc="resolution of the rate's reading"),
+    Parameter(
+        name="converter_in",
+        unit="rad/s",
+        at_least=0.0,
+        default=0.0,
+        doc="resolution of the converter that reads the rate",
+    ),
 )
 """Parameters of load motor, tachometer, delay and faults."""
 
-CURRENT = Parameter(name="converter_current", unit="A", at_least=0.0, default=0.0, doc="resolution of the current")
+CURRENT = Parameter(
+    name="converter_current", unit="A", at_least=0.0, default=0.0, doc="resolution of the converter for the current"
+)
 
 MEMORY = (
     Memory(name="shaft_rate", unit="rad/s", doc="rate of the shaft"),
     Memory(name="shaft_angle", unit="rad", doc="angle of the shaft"),
-    Memory(name="filtered", unit="rad/s", doc="rate behind the filter"),
-    Memory(name="filtered_slope", unit="rad/s^2", doc="its slope"),
+    Memory(name="filtered", unit="rad/s", doc="output of the tachometer's filter"),
+    Memory(name="filtered_slope", unit="rad/s^2", doc="rate of change of the filter's output"),
 )
 
 # 12-bit converters over +-400 rad/s and +-3 A

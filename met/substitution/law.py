@@ -52,13 +52,13 @@ class LawOutput:
 
 
 OF_LAW = (
-    ("torque", "N*m", "load torque that the law asks"),
-    ("rate", "rad/s", "rate of the shaft that the law believes"),
+    ("torque", "N*m", "load torque that the law commands"),
+    ("rate", "rad/s", "rate of the shaft, as estimated by the law"),
 )
 """Name, unit and meaning of what the engine holds of every law, besides its own memory."""
 
 OF_OBSERVER = (
-    ("unknown_torque", "N*m", "torque on the shaft that the motor's parameters do not tell"),
+    ("unknown_torque", "N*m", "torque on the shaft that the motor's parameters do not explain"),
     ("reference_rate", "rad/s", "rate that the shaft would have on the joint itself"),
 )
 """Name, unit and meaning of what the engine holds of a law with an observer besides."""
@@ -98,13 +98,31 @@ BAND = Parameter(
     unit="rad/s",
     default=0.5,
     at_least=0.0,
-    doc="rate of the shaft below which it counts as at rest: friction is then what holds it",
+    doc="rate of the shaft below which it counts as at rest, held by friction",
 )
 
 OBSERVER = (
-    Parameter(name="torque_noise", unit="N^2*m^2*s", default=1e-9, above=0.0, doc="density of torques that are noise"),
-    Parameter(name="drift", unit="N^2*m^2/s", default=1e-5, above=0.0, doc="density of steps of the unknown torque"),
-    Parameter(name="reading_noise", unit="rad^2/s", default=1e-5, above=0.0, doc="density of the reading's noise"),
+    Parameter(
+        name="torque_noise",
+        unit="N^2*m^2*s",
+        default=1e-9,
+        above=0.0,
+        doc="spectral density of the torque noise on the shaft",
+    ),
+    Parameter(
+        name="drift",
+        unit="N^2*m^2/s",
+        default=1e-5,
+        above=0.0,
+        doc="spectral density of the changes of the unknown torque",
+    ),
+    Parameter(
+        name="reading_noise",
+        unit="rad^2/s",
+        default=1e-5,
+        above=0.0,
+        doc="spectral density of the noise in the rate reading",
+    ),
 )
 """Parameters of the observer's noise. 1e-5 rad^2/s is 0.1 rad/s, rms, at 1 kHz."""
 

@@ -1,9 +1,9 @@
-"""The baseline: the load is J_eff times the acceleration that is measured, by the difference of two readings.
+"""The baseline: the load torque is J_eff times the measured acceleration, which is the difference of two readings.
 
     a = (y_k - y_{k-1})/T,  low-pass at will;   tau_l = -(Lambda a/N + b_0)/N + (J_bed - J_m) a
 
-Stable only while the arm is light against the rotor: the filter's lag and the loop's delay set the limit, and a better
-estimate of the acceleration lowers it.
+It is stable only while the arm is light compared with the rotor: the lag of the filter and the delay of the loop set
+the limit, and a better estimate of the acceleration lowers it.
 """
 
 from __future__ import annotations
@@ -37,9 +37,15 @@ LAW = Law(
     name="measured_acceleration",
     doc=__doc__,
     parameters=(
-        Parameter(name="low_pass", unit="Hz", default=math.inf, above=1e-9, doc="cut-off of a low-pass; inf: none"),
+        Parameter(
+            name="low_pass",
+            unit="Hz",
+            default=math.inf,
+            above=1e-9,
+            doc="cut-off frequency of a low-pass on the acceleration; inf: no filter",
+        ),
     ),
     balance="none",
-    memory=(Memory(name="acceleration", unit="rad/s^2", doc="acceleration of the shaft, as measured"),),
+    memory=(Memory(name="acceleration", unit="rad/s^2", doc="measured acceleration of the shaft"),),
     give=give,
 )

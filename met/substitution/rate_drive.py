@@ -1,11 +1,12 @@
-"""A drive with a rate loop of its own, emulated: it is told the rate of the shaft, as drives in velocity mode are.
+"""A drive with a rate loop of its own, emulated: its command is the rate of the shaft, as for drives in velocity mode.
 
     J w' = tau_m(V, w) + Kt_load i - F_v w - s F_c + unevenness
     e = w_told - w,  V = clip(Kp e + Ki I, +-V_max),  dI/dt = e, held while V is limited and e would push it further
 
-The servo's law above its rate loop is ours: its command, and its position loop. What is tried is all below, the drive's
-loop and its motor. The loop is the servo's own, with gains of its own where they are written, on the shaft's rate
-itself, and runs once in each substep, at 4 kHz or more; shaft, friction and faults are those of `emulated`.
+The servo's law above its rate loop is computed by MET: its command, and its position loop. What is tried is all below,
+the drive's loop and its motor. The loop is that of the servo, with gains of its own if they are written. It acts on the
+rate of the shaft itself, and runs once in each substep, at 4 kHz or more; shaft, friction and faults are those of
+`emulated`.
 """
 
 from __future__ import annotations
@@ -54,19 +55,23 @@ BED = BedModel(
     doc=__doc__,
     drive="rate",
     parameters=(
-        Parameter(name="kp", unit="V*s/rad", at_least=0.0, of_servo="kp", doc="gain of the drive's loop on its error"),
-        Parameter(name="ki", unit="V/rad", at_least=0.0, of_servo="ki", doc="gain on the error's integral"),
-        Parameter(name="v_max", unit="V", above=0.0, of_servo="v_max", doc="largest voltage of the drive"),
+        Parameter(
+            name="kp", unit="V*s/rad", at_least=0.0, of_servo="kp", doc="proportional gain of the drive's rate loop"
+        ),
+        Parameter(name="ki", unit="V/rad", at_least=0.0, of_servo="ki", doc="integral gain of the drive's rate loop"),
+        Parameter(name="v_max", unit="V", above=0.0, of_servo="v_max", doc="largest voltage of the drive's amplifier"),
         *emulated_shaft.ARMATURE,
         emulated_shaft.TAU_MAX,
         *emulated_shaft.SHAFT,
         *emulated_shaft.REST,
-        Parameter(name="converter_rate", unit="rad/s", at_least=0.0, default=0.0, doc="resolution of the rate told"),
+        Parameter(
+            name="converter_rate", unit="rad/s", at_least=0.0, default=0.0, doc="resolution of the commanded rate"
+        ),
         emulated_shaft.CURRENT,
     ),
     memory=(
         *emulated_shaft.MEMORY,
-        Memory(name="integral", unit="rad", doc="integral of the rate's error, the drive's own"),
+        Memory(name="integral", unit="rad", doc="integral of the rate error in the drive's own loop"),
         TORQUE,
     ),
     begin=begin,

@@ -1,9 +1,10 @@
-"""Torque balance (eq. 10 of the paper, with friction): the load is what makes the shaft turn as the arm's share asks.
+"""Torque balance (eq. 10 of the paper, with friction): the load torque with which the shaft turns as it would on the
+arm.
 
     tau_l = (J_bed + c_b) N qdd - (net - friction),  qdd from the balance of all torques (met/substitution/balance.py)
 
-Nothing is differentiated to find the load. The arm is told the backward difference of the filtered rate. What the
-motor does besides what its data sheet says is not known, so a motor that differs is followed badly.
+Nothing is differentiated to find the load. The arm gets the backward difference of the filtered rate. What the motor
+does besides what its data sheet says is not known, so a motor that differs from it is followed badly.
 """
 
 from __future__ import annotations

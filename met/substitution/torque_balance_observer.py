@@ -1,8 +1,9 @@
-"""Torque balance on what an observer knows: the shaft's rate, and the torque that the data sheet does not tell.
+"""Torque balance with an observer, which estimates the rate of the shaft and the torque that the data sheet does not
+explain.
 
     as `torque_balance`, with the observer's rate and unknown torque d in `net`; the arm is told qdd of the balance
 
-d is shared between bed and arm as the motor's torque is, so that the run follows the motor there is, not its data
+d is shared between bed and arm as the motor's torque is, so the run follows the motor that is on the bed, not its data
 sheet.
 """
 

@@ -1,11 +1,12 @@
-"""A drive with a current loop of its own, emulated: it is told the torque of the motor, as most drives on a CAN are.
+"""A drive with a current loop of its own, emulated: its command is the torque of the motor, as for most drives on a CAN
+bus.
 
     J w' = tau_m + Kt_load i - F_v w - s F_c + unevenness,   tau_m' = 2 pi bandwidth (gain tau_told - tau_m)
 
-The servo's law up to the motor's torque is ours: its voltage, the motor's resistance and back-EMF are computed, and the
-drive is told the mean torque of the coming tick. What is tried is the drive's torque: how fast it comes (`bandwidth`),
-how true it is (`gain`), where it ends (`tau_max`), besides the shaft, its friction and faults, which are those of
-`emulated`.
+The servo's law down to the motor's torque is computed by MET, with its voltage and the motor's resistance and back-EMF,
+and the drive is commanded the mean torque of the coming tick. What is tried is the drive's torque: how fast it follows
+(`bandwidth`), how true it is (`gain`), where it ends (`tau_max`), besides the shaft, its friction and faults, which are
+those of `emulated`.
 """
 
 from __future__ import annotations
@@ -54,13 +55,21 @@ BED = BedModel(
     drive="torque",
     parameters=(
         emulated_shaft.TAU_MAX,
-        Parameter(name="gain", above=0.0, default=1.0, doc="torque that the drive gives for what it is told"),
         Parameter(
-            name="bandwidth", unit="Hz", above=0.0, default=math.inf, doc="of the drive's current loop; inf: at once"
+            name="gain", above=0.0, default=1.0, doc="torque of the drive divided by the torque that it is commanded"
+        ),
+        Parameter(
+            name="bandwidth",
+            unit="Hz",
+            above=0.0,
+            default=math.inf,
+            doc="bandwidth of the drive's current loop; inf: the torque follows at once",
         ),
         *emulated_shaft.SHAFT,
         *emulated_shaft.REST,
-        Parameter(name="converter_torque", unit="N*m", at_least=0.0, default=0.0, doc="resolution of the torque told"),
+        Parameter(
+            name="converter_torque", unit="N*m", at_least=0.0, default=0.0, doc="resolution of the commanded torque"
+        ),
         emulated_shaft.CURRENT,
     ),
     memory=(*emulated_shaft.MEMORY, TORQUE),

@@ -1,11 +1,11 @@
-"""Velocity tracking, the default law: torque balance with an observer, and a pull towards the rate that the joint's own
-motor would have.
+"""Velocity tracking, the default law: torque balance with an observer, and feedback towards the rate that the joint's
+own motor would have.
 
     tau_l = (that of torque_balance_observer) + K (w_ref - w_hat),  K = gain J_bed/T
     w_ref' = N qdd of the balance at w_ref, from rest with friction that sticks
 
-The pull takes out what the balance leaves: errors of its own add up in the shaft's rate, and not in w_ref. It is stable
-for gains up to about 1 whatever the arm, 0.65 with two ticks of delay.
+The feedback removes what the balance leaves: errors of the balance add up in the rate of the shaft, but not in w_ref.
+It is stable for gains up to about 1 whatever the arm, and up to 0.65 with two ticks of delay.
 """
 
 from __future__ import annotations
@@ -34,7 +34,12 @@ LAW = Law(
     name="velocity_tracking",
     doc=__doc__,
     parameters=(
-        Parameter(name="gain", default=0.3, at_least=0.0, doc="gain on the rate's error, as a share of J_bed/T"),
+        Parameter(
+            name="gain",
+            default=0.3,
+            at_least=0.0,
+            doc="gain on the rate error, as a share of J_bed/T: the inertia of the shaft divided by the tick",
+        ),
         BAND,
         *OBSERVER,
     ),

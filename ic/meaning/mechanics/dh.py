@@ -1,13 +1,13 @@
 """Denavit-Hartenberg numbers of a joint, `dh = classic(...)` or `dh = craig(...)`, as the joint's frame in a plan.
 
-With q the joint's coordinate, added to theta of a revolute joint or to d of a prismatic one, the link's frame is, in
-the parent link's frame,
+With q the coordinate of the joint, which is added to theta of a revolute joint or to d of a prismatic one, the link's
+frame in the parent link's frame is
 
     classic     Rz(theta) Tz(d) Tx(a) Rx(alpha)     the joint moves about or along the parent's z
     craig       Rx(alpha) Tx(a) Rz(theta) Tz(d)     the joint moves about or along the link's z
 
-A plan has where the link's frame is at q = 0 (`at`, `rpy`), the axis in that frame, and for a classic revolute joint,
-whose axis passes the link's frame at the distance a, a point of it (`pivot`).
+A plan has the place of the link's frame at q = 0 (`at`, `rpy`), the axis in that frame, and, for a classic revolute
+joint, whose axis passes the link's frame at the distance a, a point of the axis (`pivot`).
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from met.trace import Real, Scalar, atan2, cos, sin
 NUMBERS = (
     Parameter(name="a", unit="m", default=0.0, doc="length of the link, along x"),
     Parameter(name="alpha", unit="rad", default=0.0, doc="twist of the link, about x"),
-    Parameter(name="d", unit="m", default=0.0, doc="offset along z; q is added where the joint is prismatic"),
-    Parameter(name="theta", unit="rad", default=0.0, doc="angle about z; q is added where the joint is revolute"),
+    Parameter(name="d", unit="m", default=0.0, doc="offset along z; q is added to it if the joint is prismatic"),
+    Parameter(name="theta", unit="rad", default=0.0, doc="angle about z; q is added to it if the joint is revolute"),
 )
 OTHER_NAMES = {"standard": "classic", "distal": "classic", "modified": "craig", "proximal": "craig"}
 USAGE = "write `dh = classic(a = ..., alpha = ..., d = ..., theta = ...)`, or `craig(...)`"

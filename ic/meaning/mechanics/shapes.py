@@ -15,7 +15,9 @@ from met.trace import Real
 Three = tuple[Real, Real, Real]
 Six = tuple[Real, Real, Real, Real, Real, Real]
 
-ALONG = Parameter(name="along", shape="word", words=("x", "y", "z"), doc="axis of the link along which it extends")
+ALONG = Parameter(
+    name="along", shape="word", words=("x", "y", "z"), doc="axis of the link along which the shape extends"
+)
 
 
 @frozen
@@ -85,11 +87,13 @@ SHAPES: Mapping[str, Shape] = {
     "rod": Shape((_size("length", "length of the rod"), ALONG), rod),
     "box": Shape(
         (
-            Parameter(name="size", unit="m", above=0.0, shape="vector", doc="edges along x, y and z"),
+            Parameter(name="size", unit="m", above=0.0, shape="vector", doc="lengths of the edges along x, y and z"),
             Parameter(name="along", shape="word", words=("x", "y", "z"), default="x", doc=ALONG.doc),
         ),
         box,
     ),
-    "cylinder": Shape((_size("radius", "radius"), _size("length", "length"), ALONG), cylinder),
-    "sphere": Shape((_size("radius", "radius"),), sphere),
+    "cylinder": Shape(
+        (_size("radius", "radius of the cylinder"), _size("length", "length of the cylinder"), ALONG), cylinder
+    ),
+    "sphere": Shape((_size("radius", "radius of the sphere"),), sphere),
 }

@@ -198,8 +198,11 @@ def test_cases_of_a_vector_have_a_plot_a_component(sweep: ArchiveFile, figures: 
     assert [(ax.get_title("left"), ax.get_ylabel().replace("\n", " ")) for ax in axes] == [
         ("y · joint position", "q  (rad)"),
         ("x · joint position", "q  (m)"),
-        *(("x · force of the joint on its link, link axes", f"reaction.force.{axis} (N)") for axis in "xyz"),
-        *(("origin of the link's frame, world axes", f"links.sled.position.{axis} (m)") for axis in "xyz"),
+        *(("x · force that the joint exerts on its link, link axes", f"reaction.force.{axis} (N)") for axis in "xyz"),
+        *(
+            ("position of the origin of the link's frame, world axes", f"links.sled.position.{axis} (m)")
+            for axis in "xyz"
+        ),
     ]
     assert all(len(ax.lines) == 3 for ax in axes)
 

@@ -253,7 +253,7 @@ def test_explain_says_value_place_overridden_places_and_names(tmp_path: Path) ->
         ("gain = 2 * base_gain", 2),
         ("base_gain = 2 V*s/rad", 1),
     ]
-    assert found.doc == "gain on the motor's rate error"
+    assert found.doc == "proportional gain Kp on the error of the motor's rate"
 
 
 def test_explain_of_a_definition_gives_all_that_follow_it() -> None:

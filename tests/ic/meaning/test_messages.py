@@ -442,7 +442,7 @@ error[D075]: `table` has no `values`
   |
 9 |     command = rate(table(times = [0, 2] s));
   |                    ^^^^^
-  = help: write `values = [...] rad/s` (values at those times, as many)
+  = help: write `values = [...] rad/s` (values at `times`, one for each)
 """
     )
 

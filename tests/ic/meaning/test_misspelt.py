@@ -169,7 +169,7 @@ error[D075]: servo `drive` has no `tau_max`
   |
 5 | servo drive {{
   | ^^^^^^^^^^^
-  = help: write `tau_max = ... N*m;` (largest motor torque, before friction)
+  = help: write `tau_max = ... N*m;` (largest torque of the motor, before friction)
 
 error[D141]: servo `drive` has no `strength`
  --> deck.ic:8:5

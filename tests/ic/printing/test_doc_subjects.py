@@ -37,7 +37,8 @@ def test_every_shape_has_its_sizes(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_substitute_says_its_keys_defaults_models_and_what_is_the_servos(capsys: pytest.CaptureFixture[str]) -> None:
     out = printed(capsys, "substitute")
-    assert "\nbeds; emulated unless written\n" in out and "\nlaws; velocity_tracking unless written\n" in out
+    assert "\nModels of a bed; the default is emulated\n" in out
+    assert "\nModels of a law; the default is velocity_tracking\n" in out
     assert all(f"\n  {name} " in out for kind in ("bed", "law") for name in models.find_own(kind))
     assert "the servo's j_m " in out
     assert [each["name"] for each in json.loads(printed(capsys, "substitute", "--format", "json"))] == [
@@ -78,16 +79,16 @@ def test_distributions_are_shown_with_what_they_take(capsys: pytest.CaptureFixtu
     assert (
         printed(capsys, "distributions")
         == """\
-distributions: what a parameter of a sample is drawn from
+distributions: the probability distributions of a parameter in a sample
 
 In a deck: sample lhs(200) { PATH = uniform(0.09, 0.11) N*m/A; }
 
-  uniform(from, to)                     evenly between two values
-  loguniform(from, to)                  evenly in the logarithm
-  normal(mean, deviation)               normal, without bounds
-  truncated(mean, deviation, from, to)  normal, cut off on either side
+  uniform(from, to)                     uniform between two values
+  loguniform(from, to)                  uniform in the logarithm between two values
+  normal(mean, deviation)               normal, without bounds, by its mean and standard deviation
+  truncated(mean, deviation, from, to)  normal, by its mean and standard deviation, cut off at two values
 
-The unit behind the brackets is for all numbers inside. Values are rounded to 12 digits in it.
+A unit behind the brackets applies to all numbers inside. Values are rounded to 12 digits in it.
 """
     )
 
@@ -195,17 +196,17 @@ def test_an_entry_of_a_block_is_explained(capsys: pytest.CaptureFixture[str]) ->
         printed(capsys, "allow")
         == """\
 allow CODE because "REASON";  in a run
-    a warning that is right, and not to be given; its code is printed with it: `allow D105 because "the report's own rates";`
+    suppresses an expected warning, by the code that is printed with it: `allow D105 because "the report's own rates";`
     default: none
 allow CODE because "REASON";  in a sweep
-    a warning that is not to be given, beside those that the run allows
-    default: those of the run
+    suppresses an expected warning, in addition to those that the run allows
+    default: those that the run allows
 allow CODE because "REASON";  in a search
-    a warning that is not to be given, beside those that the run allows
-    default: those of the run
+    suppresses an expected warning, in addition to those that the run allows
+    default: those that the run allows
 allow CODE because "REASON";  in a tune
-    a warning that is not to be given, beside those that the run allows
-    default: those of the run
+    suppresses an expected warning, in addition to those that the run allows
+    default: those that the run allows
 """
     )
     assert printed(capsys, "exclude").startswith("exclude when CONDITION;  in a sweep\n")

@@ -40,7 +40,7 @@ EXPLAINED = [
         "guides.tip.gain",
         """\
 guides.tip.gain = 1 1/s
-  rate per error of the path (resolved_rate)
+  gain of the guide: rate per path error (resolved_rate)
   the default
 """,
     ),
@@ -48,7 +48,7 @@ guides.tip.gain = 1 1/s
         "tip.high.max_rate",
         """\
 guides.tip.high.max_rate = inf rad/s
-  rate that is not exceeded (resolved_rate)
+  largest rate (resolved_rate)
   the default
 """,
     ),
@@ -56,7 +56,7 @@ guides.tip.high.max_rate = inf rad/s
         "guides.tip.y.over",
         """\
 guides.tip.y.over = 1 s
-  how long the ramp lasts (ramp)
+  duration of the ramp (ramp)
   --> deck.ic:16:86
    |
 """,
@@ -84,6 +84,6 @@ def test_explain_says_where_a_guides_numbers_come_from(
 def test_doc_says_what_a_guide_gives(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["doc", "guide", "resolved_rate"]) == 0
     text = capsys.readouterr().out
-    assert "Commands it gives: rate, position" in text
-    assert "Given by its law, at its ticks; recorded as guides.NAME.NAME" in text
-    assert "of each joint: rate that is not exceeded" in text
+    assert "Kinds of command that it gives: rate, position" in text
+    assert "Outputs of the guide, updated at each of its ticks; recorded as guides.NAME.NAME" in text
+    assert "for each joint: largest rate" in text

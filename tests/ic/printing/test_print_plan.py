@@ -91,7 +91,7 @@ Cases: 1, 11.0 KiB of histories
 
 EXPLAIN_OVERRIDDEN = """\
 knee.servo.kp = 0.02 V*s/rad
-  gain on the motor's rate error (rigid_gearbox)
+  proportional gain Kp on the error of the motor's rate (rigid_gearbox)
   --> swing.ic:19:45
    |
 19 | servo slow like motor { rate = 100 Hz; kp = 0.02 V*s/rad; }
@@ -101,7 +101,7 @@ knee.servo.kp = 0.02 V*s/rad
 
 EXPLAIN_VARIED = """\
 pivot.servo.kp = 0.05 to 0.06 V*s/rad, varies with the case
-  gain on the motor's rate error (rigid_gearbox)
+  proportional gain Kp on the error of the motor's rate (rigid_gearbox)
   varied by motor.kp: 50, 60 mV*s/rad
   --> swing.ic:34:10
    |
@@ -129,7 +129,7 @@ rail.axis = [0, 0.6, 0.8]
 
 EXPLAIN_DEFAULT = """\
 knee.servo.f_c = 0 N*m
-  Coulomb friction at the motor (rigid_gearbox)
+  Coulomb friction F_c on the motor's shaft (rigid_gearbox)
   the default
 """
 
@@ -148,19 +148,20 @@ links.camera.inertia.yz  = 0 kg*m^2     written      swing.ic:6:44
 
 DOC_METRIC = """\
 metric settling_time
-  The time from which the channel stays within a band about its target, to the end of the run.
+  The time from which the signal stays within a band around its target, until the end of the run.
 
-  Infinite where it is outside at the end. The band is `band` of the target's size, plus `within`.
+  It is infinite if the signal is outside the band at the end. The half width of the band is `band` times the size of the
+  target, plus `within`.
 
 In a deck: metric NAME = settling_time { of = CHANNEL; ... }, in a run
 Unit of the result: s
 
 Parameters
   name    unit  default  range  meaning
-  target  of    needed          value to be reached
-  band    -     0.02     >= 0   half width of the band, share of the target
-  within  of    0        >= 0   half width of the band, added to it
-  of: the unit of the channel that the metric watches
+  target  of    needed          target value of the signal
+  band    -     0.02     >= 0   half width of the band around the target, as a share of the target
+  within  of    0        >= 0   half width of the band around the target that is added to the share `band`
+  of: the unit of the signal that the metric evaluates
 """
 
 

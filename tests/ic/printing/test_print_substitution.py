@@ -91,7 +91,7 @@ def test_a_bed_tells_what_is_the_servos_and_which_words_its_faults_have(capsys: 
     rows = {line.split()[0]: line for line in printed(capsys, "doc", "emulated").splitlines() if line.startswith("  ")}
     assert "  the servo's  " in rows["kt"] and "  the servo's j_m  " in rows["inertia"]
     assert "  none  " in rows["faults"] and "  none | typical  " in rows["faults"] and "in quotes" not in rows["faults"]
-    assert rows["load_current"].split() == ["load_current", "A", "current", "that", "is", "in", "the", "load", "motor"]
+    assert rows["load_current"].split() == ["load_current", "A", "current", "in", "the", "load", "motor"]
     (told,) = json.loads(printed(capsys, "doc", "emulated", "--format", "json"))
     faults = next(parameter for parameter in told["parameters"] if parameter["name"] == "faults")
     assert (faults["shape"], faults["words"]) == ("word", ["none", "typical"])

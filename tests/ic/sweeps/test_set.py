@@ -201,7 +201,7 @@ def deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 @pytest.mark.parametrize(("path", "settings", "said"), [
     ("hinge.servo.kp", ["drive.kp=0.2 V*s/rad"], """\
 hinge.servo.kp = 0.2 V*s/rad
-  gain on the motor's rate error (rigid_gearbox)
+  proportional gain Kp on the error of the motor's rate (rigid_gearbox)
  --> <command line>:1:10
   |
 1 | drive.kp=0.2 V*s/rad
@@ -241,7 +241,7 @@ slow = 2 rad/s
 """),
     ("hinge.servo.command.value", ["slow=2 rad/s", "hinge.servo=plain"], """\
 hinge.servo.command.value = 2 rad/s
-  the value (constant)
+  value of the command at all times (constant)
   --> a.ic:14:64
    |
 14 | servo plain { model = ideal; bandwidth = 5 1/s; command = rate(slow); }

@@ -56,11 +56,10 @@ def cells(parameter: Parameter) -> list[str]:
     range_ = " | ".join(words) if words else ", ".join(bounds)
     if parameter.above_where_needed is not None:
         range_ += f"; > {in_full(parameter.above_where_needed)} where needed"
-    shape = {"vector": "three numbers; ", "list": "a list; ", "text": "in quotes; "}.get(parameter.shape, "")
+    shape = {"vector": "three numbers; ", "list": "a list; ", "text": "a text in quotes; "}.get(parameter.shape, "")
     shape = "the same in all cases; " if parameter.decides else shape
-    only = f"; with {parameter.only[0]} = {' or '.join(parameter.only[1])}" if parameter.only else ""
-    source = f" ({parameter.source})" if parameter.source else ""
-    return [cell for cell in (parameter.name, unit, text, range_, f"{shape}{parameter.doc}{only}{source}") if cell]
+    only = f"; only with {parameter.only[0]} = {' or '.join(parameter.only[1])}" if parameter.only else ""
+    return [cell for cell in (parameter.name, unit, text, range_, f"{shape}{parameter.doc}{only}") if cell]
 
 
 def as_json(value: object) -> object:

@@ -151,7 +151,7 @@ error[D241]: `lower` of environment `end` must be less than `upper`
   |
 8 |         end = joint_stop { joint = slide; lower = 0.2 m; upper = 0.1 m; stiffness = 800 N/m; dissipation = 0.5 s/m; }
   |                                                   ^^^^^ 0.2 is not less than 0.1
-  = help: swap them, or leave one out (position of the lower end; none unless written)
+  = help: swap them, or leave one out (position of the lower stop; by default there is none)
 
 1 error
 """

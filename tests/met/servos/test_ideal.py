@@ -135,7 +135,7 @@ error[D160]: servo `follow` needs `bandwidth` under a {place.partition("(")[0]} 
   |
 5 | servo follow {{ model = ideal; command = {place}; }}
   |                                         {"^" * len(place)}
-  = help: write `bandwidth = ... 1/s;`: how fast an error dies away, used under a rate or position command
+  = help: write `bandwidth = ... 1/s;`: errors decay as exp(-bandwidth t); used only under a rate or position command
 
 1 error
 """

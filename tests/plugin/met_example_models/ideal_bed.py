@@ -45,18 +45,26 @@ BED = BedModel(
     name="ideal_bed",
     doc=__doc__,
     parameters=(
-        Parameter(name="inertia", unit="kg*m^2", above=0.0, of_servo="j_m", doc="inertia of the shaft, both rotors"),
+        Parameter(
+            name="inertia", unit="kg*m^2", above=0.0, of_servo="j_m", doc="inertia of the shaft with both rotors"
+        ),
         Parameter(name="kt_load", unit="N*m/A", above=0.0, default=0.072, doc="torque constant of the load motor"),
-        Parameter(name="f_cut", unit="Hz", above=0.0, default=50.0, doc="cut-off of the tachometer's filter"),
+        Parameter(name="f_cut", unit="Hz", above=0.0, default=50.0, doc="cut-off frequency of the tachometer's filter"),
         Parameter(name="delay", at_least=0.0, at_most=3.0, whole=True, default=0.0, doc="ticks from reading to acting"),
         Parameter(name="kt", unit="N*m/A", above=0.0, of_servo="kt", doc="torque constant of the drive motor"),
-        Parameter(name="resistance", unit="ohm", above=0.0, of_servo="resistance", doc="its armature resistance"),
-        Parameter(name="i_max", unit="A", above=0.0, default=3.0, doc="limit of the load's amplifier"),
+        Parameter(
+            name="resistance",
+            unit="ohm",
+            above=0.0,
+            of_servo="resistance",
+            doc="armature resistance of the drive motor",
+        ),
+        Parameter(name="i_max", unit="A", above=0.0, default=3.0, doc="largest current of the load motor's amplifier"),
     ),
     memory=(
         Memory(name="shaft_rate", unit="rad/s", doc="rate of the shaft"),
-        Memory(name="filtered", unit="rad/s", doc="rate behind the filter"),
-        Memory(name="filtered_slope", unit="rad/s^2", doc="its slope"),
+        Memory(name="filtered", unit="rad/s", doc="output of the tachometer's filter"),
+        Memory(name="filtered_slope", unit="rad/s^2", doc="rate of change of the filter's output"),
     ),
     begin=begin,
     advance=advance,

@@ -162,7 +162,7 @@ error[D292]: `fault` would drive joint `hinge` with all that servo `drive` (casc
 14 |     environment { fault = runaway { joint = hinge; } }
    |                                             ^^^^^
   ::: deck.ic:12:14  its servo
-   = help: write `i_max = ... A;` in the servo: largest current that is asked
+   = help: write `i_max = ... A;` in the servo: largest current that the control law commands
 """
     )
     assert codes(tmp_path, ARM, changed(CASCADE, ("ki = 0.5", "i_max = 5 A;  ki = 0.5")), run) == []

@@ -28,7 +28,7 @@ error[D077]: `bandwidth` of servo `drive` must be above 0 1/s under a position c
   |
 5 | servo drive { model = ideal; bandwidth = 0 1/s; command = position(0 rad); }
   |                                          ^^^^^ this is 0 1/s
-  = help: write a number above 0 1/s (how fast an error dies away, used under a rate or position command)
+  = help: write a number above 0 1/s (errors decay as exp(-bandwidth t); used only under a rate or position command)
 """
     )
 
@@ -44,7 +44,7 @@ error[D077]: `bandwidth` of servo `drive` must be above 0 1/s under a rate comma
 13 | sweep widths of hold { vary drive.bandwidth = [1, 0] 1/s; }
    |                             ^^^^^^^^^^^^^^^ this is 0 1/s
    = help: case #1: drive.bandwidth = 0 1/s
-   = help: write a number above 0 1/s (how fast an error dies away, used under a rate or position command)
+   = help: write a number above 0 1/s (errors decay as exp(-bandwidth t); used only under a rate or position command)
 """
     )
 

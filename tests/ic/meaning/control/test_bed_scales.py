@@ -92,7 +92,7 @@ error[D077]: `torque` of the scale of joint `hinge`'s bed must be above 0
   |
 1 | run it like hold { substitute hinge { scale { torque = 0; } } }
   |                                                        ^ this is 0
-  = help: write a number above 0 (torque of the joint's motor over that of the bed's)
+  = help: write a number above 0 (torque of the joint's motor divided by that of the bed's motor)
 """,
     "scale { rate = -2; }": """\
 error[D077]: `rate` of the scale of joint `hinge`'s bed must be above 0
@@ -100,7 +100,7 @@ error[D077]: `rate` of the scale of joint `hinge`'s bed must be above 0
   |
 1 | run it like hold { substitute hinge { scale { rate = -2; } } }
   |                                                      ^^ this is -2
-  = help: write a number above 0 (rate of the joint's motor over that of the bed's)
+  = help: write a number above 0 (rate of the joint's motor divided by that of the bed's motor)
 """,
     "scale { torque = 25 N*m; }": """\
 error[D061]: `torque` of the scale of joint `hinge`'s bed is a pure number, and this is in N*m
@@ -268,7 +268,7 @@ On a bed: the motor of hinge; what is not told here is the servo's, or the defau
         capsys.readouterr().out
         == """\
 hinge.bed.scale.torque = 25
-  torque of the joint's motor over that of the bed's (scale)
+  torque of the joint's motor divided by that of the bed's motor (scale)
   --> a.ic:18:64
    |
 18 | default run it like hold { substitute hinge { scale { torque = 25;  rate = 2; } } }

@@ -239,7 +239,7 @@ error[D075]: guide `tip` has no `max_damping`
    |
 11 |     guide tip = resolved_rate {
    |     ^^^^^^^^^
-   = help: write `max_damping = ... m;` (lambda at a singularity; 0: none)
+   = help: write `max_damping = ... m;` (damping lambda at a singularity; 0: no damping)
 
 1 error
 """,
@@ -267,7 +267,7 @@ error[D077]: `max_rate` of joint `low` of guide `tip` must be above 0 rad/s
    |
 13 |         x = ramp(to = -20 cm, over = 1 s); low.max_rate = 0 rad/s;
    |                                                           ^^^^^^^ this is 0 rad/s
-   = help: write a number above 0 rad/s (rate that is not exceeded)
+   = help: write a number above 0 rad/s (largest rate)
 
 1 error
 """,

@@ -138,7 +138,7 @@ error[D075]: sensor `up` has no `cutoff`
   |
 9 |     sensor up = accelerometer { link = bar; along = [0, 0, 1]; }
   |     ^^^^^^^^^
-  = help: write `cutoff = ... Hz;` (cut-off of the filter)
+  = help: write `cutoff = ... Hz;` (cut-off frequency of the filter)
 
 1 error
 """),

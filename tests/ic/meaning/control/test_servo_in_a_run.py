@@ -117,7 +117,7 @@ error[D075]: servo `drive` on joint `hinge` has no `kp`
 18 | run other like hold { servos { hinge { remove kp; } } }
    |                                        ^^^^^^ removed here
   ::: deck.ic:5:1  servo `drive` on joint `hinge` stands here
-   = help: write `kp = ... V*s/rad;` (gain on the motor's rate error)
+   = help: write `kp = ... V*s/rad;` (proportional gain Kp on the error of the motor's rate)
 
 1 error
 """
@@ -183,7 +183,7 @@ error[D061]: `band` of metric `settle` is a pure number, and this is in rad
    |
 16 |     metric settle = settling_time { of = hinge.q; target = 1 rad; band = 0.2 deg; }
    |                                                                          ^^^^^^^
-   = help: `within` is what is in rad: half width of the band, added to it
+   = help: `within` is what is in rad: half width of the band around the target that is added to the share `band`
    = help: leave the unit out; `%` is the only unit of a pure number
 
 1 error

@@ -232,7 +232,11 @@ def test_explain_tells_what_was_written_and_what_is_the_servos(tmp_path: Path) -
     )
     assert (kt.value, kt.written, kt.origin, kt.note) == (0.065, "0.065 N*m/A", "deck", "")
     assert (resistance.written, resistance.note) == ("1 ohm", "that of `one.servo.resistance`")
-    assert (once.written, once.note, once.doc) == ("typical", "by `faults`", "misalignment, once a turn")
+    assert (once.written, once.note, once.doc) == (
+        "typical",
+        "by `faults`",
+        "amplitude of the misalignment torque with one period per turn",
+    )
 
 
 # What is wrong with one
@@ -528,7 +532,7 @@ error[D077]: `i_max` of bed `emulated` of joint `one` must be above 0 A
   |
 1 | run it like base_run { substitute one { bed = emulated(ktt = 3, kt = 1 N*m, i_max = -3 A); } }
   |                                                                                     ^^^^ this is -3 A
-  = help: write a number above 0 A (limit of the load's amplifier)
+  = help: write a number above 0 A (largest current of the load motor's amplifier)
 """
     )
 

@@ -204,7 +204,7 @@ error[D075]: payload `box` has no `position`
   |
 9 |     payload box {
   |     ^^^^^^^^^^^
-  = help: write `position = [...] m;` (the payload's frame at the start, world axes)
+  = help: write `position = [...] m;` (origin of the payload's frame at the start, in world axes)
 
 1 error
 """,
@@ -551,7 +551,7 @@ error[D075]: payload `box` has no `position`
 23 | run other like it { box { remove position; } }
    |                           ^^^^^^ removed here
   ::: deck.ic:9:5  payload `box` stands here
-   = help: write `position = [...] m;` (the payload's frame at the start, world axes)
+   = help: write `position = [...] m;` (origin of the payload's frame at the start, in world axes)
 
 1 error
 """
