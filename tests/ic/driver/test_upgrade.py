@@ -206,9 +206,14 @@ def test_standard_input_and_plans_are_not_upgraded(capsys: pytest.CaptureFixture
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(path.relative_to(LIBRARY).as_posix() for path in LIBRARY.rglob("*.ic")))
 def test_standard_decks_can_be_upgraded(name: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    Path("a.ic").write_text((LIBRARY / name).read_text())
+    text = (LIBRARY / name).read_text()
+    old = text.replace("deck 2;\n\n", "", 1)
+    assert old != text
+    Path("a.ic").write_text(old)
+    before = meaning("a.ic")
     assert fmt(capsys, "--upgrade", "a.ic") == (0, "a.ic: upgraded\n", "")
-    assert meaning("a.ic") == meaning(str(LIBRARY / name))
+    assert Path("a.ic").read_text() == text
+    assert meaning("a.ic") == before == meaning(str(LIBRARY / name))
 
 
 @pytest.mark.parametrize("seed", range(4))
