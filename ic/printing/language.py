@@ -50,8 +50,8 @@ def print_entries(word: str) -> Iterator[str]:
         for each in block.entries:
             if each.name.split()[0] == word:
                 yield f"{each.written}  in {_an(block.name)}"
-                yield f"    {each.doc}"
-                yield f"    default: {default(each)}"
+                about = [(each.doc,), (f"default: {default(each)}",)]
+                yield from described(about, width=terminal_width(), indent="    ")
 
 
 def block_json(block: BlockDeclaration) -> list[dict[str, Any]]:
