@@ -84,9 +84,9 @@ SERVO = Servo(
     parameters=(
         Parameter(name="gain", unit="effort*s/joint", above=0.0, doc="torque per rate error"),
         Parameter(name="limit", unit="effort", above=0.0, doc="largest torque"),
-        Parameter(name="rotor", unit="effort*s^2/joint", above=0.0, doc="inertia of the drive, seen at the joint"),
+        Parameter(name="rotor", unit="effort*s^2/joint", above=0.0, doc="inertia of the drive seen at the joint"),
     ),
-    outputs=(Memory(name="qd_cmd", unit="joint/s", doc="rate asked"),),
+    outputs=(Memory(name="qd_cmd", unit="joint/s", doc="commanded rate"),),
     signals=(Signal(name="wanted", unit="effort", doc="torque that would be given without the limit"),),
     control=control,
     drive=drive,
@@ -157,11 +157,11 @@ SENSOR = Sensor(
     name="$name",
     doc=__doc__,
     parameters=(
-        Parameter(name="cutoff", unit="Hz", above=0.0, doc="cut-off of the filter"),
-        Parameter(name="bias", unit="of", default=0.0, doc="what is read where the quantity is 0"),
+        Parameter(name="cutoff", unit="Hz", above=0.0, doc="cut-off frequency of the filter"),
+        Parameter(name="bias", unit="of", default=0.0, doc="reading at zero of the quantity"),
         Parameter(name="noise", unit="of", default=0.0, at_least=0.0, doc="noise at each tick, rms"),
     ),
-    states=(State(name="filtered", unit="of", doc="what is behind the filter"),),
+    states=(State(name="filtered", unit="of", doc="output of the filter"),),
     follow=follow,
     begin=begin,
     read=read,
@@ -208,7 +208,9 @@ ENVIRONMENT = Environment(
     parameters=(
         Parameter(name="link", shape="word", names="link", doc="link that is held back"),
         Parameter(name="damping", unit="N*s/m", at_least=0.0, doc="force per velocity"),
-        Parameter(name="point", unit="m", shape="vector", default=(0.0, 0.0, 0.0), doc="where it acts, link frame"),
+        Parameter(
+        name="point",
+        unit="m", shape="vector", default=(0.0, 0.0, 0.0), doc="point at which it acts, in the link's frame"),
     ),
     loads=loads,
 )
@@ -249,13 +251,13 @@ def course(p: Any, t: Real) -> tuple[Real, Real]:
     return value, slope
 
 
-# `command` is the unit of what is commanded: rad/s of a rate, rad of a position, ...
+# `command` is the unit of the commanded quantity: rad/s of a rate, rad of a position, ...
 PROFILE = Profile(
     name="$name",
     doc=__doc__,
     parameters=(
         Parameter(name="to", unit="command", doc="value that is reached"),
-        Parameter(name="over", unit="s", above=0.0, doc="how long that takes"),
+        Parameter(name="over", unit="s", above=0.0, doc="time that this takes"),
     ),
     course=course,
 )
@@ -299,7 +301,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
     return where(held.until > 0.0, held.area / length, held.last)
 
 
-# `of` is the unit of the channel that is watched.
+# `of` is the unit of the signal that is evaluated.
 METRIC = Metric(
     name="$name",
     doc=__doc__,
@@ -392,7 +394,7 @@ def course(p: Any, joints: Sequence[Any], begins: Sequence[Real], t: Real) -> li
 GUIDE = Guide(
     name="$name",
     doc=__doc__,
-    parameters=(Parameter(name="over", unit="s", above=0.0, doc="how long the move lasts"),),
+    parameters=(Parameter(name="over", unit="s", above=0.0, doc="duration of the move"),),
     of_joint=(Parameter(name="to", unit="joint", doc="position that is reached"),),
     commands=("position",),
     course=course,

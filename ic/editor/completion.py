@@ -47,7 +47,7 @@ _NOT_VARIED = ("seed", "record")
 
 COMPARISONS = ("<", "<=", ">", ">=")
 
-_SAID = {"of": "the unit of what is watched", "command": "the unit of the command"}
+_SAID = {"of": "the unit of the signal", "command": "the unit of the command"}
 """Units that depend on another word of the deck, as a person says them."""
 
 _SIGNALS_ALONE = ("record", "open")
@@ -183,9 +183,11 @@ def _of_entry(
 def _behind_a_name(definition: str) -> Iterator[Offer]:
     """The words between the name of a definition and its block."""
     if definition in OF_A_RUN:
-        yield Offer("of", types.CompletionItemKind.Keyword, f"the run whose cases it has: `{definition} NAME of RUN`")
+        yield Offer(
+            "of", types.CompletionItemKind.Keyword, f"names the run that the cases are of: `{definition} NAME of RUN`"
+        )
     else:
-        said = f"has all that another {definition} has, and what it writes itself: `{definition} NAME like OTHER`"
+        said = f"takes the entries of another {definition}, and changes or adds some: `{definition} NAME like OTHER`"
         yield Offer("like", types.CompletionItemKind.Keyword, said)
 
 
@@ -195,7 +197,7 @@ def _beginnings(around: TextEntry | None, names: NamesInTexts) -> Iterator[Offer
         yield from (Offer(each, types.CompletionItemKind.Keyword, BLOCKS[each].doc) for each in DEFINITIONS)
         for entry in TOP_LEVEL.entries:
             yield Offer(entry.name, types.CompletionItemKind.Keyword, f"{entry.doc}: `{entry.written}`")
-        yield Offer("default", types.CompletionItemKind.Keyword, "marks the run that `met run` takes")
+        yield Offer("default", types.CompletionItemKind.Keyword, "marks the run that `met run` takes if none is named")
         yield from _named(names, "macro")
         return
     block = BLOCKS.get(around.block)
@@ -203,10 +205,13 @@ def _beginnings(around: TextEntry | None, names: NamesInTexts) -> Iterator[Offer
         yield from _named(names, "joint", around=around)
     if block is not None:
         for entry in block.entries:
-            about = f"{entry.doc}; {entry.default}" if entry.default else entry.doc
+            default = entry.default if entry.default.startswith("needed") else f"default: {entry.default}"
+            about = f"{entry.doc}; {default}" if entry.default else entry.doc
             yield Offer(entry.name, types.CompletionItemKind.Property, about)
         if around.block in DEFINITIONS and around.word_behind("like"):
-            yield Offer("remove", types.CompletionItemKind.Keyword, "takes away what this one has of what it is `like`")
+            yield Offer(
+                "remove", types.CompletionItemKind.Keyword, "removes an entry of the definition that this one is `like`"
+            )
     yield from (_of_parameter(each) for each in parameters_of(around, names))
     if around.kind == "environment":
         for name in models.available("environment"):
@@ -333,10 +338,10 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
     if where == "joint" and texts in (["axis", "="], ["axis", "=", "-"]):
         yield from (Offer(each, types.CompletionItemKind.EnumMember, "an axis of the joint's frame") for each in AXES)
     if texts[-2:] == ["rows", "="]:
-        yield Offer(ALL_ROWS, types.CompletionItemKind.EnumMember, "every row is to be used")
+        yield Offer(ALL_ROWS, types.CompletionItemKind.EnumMember, "requires that every row is used")
         return
     if where == "initial" and texts[-2:] in (["q", "="], ["qd", "="]):
-        yield Offer("command", types.CompletionItemKind.EnumMember, "where the command of the joint begins")
+        yield Offer("command", types.CompletionItemKind.EnumMember, "the initial value of the joint's command")
     if where == "linear" and texts == ["at", "="]:
         yield Offer(EQUILIBRIUM, types.CompletionItemKind.Function, "the equilibrium near positions of the joints")
     if where == "servos":
@@ -345,7 +350,7 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
     kinds = {"parent": "link", "child": "link", "arm": "arm"}
     if key in kinds and where in ("joint", "run"):
         if kinds[key] == "link":
-            yield Offer("base", types.CompletionItemKind.Constant, "what the arm stands on")
+            yield Offer("base", types.CompletionItemKind.Constant, "the body that the arm stands on")
         yield from _named(names, kinds[key], around=around)
         yield from _named(names, "roof") if kinds[key] in DEFINED else ()
         return
@@ -362,7 +367,7 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
             yield Offer(name, types.CompletionItemKind.Class, summary(model))
         if key != "command":
             return
-        yield from (Offer(each, types.CompletionItemKind.Function, "of what is commanded") for each in COMMAND_UNIT)
+        yield from (Offer(each, types.CompletionItemKind.Function, "a command of this kind") for each in COMMAND_UNIT)
     if len(texts) > 1 and texts[-1] == "(" and texts[-2] in COMMAND_UNIT:
         for name, model in models.available("command").items():
             yield Offer(name, types.CompletionItemKind.Class, summary(model))
@@ -378,7 +383,7 @@ def _values(texts: list[str], around: TextEntry | None, names: NamesInTexts, ind
         values = () if key in _SIGNALS_ALONE else index.values
         heads = dict.fromkeys(each.path.partition(".")[0] for each in values)
         heads |= dict.fromkeys(path.partition(".")[0] for path in index.signals)
-        yield from (Offer(each, types.CompletionItemKind.Field, "of a path") for each in heads)
+        yield from (Offer(each, types.CompletionItemKind.Field, "the first word of a path") for each in heads)
         if key in _SIGNALS_ALONE:
             yield from _named(names, "joint", "macro", around=around)
             return
@@ -402,7 +407,7 @@ def _of_goal(texts: list[str], around: TextEntry | None, names: NamesInTexts, in
     if texts.count("(") > texts.count(")"):
         heads = dict.fromkeys(path.partition(".")[0] for path in index.signals)
         yield from _named(names, "metric", "linear", "joint", around=around)
-        yield from (Offer(each, types.CompletionItemKind.Field, "of a path") for each in heads)
+        yield from (Offer(each, types.CompletionItemKind.Field, "the first word of a path") for each in heads)
         yield from _of_expression(names)
     elif any(each in COMPARISONS for each in texts):
         yield from _named(names, "servo")
@@ -412,7 +417,7 @@ def _of_goal(texts: list[str], around: TextEntry | None, names: NamesInTexts, in
         if texts[0] == "require":
             over_time = [name for name, model in models.available("metric").items() if model.condition]
             for each in (*over_time, *FIGURES, STEP_ERROR, PERCENTILE):
-                yield Offer(each, types.CompletionItemKind.Function, "of what is required")
+                yield Offer(each, types.CompletionItemKind.Function, "a figure to require a limit of")
 
 
 def _of_varied(texts: list[str], names: NamesInTexts, index: DeckIndex) -> Iterator[Offer]:
@@ -421,7 +426,7 @@ def _of_varied(texts: list[str], names: NamesInTexts, index: DeckIndex) -> Itera
         heads = dict.fromkeys(each.path.partition(".")[0] for each in index.values)
         for each in heads:
             if texts[0] != "vary" or each not in _NOT_VARIED:
-                yield Offer(each, types.CompletionItemKind.Field, "of a path")
+                yield Offer(each, types.CompletionItemKind.Field, "the first word of a path")
         if texts == ["vary"]:
             yield Offer("macro", types.CompletionItemKind.Keyword, "a macro of the deck: `vary macro NAME = [...];`")
         yield from _named(names, "joint", "servo", "let", "macro", "roof")
@@ -459,5 +464,5 @@ def _named(names: NamesInTexts, *kinds: str, around: TextEntry | None = None) ->
 
 
 def _of_parameter(parameter: Parameter) -> Offer:
-    unit = f" in {_SAID.get(parameter.unit, parameter.unit)}" if parameter.unit not in ("", "1") else ""
+    unit = f"; in {_SAID.get(parameter.unit, parameter.unit)}" if parameter.unit not in ("", "1") else ""
     return Offer(parameter.name, types.CompletionItemKind.Property, f"{parameter.doc}{unit}")

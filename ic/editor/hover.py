@@ -36,8 +36,9 @@ def _of_key(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Itera
     block = BLOCKS.get(around.block) if around is not None else None
     for each in block.entries if block is not None else ():
         if each.name.split()[0] == token.text:
-            unit = f" in {each.unit}" if each.unit not in ("", "1") else ""
-            yield f"`{each.written}`\n\n{each.doc}{unit}; default: {each.default}"
+            unit = f"unit: {each.unit}; " if each.unit not in ("", "1") else ""
+            default = each.default if each.default.startswith("needed") else f"default: {each.default}"
+            yield f"`{each.written}`\n\n{each.doc}\n\n{unit}{default}"
             return
     for parameter in parameters_of(around, names) if around is not None else ():
         if parameter.name == token.text:

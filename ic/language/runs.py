@@ -225,9 +225,9 @@ RUN = BlockDeclaration(
               doc="a linear analysis at one instant, for requirements such as `require phase_margin(NAME) > 30 deg;` "
                   "(`met doc linear`)"),
         Entry(name="require", form="statement", written="require METRIC < LIMIT;", default="none",
-              doc="a limit on a metric, with `<`, `<=`, `>` or `>=`; a missed limit makes the exit code 1. It may hold "
-                  "`in 99 % of cases with 90 % confidence`, limit the error by the step length, "
-                  "`step_error(METRIC) < 1 %`, limit a condition over time, `always(CONDITION, after = 1 s)`, and have "
+              doc="a limit on a metric, with `<`, `<=`, `>` or `>=`; a missed limit makes the exit code 1. Also: a "
+                  "share of cases, `METRIC < LIMIT in 99 % of cases with 90 % confidence`; the error by the step "
+                  "length, `step_error(METRIC) < 1 %`; a condition over time, `always(CONDITION, after = 1 s)`; with "
                   "a name, `require NAME: ...;`"),
         Entry(name="allow", form="statement", written='allow CODE because "REASON";', default="none",
               doc="suppresses an expected warning, by the code that is printed with it: "

@@ -35,12 +35,12 @@ def print_block(block: BlockDeclaration) -> Iterator[str]:
     if numbers:
         yield ""
         rows = [(each.name, type_of(each), _bounds(each.parameter)) for each in numbers]
-        yield "Types, and bounds in SI"
+        yield "Types, with bounds in SI units"
         yield from columns(rows)
     varying = [(_path(each), _varies(each)) for each in block.entries if each.path and each.varies != "never"]
     if varying:
         yield ""
-        yield "In a sweep, and by `--set`"
+        yield "What a sweep varies and `--set` replaces"
         yield from columns(varying)
 
 
@@ -50,8 +50,8 @@ def print_entries(word: str) -> Iterator[str]:
         for each in block.entries:
             if each.name.split()[0] == word:
                 yield f"{each.written}  in {_an(block.name)}"
-                yield f"    {each.doc}"
-                yield f"    default: {default(each)}"
+                about = [(each.doc,), (f"default: {default(each)}",)]
+                yield from described(about, width=terminal_width(), indent="    ")
 
 
 def block_json(block: BlockDeclaration) -> list[dict[str, Any]]:
@@ -115,7 +115,7 @@ def _path(entry: Entry) -> str:
 
 
 def _varies(entry: Entry) -> str:
-    return "over numbers" if entry.varies == "number" else "over choices, each a program of its own"
+    return "a number" if entry.varies == "number" else "a choice; each choice makes a program of its own"
 
 
 def _an(name: str) -> str:

@@ -121,7 +121,7 @@ ENVIRONMENT = Environment(
             default=3.986004418e14,
             above=0.0,
             doc="gravitational parameter of the central body",
-            source="Earth: WGS 84",
+            source="WGS 84, for the Earth",
         ),
         Parameter(
             name="rpy",

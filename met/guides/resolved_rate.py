@@ -136,7 +136,7 @@ GUIDE = Guide(
             unit="m",
             at_least=0.0,
             doc="damping lambda at a singularity; 0: no damping",
-            source="Nakamura and Hanafusa 1986; how it grows: Chiaverini, IEEE Trans. Robotics Autom. 13, 1997",
+            source="Nakamura and Hanafusa 1986; its growth: Chiaverini, IEEE Trans. Robotics Autom. 13, 1997",
         ),
         Parameter(
             name="threshold",
@@ -163,7 +163,7 @@ GUIDE = Guide(
             default="arm",
             doc="on a free base: J as if the base were held (`arm`), or with the base's reaction to the arm "
             "(`generalized`)",
-            source="generalized: Umetani and Yoshida, IEEE Trans. Robotics Autom. 5, 1989",
+            source="Umetani and Yoshida, IEEE Trans. Robotics Autom. 5, 1989 (generalized)",
         ),
     ),
     of_joint=(Parameter(name="max_rate", unit="joint/s", default=float("inf"), above=0.0, doc="largest rate"),),

@@ -247,7 +247,7 @@ def _channels(structure: Structure, names: list[str], *, all_owners: bool) -> di
         kind = use.command.kind if use.command is not None else None
         if kind is not None:
             unit = joint_unit(COMMAND_UNIT[kind], joint)
-            add(f"{joint.name}.servo.command", unit, f"{kind} asked of the servo", use.divisor, joint.name)
+            add(f"{joint.name}.servo.command", unit, f"{kind} command of the servo", use.divisor, joint.name)
         for divisor, held in ((use.divisor, of_servo.memory), (dynamics, (*of_servo.states, *of_servo.shown))):
             for part in held:
                 unit = joint_unit(part.unit, joint, kind)
@@ -255,7 +255,7 @@ def _channels(structure: Structure, names: list[str], *, all_owners: bool) -> di
         for sensor in use.sensors:
             unit = joint_unit(quantities(use)[sensor.of], joint, kind)
             path = f"{joint.name}.servo.sensor.{sensor.of}"
-            add(path, unit, f"what the servo sees as {sensor.of}", use.divisor, joint.name)
+            add(path, unit, f"{sensor.of}, as the servo's sensor reads it", use.divisor, joint.name)
             for state in sensor_parts(sensor, "states"):
                 add(f"{path}.{state.name}", watched_unit(state.unit, unit), state.doc, dynamics, joint.name)
         if joint.name in on_beds:
@@ -269,7 +269,7 @@ def _channels(structure: Structure, names: list[str], *, all_owners: bool) -> di
             add(f"guides.{guide.name}.{part.name}", part.unit, part.doc, guide.divisor, "")
     for on_link in structure.sensors:
         unit, path = models.find("sensor", on_link.model, on_link.place).unit, f"sensors.{on_link.name}"
-        add(path, unit, f"what the {on_link.model} reads", on_link.divisor, "")
+        add(path, unit, f"reading of the {on_link.model}", on_link.divisor, "")
         for state in sensor_parts(on_link, "states"):
             add(f"{path}.{state.name}", watched_unit(state.unit, unit), state.doc, dynamics, "")
     mentioned = {name.split(".")[1] for name in mentions if name.startswith("links.")}

@@ -18,7 +18,7 @@ RESOLUTION = Parameter(
     unit="of",
     default=0.0,
     at_least=0.0,
-    doc="step of the converter, to the nearest of which it rounds; 0: no rounding",
+    doc="step of the converter, which rounds to the nearest one; 0: no rounding",
 )
 DELAY = Parameter(
     name="delay",

@@ -11,8 +11,8 @@ a step of the command. The second derivative of a position command is not known,
 command whose rate changes by (its acceleration)/w^2. tau comes from inverse dynamics and includes the share of the
 rotor; it has no limit.
 
-This is neither a motor nor a controller: no torque in the world would be enough to be this good. A joint that is moved
-in this way shakes the other joints like any other, but nothing shakes it.
+This is neither a motor nor a controller: the joint follows its command however much torque that takes. A joint that is
+moved in this way shakes the other joints like any other, but nothing shakes it.
 """
 
 from __future__ import annotations

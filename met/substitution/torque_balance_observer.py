@@ -1,7 +1,7 @@
 """Torque balance with an observer, which estimates the rate of the shaft and the torque that the data sheet does not
 explain.
 
-    as `torque_balance`, with the observer's rate and unknown torque d in `net`; the arm is told qdd of the balance
+    as `torque_balance`, with the observer's rate and unknown torque d in `net`; the arm gets qdd of the balance
 
 d is shared between bed and arm as the motor's torque is, so the run follows the motor that is on the bed, not its data
 sheet.

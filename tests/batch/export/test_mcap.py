@@ -118,7 +118,7 @@ def test_a_channel_says_its_unit_or_that_of_each_joint(pick: tuple[ArchiveFile, 
     _, read = pick
     assert read.channels["/swing/servo/command"].metadata == {
         "unit": "rad/s^2",
-        "about": "acceleration asked of the servo",
+        "about": "acceleration command of the servo",
     }
     assert read.channels["/tau"].metadata == {
         "unit.lift": "N",

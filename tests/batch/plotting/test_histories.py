@@ -102,7 +102,9 @@ def commanded(cases: int, monkeypatch: pytest.MonkeyPatch, slope: float = 0.0, f
 
     monkeypatch.setattr(run, "run", answer)
     experiment = plans.gains(cases)
-    command = Recorded("shoulder.servo.command", ("shoulder.servo.command",), (), ("rad/s",), "rate asked of the servo")
+    command = Recorded(
+        "shoulder.servo.command", ("shoulder.servo.command",), (), ("rad/s",), "rate command of the servo"
+    )
     structure = replace(experiment.structure, record=(*experiment.structure.record[:3], command))
     batch.run(plans.plan(replace(experiment, structure=structure)), output="a.h5")
     return ArchiveFile("a.h5")
@@ -124,7 +126,7 @@ def test_a_command_is_drawn_over_what_follows_it_and_nowhere_else(
         assert len(over) == 1
         assert "joint rate" in over[0].get_title("left")
         np.testing.assert_array_equal(dashed(over[0])[0].get_ydata(), np.full(51, 0.03))
-        assert not any("rate asked" in ax.get_title("left") for ax in axes)
+        assert not any("rate command" in ax.get_title("left") for ax in axes)
 
 
 @pytest.mark.slow
@@ -155,7 +157,7 @@ def test_a_fan_of_unlike_commands_leaves_them_a_panel(
         draw(file, "a.png")
     axes = shown(figures[0])
     assert not any(dashed(ax) for ax in axes)
-    assert any("rate asked" in ax.get_title("left") for ax in axes)
+    assert any("rate command" in ax.get_title("left") for ax in axes)
 
 
 @pytest.mark.slow

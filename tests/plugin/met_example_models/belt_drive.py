@@ -59,7 +59,7 @@ SERVO = Servo(
         Parameter(name="stiffness", unit="effort/joint", above=0.0, doc="stiffness of the belt"),
         Parameter(name="damping", unit="effort*s/joint", at_least=0.0, default=0.0, doc="damping of the belt"),
     ),
-    outputs=(Memory(name="torque_cmd", unit="effort", doc="torque asked of the motor"),),
+    outputs=(Memory(name="torque_cmd", unit="effort", doc="commanded torque of the motor"),),
     integrals=(State(name="integral", unit="joint", doc="integral of the rate error"),),
     states=(
         State(name="angle", unit="joint", doc="where the motor is"),

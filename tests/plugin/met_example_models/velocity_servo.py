@@ -47,7 +47,7 @@ SERVO = Servo(
         Parameter(name="lag", unit="s", default=0.01, above=0.0, doc="time constant of the torque"),
         Parameter(name="rotor", unit="effort*s^2/joint", above=0.0, doc="inertia of the drive, seen at the joint"),
     ),
-    outputs=(Memory(name="qd_cmd", unit="joint/s", doc="rate asked"),),
+    outputs=(Memory(name="qd_cmd", unit="joint/s", doc="commanded rate"),),
     states=(State(name="torque", unit="effort", doc="torque of the drive"),),
     signals=(Signal(name="wanted", unit="effort", doc="torque that the drive goes to"),),
     control=control,
