@@ -302,7 +302,7 @@ MET.simulate = (data, back, { seen = null, surface = null } = {}) => {
 
   function entitle({ kicker, name, lede }) {
     document.title = name;
-    [[".kicker", kicker], ["h1", name], [".lede", lede]].forEach(([which, text]) => { document.querySelector(`header ${which}`).textContent = text; });
+    [[".kicker", kicker], ["h1", name], [".lede", lede]].forEach(([which, text]) => { document.querySelector(`header ${which}`).replaceChildren(...(which === ".lede" ? MET.prose(text) : [text])); });
   }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", traces.draw, { signal: ending.signal });
   addEventListener("resize", traces.draw, { signal: ending.signal });
