@@ -29,7 +29,7 @@ from batch.report.html import inlined
 from batch.report.html.head import page_head
 from batch.report.html.markup import Html, el, lines
 from batch.report.html.payload import script_json
-from met.backends.wasm.module import KERNEL_JS, compiled
+from met.backends.wasm.module import KERNEL_JS, begun
 from met.diagnostic import Problem, error
 from met.messages.visible import visible
 from met.outputs import quoted
@@ -151,7 +151,8 @@ def data_of(
     quick     whether a module that is sooner made and slower will do
     """
     prepared = prepared or prepare(experiment)
-    module = compiled(prepared.recording, quick=quick)
+    making, arm, code_key = begun(prepared.recording, quick=quick), _arm(experiment), prepared.code_key
+    module = making()
     told = described(prepared, module)
     positions = group.values("case")[:MOST_CASES]
     rows = np.searchsorted(experiment.cases.table, positions)
@@ -170,7 +171,7 @@ def data_of(
         "module": base64.b64encode(module.code).decode("ascii"),
         "description": shown,
         "source": source,
-        "same_code": prepared.code_key == group.attributes.get("code_key"),
+        "same_code": code_key == group.attributes.get("code_key"),
         "positions": positions.tolist(),
         "count": group.count,
         "status": group.stretch("status", 0, len(positions)).tolist(),
@@ -189,7 +190,7 @@ def data_of(
         "signalAbout": {visible(each.name): visible(each.doc) for each in experiment.structure.record},
         "columnUnits": [_unit(unit) for _, unit in columns],
         "columnScales": [scale for scale, _ in columns],
-        "arm": _arm(experiment),
+        "arm": arm,
     }  # fmt: skip
 
 

@@ -17,8 +17,8 @@ from ic.text.files import LIBRARY
 from ic.text.lexer import COMMAND_LINE
 from met.host.files import read_regular
 
-PAUSE = 0.05
-"""Seconds between two looks."""
+PAUSE = 0.02
+"""Seconds between two looks, which take some 50 us."""
 
 SETTLED, LONGEST = 0.02, 0.5
 """Seconds without a change after which a file counts as written; and the most that are waited for that."""

@@ -7,6 +7,7 @@ the cache of compiled objects, so that whoever is killed in the middle leaves no
 
 from __future__ import annotations
 
+import gc
 import threading
 import time
 from collections.abc import Callable
@@ -24,8 +25,8 @@ from met.messages.render import render
 from met.messages.visible import visible
 from met.run import Prepared, prepare
 
-HEAD_START_SECONDS = 0.1
-"""Of the page, before its cases are run: it is fetched meanwhile."""
+HEAD_START_SECONDS = 0.25
+"""Seconds that a page has for itself before its cases are run: it is fetched and drawn meanwhile."""
 
 PATIENCE_SECONDS = 2.0
 """For cases that are given up, when all ends: a compiler is not to be left in the middle."""
@@ -76,7 +77,8 @@ class _Loop:
         self._group: str | None = None
         self._files = DeckFiles(deck.file, deck.include_dirs)
         self._known: dict[bytes, Any] = {}
-        self._page = self._work = ""
+        self._page = ""
+        self._shown: Prepared | None = None
         self._is_broken = False
         self._cases: threading.Thread | None = None
         self._stop = threading.Event()
@@ -85,13 +87,15 @@ class _Loop:
 
     def run(self) -> None:
         """Compile, show, wait; for ever."""
+        again = self._sound()
+        gc.freeze()  # what stands at the start stays: looking through it takes a tenth of a save
         while True:
-            again = self._sound()
             if not again:
                 self._files.wait(around=self._is_broken, until=self._board.is_chosen)
             if (chosen := self._board.take_chosen()) is not None:
                 self._name, self._group = chosen
             self._board.tell(doing="compiling")
+            again = self._sound()
 
     def give_up(self, seconds: float | None = None) -> None:
         """Run no more cases of what is shown; wait until that is so, for so long at most."""
@@ -147,12 +151,12 @@ class _Loop:
         told |= {
             "run": experiment.name_in_deck, "group": experiment.name, "broken": False, "saved": begun, "tried": begun,
         }  # fmt: skip
-        text, work = answers.page(answer, prepared), prepared.work_key
-        if (text, work) == (self._page, self._work):
+        text = answers.page(answer, prepared)
+        if text == self._page and self._shown is not None and prepared.work_key == self._shown.work_key:
             self._board.tell(**told, doing="")
             return
         self.give_up(0.0)
-        self._page, self._work, self._stop = text, work, threading.Event()
+        self._page, self._shown, self._stop = text, prepared, threading.Event()
         page = self._board.show("page", text, **told, numbers=0, doing="compiling for this machine")
         self._cases = threading.Thread(target=self._run_cases, args=(prepared, page, self._stop), daemon=True)
         self._cases.start()

@@ -3,7 +3,7 @@
 "use strict";
 
 MET.beside = (() => {
-  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const { bytes } = MET;
 
   // given: as `batch.portable.page` wrote it; data, time: the page's own, and the times of its rows.
   function make(given, data, time) {

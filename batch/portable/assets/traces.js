@@ -60,11 +60,14 @@ MET.traces = (() => {
       const colours = palette();
       plots.forEach((plot) => plot.destroy());
       root.replaceChildren();
-      plots = signals.map((group, nth) => draws(group, colours, limits[nth], nth === signals.length - 1));
+      const panels = signals.map((group, nth) => draws(group, colours, limits[nth], nth === signals.length - 1));
+      const wide = panels.length ? MET.width(panels[0].frame) : 0;  // of all, asked for once, when all are there
+      plots = panels.map(({ plot }) => plot(wide));
       timeline.put(plots);
       follow();
     }
 
+    // The panel of a group: its frame, and what draws the plot in it, so wide.
     function draws(group, colours, limited, last) {
       const { signal } = columns[group[0]];
       const unit = data.columnUnits[group[0]] ? ` (${data.columnUnits[group[0]]})` : "";
@@ -78,7 +81,7 @@ MET.traces = (() => {
         const chip = node("button", { type: "button", class: "chip", title: `${channel}: show or hide`, "aria-pressed": String(!hidden.has(channel)), click: () => {
           if (!hidden.delete(channel)) hidden.add(channel);
           chip.setAttribute("aria-pressed", String(!hidden.has(channel)));
-          (beside ? [nth, nth + group.length] : [nth]).forEach((line) => u.setSeries(line + 1, { show: !hidden.has(channel) }));
+          (beside ? [nth, nth + group.length] : [nth]).forEach((line) => made.setSeries(line + 1, { show: !hidden.has(channel) }));
         } }, swatch(inks[nth].colour, inks[nth].dash), named(n), values[nth]);
         return chip;
       });
@@ -87,7 +90,8 @@ MET.traces = (() => {
         about ? node("span", { class: "about" }, about) : null, instant), node("div", { class: "chips lines" }, chips), frame));
       const show = (n) => !hidden.has(columns[n].channel);
       const line = { points: { show: false }, spanGaps: false, pxAlign: 0 };
-      const u = new uPlot({ width: MET.width(frame), height: last ? 208 : 190, padding: [8, 14, 0, 0], legend: { show: false },
+      let made = null;
+      const plot = (wide) => new uPlot({ width: wide, height: last ? 208 : 190, padding: [8, 14, 0, 0], legend: { show: false },
         scales: { x: { time: false }, y: { range: (self, low, high) => (low === null ? [-1, 1] : spanned(low, high, limited.filter(({ n }) => show(n)))) } },
         cursor: timeline.cursor,
         hooks: { setCursor: [(self) => read(self, group, values, instant)], setScale: [timeline.setScale], draw: [(self) => limited.forEach((each) => show(each.n) && mark(self, each, colours))] },
@@ -96,11 +100,10 @@ MET.traces = (() => {
         axes: MET.timeline.axes(colours, null, last),
       }, drawn(group), frame);
       frame.addEventListener("keydown", (event) => {
-        if (event.key === "Enter" && u.cursor.idx !== null) seek(time[u.cursor.idx]);
-        else timeline.keys(event, u);
+        if (event.key === "Enter" && made.cursor.idx !== null) seek(time[made.cursor.idx]);
+        else timeline.keys(event, made);
       });
-      clicks(u);
-      return u;
+      return { frame, plot: (wide) => { clicks(made = plot(wide)); return made; } };
     }
 
     // A limit comes into view where it is less than a plot's span away.

@@ -6,9 +6,8 @@
 // data: as `batch.portable.page` wrote it; back: of a second module, the archive's. Of the simulation whose place it takes,
 // seen: where the arm was looked at from; surface: what it was drawn on.
 MET.simulate = (data, back, { seen = null, surface = null } = {}) => {
-  const { node, number } = MET;
+  const { bytes, node, number } = MET;
   const { description: told } = data;
-  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const kernel = METKernel.make(bytes(data.module), told.kernel);
   const cases = told.cases.inputs;
   const { source } = data;  // what the numbers are compared with: an archive, or the run of a deck that is watched
@@ -303,7 +302,7 @@ MET.simulate = (data, back, { seen = null, surface = null } = {}) => {
 
   function entitle({ kicker, name, lede }) {
     document.title = name;
-    [[".kicker", kicker], ["h1", name], [".lede", lede]].forEach(([which, text]) => { document.querySelector(`header ${which}`).textContent = text; });
+    [[".kicker", kicker], ["h1", name], [".lede", lede]].forEach(([which, text]) => { document.querySelector(`header ${which}`).replaceChildren(...(which === ".lede" ? MET.prose(text) : [text])); });
   }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", traces.draw, { signal: ending.signal });
   addEventListener("resize", traces.draw, { signal: ending.signal });

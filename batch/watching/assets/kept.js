@@ -95,5 +95,5 @@ globalThis.metKept = (() => {
     });
   }
 
-  return { take, become, arrive };
+  return { take, become, arrive, MET };
 })();

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -91,6 +92,47 @@ def test_a_save_changes_the_run_and_leaves_the_view_where_it_was(chromium: Chrom
         page.settle()
         assert at(page) == before
         assert page.run(f"{RUN}.document.querySelector('.came').textContent").startswith("Not in the sweep: ")
+        silent(page, view)
+        page.close()
+
+
+def still(page: Page) -> bytes:
+    """A picture of the arm when it stands, with all its ghosts, on plain paper: a gradient is never twice the same."""
+    until(page, f"{RUN}.document.documentElement.dataset.haunted && {RUN}.metKept.MET.shown.isStill()")
+    page.run(f"void ({RUN}.document.querySelector('.view').style.background = 'white')")
+    page.settle()
+    clip = page.run(
+        f"(() => {{ const [a, b] = [document.querySelector('iframe'), {RUN}.document.querySelector('.view')]"
+        ".map(each => each.getBoundingClientRect());"
+        "return { x: a.left + b.left, y: a.top + b.top, width: b.width, height: b.height, scale: 1 }; })()"
+    )
+    return base64.b64decode(page.ask("Page.captureScreenshot", format="png", clip=clip)["data"])
+
+
+def test_a_save_keeps_the_page_and_draws_on_what_was_drawn_on(chromium: Chromium, tmp_path: Path) -> None:
+    deck = write_deck(tmp_path, DECK.replace("3.55 V", "31 V"))
+    with viewing(deck, "-q") as view:
+        page = opened(chromium, view)
+        canvas = f"{RUN}.document.querySelector('.stage canvas')"
+        count = f"[{RUN}.metKept.MET.drawn.length, {RUN}.document.querySelectorAll('.stage, .panel').length]"
+        page.run(f"{RUN}.document.querySelector('.view').focus()")
+        before = still(page)
+        page.run(f"void ({RUN}.stays = {canvas}.stays = 'yes')")
+        had = page.run(count)
+        for number in (2, 3, 4):
+            replace(deck, f"3{number - 1} V", f"3{number} V")  # a limit that no case is near
+            shown(page, number)
+            assert still(page) == before
+        assert page.run(f"[{RUN}.stays, {canvas}.stays, {RUN}.metKept.MET.shown.drawsBy()]") == ["yes", "yes", "webgl"]
+        assert page.run(count) == had  # nothing of the runs before is left
+        assert page.run(f"{RUN}.document.activeElement === {RUN}.document.querySelector('.view')")
+        assert [each for each in page.requests if each.endswith("/run")] == [f"{view.address}run"]
+        page.run(f"{canvas}.getContext('webgl2').getExtension('WEBGL_lose_context').loseContext()")
+        until(page, f"{RUN}.metKept.MET.shown.drawsBy() === 'svg'")
+        replace(deck, "34 V", "35 V")
+        shown(page, 5)
+        assert page.run(f"{RUN}.metKept.MET.shown.drawsBy()") == "webgl"  # on another
+        assert still(page) == before
         silent(page, view)
         page.close()
 

@@ -160,6 +160,23 @@ def test_rows_that_do_not_fit_on_the_stack_get_memory_once() -> None:
     assert outputs.tobytes() == found.outputs.tobytes()
 
 
+def test_a_module_that_is_made_meanwhile_is_the_same_and_fails_where_it_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    recording = wide(30)
+    for quick in (False, True):
+        assert module.begun(recording, quick=quick)().code == module.compiled(recording, quick=quick).code
+
+    def failing(*_: object, **__: object) -> bytes:
+        raise RuntimeError("no room")
+
+    monkeypatch.setattr(machine, "assemble", failing)
+    monkeypatch.setenv("MET_CACHE_DIR", "")
+    asked = module.begun(wide(31))
+    with pytest.raises(RuntimeError, match="no room"):
+        asked()
+
+
 def test_a_module_lists_where_it_multiplies_and_adds() -> None:
     recording = one_row()
     made = module.compiled(recording)

@@ -3,7 +3,12 @@
 "use strict";
 
 const MET = (() => {
-  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  function bytes(text) {
+    const letters = atob(text);
+    const out = new Uint8Array(letters.length);
+    for (let n = 0; n < out.length; n++) out[n] = letters.charCodeAt(n);
+    return out;
+  }
 
   // Numbers as `payload.packed` wrote them, as doubles.
   function unpack(packed) {

@@ -55,9 +55,9 @@ MET.timeline = (() => {
       event.preventDefault();
     }
 
-    // The cursors at a time, which the arm stands at.
+    // The cursors at a time, which the arm stands at. Nothing is asked of the page's layout, which each cursor changes.
     function point(time) {
-      plots.forEach((u) => u.setCursor({ left: u.valToPos(time, "x"), top: u.over.clientHeight / 2 }, true, false));
+      plots.forEach((u) => u.setCursor({ left: u.valToPos(time, "x"), top: u.bbox.height / devicePixelRatio / 2 }, true, false));
     }
 
     const cursor = { y: false, points: { size: 6 }, drag: { x: true, y: false }, focus: { prox: -1 },
