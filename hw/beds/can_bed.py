@@ -58,6 +58,7 @@ class CanBed(BedDriver):
     open_line      opens the bus;  period: s from one exchange to the next, infinite where none are made
     drive          what it is sent for the drive: a voltage, a torque or a rate
     believed       the rate loop that the deck takes for the drive's; None where it sends no rate
+    torque_believed  N m, the largest torque that the deck takes the drive to give; 0 where no deck says it
     of_deck        warnings of what the bench's file says otherwise than the deck
     proved         s after which each drive had stopped by itself when it was last armed; None where it said so only
                    when it was asked
@@ -73,9 +74,11 @@ class CanBed(BedDriver):
         period: float,
         drive: DriveCommand = "voltage",
         believed: can_deck.BelievedLoop | None = None,
+        torque_believed: float = 0.0,
         of_deck: tuple[Diagnostic, ...] = (),
     ) -> None:
         self._kind, self._believed, self._of_deck = drive, believed, of_deck
+        self._torque_believed = torque_believed
         self.warnings = of_deck
         self._bench, self._drives, self._open, self.period = bench, drives, open_line, period
         self._line: CanLine | None = None
@@ -152,7 +155,7 @@ class CanBed(BedDriver):
             side.begin(reading, readings[0].time)
         self._filtered = (self._sides[0].rate, 0.0)
         self.remarks = self._remarks()
-        self.warnings = (*self._of_deck, *self._of_loop())
+        self.warnings = (*self._of_deck, *self._of_torque(), *self._of_loop())
         self._state = BedState.STOPPED if self._faults else BedState.DISARMED
         self._latch_failures()
         return about
@@ -200,6 +203,13 @@ class CanBed(BedDriver):
             sides.append(("loop", words))
         return (*sides, ("bus", f"{bus['interface']} {bus['channel']}: {most}"), ("filter", filter))
 
+    def _of_torque(self) -> tuple[Diagnostic, ...]:
+        """A warning where the drive's own largest torque is less than the file's and than what the deck believes."""
+        own, files = self._sides[0].facts.torque_max, self._bench.drive.figures["torque_max"]
+        if min(files, self._torque_believed) <= own * (1.0 + 1e-6):
+            return ()
+        return (can_deck.torque_warning(self._drives[0].words, own, self._torque_believed),)
+
     def _of_loop(self) -> tuple[Diagnostic, ...]:
         """A warning where the drive's rate loop is not what the deck takes it for."""
         own = self._sides[0].facts.rate_loop
@@ -213,6 +223,9 @@ class CanBed(BedDriver):
     def limit(self, limits: Mapping[str, float]) -> None:
         about = self._there()
         tighter = greeting.tighter(about, limits)
+        if self._kind == "rate" and "rate" in limits:  # what it is told is a rate, too
+            told = greeting.counts(limits["rate"], about.scales.voltage)
+            tighter["voltage"] = min(told, tighter.get("voltage", told))
         if self._state != BedState.DISARMED:
             raise self._refused("take tighter limits")
         self._in_force = replace(
@@ -549,6 +562,7 @@ def _opened_port(opening: Opening) -> CanBed:
         period=opening.period,
         drive=drive,
         believed=can_deck.believed_loop(opening),
+        torque_believed=0.0 if opening.experiment is None else can_deck.believed_torque(opening),
         of_deck=can_deck.warnings(bench, path, opening),
     )
 

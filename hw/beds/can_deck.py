@@ -13,6 +13,9 @@ from met.plan import Experiment, Formula, Substitution
 RATE_LOOP_TOLERANCE = 0.1
 """Share of its gains by which a drive's rate loop may differ from the deck's before it is said."""
 
+WEAKER = "beyond it the drive gives less than the law believes, and the run is one of neither motor"
+"""Why a drive that is weaker than the deck's motor is told of."""
+
 
 def bench_at(path: str) -> TwoDrives:
     """The bench of a file. Raises Problem E446."""
@@ -77,7 +80,7 @@ def warnings(bench: TwoDrives, path: str, opening: Opening) -> tuple[Diagnostic,
         origin = opening.experiment.parameters[f"{opening.joint}.servo.tau_max"].origin
         also = () if origin.place is None else (Label(origin.place, "the deck's"),)
         helps = (
-            "beyond it the drive gives less than the law believes, and the run is one of neither motor",
+            WEAKER,
             "a larger `torque_max` of `[drive]`, if drive and shaft bear it, or a smaller `tau_max` in the deck",
         )
         found.append(Diagnostic("E444", message, Label(bench.torque_at), also, helps, "warning"))
@@ -87,6 +90,14 @@ def warnings(bench: TwoDrives, path: str, opening: Opening) -> tuple[Diagnostic,
 def believed_torque(opening: Opening) -> float:
     """The largest torque that the law takes the bed's motor to give, N m of the bed's size."""
     return _value(opening, "servo.tau_max") / _value(opening, "bed.scale.torque", 1.0)
+
+
+def torque_warning(who: str, own: float, believed: float) -> Diagnostic:
+    """The warning that a drive's own largest torque is less than that of the deck's motor, both N m. who: it, in
+    words"""
+    message = f"the {who} gives {own:.4g} N*m at most by its own limits, and the motor of the deck {believed:g} N*m"
+    helps = (WEAKER, "larger limits in the drive, if it and the shaft bear them, or a smaller `tau_max` in the deck")
+    return Diagnostic("E444", message, help=helps, severity="warning")
 
 
 @frozen

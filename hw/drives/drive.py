@@ -15,6 +15,7 @@ shaft. It disarms itself where it hears nothing for the time of its watchdog.
 from __future__ import annotations
 
 import enum
+import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Hashable, Iterable, Sequence
@@ -29,6 +30,9 @@ GREETED = 2.0
 
 OWED = 0.02
 """Time after a question for which its answer may still come, s: question and answer 10 ms late each."""
+
+TURNS = 0.5
+"""Rate of a shaft, rad/s, above which it is at another angle when it is asked again."""
 
 REMEMBERED = 64
 """Answers of a drive that are remembered, so that an old one is known again."""
@@ -127,6 +131,8 @@ class CanDrive(ABC):
         self.steps = 0.0, 0.0
         self._said: dict[Hashable, float] = {}
         """When angle and rate, as its answers had them, were said last, s."""
+        self._turned = -math.inf
+        """When an answer said last that the shaft turns, s."""
 
     @abstractmethod
     def greet(self, talk: Talk) -> DriveFacts:
@@ -182,11 +188,15 @@ class CanDrive(ABC):
 
     def has_said(self, fields: Hashable, rate: float, time: float) -> bool:
         """True for an old frame: angle and rate, as an answer has them, are those of an earlier one, and the shaft has
-        turned since by more than a step of the angle, as they say themselves. rate: rad/s;  time: of the frame, s"""
+        turned since: by more than a step of the angle, as they say themselves, or as another answer said that came
+        between. rate: rad/s;  time: of the frame, s"""
         angle_step, rate_step = self.steps
-        before = self._said.pop(fields, time)
-        old = max(0.0, abs(rate) - rate_step) * abs(time - before) > angle_step
-        self._said[fields] = before if old else time
+        turns = max(0.0, abs(rate) - rate_step)
+        before = self._said.pop(fields, None)
+        old = before is not None and (turns * abs(time - before) > angle_step or before < self._turned)
+        self._said[fields] = before if before is not None and old else time
+        if turns > TURNS and not old:
+            self._turned = time
         if len(self._said) > REMEMBERED:
             del self._said[next(iter(self._said))]
         return old

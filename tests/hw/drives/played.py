@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from hw import conformance
-from hw.bed import BedDriver
+from hw.bed import About, BedDriver, BedSample
 from hw.beds.can_bed import CanBed
 from hw.drives import DIALECTS
 from hw.drives.bench_file import TwoDrives, two_drives
@@ -138,6 +138,16 @@ class PlayedConformance(conformance.FreeRunning):
     def rate_told(self) -> float:
         """The rate that the drive under test follows, rad/s of the shaft."""
         raise NotImplementedError
+
+    def weaken(self) -> None:
+        """Leave a drive that is told rates next to no torque, so that its load turns the shaft."""
+        raise NotImplementedError
+
+    def sped(self, bed: BedDriver, about: About) -> BedSample:
+        if self.drive_told != "rate":
+            return super().sped(bed, about)
+        self.weaken()  # else it holds its shaft at what it is told, which is no more than the limit
+        return self.drive(bed, 1.0, current=about.limits.current)
 
     def wait(self, bed: BedDriver, seconds: float) -> None:
         self.line.sleep(seconds)

@@ -34,6 +34,11 @@ class TestCia402ToldRates(TestCia402):
         assert isinstance(drive, PlayedCia402)
         return drive.rate_told if drive.value(0x6060) == 9 else float("nan")
 
+    def weaken(self) -> None:
+        drive = self.played.drive
+        assert isinstance(drive, PlayedCia402)
+        drive.set_value(0x6072, 0, 50)
+
 
 def bench(folder: Path) -> tuple[CanBed, PlayedLine, PlayedBench, PlayedCia402, PlayedCia402]:
     played = played_bench("cia402")

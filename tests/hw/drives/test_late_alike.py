@@ -154,6 +154,15 @@ def test_an_answer_that_is_an_earlier_one_again_is_old_where_the_shaft_turns(tmp
     assert not drive.has_said("one", 3.0, 1.02)
 
 
+def test_an_answer_of_a_shaft_at_rest_is_old_where_it_has_turned_since(tmp_path: Path) -> None:
+    """As it begins to turn both drives' may be frames of before, alike: nothing else tells."""
+    drive = a_drive(tmp_path)
+    assert not any(drive.has_said("rest", 0.0, 1.0 + 1e-3 * n) for n in range(9))
+    assert not drive.has_said("turns", 1.09, 1.009)
+    assert drive.has_said("rest", 0.0, 1.010) and drive.has_said("rest", 0.0, 1.011)
+    assert not drive.has_said("rest elsewhere", 0.0, 1.012) and not drive.has_said("rest elsewhere", 0.0, 1.013)
+
+
 def test_an_answer_is_not_old_where_the_shaft_may_have_turned_by_less_than_a_step(tmp_path: Path) -> None:
     drive = a_drive(tmp_path, lambda drive: setattr(drive, "steps", (4e-4, 2e-2)))
     drive.has_said("one", 0.42, 1.0)  # 0.4 rad/s at least

@@ -32,6 +32,11 @@ class TestOdriveToldRates(TestOdrive):
         assert isinstance(drive, PlayedOdrive)
         return drive.rate_told if drive.mode == 2 else float("nan")
 
+    def weaken(self) -> None:
+        drive = self.played.drive
+        assert isinstance(drive, PlayedOdrive)
+        drive.values |= {"axis0.config.torque_soft_max": 0.01, "axis0.config.torque_soft_min": -0.01}
+
 
 def greeting(folder: Path, change: Callable[[PlayedBench, Path], object]) -> str:
     """What is said where a bench that was changed is greeted."""

@@ -46,6 +46,11 @@ class TestOdriveAsciiToldRates(TestOdriveAscii):
         assert isinstance(drive, PlayedOdriveAscii)
         return drive.rate_told if drive.mode == 2 else float("nan")
 
+    def weaken(self) -> None:
+        drive = self.played.drive
+        assert isinstance(drive, PlayedOdriveAscii)
+        drive.values |= {"axis0.config.torque_soft_max": 0.01, "axis0.config.torque_soft_min": -0.01}
+
 
 # Lines
 

@@ -108,6 +108,27 @@ def test_a_rate_beyond_the_limit_is_not_sent(tmp_path: Path, dialect: str) -> No
 
 
 @pytest.mark.parametrize("dialect", TOLD)
+def test_a_tighter_limit_of_the_rate_is_one_of_the_rates_that_are_told(tmp_path: Path, dialect: str) -> None:
+    """Else a shaft that follows what it is told would stop the bed."""
+    bed, played, line = bed_of(tmp_path, dialect)
+    with bed:
+        bed.connect()
+        bed.limit({"rate": 30.0})
+        bed.arm()
+        line.sleep(1e-3)
+        sample = bed.exchange(29.8, 0.0)
+        assert sample is not None and sample.state == BedState.ARMED
+        line.sleep(1e-3)
+        words = refusal(lambda: bed.exchange(30.2, 0.0))
+        assert words.startswith("error[E408]: a rate of 30.2 rad/s for bed `paper` is beyond the limit of ")
+        assert played.off
+        bed.limit({"voltage": 10.0, "rate": 20.0})
+        bed.arm()
+        assert " is beyond the limit of " in refusal(lambda: bed.exchange(11.0, 0.0))
+    assert played.off
+
+
+@pytest.mark.parametrize("dialect", TOLD)
 def test_each_arming_proves_the_watchdog_of_a_drive_that_closes_its_loop(tmp_path: Path, dialect: str) -> None:
     bed, played, line = bed_of(tmp_path, dialect)
     with bed:
@@ -316,6 +337,33 @@ def test_a_bench_weaker_than_the_deck_s_motor_is_told_at_its_torque(tmp_path: Pa
         "\n\n1 warning\n"
     )
     assert not any("N*m at most" in each.message for each in bench.warnings)
+
+
+def test_a_drive_weaker_than_the_deck_s_motor_by_its_own_limits_is_told_when_it_is_greeted(tmp_path: Path) -> None:
+    path, played = bench_file(tmp_path), played_bench()
+    drive = played.drive
+    assert isinstance(drive, PlayedOdrive)
+    said = {}
+    for amperes in (10.0, 3.0, 2.0):
+        drive.values["axis0.config.motor.current_soft_max"] = amperes
+        bed = opened(Port(f"can:{path}"), experiment(tmp_path, "bench"), "shoulder", 0, 1e-3)
+        assert isinstance(bed, CanBed)
+        line = PlayedLine(played)
+        bed._open = lambda line=line: line  # type: ignore[misc]
+        with bed:
+            bed.connect()
+            said[amperes] = [render([each], {}) for each in bed.warnings if "own limits" in each.message]
+    assert said == {
+        10.0: [],
+        3.0: [],  # 0.18 N m: less than the file's, and more than the deck's
+        2.0: [
+            "warning[E444]: the drive (node 1) gives 0.12 N*m at most by its own limits, and the motor of the deck "
+            "0.144 N*m\n"
+            " = help: beyond it the drive gives less than the law believes, and the run is one of neither motor\n"
+            " = help: larger limits in the drive, if it and the shaft bear them, or a smaller `tau_max` in the deck\n\n"
+            "1 warning\n"
+        ],
+    }
 
 
 def test_a_loop_that_is_not_the_deck_s_is_told_when_the_drive_is_greeted(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Played drives on buses of python-can, in real time: in this process, and in one of their own.
 
-`python -m tests.hw.drives.test_real_time 60` prints what 60 s of exchanges at the highest rate came to.
+`python -m tests.hw.drives.test_real_time 60` prints what 60 s of exchanges at the highest rate came to; of the dialects
+that are named after it, where any are.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -26,19 +27,24 @@ from hw.drives.bus import open_bus
 from hw.players.fdcanusb import played_bus
 from hw.players.player import play
 from hw.realtime import put_first
-from tests.hw.drives.driving import driving_voltage
+from met.substitution.bed import DriveCommand
+from tests.hw.drives.driving import driving_command
 from tests.hw.drives.played import bench_file, host_on, played_bench
 
 pytestmark = pytest.mark.alone
 
-DIALECTS = ("odrive", "damiao", "moteus", "cia402", "robstride", "odrive_ascii", "moteus behind an fdcanusb")
+DIALECTS = (
+    *("odrive", "damiao", "moteus", "cia402", "robstride", "odrive_ascii", "moteus behind an fdcanusb"),
+    *("odrive told rates", "cia402 told rates"),
+)
+RATES = " told rates"
 GROUP = "239.74.163.2"
 """Multicast group, of this machine alone, in whose place a bus is."""
 
 
 def file_for(folder: Path, dialect: str, interface: str, channel: str) -> Path:
     """A bench file of a dialect on a bus; of one behind an adapter, on its pseudo-terminal in the folder."""
-    name, _, adapter = dialect.partition(" behind an ")
+    name, _, adapter = dialect.removesuffix(RATES).partition(" behind an ")
     return bench_file(folder, name, adapter or interface, str(folder / "line") if adapter else channel)
 
 
@@ -51,7 +57,8 @@ def on_virtual_bus(folder: Path, dialect: str) -> Iterator[CanBed]:
     thread = threading.Thread(target=play, args=(theirs, played, ended.is_set), daemon=True)
     thread.start()
     try:
-        with host_on(bench, lambda: open_bus(bench.bus)) as bed:
+        told: DriveCommand = "rate" if dialect.endswith(RATES) else "voltage"
+        with host_on(bench, lambda: open_bus(bench.bus), drive=told) as bed:
             yield bed
     finally:
         ended.set()
@@ -63,7 +70,7 @@ def on_virtual_bus(folder: Path, dialect: str) -> Iterator[CanBed]:
 def exchanged(bed: CanBed, seconds: float) -> tuple[int, list[float], list[float]]:
     """Drive a bed at its highest rate. Returns how many exchanges had no answer, and of all: how late they began, and
     how long they took, s. Where it stops itself, as it does where the machine is busy, it is armed anew."""
-    voltage = driving_voltage(bed.connect())
+    command = driving_command(bed.connect())
     period = bed.period
     bed.patience = 2.0 * period
     bed.arm()
@@ -74,7 +81,7 @@ def exchanged(bed: CanBed, seconds: float) -> tuple[int, list[float], list[float
         if (left := due - time.perf_counter()) > 0.0:
             time.sleep(left)
         now = time.perf_counter()
-        sample = bed.exchange(voltage, 0.1)
+        sample = bed.exchange(command, 0.1)
         late.append(now - due)
         took.append(time.perf_counter() - now)
         if sample is None:
@@ -114,9 +121,9 @@ def stopped_after(folder: Path, dialect: str) -> float:
     host = None
     try:
         assert player.stdout.readline() == "ready\n"
-        host = subprocess.Popen(
-            [sys.executable, "-m", "tests.hw.drives.driving", str(path)], stdout=subprocess.PIPE, text=True
-        )
+        told = ["rate"] if dialect.endswith(RATES) else []
+        command = [sys.executable, "-m", "tests.hw.drives.driving", str(path), *told]
+        host = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         assert host.stdout is not None
         found = host.stdout.readline()
         assert found, "the host did not come to drive"
@@ -133,10 +140,10 @@ def stopped_after(folder: Path, dialect: str) -> float:
     return float(said.split()[-1]) - killed if "ARMED" in found else -1.0
 
 
-def _figures(seconds: float) -> None:
+def _figures(seconds: float, dialects: Sequence[str] = DIALECTS) -> None:
     with contextlib.suppress(OSError):  # threads too
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
-    for dialect in DIALECTS:
+    for dialect in dialects:
         with tempfile.TemporaryDirectory() as name:
             with on_virtual_bus(Path(name), dialect) as bed:
                 missed, late, took = exchanged(bed, seconds)
@@ -152,4 +159,4 @@ def _figures(seconds: float) -> None:
 
 
 if __name__ == "__main__":
-    _figures(float(sys.argv[1]))
+    _figures(float(sys.argv[1]), sys.argv[2:] or DIALECTS)
