@@ -132,11 +132,11 @@ def plan_coordinates(
     return tuple(made)
 
 
-def without_effect(experiment: Experiment) -> tuple[str, ...]:
+def without_effect(experiment: Experiment, memo: AnalysisMemo | None = None) -> tuple[str, ...]:
     """Inputs of the experiment's program that change nothing. Raises Problem where a model cannot be recorded."""
     from met.analysis.audit import idle_inputs
 
-    return idle_inputs(experiment)
+    return idle_inputs(experiment, memo)
 
 
 def check_effects(complaints: Complaints, sweep: Sweep, experiment: Experiment, memo: AnalysisMemo) -> None:
@@ -145,7 +145,7 @@ def check_effects(complaints: Complaints, sweep: Sweep, experiment: Experiment, 
         return
     places = {varied.path: varied.place for varied in sweep.varied}
     with complaints.gather():
-        for name in memo.answer("idle inputs", experiment, lambda: without_effect(experiment)):
+        for name in memo.answer("idle inputs", experiment, lambda: without_effect(experiment, memo)):
             if name in places:
                 complaints.error(
                     "D137",

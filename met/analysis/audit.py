@@ -6,24 +6,31 @@ computed from it, through however many steps; that is a question about the progr
 
 from __future__ import annotations
 
-from met.analysis.chains import chains
+from collections.abc import Iterable
+from functools import partial
+
+from met import models
+from met.analysis.chains import chains, numbered
+from met.analysis.memo import AnalysisMemo
 from met.plan import Experiment
 from met.program.build import COORDINATE, build
 from met.trace.nodes import live
-from met.trace.program import WhileAny, walk
-from met.trace.recorder import record
+from met.trace.program import Program, Unless0, WhileAny, walk
+from met.trace.recorder import SectionRecorder, record
 from met.trace.recording import CodeSection
 
 
-def idle_inputs(experiment: Experiment) -> tuple[str, ...]:
+def idle_inputs(experiment: Experiment, memo: AnalysisMemo | None = None) -> tuple[str, ...]:
     """Inputs of the experiment's program that change nothing: paths of coordinates, `met.plan.REPEAT` and `SEED`.
 
     Of an arm whose chains do not act on each other, no more is recorded than it takes to see that all have an effect.
-    Raises Problem where a model cannot be recorded.
+    memo: of other experiments, which may have equal chains. Raises Problem where a model cannot be recorded.
     """
+    memo = memo if memo is not None else AnalysisMemo()
     every = {*(each.path for each in experiment.cases.coordinates), *experiment.cases.noise}
     for chain in chains(experiment):
-        every &= set(_idle_inputs(chain))
+        alike, _ = numbered(chain)
+        every &= set(memo.answer("idle inputs of a chain", alike, partial(_idle_inputs_of_chain, alike)))
         if not every:
             return ()
     return _idle_inputs(experiment)
@@ -31,18 +38,36 @@ def idle_inputs(experiment: Experiment) -> tuple[str, ...]:
 
 def _idle_inputs(experiment: Experiment) -> tuple[str, ...]:
     program = build(experiment)
-    recording = record(program, fuse=False)
+    return _unread(program, record(program, fuse=False).sections)
+
+
+def _idle_inputs_of_chain(chain: Experiment) -> tuple[str, ...]:
+    """The same of a chain, of which the rest of a step is recorded only where it takes that to see an effect."""
+    program = build(chain)
+    made = SectionRecorder(program)
+    made.steps(program.start, "start")
+    made.steps(program.end, "end")
+    if chain.structure.integrator in models.find_own("integrator"):  # another package's is recorded in any case
+        made.steps(tuple(Unless0(()) if isinstance(each, Unless0) else each for each in program.tick), "tick")
+        if not _unread(program, made.sections):
+            return ()
+    made.steps(program.tick, "tick")
+    return _unread(program, made.sections)
+
+
+def _unread(program: Program, sections: Iterable[CodeSection]) -> tuple[str, ...]:
+    """Inputs from which these sections compute nothing that the program records, gives or decides by."""
     control = walk((*program.start, *program.tick, *program.end))
     needed = {node.cell for node in control if isinstance(node, WhileAny)}
     given = {n for n, name in enumerate(program.outputs) if not name.startswith(COORDINATE)}
     read: set[str] = set()
     while True:
         found: set[str] = set()
-        for section in recording.sections:
+        for section in sections:
             inputs, cells = _reads(section, needed, given)
             read |= inputs
             found |= cells
-        if found <= needed:
+        if found <= needed or len(read) == len(program.inputs):
             return tuple(name for name in program.inputs if name not in read)
         needed |= found
 

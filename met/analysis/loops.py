@@ -72,14 +72,16 @@ def _over(
 def frame(
     found: SampledLoops, lane: int | np.ndarray, gains: Gains | None = None, *, direct: bool = False
 ) -> np.ndarray:
-    """The map of one frame, of state, memory, memory at the step's first tick, and the state a step before; of a lane,
-    or of several.
+    """The map of one frame, of state, memory, memory at the step's first tick, and the state a step before; of state
+    and memory alone where all tick with the dynamics. Of a lane, or of several.
 
     gains   what the outputs of a joint's law are multiplied by, 1 where nothing is said
     direct  whether laws see what is so, without their sensors
     """
     laws = [law for law in found.laws if not law.continuous]
     A, n, cells = _over(found, lane, gains, direct, [law for law in found.laws if law.continuous])
+    if all(law.divisor == found.divisor for law in laws):
+        return _frame_of_a_step(found, A, n, cells, [(law, _rows(law, lane, gains, direct)) for law in laws])
     p, m, held = found.positions, len(cells) - n, [found.held[cell - found.states] for cell in cells[n:].tolist()]
     h, d, hz, over = found.h, found.divisor, found.base_hz, A.shape[:-2]
     size = 2 * n + 2 * m
@@ -120,6 +122,26 @@ def frame(
         if k % d == 0:
             whole = latch @ whole
     return whole
+
+
+def _frame_of_a_step(
+    found: SampledLoops, A: np.ndarray, n: int, cells: np.ndarray, laws: Sequence[tuple[SampledLaw, np.ndarray]]
+) -> np.ndarray:
+    """The frame of laws that all tick with the dynamics, of state and memory: what is held at a step's first tick is
+    held over it, and no tick sees a state that is carried on.
+
+    A, n, cells  as of `_over`;  laws: those that tick, with their slopes by all states and memory
+    """
+    m = len(cells) - n
+    wide = np.zeros((*A.shape[:-2], n + m, n + m))
+    wide[..., :n, :] = A[..., :n, :]
+    step = linear_step(found.integrator, wide, found.positions, found.h)
+    tick = np.broadcast_to(np.eye(n + m), step.shape).copy()
+    places = {cell: at for at, cell in enumerate(cells.tolist())}
+    for law, rows in laws:
+        at = [places[found.states + found.held.index(name)] for name in law.memory]
+        tick[..., at, :] = rows[..., cells]
+    return np.asarray(tick @ step)
 
 
 def _carried(n: int, positions: int, m: int, since: float, h: float) -> np.ndarray:

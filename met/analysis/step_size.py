@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -109,16 +110,29 @@ def step_size(experiment: Experiment, cases: Sequence[int], memo: AnalysisMemo |
     memo = memo if memo is not None else AnalysisMemo()
     of_parts = list[StepSize]()
     for part, names in map(numbered, parts):
-        looked = _look(part, cases, memo)
-        if looked.may_grow(experiment):
-            break
-        of_part = looked.judged(experiment)
-        if of_part.faults or not of_part.finite:
+        of_part = memo.answer("steps of a chain", part, partial(_of_chain, part, cases, memo), cases)
+        if of_part is None:
             break
         of_parts.append(_named(of_part, names))
     if parts and len(of_parts) == len(parts):
         return _together(of_parts)
     return _Look(experiment, cases).judged(experiment)
+
+
+def _of_chain(chain: Experiment, cases: Sequence[int], memo: AnalysisMemo) -> StepSize | None:
+    """The findings on a chain, in little memory; None where there is something to say of it, for which the whole arm is
+    looked at."""
+    looked = _look(chain, cases, memo)
+    if looked.may_grow(chain):
+        return None
+    found = looked.judged(chain)
+    if found.faults or not found.finite:
+        return None
+    mode = found.mode
+    if mode is not None:  # of what takes part in it, the owner alone is asked for
+        owner = next(name for name in mode.names if _owner(name) == (found.owner, found.joint))
+        mode = replace(mode, names=(owner,), weights=np.ones(1))
+    return replace(found.without_matrices(), mode=mode)
 
 
 def _look(part: Experiment, cases: Sequence[int], memo: AnalysisMemo) -> _Look:

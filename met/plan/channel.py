@@ -43,7 +43,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from functools import lru_cache
 
 from met import models, units
@@ -329,10 +329,16 @@ def joint_of(name: str) -> str:
 
 
 def recordable(
-    structure: Structure, names: Iterable[str] = (), known: Mapping[str, Channel] | None = None
+    structure: Structure,
+    names: Iterable[str] = (),
+    known: Mapping[str, Channel] | None = None,
+    *,
+    wanted: Collection[str] | None = None,
 ) -> dict[str, tuple[Recorded, ...]]:
-    """Every name that a record may write, with the variables that it stands for (names: as of `channels`; known: what
-    that comes to, where it is at hand).
+    """Every name that a record may write, with the variables that it stands for.
+
+    names   as of `channels`;  known: what that comes to, where it is at hand
+    wanted  those names alone, as far as there are such; None: all
 
     A name stands for one number (`elbow.q`, `elbow.reaction.force.x`), for a vector (`links.tip.position`), for that of
     all joints that have it (`q`, `reaction.force`), or for several variables (`reaction`, `energy`; `sensors`: what
@@ -349,14 +355,21 @@ def recordable(
             if group:
                 joints.setdefault(group, []).append(channel.joint)
     found: dict[str, tuple[Recorded, ...]] = {}
+
+    def is_wanted(name: str) -> bool:
+        return wanted is None or name in wanted or name.rpartition(".")[0] in wanted
+
     for name, channel in own.items():
-        _enter(found, known, name, (), () if name in known else channel.components)
+        if is_wanted(name):
+            _enter(found, known, name, (), () if name in known else channel.components)
     for name, of in joints.items():
+        if not is_wanted(name):
+            continue
         (one,) = channel_paths(name, (of[0],), ())
         _enter(found, known, name, tuple(of), () if one in known else own[one].components)
-    if structure.sensors:
+    if structure.sensors and wanted is None:
         found["sensors"] = tuple(found[f"sensors.{use.name}"][0] for use in structure.sensors)
-    return found
+    return found if wanted is None else {name: each for name, each in found.items() if name in wanted}
 
 
 def _of_all(name: str, channel: Channel) -> str:

@@ -15,7 +15,10 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import marshal
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -25,6 +28,9 @@ from met.plan import Experiment, Formula, Structure
 from met.plan.swept import blocks
 
 DIGEST_BYTES = 8
+
+MARSHAL = 2
+"""Version of Python's marshal that writes equal values alike: later ones go by which objects are the same."""
 
 
 def in_key(field: dataclasses.Field[Any]) -> str:
@@ -108,12 +114,23 @@ def id_head(experiment: Experiment) -> bytes:
 
 def content_digest(question: str, experiment: Experiment, rows: Sequence[int] = ()) -> bytes:
     """Digest of a question about an experiment, with all that decides its numbers: structure, inputs, parameters, and
-    the coordinates of some rows of the case table. Of 32 bytes, for what must not be taken for another's."""
-    described = [question, _described(experiment.structure), list(inputs(experiment)), [int(row) for row in rows]]
-    made = hashlib.sha256(_bytes(described))
-    made.update(id_head(experiment))
-    made.update(_row_table(experiment, np.asarray(rows, np.int64))[1].tobytes())
-    return made.digest()
+    the coordinates of some rows of the case table. Of 32 bytes, for what must not be taken for another's.
+
+    It is the same in every process of one version of Python, and never written down: numbers go in as they are.
+    """
+    cases, formulas = experiment.cases, experiment.formulas
+    parameters = [(path, _value(quantity.value)) for path, quantity in experiment.parameters.items()]
+    head, table = _row_table(experiment, np.asarray(rows, np.int64))
+    asked = [
+        question, _described(experiment.structure), list(inputs(experiment)), [int(row) for row in rows],
+        sorted(parameters, key=itemgetter(0)), cases.seed, cases.seeds, formulas.inputs, formulas.nodes,
+        formulas.outputs, head, table.tobytes(),
+    ]  # fmt: skip
+    try:
+        packed = marshal.dumps(asked, MARSHAL)
+    except ValueError:  # numbers of numpy
+        packed = marshal.dumps([_bytes(asked[:-2]), *asked[-2:]], MARSHAL)
+    return hashlib.sha256(packed).digest()
 
 
 def id_numbers(experiment: Experiment) -> np.ndarray:
@@ -158,16 +175,27 @@ def _value(value: Any) -> Any:
 
 def _described(value: Any) -> Any:
     """Plain data of a structure, without what changes no number."""
-    if dataclasses.is_dataclass(value):
-        described = {}
-        for field in dataclasses.fields(value):
-            part, when = getattr(value, field.name), in_key(field)
-            if when == "always" or (when == "where set" and part != field.default):
-                described[field.name] = _described(part)
-        return described
+    kind: Any = type(value)
+    if kind is str or kind is int:
+        return value
     if isinstance(value, tuple):
         return [_described(part) for part in value]
-    return value
+    described = {}
+    for name, always, default in _fields_in_key(kind) or ():
+        part = getattr(value, name)
+        if always or part != default:
+            described[name] = _described(part)
+    return described if _fields_in_key(kind) is not None else value
+
+
+@lru_cache(maxsize=256)
+def _fields_in_key(kind: type) -> tuple[tuple[str, bool, Any], ...] | None:
+    """The fields of a dataclass that may be in a key: name, whether always, and the default with which it is not; None
+    of what is no dataclass."""
+    if not dataclasses.is_dataclass(kind):
+        return None
+    fields = ((field, in_key(field)) for field in dataclasses.fields(kind))
+    return tuple((field.name, when == "always", field.default) for field, when in fields if when != "never")
 
 
 def _plain(value: Any) -> Any:

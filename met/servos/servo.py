@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from met.frozen import frozen
@@ -186,6 +187,11 @@ class Servo:
     rate_wanted: Callable[[Any, Real, Setpoint], Real] | None = None
     at_rest: Callable[[Any], Truth] | None = None
 
+    @cached_property
+    def parts_by_words(self) -> dict[tuple[tuple[tuple[str, str], ...], bool], Parts]:
+        """The parts that `parts` has found, by words and whether the law is continuous."""
+        return {}
+
     @property
     def deciding(self) -> tuple[str, ...]:
         """Names of the parameters, words, on which parts of it depend (`only`), in order."""
@@ -232,6 +238,13 @@ class Parts:
 
 def parts(servo: Servo, words: Mapping[str, str], *, continuous: bool = False) -> Parts:
     """The parts of a servo that are present under these words, by parameter; a word left out has its default."""
+    known, key = servo.parts_by_words, (tuple(sorted(words.items())), continuous)
+    if key not in known:
+        known[key] = _parts(servo, words, continuous)
+    return known[key]
+
+
+def _parts(servo: Servo, words: Mapping[str, str], continuous: bool) -> Parts:
     groups = (servo.parameters, servo.outputs, servo.integrals, servo.states, servo.signals)
     if any(part.only is not None for group in groups for part in group):
         words = {each.name: each.default for each in servo.parameters if isinstance(each.default, str)} | dict(words)

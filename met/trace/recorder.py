@@ -80,25 +80,54 @@ class RecordingTape:
         self.parts.append((len(self.graph.nodes), outer))
 
 
-def record(program: Program, *, fuse: bool = True) -> Recording:
-    """Runs every phase once over recorded numbers.
+class SectionRecorder:
+    """The sections of a program, each recorded when it is first asked for.
 
-    Stores that no phase and no condition ever reads are dropped with all that only they need; then, unless `fuse` is
-    false, products are fused into sums (`met.trace.fuse`).
+    sections  those that were recorded so far
     """
-    sections: list[CodeSection] = []
-    made: dict[tuple[tuple[int, ...], str], int] = {}
 
-    def section(phases: list[Phase], where: str) -> int:
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.sections: list[CodeSection] = []
+        self._made: dict[tuple[tuple[int, ...], str], int] = {}
+
+    def steps(self, body: tuple[Control, ...], where: str) -> tuple[RecordedControl, ...]:
+        """A body with its phases recorded, neighbours in one section; where: start, tick or end."""
+        result: list[RecordedControl] = []
+        waiting: list[Phase] = []
+
+        def flush() -> None:
+            if waiting:
+                result.append(RunSection(self._section(waiting, where)))
+                waiting.clear()
+
+        for node in _flat(body):
+            if isinstance(node, RunPhase):
+                waiting.append(node.phase)
+                continue
+            flush()
+            if isinstance(node, CallPhase):
+                result.append(RunSection(self._section([node.phase], where)))
+            elif isinstance(node, RecordPhase):
+                if where != "tick":
+                    raise ValueError(f"{node.phase.name} records in `{where}`; rows belong to ticks")
+                result.append(RecordSection(self._section([node.phase], "record"), node.divisor))
+            else:
+                result.append(Branch(node, self.steps(node.body, where)))
+        flush()
+        return tuple(result)
+
+    def _section(self, phases: list[Phase], where: str) -> int:
+        """The number of the section of these phases."""
         key = (tuple(map(id, phases)), where)
-        if key not in made:
-            tape = RecordingTape(program, where)
+        if key not in self._made:
+            tape = RecordingTape(self.program, where)
             for phase in phases:
                 with tape.part(phase.name):
                     phase.body(tape)
-            made[key] = len(sections)
+            self._made[key] = len(self.sections)
             names = list(dict.fromkeys(phase.name for phase in phases))
-            sections.append(
+            self.sections.append(
                 CodeSection(
                     "+".join(names[:3] + ["..."] * (len(names) > 3)),
                     tuple(tape.graph.nodes),
@@ -113,37 +142,22 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
                     tuple(tape.graph.known),
                 )
             )
-        return made[key]
+        return self._made[key]
 
-    def steps(body: tuple[Control, ...], where: str) -> tuple[RecordedControl, ...]:
-        result: list[RecordedControl] = []
-        waiting: list[Phase] = []
 
-        def flush() -> None:
-            if waiting:
-                result.append(RunSection(section(waiting, where)))
-                waiting.clear()
+def record(program: Program, *, fuse: bool = True) -> Recording:
+    """Runs every phase once over recorded numbers.
 
-        for node in _flat(body):
-            if isinstance(node, RunPhase):
-                waiting.append(node.phase)
-                continue
-            flush()
-            if isinstance(node, CallPhase):
-                result.append(RunSection(section([node.phase], where)))
-            elif isinstance(node, RecordPhase):
-                if where != "tick":
-                    raise ValueError(f"{node.phase.name} records in `{where}`; rows belong to ticks")
-                result.append(RecordSection(section([node.phase], "record"), node.divisor))
-            else:
-                result.append(Branch(node, steps(node.body, where)))
-        flush()
-        return tuple(result)
-
+    Stores that no phase and no condition ever reads are dropped with all that only they need; then, unless `fuse` is
+    false, products are fused into sums (`met.trace.fuse`).
+    """
+    made = SectionRecorder(program)
     _refuse_nested_records(program)
     start, tick, end = (
-        steps(body, where) for body, where in ((program.start, "start"), (program.tick, "tick"), (program.end, "end"))
+        made.steps(body, where)
+        for body, where in ((program.start, "start"), (program.tick, "tick"), (program.end, "end"))
     )
+    sections = made.sections
     _check_complete(program, sections)
     asked = {node.cell for node in walk((*program.start, *program.tick, *program.end)) if isinstance(node, WhileAny)}
     kept = without_dead_stores(sections, asked)

@@ -7,7 +7,6 @@ what a run sets or varies, a joint that uses it has the same values under its ow
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -60,17 +59,34 @@ def use_shared(scope: Scope, item: Item, arm: ResolvedArm, resolve: Resolve) -> 
     if shared is None or not _is_as_written(scope, shared, item.name):
         return resolve(scope, item, arm)
 
-    def on_joint(path: str) -> str:
-        return path.replace(ANY, item.name)
-
-    scope.parameters |= {on_joint(path): copy(settled) for path, settled in shared.parameters.items()}
-    scope.auxiliary |= {on_joint(path): copy(settled) for path, settled in shared.auxiliary.items()}
-    for path, parameters in shared.known.items():
-        scope.known.setdefault(on_joint(path), []).extend(map(on_joint, parameters))
-    for path, why in shared.not_sweepable.items():
-        scope.not_sweepable.setdefault(on_joint(path), _on_joint(why, on_joint))
+    here = _renamed(scope, shared, kind or "", item.name)
+    scope.parameters |= here.parameters
+    scope.auxiliary |= here.auxiliary
+    for path, parameters in here.known.items():
+        scope.known.setdefault(path, []).extend(parameters)
+    for path, why in here.not_sweepable.items():
+        scope.not_sweepable.setdefault(path, why)
     scope.names.take_over(shared.names)
     return replace(shared.use, joint=item.name, place=item.place, parameters=dict(shared.use.parameters or {}))
+
+
+def _renamed(scope: Scope, shared: SharedServo, kind: str, joint: str) -> SharedServo:
+    """The servo with the paths that it has on a joint of this kind and name, whichever run has it there."""
+    memo, key = scope.definitions.memo, ("servo on joint", shared.heads[0], kind, joint)
+
+    def on_joint(path: str) -> str:
+        return path.replace(ANY, joint)
+
+    if key not in memo:
+        memo[key] = replace(
+            shared,
+            parameters={on_joint(path): settled for path, settled in shared.parameters.items()},
+            auxiliary={on_joint(path): settled for path, settled in shared.auxiliary.items()},
+            known={on_joint(path): list(map(on_joint, parameters)) for path, parameters in shared.known.items()},
+            not_sweepable={on_joint(path): _on_joint(why, on_joint) for path, why in shared.not_sweepable.items()},
+        )
+    found: SharedServo = memo[key]
+    return found
 
 
 def _on_joint(why: NotSweepable, on_joint: Callable[[str], str]) -> NotSweepable:

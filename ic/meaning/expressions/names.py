@@ -82,8 +82,9 @@ class Names:
         """Take over what others found, which is the same here."""
         for name, worth in found.worth.items():
             self._worth.setdefault(name, worth)
-        self.cells = {**found.cells, **self.cells}
-        self._read = {**found.read, **self._read}
+        if found.cells or found.read:
+            self.cells = {**found.cells, **self.cells}
+            self._read = {**found.read, **self._read}
 
     def evaluate(self, expression: Expression) -> Value | ValueList:
         return evaluate(expression, self.find)

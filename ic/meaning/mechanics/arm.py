@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import pickle
-from collections.abc import Mapping
-from copy import copy
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 from ic.grammar.syntax import Call, Expression, Name, Unary
 from ic.language import HEADS
@@ -59,14 +59,14 @@ class ResolvedArm:
 
 
 @frozen
-class SharedArm:
-    """An arm in which nothing is wrong, resolved without a sweep: what runs that vary nothing of it have in common.
+class SharedPart:
+    """A link or a joint in which nothing is wrong, resolved without a sweep.
 
-    parameters, auxiliary, known, not_sweepable  as a scope has them that holds nothing but the arm
+    parameters, auxiliary, known, not_sweepable  as a scope has them that holds nothing but this part
     names  what the `let`s that it is made of are worth
     """
 
-    arm: ResolvedArm
+    thing: Link | Joint
     parameters: Mapping[str, Settled]
     auxiliary: Mapping[str, Settled]
     known: Mapping[str, list[str]]
@@ -74,12 +74,25 @@ class SharedArm:
     names: FoundNames
 
 
+@frozen
+class SharedArm:
+    """An arm in which nothing is wrong: what runs have in common of it, each but for the parts of which it varies
+    something.
+
+    parts  its links, then its joints, in the deck's order
+    """
+
+    arm: ResolvedArm
+    parts: tuple[SharedPart, ...]
+
+
 def packed_arm(definitions: Definitions, name: str) -> bytes:
     """The arm of a definition as runs share it, for `bring_arm`; nothing where it was not resolved, or cannot be."""
     shared = definitions.memo.get(_memo_key(name))
     if isinstance(shared, bytes):
         return shared
-    return pickle.dumps(shared, pickle.HIGHEST_PROTOCOL) if shared is not None and shared.names.is_plain else b""
+    plain = shared is not None and all(part.names.is_plain for part in shared.parts)
+    return pickle.dumps(shared, pickle.HIGHEST_PROTOCOL) if plain else b""
 
 
 def bring_arm(definitions: Definitions, name: str, packed: bytes) -> None:
@@ -95,19 +108,33 @@ def _memo_key(name: str) -> tuple[str, str]:
 def resolve_arm(scope: Scope, definition: Definition) -> ResolvedArm | None:
     """The arm, with its numbers entered as parameters; None where its definition could not be merged.
 
-    It is resolved once for all runs of the deck, but for those that set or vary something of it.
+    Each link and joint is resolved once for all runs of the deck, but for those that set or vary something of it.
     """
     shared = _shared(scope, definition)
-    if shared is None or not _is_as_written(scope, shared):
+    if shared is None:
         return _resolved(scope, definition)
-    scope.parameters |= {path: copy(settled) for path, settled in shared.parameters.items()}
-    scope.auxiliary |= {path: copy(settled) for path, settled in shared.auxiliary.items()}
-    for path, parameters in shared.known.items():
+    as_written = [_is_as_written(scope, part) for part in shared.parts]
+    if all(as_written):
+        for part in shared.parts:
+            _take_over(scope, part)
+        return replace(shared.arm, free_of_errors=not scope.complaints.errors)
+    those = {_name(part.thing): part for part, plain in zip(shared.parts, as_written, strict=True) if plain}
+    return _resolved(scope, definition, those)
+
+
+def _name(thing: Link | Joint) -> tuple[str, str]:
+    return "link" if isinstance(thing, Link) else "joint", thing.name
+
+
+def _take_over(scope: Scope, part: SharedPart) -> None:
+    """Enter a part in a scope as it is shared."""
+    scope.parameters |= part.parameters
+    scope.auxiliary |= part.auxiliary
+    for path, parameters in part.known.items():
         scope.known.setdefault(path, []).extend(parameters)
-    for path, why in shared.not_sweepable.items():
+    for path, why in part.not_sweepable.items():
         scope.not_sweepable.setdefault(path, why)
-    scope.names.take_over(shared.names)
-    return replace(shared.arm, free_of_errors=not scope.complaints.errors)
+    scope.names.take_over(part.names)
 
 
 def _shared(scope: Scope, definition: Definition) -> SharedArm | None:
@@ -116,24 +143,41 @@ def _shared(scope: Scope, definition: Definition) -> SharedArm | None:
         return None
     memo, key = scope.definitions.memo, _memo_key(definition.name)
     if key not in memo:
-        complaints = Complaints()
-        alone = Scope(scope.definitions.reporting_to(complaints), complaints)
-        arm = _resolved(alone, definition)
-        plain = not (alone.notes or alone.targets or alone.removed or alone.joint_kinds)
-        memo[key] = None
-        if arm and plain and complaints.is_clear and alone.checks.is_clear:
-            memo[key] = SharedArm(
-                arm, alone.parameters, alone.auxiliary, alone.known, alone.not_sweepable, alone.names.found
-            )
+        memo[key] = _alone(scope, definition)
     if isinstance(memo[key], bytes):
         memo[key] = pickle.loads(memo[key])
     found: SharedArm | None = memo[key]
     return found
 
 
-def _is_as_written(scope: Scope, shared: SharedArm) -> bool:
-    """True where no sweep and nothing set from outside changes a number of the arm, or what one is made of."""
+def _alone(scope: Scope, definition: Definition) -> SharedArm | None:
+    """The arm resolved by itself, each part in a scope of its own."""
+    complaints, scopes = Complaints(), list[Scope]()
+    definitions = scope.definitions.reporting_to(complaints)
+
+    def own_scope() -> Scope:
+        scopes.append(Scope(definitions, complaints))
+        return scopes[-1]
+
+    arm = _resolved(Scope(definitions, complaints), definition, own_scope=own_scope)
+    if not arm or not complaints.is_clear:
+        return None
+    for each in scopes:
+        if each.notes or each.targets or each.removed or each.joint_kinds or not each.checks.is_clear:
+            return None
+    things: tuple[Link | Joint, ...] = (*arm.links, *arm.joints)
+    parts = (
+        SharedPart(thing, own.parameters, own.auxiliary, own.known, own.not_sweepable, own.names.found)
+        for thing, own in zip(things, scopes, strict=True)
+    )
+    return SharedArm(arm, tuple(parts))
+
+
+def _is_as_written(scope: Scope, shared: SharedPart) -> bool:
+    """True where no sweep and nothing set from outside changes a number of the part, or what one is made of."""
     given = {*scope.varied, *scope.settings}
+    if not given:
+        return True
     named = shared.names.named
     if not given.isdisjoint(shared.known) or not given.isdisjoint(named):
         return False
@@ -143,8 +187,17 @@ def _is_as_written(scope: Scope, shared: SharedArm) -> bool:
     )
 
 
-def _resolved(scope: Scope, definition: Definition) -> ResolvedArm | None:
-    """The arm resolved in this scope."""
+def _resolved(
+    scope: Scope,
+    definition: Definition,
+    shared: Mapping[tuple[str, str], SharedPart] = MappingProxyType({}),
+    own_scope: Callable[[], Scope] | None = None,
+) -> ResolvedArm | None:
+    """The arm resolved in this scope.
+
+    shared     parts that are taken over instead, by kind and name
+    own_scope  makes the scope in which each part is resolved; None: in this one
+    """
     block = scope.definitions.block(definition)
     if block is None:
         return None
@@ -157,10 +210,19 @@ def _resolved(scope: Scope, definition: Definition) -> ResolvedArm | None:
         scope.complaints.error(
             "D080", "an arm holds links and joints; this is neither", statement.place, help="move it to the run"
         )
-    links = [link for item in block.of_kind("link") if (link := _link(scope, item, homes)) is not None]
     ends = {item.name: None for item in block.of_kind("link")}
-    made = [_joint(scope, item, homes, ends) for item in block.of_kind("joint")]
-    joints = [joint for joint in made if joint is not None]
+
+    def part(item: Item) -> Link | Joint | None:
+        known = shared.get((item.kind, item.name))
+        if known is not None:
+            _take_over(scope, known)
+            return known.thing
+        there = scope if own_scope is None else own_scope()
+        return _link(there, item, homes) if item.kind == "link" else _joint(there, item, homes, ends)
+
+    links = [link for item in block.of_kind("link") if isinstance(link := part(item), Link)]
+    made = [part(item) for item in block.of_kind("joint")]
+    joints = [joint for joint in made if isinstance(joint, Joint)]
     if not any(True for _ in block.of_kind("link")):
         scope.complaints.missing(
             definition.place,

@@ -74,6 +74,8 @@ class Owner:
 class Settled:
     """A parameter as it goes to the plan, but with a recorded scalar where the plan has a formula; and what it means.
 
+    Scopes share those of links, joints and servos that are as written: once settled there, none is changed.
+
     expression  what the deck wrote, None where it wrote nothing
     """
 

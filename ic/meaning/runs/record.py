@@ -42,7 +42,10 @@ def resolve_record(
         )
         return ()
     asked = [name for expression in (item.value, *item.appended) for name in _names(scope, item, expression)]
-    known = recordable(structure, known=channels)
+    names = {name.text for name in asked}
+    known = recordable(structure, known=channels, wanted=names)
+    if not names <= known.keys():
+        known = recordable(structure, known=channels)  # what may have been meant
     found: dict[str, tuple[Recorded, Place]] = {}
     for name in asked:
         made = known.get(name.text)

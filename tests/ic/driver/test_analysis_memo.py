@@ -95,7 +95,7 @@ def test_a_warning_and_its_remedy_are_the_same_where_they_were_known() -> None:
 def test_a_remedy_that_is_not_known_is_found_for_a_fault_that_is() -> None:
     deck = ARM + RUN + SPRING
     first, known, _ = audited(deck, {})
-    faults = {key: each for key, each in known.items() if type(each).__name__ != "Remedy"}
+    faults = {key: each for key, each in known.items() if type(each.answer).__name__ != "Remedy"}
     assert len(faults) == len(known) - 1
     again, _, found = audited(deck, faults)
     assert found == 1

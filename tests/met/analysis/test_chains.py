@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -127,6 +128,44 @@ def test_of_runs_that_differ_in_duration_alone_a_chain_is_looked_at_once(
         longer = replace(whole, structure=replace(whole.structure, schedule=replace(schedule, ticks=ticks)))
         step_size.step_size(longer, chosen_cases(longer), memo)
     assert len(looks) == 2
+
+
+def test_of_an_arm_in_which_a_number_has_changed_only_its_chain_is_looked_at_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, looks, memo = made(tmp_path, deck(count=3), monkeypatch), list[tuple[str, ...]](), step_size.AnalysisMemo()
+    real, recording = step_size.Linearizer, audit.build
+
+    def counted(each: Experiment, *given: object, **named: object) -> object:
+        looks.append(tuple(joint.name for joint in each.structure.joints))
+        return real(each, *given, **named)  # type: ignore[arg-type]
+
+    def recorded(each: Experiment) -> object:
+        looks.append(("recorded",))
+        return recording(each)
+
+    def asked(memo: step_size.AnalysisMemo) -> tuple[step_size.StepSize, tuple[str, ...]]:
+        rows = chosen_cases(before)
+        steps = memo.answer("steps", before, lambda: step_size.step_size(before, rows, memo), rows)
+        return steps, memo.answer("idle inputs", before, lambda: idle_inputs(before, memo))
+
+    first = asked(memo)
+    monkeypatch.setattr(step_size, "Linearizer", counted)
+    monkeypatch.setattr(audit, "build", recorded)
+    brought = memo
+    for _ in range(2):  # of what is known as a whole the parts are kept too
+        brought = step_size.AnalysisMemo(pickle.loads(pickle.dumps(brought.asked)))
+        again = asked(brought)
+    assert (again[0].owner, again[0].fastest, again[1]) == (first[0].owner, first[0].fastest, first[1])
+    assert looks == []
+    quantity = before.parameters["links.l5.mass"]
+    heavier = {**before.parameters, "links.l5.mass": replace(quantity, value=1.5)}
+    after = replace(before, parameters=heavier)
+    found = step_size.step_size(after, chosen_cases(after), brought)
+    assert idle_inputs(after, brought) == ()
+    assert looks == [("0", "1")]
+    expected = step_size.step_size(after, chosen_cases(after))
+    assert (found.owner, found.fastest) == (expected.owner, expected.fastest)
 
 
 def test_no_more_than_a_chain_is_recorded_where_each_input_has_an_effect_on_it(

@@ -65,6 +65,15 @@ def test_what_can_be_recorded_follows_from_the_channels(tmp_path: Path) -> None:
     assert names[0] not in recordable(bare)
 
 
+def test_the_names_that_are_wanted_alone_are_what_they_are_among_all(tmp_path: Path) -> None:
+    run = structure(tmp_path)
+    every = recordable(run)
+    for name in every.keys() - {"sensors"}:
+        assert recordable(run, wanted=[name]) == {name: every[name]}
+    assert {"q", "reaction", "energy", "links.tip.position", "hinge.reaction.force.x"} <= every.keys()
+    assert recordable(run, wanted=["nothing", "q"]) == {"q": every["q"]}
+
+
 def test_a_jacobian_that_only_the_record_names_is_recorded(tmp_path: Path) -> None:
     only = changed(RUN, ("record = [q]", "record = [links.tip.jacobian.linear.slide]"))
     (recorded,) = experiment(tmp_path, SERVO, only).structure.record

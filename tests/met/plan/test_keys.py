@@ -82,6 +82,29 @@ def test_zero_has_one_key() -> None:
     assert one == other
 
 
+def test_a_digest_of_content_goes_by_numbers_structure_and_rows_and_not_by_places_or_names() -> None:
+    experiment = first_plan()
+    digest = keys.content_digest("steps", experiment, [0, 2])
+    place = Place("other.ic", 7, 1)
+    moved = replace(
+        experiment.structure, links=tuple(replace(each, place=place) for each in experiment.structure.links)
+    )
+    alike = replace(
+        experiment, name="another", structure=moved, parameters=dict(reversed(experiment.parameters.items()))
+    )
+    assert keys.content_digest("steps", alike, [0, 2]) == digest
+    path, quantity = next((path, q) for path, q in experiment.parameters.items() if isinstance(q.value, float))
+    numbers = {**experiment.parameters, path: replace(quantity, value=np.nextafter(quantity.value, 1e9))}
+    others = [
+        keys.content_digest("margins", experiment, [0, 2]),
+        keys.content_digest("steps", experiment, [0, 1]),
+        keys.content_digest("steps", replace(experiment, parameters=numbers), [0, 2]),
+        keys.content_digest("steps", replace(experiment, structure=replace(moved, integrator="rk4")), [0, 2]),
+        keys.content_digest("steps", replace(experiment, cases=replace(experiment.cases, seed=8)), [0, 2]),
+    ]
+    assert len({digest, *others}) == 6
+
+
 def test_the_seed_is_part_of_a_case_id() -> None:
     experiment = plans.nominal()
     assert keys.case_ids(experiment) != keys.case_ids(replace(experiment, cases=Cases(1, seed=1)))
