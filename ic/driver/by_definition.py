@@ -70,10 +70,13 @@ class DefinitionChecks:
             n for n in order if n not in self._found
         ]  # arms and servos first: runs have their mistakes too
 
-    def check_next(self) -> bool:
-        """Check a definition of which nothing is known; False where there is none left."""
-        if not self._waiting:
-            return False
+    @property
+    def to_come(self) -> int:
+        """The number of definitions of which nothing is known yet."""
+        return len(self._waiting)
+
+    def check_next(self) -> None:
+        """Check one of them."""
         n = self._waiting.pop(0)
         complaints = self._complaints.apart()
         allowances: tuple[tuple[Allowance, ...], ...] = ()
@@ -87,7 +90,6 @@ class DefinitionChecks:
         definition = self._units[n][0]
         arm = packed_arm(self._definitions, definition.name) if definition.kind == "arm" else b""
         self._found[n] = KnownFindings(complaints.findings(), allowances, arm)
-        return True
 
     @property
     def findings(self) -> Known:
@@ -171,6 +173,7 @@ class _Keys:
         self._known = {name: each for kind in EXPERIMENTS for name, each in definitions.of_kind(kind).items()}
         self._of_kind = {kind: definitions.of_kind(kind) for kind in ("run", "arm", "servo")}
         everything = [each for kind in (*EXPERIMENTS, "arm", "servo") for each in definitions.of_kind(kind).values()]
+        self._chooses = {id(each): _chooses_macros(each.group.body) for each in everything if each.kind in EXPERIMENTS}
         self._own = {id(each): pickle.dumps((each.group, each.default, each.parts)) for each in everything}
         names = [(each.kind, each.name, each.default, each.place) for each in everything]
         lets = list(definitions.lets.values())
@@ -200,7 +203,7 @@ class _Keys:
             body = self._own[id(each)]
             if id(each) in seen:
                 continue
-            if _chooses_macros(each.group.body):
+            if self._chooses.get(id(each)):
                 return None
             seen[id(each)] = body
             like, of = each.group.like, each.group.of

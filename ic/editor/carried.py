@@ -86,15 +86,17 @@ class LastAudit:
         """Keep what an audit has said, the one that belongs to the definitions that were told last."""
         if self._defined is not None and not _has_errors(self._defined):
             new = [n for n, each in enumerate(reply.diagnostics) if each not in self._defined.diagnostics]
-            diagnostics, edits = (tuple(some[n] for n in new) for some in (reply.diagnostics, reply.edits))
-            self._said = replace(reply, diagnostics=diagnostics, edits=edits)
+            diagnostics = tuple(reply.diagnostics[n] for n in new)
+            self._said = replace(reply, diagnostics=diagnostics, edits=tuple(reply.edits[n] for n in new))
         self._defined = None
 
     def give_up(self) -> CheckReply | None:
-        """Forget it where the audit has died; the reply of the definitions alone. None where an audit has ended."""
-        if self._defined is not None:
+        """Forget it where an audit has died; the reply of the definitions alone. None where it has ended, or there is
+        nothing to forget."""
+        alone = self._defined if self._said is not None else None
+        if alone is not None:
             self._said = None
-        return self._defined
+        return alone
 
 
 def _has_errors(reply: CheckReply) -> bool:

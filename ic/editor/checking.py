@@ -31,7 +31,8 @@ LENGTH = struct.Struct("!Q")
 """The length of a pickled answer, which stands before it."""
 
 EARLY = 0.05
-"""Seconds from the start of a check after which that is told which is found by then."""
+"""Seconds from the start of a check after which that is told which is found by then; and then again, where that is
+more, after as many."""
 
 DEAR = 0.5
 """Seconds of an audit after which what it has found is kept, though it may not come to its end."""
@@ -146,11 +147,12 @@ def first_replies(request: CheckRequest, clock: Callable[[], float] = time.monot
     except Problem as problem:
         yield _reply(problem.diagnostics, problem.sources)
         return
-    checks, told = DefinitionChecks(deck, request.known), False
-    while checks.check_next():
-        if not told and clock() - began > EARLY:
-            told = True
-            yield _reply(*checks.diagnostics(), audited=False)
+    checks, told, last = DefinitionChecks(deck, request.known), None, began
+    while checks.to_come:
+        if clock() - last > EARLY and (found := checks.diagnostics()) != told:
+            yield _reply(*found, audited=False)
+            told, last = found, clock()
+        checks.check_next()
     yield _reply(*checks.diagnostics(), known=checks.findings, audited=False)
 
 

@@ -281,7 +281,10 @@ class DeckChecks:
         elif self._auditing:
             self._audits[deck.uri].take(answer)
         elif not answer.audited and deck.uri in self.checked:
-            answer = carried_over(self.checked[deck.uri].reply, answer)
+            shown = self.checked[deck.uri].reply
+            further = {name: text for name, text in shown.sources.items() if name not in answer.sources}
+            answer = carried_over(shown, answer)
+            answer = replace(answer, sources={**answer.sources, **further})  # files of values are read later
         self._keep(deck, request, texts, answer)
 
     def _keep(self, deck: OpenText, request: CheckRequest, texts: dict[str, OpenText], answer: CheckReply) -> None:

@@ -176,13 +176,14 @@ class Cursor:
 
     def begins_entry(self, at: int) -> bool:
         """Return True if a new line begins here, and looks like an entry: the one before lacks its semicolon."""
-        if self.tokens[at].kind != NAME or not self.on_new_line(at):
+        if self.tokens[at].kind != NAME:
             return False
         behind = at + 1
         while self.tokens[behind].text == "." and self.tokens[behind + 1].kind == NAME:  # a path
             behind += 2
         after = self.tokens[behind]
-        return after.text in ("=", "+=", "{", ".") or (after.kind == NAME and after.text not in ("and", "or"))
+        looks_like_one = after.text in ("=", "+=", "{", ".") or (after.kind == NAME and after.text not in ("and", "or"))
+        return looks_like_one and self.on_new_line(at)
 
     def begins_value(self) -> bool:
         token = self.token

@@ -1,5 +1,6 @@
 """From a keystroke to what an editor shows of it: processor time of a check, as the process of `ic.editor.checker` does
-it, which forks for each; without the fork, and without the language server's own part.
+it, which forks for each; without the fork, and without the language server's own part. What is told first is what
+cannot be read, and what is known of definitions that have not changed; the rest where it is found soon enough.
 
 Words at random places of a deck are taken away and written again, letter by letter, by somebody who types five letters
 a second: where a check takes longer than that it is ended once it has told something, and knows no more than the last

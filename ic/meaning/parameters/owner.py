@@ -84,3 +84,9 @@ class Settled:
     origin: Origin
     doc: str = ""
     expression: Expression | None = None
+
+    def __copy__(self) -> Settled:
+        """A copy, a third of the time that `copy` takes by itself: long arms have thousands."""
+        made = object.__new__(Settled)
+        made.__dict__.update(self.__dict__)
+        return made

@@ -48,7 +48,8 @@ def found(text: str, known: Known, units: list[int] | None = None) -> tuple[tupl
     except Problem as problem:
         return problem.diagnostics, known
     checks, count = DefinitionChecks(deck, known), 0
-    while checks.check_next():
+    while checks.to_come:
+        checks.check_next()
         count += 1
     if units is not None:
         units.append(count)
@@ -138,8 +139,8 @@ def test_a_deck_that_reads_a_file_of_values_brings_nothing_along(tmp_path: Path)
     (tmp_path / "cases.csv").write_text("heavy [kg]\n1\n2\n")
     (tmp_path / "deck.ic").write_text(ARM + RUN.replace("vary heavy = [1 kg, 2 kg];", 'from "cases.csv";'))
     checks = DefinitionChecks(read(tmp_path / "deck.ic", despite_errors=True), {})
-    while checks.check_next():
-        pass
+    while checks.to_come:
+        checks.check_next()
     assert str(tmp_path / "cases.csv") in checks.diagnostics()[1]
     assert checks.findings == {}
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 import math
+from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +13,7 @@ import pytest
 
 from ic.editor import checking
 from ic.editor.carried import LastAudit, carried_over
+from ic.editor.checker_process import CheckerProcess
 from ic.editor.checking import (
     EARLY,
     CheckReply,
@@ -20,6 +23,7 @@ from ic.editor.checking import (
     compiled_with_reply,
     first_replies,
 )
+from ic.editor.checks import DeckChecks, OpenText
 from ic.text.files import LIBRARY
 from tests.ic.editor.client import Editor, uri
 
@@ -78,9 +82,22 @@ def test_all_mistakes_of_definitions_are_told_together_where_that_is_quick() -> 
 
 def test_mistakes_of_an_arm_are_told_first_where_the_rest_takes_long() -> None:
     wrong = "arm bad { link a { mass = 1 m; } }\n" + DECK.replace("vary spare", "vary spar")
-    first, every = replies(wrong, 2 * EARLY)
+    nothing, first, *further, every = replies(wrong, 2 * EARLY)
+    assert nothing == [], "before a definition is checked that is told which is known by then"
     assert "`mass` of link `a` is in kg, and this is in m" in first
+    assert all(each in (first, every) for each in further)
     assert every == [*first, "no parameter `spar` in this run"]
+
+
+def test_what_cannot_be_read_is_told_before_a_definition_is_checked_where_these_take_long() -> None:
+    wrong = DECK.replace("vary spare", "vary spar").replace("1 kg;", "1 kg")
+    first, *_, every = replies(wrong, 2 * EARLY)
+    assert first == ["expected `;`"]
+    assert "no parameter `spar` in this run" in every
+
+
+def test_nothing_is_told_again_where_no_more_is_found() -> None:
+    assert len(replies(DECK.replace("sweep spares", "// sweep spares"), 2 * EARLY)) == 2
 
 
 def test_an_audit_takes_along_what_the_last_one_found_also_where_it_was_ended(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -103,7 +120,7 @@ def test_what_was_said_of_lines_that_are_as_they_were_stays_where_they_are_now()
     (*_, last) = all_replies(wrong, 0.0)
     lines = wrong.split("\n")
     changed = "\n".join(["// a line more", *lines[:2], "// and one", lines[2].replace("= 1;", "= 2;"), *lines[3:]])
-    first, every = all_replies(changed, 2 * EARLY)
+    first, *_, every = all_replies(changed, 2 * EARLY)
     assert not first.diagnostics and len(every.diagnostics) == 3
     carried = carried_over(last, first)
     assert [each for each in every.diagnostics if "bare number" not in each.message] == list(carried.diagnostics)
@@ -195,4 +212,39 @@ def test_where_an_audit_dies_what_the_last_one_said_is_taken_back() -> None:
     assert last.give_up() is None, "it has ended"
     assert messages(last.carried_into(definitions(QUIET))) == [NO_NOISE]
     assert messages(last.give_up()) == []
+    assert last.give_up() is None, "there is nothing left to take back"
     assert messages(last.carried_into(definitions(QUIET))) == []
+
+
+class GivenReplies(CheckerProcess):
+    """A process whose checks have these replies, those of a check each."""
+
+    def __init__(self, *checks: list[CheckReply]) -> None:
+        super().__init__()
+        self._checks = list(checks)
+
+    async def ask(self, request: CheckRequest) -> AsyncIterator[object]:
+        for each in self._checks.pop(0):
+            yield each
+
+
+def test_a_file_of_values_belongs_to_its_deck_also_while_a_check_has_not_come_to_it(tmp_path: Path) -> None:
+    deck = OpenText((tmp_path / "arm.ic").as_uri(), "", 1)
+    partial = CheckReply((), (), {"arm.ic": ""}, audited=False)
+    whole = CheckReply((), (), {"arm.ic": "", "cases.csv": ""}, known={}, audited=False)
+    files: list[set[str]] = []
+    process = GivenReplies([partial, whole], [partial, whole])
+    checks = DeckChecks(
+        process, lambda decks: files.append({Path(each).name for of in decks for each in of.files}), print, print
+    )
+
+    async def check_twice() -> None:
+        worker = asyncio.create_task(checks.work())
+        checks.open(deck)
+        await checks.rest()
+        checks.change(replace(deck, version=2))
+        await checks.rest()
+        worker.cancel()
+
+    asyncio.run(check_twice())
+    assert files == [{"arm.ic"}, *[{"arm.ic", "cases.csv"}] * 3]
