@@ -6,6 +6,7 @@ import pickle
 import random
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -90,9 +91,9 @@ def test_an_arm_that_has_not_changed_is_brought_along(monkeypatch: pytest.Monkey
     resolved: list[str] = []
     resolve = mechanics_arm._resolved
 
-    def noted(scope: Scope, definition: Definition) -> mechanics_arm.ResolvedArm | None:
+    def noted(scope: Scope, definition: Definition, *given: Any, **named: Any) -> mechanics_arm.ResolvedArm | None:
         resolved.append(definition.name)
-        return resolve(scope, definition)
+        return resolve(scope, definition, *given, **named)
 
     monkeypatch.setattr(mechanics_arm, "_resolved", noted)
     run = RUN.replace("record = [q]", "record = [q, qd]")

@@ -22,7 +22,7 @@ def compiled(text: str) -> Compiled:
 
 def test_only_what_changes_an_arm_resolves_it_again(monkeypatch: pytest.MonkeyPatch) -> None:
     resolved, times = arms._resolved, []
-    monkeypatch.setattr(arms, "_resolved", lambda scope, definition: times.append(0) or resolved(scope, definition))
+    monkeypatch.setattr(arms, "_resolved", lambda *given, **named: times.append(0) or resolved(*given, **named))
     assert compiled(ARM + RUN.replace("sweep masses", "// sweep masses")).plan is not None
     assert len(times) == 1
     times.clear()

@@ -72,7 +72,7 @@ async def edit(server: DeckServer, uri: str, edits: range) -> tuple[Counter[str]
     await server.checks.rest()
     gc.collect()
     classes = [type(each) for each in gc.get_objects()]
-    ours = Counter(each.__qualname__ for each in classes if each.__module__.startswith(("ic.", "met.")))
+    ours = Counter(each.__qualname__ for each in classes if str(each.__module__).startswith(("ic.", "met.")))
     return ours, len(classes) - ours.total()
 
 

@@ -69,7 +69,7 @@ error[D075]: servo `drive` has no `v_max`
   |
 9 | servo drive {
   | ^^^^^^^^^^^
-  = help: write `v_max = ... V;` (largest voltage of the drive's amplifier)
+  = help: write `v_max = ... V;` (largest voltage V_max of the drive's amplifier)
 """
     )
 
