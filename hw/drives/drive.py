@@ -34,8 +34,8 @@ OWED = 0.02
 TURNS = 0.5
 """Rate of a shaft, rad/s, above which it is at another angle when it is asked again."""
 
-REMEMBERED = 64
-"""Answers of a drive that are remembered, so that an old one is known again."""
+REMEMBERED, SINCE = 64, 0.05
+"""Answers of a drive that are remembered, so that an old one is known again, and for how long, s."""
 
 ASKS = 5
 """How often a question of a greeting is asked: a bus loses frames only where something is wrong with it."""
@@ -186,13 +186,20 @@ class CanDrive(ABC):
             self.owed.popleft()
         return bool(self.owed)
 
+    def forget_answers(self) -> None:
+        """Take none of its answers so far for one that is said again: it is asked anew, outside of a run."""
+        self._said.clear()
+        self._turned = -math.inf
+
     def has_said(self, fields: Hashable, rate: float, time: float) -> bool:
-        """True for an old frame: angle and rate, as an answer has them, are those of an earlier one, and the shaft has
-        turned since: by more than a step of the angle, as they say themselves, or as another answer said that came
-        between. rate: rad/s;  time: of the frame, s"""
+        """True for an old frame: angle and rate, as an answer has them, are those of one within the last 50 ms, and the
+        shaft has turned since: by more than a step of the angle, as they say themselves, or as another answer said that
+        came between. rate: rad/s;  time: of the frame, s"""
         angle_step, rate_step = self.steps
         turns = max(0.0, abs(rate) - rate_step)
         before = self._said.pop(fields, None)
+        if before is not None and time - before > SINCE:
+            before = None
         old = before is not None and (turns * abs(time - before) > angle_step or before < self._turned)
         self._said[fields] = before if before is not None and old else time
         if turns > TURNS and not old:
