@@ -88,13 +88,15 @@ def planted(
 
 
 def decks() -> dict[str, str]:
-    """Texts of decks by name: those that come with MET, and the one of docs/deck.md."""
+    """Texts of decks by name: those that come with MET, and the one of docs/deck.md. Without the line of their edition:
+    a mistake in it is one of the whole text."""
     root = Path(__file__).parents[3]
     texts = {path.name: path.read_text() for path in sorted((root / "ic/decks").glob("*.ic"))}
     page = (root / "docs/deck.md").read_text()
     picker = re.findall(r"<!-- (?:picker\.ic|more) -->\n```c\n(.*?)```", page, re.DOTALL)
     without_files = (each for each in picker if "moves.csv" not in each and "cases.csv" not in each)
-    return {"picker.ic": "\n".join(without_files), **texts}
+    texts = {"picker.ic": "\n".join(without_files), **texts}
+    return {name: text.replace("deck 2;\n\n", "", 1) for name, text in texts.items()}
 
 
 def main(seed: int, count: int) -> None:
