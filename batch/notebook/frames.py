@@ -23,10 +23,10 @@ LINK = "link"
 OWN = frozenset({"position", "orientation", LINK, "axis", "quaternion"})
 """Names of what is computed; a deck's that is one of them gets a word before it, as in an archive."""
 
-POSITION_TOLD = {"units": "m", "long_name": "origin of the link's frame", "frame": "world axes"}
+POSITION_TOLD = {"units": "m", "long_name": "position of the origin of the link's frame", "frame": "world axes"}
 ORIENTATION_TOLD = {
     "units": "1",
-    "long_name": "unit quaternion of the link's frame",
+    "long_name": "orientation of the link's frame, a unit quaternion",
     "frame": "from link axes to world axes, continuous from w >= 0",
 }
 """Attributes of an orientation, as an archive has them where it is recorded."""
