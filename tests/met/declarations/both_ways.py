@@ -325,6 +325,10 @@ def servo_calls(servo: Servo, use: Use, experiment: Experiment) -> dict[str, Cal
         "full": lambda n: servo.full(p(n)),
         "motor": lambda n: servo.motor(p(n)),
         "at_rest": lambda n: servo.at_rest(p(n)),
+        "rate_loop": lambda n: servo.rate_loop(p(n)),
+        "rate_wanted": lambda n: servo.rate_wanted(
+            p(n), n.number("q", n.any), filled(n, Setpoint, "asked", kind=command)
+        ),
     }
 
 
@@ -426,6 +430,9 @@ def _environment(use: Use, experiment: Experiment) -> dict[str, Callable[[Number
     def world_rate(n: Numbers, world: Any) -> Any:
         return use.model.world_rate(p(n), world)
 
+    def jet(n: Numbers, world: Any) -> Any:
+        return use.model.jet(p(n), world)
+
     def p(n: Numbers) -> SimpleNamespace:
         return parameters(n, use, experiment)
 
@@ -440,6 +447,7 @@ def _environment(use: Use, experiment: Experiment) -> dict[str, Callable[[Number
         "loads": _asking(use, experiment, loads),
         "free_fall": _asking(use, experiment, free_fall),
         "world_rate": _asking(use, experiment, world_rate),
+        "jet": _asking(use, experiment, jet),
         "decoupling": lambda n: use.model.decoupling(p(n), SimpleNamespace(begin=time(n), step=step)),
         "replaced_outputs": lambda n: use.model.replaced_outputs(
             p(n), time(n), outputs(n, "outputs"), outputs(n, "full")
