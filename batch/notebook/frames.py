@@ -18,18 +18,14 @@ from batch.notebook.table import CASE, NO_HISTORIES, RECORDED, path_of, run_name
 from met.diagnostic import Problem, error
 from met.dynamics.spatial import HERE, Pose
 from met.plan import Experiment
+from met.plan.channel import OF_LINK
 
 LINK = "link"
 OWN = frozenset({"position", "orientation", LINK, "axis", "quaternion"})
 """Names of what is computed; a deck's that is one of them gets a word before it, as in an archive."""
 
-POSITION_TOLD = {"units": "m", "long_name": "position of the origin of the link's frame", "frame": "world axes"}
-ORIENTATION_TOLD = {
-    "units": "1",
-    "long_name": "orientation of the link's frame, a unit quaternion",
-    "frame": "from link axes to world axes, continuous from w >= 0",
-}
-"""Attributes of an orientation, as an archive has them where it is recorded."""
+TOLD = {name: {"units": unit, "long_name": doc, "frame": frame} for name, unit, doc, _, frame in OF_LINK}
+"""Attributes of a link's position and orientation, as an archive has them where these are recorded."""
 
 
 def frames(
@@ -80,11 +76,11 @@ def _frames(
             kept[str(name)] = array.variable
     out = xarray.Dataset(
         {
-            "position": ((*dims, LINK, "axis"), _stacked([pose.position for pose in poses], unknown), POSITION_TOLD),
+            "position": ((*dims, LINK, "axis"), _stacked([pose.position for pose in poses], unknown), TOLD["position"]),
             "orientation": (
                 (*dims, LINK, "quaternion"),
                 _stacked([pose.orientation for pose in poses], unknown),
-                ORIENTATION_TOLD,
+                TOLD["orientation"],
             ),
         },
         coords={**kept, LINK: list(links), "axis": list("xyz"), "quaternion": list("wxyz")},
