@@ -106,9 +106,9 @@ CHANGES: dict[str, tuple[tuple[str, str], tuple[str, ...]]] = {
             "gearbox.kp is not varied any more",
             "gearbox.ki is varied now: 40 values from 0.1 to 0.2 V/rad",
             "elbow.servo.ki: 0.125 V/rad -> varied (d.ic:7)",
-            "elbow.servo.kp: varied -> 0.02 V*s/rad (<servos/rigid_gearbox.ic>:12)",
+            "elbow.servo.kp: varied -> 0.02 V*s/rad (<servos/rigid_gearbox.ic>:14)",
             "shoulder.servo.ki: 0.125 V/rad -> varied (d.ic:7)",
-            "shoulder.servo.kp: varied -> 0.02 V*s/rad (<servos/rigid_gearbox.ic>:12)",
+            "shoulder.servo.kp: varied -> 0.02 V*s/rad (<servos/rigid_gearbox.ic>:14)",
         ),
     ),
     "a parameter": (
