@@ -101,8 +101,8 @@ class CanBed(BedDriver):
 
     def _greet(self, line: CanLine) -> About:
         self._talk = talk = Talk(line, self._drives)
-        for drive in self._drives:
-            drive.forget_answers()
+        for each in self._drives:
+            each.forget_answers()
         bench, by_rate = self._bench, self._kind == "rate"
         if by_rate and not self._drives[0].takes_rates:
             known = ", ".join(name for name, each in DIALECTS.items() if each.takes_rates)
