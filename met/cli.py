@@ -292,7 +292,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def of_machine(lacking: MemoryError | OSError) -> Diagnostic:
-    """What the machine has not: memory, E337, or what a file or device would be, E338."""
+    """The error of a machine that lacks something: memory, E337, or a file or device, E338."""
     if isinstance(lacking, MemoryError):
         message = "there is not enough memory for this"
         return error("E337", message, help="run fewer cases at once, or record less")

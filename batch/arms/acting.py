@@ -54,8 +54,8 @@ class PayloadInHand:
 
 @frozen
 class NotDrawn:
-    """What could not be drawn: a load or a payload of this name, and signals that the run would have to record; none
-    of a load with which the formulas were too many."""
+    """A load or a payload that could not be drawn, by name, and the signals that the run would have to record; no
+    signals where the load has too many formulas."""
 
     what: Literal["load", "payload"]
     name: str

@@ -182,7 +182,7 @@ def _recorded_pose(graph: Graph, position: str, orientation: str) -> Pose:
 
 
 def _rigid_with(joints: Sequence[Joint], moving: Mapping[str, int]) -> dict[str, int]:
-    """Of each joint that is fixed the number of none: it is drawn as a part of its link."""
+    """The number -1 for each fixed joint: it does not move, and is drawn as a part of its link."""
     return {joint.name: -1 for joint in joints if joint.name not in moving}
 
 

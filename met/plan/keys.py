@@ -74,7 +74,7 @@ def _case_key_digests(experiment: Experiment, rows: np.ndarray) -> np.ndarray:
 
 
 def _row_table(experiment: Experiment, rows: np.ndarray) -> tuple[bytes, np.ndarray]:
-    """What all rows of the case table have in common, and these rows: values of coordinates by path, and the repeat."""
+    """The part that all rows of the case table share, and these rows: values of coordinates by path, and the repeat."""
     coordinates = sorted(experiment.cases.coordinates, key=lambda coordinate: coordinate.path)
     cases, count = experiment.cases, len(rows)
     table = np.zeros((count, len(coordinates) + 1), dtype="<f8")  # the last column is the repeat

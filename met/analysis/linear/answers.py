@@ -227,7 +227,7 @@ class LinearQuestion:
         return found
 
     def of_cases(self, rows: Sequence[int]) -> Iterator[Linearized | Problem]:
-        """What `of` returns or raises of each of these rows, of the same bits. Raises Problem as `program` does."""
+        """The answer or Problem of each of these rows, of the bits of `of`. Raises Problem as `program` does."""
         for at in range(0, len(rows), MOST_TOGETHER):
             some = rows[at : at + MOST_TOGETHER]
             given = engine.inputs(self.experiment, np.array(some))
