@@ -5,4 +5,5 @@ shapes    simple solids and lines, fixed to the links' frames
 look      sizes, colours and the viewpoint
 scene     both as formulas of what a case records and a sweep varies, which a page replays
 acting    what acts on it: loads, contact, gas of thrusters, payloads; as such formulas too
+drawn     scene and what acts on it together, and the columns of a run that they need
 """

@@ -16,8 +16,7 @@ import numpy as np
 from batch.archive.in_memory import GroupInMemory
 from batch.archive.read import ArchiveFile, ArchiveGroup, reading
 from batch.archive.stored import Unlike
-from batch.arms.acting import acting_json, acting_on
-from batch.arms.scene import arm_scene, lacking, scene_json
+from batch.arms.drawn import drawn_arm, drawn_json, visible_texts
 from batch.arms.scripts import arm_scripts, arm_style
 from batch.modules.description import MOST_CASES, described, described_columns
 from batch.portable import beside
@@ -111,7 +110,7 @@ def _numbers(numbers: OtherNumbers, of: Experiment) -> dict[str, Any]:
     words.append(". The run is computed here by another program than the archive's, for numbers are its inputs ")
     words.append(f"({_program(data)}): last digits may differ. What the archive has is behind the switch.")
     head = {"kicker": "Other numbers than the archive's", "name": numbers.of, "lede": "".join(words)}
-    data["head"] = _visible(head)
+    data["head"] = visible_texts(head)
     return data
 
 
@@ -151,15 +150,16 @@ def data_of(
     quick     whether a module that is sooner made and slower will do
     """
     prepared = prepared or prepare(experiment)
-    making, arm, code_key = begun(prepared.recording, quick=quick), _arm(experiment), prepared.code_key
-    module = making()
+    making = begun(prepared.recording, quick=quick)
+    arm = drawn_json(drawn_arm(experiment, [each["channel"] for each in described_columns(experiment)]))
+    code_key, module = prepared.code_key, making()
     told = described(prepared, module)
     positions = group.values("case")[:MOST_CASES]
     rows = np.searchsorted(experiment.cases.table, positions)
     told["cases"]["inputs"] = inputs(experiment, np.asarray(rows, np.int64)).tolist()
     stored = {variable.name: variable for variable in group.role("metric")}
     known = {name.removeprefix("metrics."): name for name in stored}
-    shown: dict[str, Any] = _visible(told)
+    shown: dict[str, Any] = visible_texts(told)
     metrics = [*told["metrics"], *told["not_computed"]]
     columns = _in_deck_units(DeckUnits(archive, group), told["columns"])
     lacking = [each["name"] for each in metrics if each["name"] not in known]
@@ -204,32 +204,9 @@ def _in_deck_units(units: DeckUnits, columns: Sequence[Mapping[str, str]]) -> li
     return out
 
 
-def _arm(experiment: Experiment) -> dict[str, Any]:
-    """The arm as the page draws it, or what the run does not record for that."""
-    recorded = [channel for each in experiment.structure.record for channel in each.channels]
-    scene = arm_scene(experiment, recorded)
-    missing = lacking(scene, recorded)
-    if missing:
-        return {"lacking": [visible(name) for name in missing]}
-    acting = acting_on(experiment, scene, recorded)
-    found: dict[str, Any] = {"scene": scene_json(scene)}
-    if acting.arrows or acting.payloads or acting.not_drawn:
-        found["acting"] = _visible(acting_json(acting))
-    return found
-
-
 def _unit(unit: str) -> str:
     """A unit as the page writes it; nothing where there is none."""
     return "" if unit == "1" else visible(pretty_unit(unit))
-
-
-def _visible(value: Any) -> Any:
-    """The same data, with what cannot be seen in its texts as escapes."""
-    if isinstance(value, str):
-        return visible(value)
-    if isinstance(value, dict):
-        return {visible(key): _visible(each) for key, each in value.items()}
-    return [_visible(each) for each in value] if isinstance(value, list) else value
 
 
 def doubles(values: np.ndarray) -> str:

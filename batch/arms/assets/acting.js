@@ -20,6 +20,18 @@ MET.acting = (() => {
     payload: ["#e0a02a", "#e0b44a", "o", "payloads", "Payloads: pale while they fly, with a line to the place where their link holds them (o)"],
   };
 
+  // The recorded forces of joints on their links: at a time, and the largest, N; null without any. run: as of
+  // `MET.arm.columns`; places: of each body and the columns of its force.
+  function reactions({ time, numbers, width }, places) {
+    if (!places.length) return null;
+    const rows = time.length;
+    const of = (row) => places.map(([body, ...columns]) => [body, ...columns.map((column) => numbers[row * width + column])]);
+    let most = 0;
+    for (let row = 0; row < rows; row++) of(row).forEach(([, ...force]) => { most = Math.max(most, length(force)); });
+    const step = rows > 1 ? time[rows - 1] / (rows - 1) : 1;
+    return { most, at: (t) => of(Math.min(rows - 1, Math.round(t / step))) };
+  }
+
   // acting: as `batch.arms.acting.acting_json` has it, or nothing; arm: as `MET.arm.make` makes it of its scene.
   function make(acting, arm) {
     const { arrows, jets, payloads, channels } = acting;
@@ -177,5 +189,5 @@ MET.acting = (() => {
     return node("p", { class: "note" }, `Not drawn: ${told.join(", ")}.`, ...(wanted.length ? [" For all that, the run must record ", node("code", null, `record += [${wanted.join(", ")}];`)] : []));
   }
 
-  return { make, legend, inks, note };
+  return { make, reactions, legend, inks, note };
 })();

@@ -32,6 +32,9 @@ MET.arm = (() => {
     return inputs;
   }
 
+  // Columns of a run: {values: of what the sweep varies, by path; time: of its rows; numbers: row after row; width: of a row}.
+  const columns = ({ time, numbers, width }, places) => places.map((place) => Float64Array.from(time, (_, row) => numbers[row * width + place]));
+
   // scene: as `batch.arms.scene.scene_json` has it.
   function make(scene) {
     const moving = new Set(["time", ...scene.channels]);
@@ -147,5 +150,5 @@ MET.arm = (() => {
     return { ends: [plus(at, axes[2], -half), plus(at, axes[2], half)], radius: mesh === "block" ? Math.hypot(x, y) / 2 : x };
   }
 
-  return { make, between, ends, dot, cross, plus, unit, along, length: size, SOLID };
+  return { make, columns, between, ends, dot, cross, plus, unit, along, length: size, SOLID };
 })();

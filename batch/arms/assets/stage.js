@@ -36,9 +36,10 @@ MET.stage = (() => {
     }
   }
 
-  // scene: as `batch.arms.scene.scene_json` has it. seen: is told of each instant that is shown. acting: as
-  // `batch.arms.acting.acting_json` has it. surface: what the view was drawn on whose place it takes.
-  function make(root, scene, { seen = () => {}, acting = null, surface = null } = {}) {
+  // drawn: an arm with a scene, as `batch.arms.drawn.drawn_json` has it. seen: is told of each instant that is shown.
+  // surface: what the view was drawn on whose place it takes.
+  function make(root, drawn, { seen = () => {}, surface = null } = {}) {
+    const { scene, acting, reactions } = drawn;
     surface ||= surfaceOf(node("canvas"));
     const arm = MET.arm.make(scene);
     const camera = MET.camera.make();
@@ -272,16 +273,19 @@ MET.stage = (() => {
       redraw();
     });
 
-    // The case that is solid, taken by `take`; label: what it is called; reactions: forces of its joints; around: what
-    // else acts on it, taken by `takeActing`.
-    function show(taken, label, { reactions = null, around = null } = {}) {
-      legend.show(around, around && acts, reactions);
+    // A case that is a ghost. run: its numbers, as `MET.arm.columns` takes them.
+    const take = (run) => arm.take(run.values, run.time, MET.arm.columns(run, drawn.columns));
+
+    // The case that is solid, with what acts on it; label: what it is called.
+    function show(run, label) {
+      const around = acts && acts.take(run.values, run.time, MET.arm.columns(run, acting.columns));
+      legend.show(around, acts, MET.acting.reactions(run, reactions));
       const first = !chosen;
-      chosen = taken;
-      end = taken.end;
+      chosen = take(run);
+      end = chosen.end;
       time = Math.min(time, end);
       told.textContent = label;
-      path = Array.from({ length: TRACED }, (_, n) => taken.tip((end * n) / (TRACED - 1)));
+      path = Array.from({ length: TRACED }, (_, n) => chosen.tip((end * n) / (TRACED - 1)));
       if (first) {
         rate = SPEEDS.find((each) => end / each <= LONG) ?? SPEEDS[SPEEDS.length - 1];
         if (rate < 1) rate = end < 0.5 ? rate : 1;
@@ -367,7 +371,7 @@ MET.stage = (() => {
       }
       return (performance.now() - begun) / count;
     }
-    return { take: arm.take, takeActing: acts && acts.take, legend, around: () => { const { solids, clear } = legend.solids(time, chosen.at(time)); return [...solids, ...clear]; }, show, haunt, accompany, settle, seek, kept, resume, close, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, finish: () => surface?.renderer.finish(), ghosts: () => others.length, drawsBy: () => (surface ? "webgl" : "svg") };
+    return { take, legend, around: () => { const { solids, clear } = legend.solids(time, chosen.at(time)); return [...solids, ...clear]; }, show, haunt, accompany, settle, seek, kept, resume, close, play: run, measure, camera, redraw, time: () => time, isStill: () => still && !asked, isPlaying: () => playing, finish: () => surface?.renderer.finish(), ghosts: () => others.length, drawsBy: () => (surface ? "webgl" : "svg") };
   }
 
   return { make };

@@ -44,7 +44,7 @@ MET.beside = (() => {
       const width = told.columns.length;
       const theirs = (column) => Float64Array.from({ length: rows }, (_, row) => found.rows[row * width + column]);
       const columns = places.map((place, n) => (place < 0 || !units[n] || !rows ? null : resampled(theirs(place), step, time)));
-      const moving = arm ? arm.scene.channels.map((name) => theirs(told.columns.findIndex((column) => column.channel === name))) : [];
+      const moving = arm ? page.arm.columns.map(theirs) : [];
       const times = Float64Array.from({ length: rows }, (_, row) => row * step);
       const named = Object.fromEntries(told.inputs.map(({ name }, n) => [name, given[n]]));
       const metrics = Object.fromEntries(told.metrics.filter(({ name, unit }) => asked[name] === unit).map(({ name, output }) => [name, tick === null ? found.outputs[output] : NaN]));

@@ -106,7 +106,7 @@ MET.simulate = (data, back, { seen = null, surface = null } = {}) => {
     measured = told.metrics.map((metric) => (failed ? NaN : found.outputs[metric.output]));
     traces.show(lines, pale, (m, requirement) => (Number.isNaN(measured[m]) ? null : { value: measured[m], met: judged(requirement, measured[m]) }));
     (again = () => tell(which, found.outputs, failed, tick, took))();
-    if (stage && rows) stage.show(taken(values, found.rows, rows), free ? (free.isOwn() ? "the deck's numbers" : "other numbers") : which < 0 ? `not in the ${source}` : `case #${data.positions[which]}`, { reactions: reactions(found.rows, rows), around: around(values, found.rows, rows) });
+    if (stage && rows) stage.show(runOf(values, found.rows, rows), free ? (free.isOwn() ? "the deck's numbers" : "other numbers") : which < 0 ? `not in the ${source}` : `case #${data.positions[which]}`);
     if (stage) stage.haunt(others.filter((each) => each.n !== which));
   }
 
@@ -125,33 +125,12 @@ MET.simulate = (data, back, { seen = null, surface = null } = {}) => {
   }
 
   // The arm: the case that is shown, and the archive's others, which are computed here one after another.
-  const stage = data.arm.scene ? MET.stage.make(room, data.arm.scene, { seen: point, acting: data.arm.acting, surface }) : null;
+  const stage = data.arm.scene ? MET.stage.make(room, data.arm, { seen: point, surface }) : null;
   if (!stage && surface) surface.renderer.close();
   if (!stage) room.append(node("p", { class: "note" }, `The arm is not shown, for the run does not record ${data.arm.lacking.join(", ")}: `, node("code", null, `record += [${data.arm.lacking.join(", ")}];`)));
 
-  // What is drawn of a case: a function of its inputs, its time and columns, given these.
-  const drawnOf = (take, places) => (inputs, numbers, rows) => {
-    const width = told.columns.length;
-    const columns = places.map((c) => Float64Array.from({ length: rows }, (_, row) => numbers[row * width + c]));
-    return take(Object.fromEntries(told.inputs.map((input, n) => [input.name, inputs[n]])), time.subarray(0, rows), columns);
-  };
-  const placesOf = (names) => names.map((name) => told.columns.findIndex((column) => column.channel === name));
-  const taken = stage && drawnOf(stage.take, placesOf(data.arm.scene.channels));
-  const around = stage?.takeActing ? drawnOf(stage.takeActing, placesOf(data.arm.acting.channels)) : () => null;
-
-  // The forces of joints on their links, where all three of their numbers are recorded: of a time, and the largest, N.
-  const recorded = data.arm.scene ? data.arm.scene.joints.map((joint, n) => [
-    data.arm.scene.shapes.find(([, , role, of]) => role === "joint" && of === n)?.[0],
-    ...["x", "y", "z"].map((axis) => told.columns.findIndex(({ channel }) => channel === `${joint}.reaction.force.${axis}`)),
-  ]).filter((places) => places.every((place) => place >= 0)) : [];
-  function reactions(numbers, rows) {
-    if (!recorded.length) return null;
-    const width = told.columns.length;
-    const of = (row) => recorded.map(([body, ...columns]) => [body, ...columns.map((column) => numbers[row * width + column])]);
-    let most = 0;
-    for (let row = 0; row < rows; row++) of(row).forEach(([, ...force]) => { most = Math.max(most, Math.hypot(...force)); });
-    return { most, at: (t) => of(Math.min(rows - 1, Math.round((t * told.kernel.base_hz) / told.kernel.record_divisor))) };
-  }
+  // The numbers of a case, as the arm takes them.
+  const runOf = (inputs, numbers, rows) => ({ values: Object.fromEntries(told.inputs.map((input, n) => [input.name, inputs[n]])), time: time.subarray(0, rows), numbers, width: told.columns.length });
 
   function haunt() {
     if (ending.signal.aborted) return;
@@ -168,7 +147,7 @@ MET.simulate = (data, back, { seen = null, surface = null } = {}) => {
         const found = kernel.run([cases[n]], told.ticks);
         const { failed, rows } = ended(found.outputs);
         const bad = failed || told.requirements.some((each) => missed(each, n, found.outputs));
-        if (rows) others.push({ n, bad, taken: taken(cases[n], found.rows, rows) });
+        if (rows) others.push({ n, bad, taken: stage.take(runOf(cases[n], found.rows, rows)) });
       }
       stage.haunt(others.filter((each) => !same(cases[each.n], values)));
       if (done < chosen.length) setTimeout(next);

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.arms.scene import ArmScene
+from batch.arms.drawn import DrawnArm
 from met.frozen import frozen
 
 
@@ -20,8 +20,7 @@ class SimulatedStructure:
     metrics     what the archive has of them, by the variable's name, in the order of the module's metrics
     before      what the other archive has of these cases, numbered as here, where one is compared with;  None without
     panels      for each panel of `Signals` the module's column of each line, -1 where there is none
-    scene       the arm that is drawn, and `channels`, the columns of what it needs of a run; None where a run does not
-                record what is `lacking`
+    arm         as the page draws it
     """
 
     code: bytes
@@ -32,9 +31,7 @@ class SimulatedStructure:
     metrics: tuple[tuple[str, np.ndarray], ...]
     status: np.ndarray
     panels: tuple[tuple[int, ...], ...]
-    scene: ArmScene | None
-    channels: tuple[int, ...]
-    lacking: tuple[str, ...]
+    arm: DrawnArm
     before: SimulatedStructure | None = None
 
 

@@ -15,7 +15,7 @@ from batch.archive.layout import layout
 from batch.archive.read import ArchiveGroup
 from batch.archive.stored import Stored
 from batch.archive.values import values_of_dimensions
-from batch.arms.scene import arm_scene, lacking
+from batch.arms.drawn import drawn_arm
 from batch.modules.description import described
 from batch.queries.pool import Pool
 from batch.report.contents.against import EarlierCases
@@ -93,7 +93,9 @@ def _earlier(
         both = [case for case in now.cases.tolist() if case in pairs]
         wanted = np.array([pairs[case] for case in both], np.int64)
         found, left = _structure(group, experiments[group.name], wanted, sources, left)
-        return replace(found, cases=np.array(both[: len(found.cases)], np.int64)), left
+        cases = np.array(both[: len(found.cases)], np.int64)
+        # on the arm of an earlier archive, a ghost, nothing is drawn that acts on it
+        return replace(found, cases=cases, arm=replace(found.arm, acting=None)), left
     return None, left
 
 
@@ -114,8 +116,6 @@ def _structure(
     positions = np.searchsorted(group.values("case"), wanted)
     rows = np.searchsorted(experiment.cases.table, wanted)
     columns = {each["channel"]: place for place, each in enumerate(told["columns"])}
-    scene = arm_scene(experiment, list(columns))
-    missing = lacking(scene, list(columns))
     made = SimulatedStructure(
         code=module.code,
         told=told,
@@ -125,9 +125,7 @@ def _structure(
         metrics=tuple((name, group.at(name, positions)) for name in metrics),
         status=group.at("status", positions),
         panels=tuple(tuple(columns.get(channel, -1) for channel in panel) for panel in sources),
-        scene=None if missing else scene,
-        channels=() if missing else tuple(columns[channel] for channel in scene.channels),
-        lacking=missing,
+        arm=drawn_arm(experiment, list(columns)),
     )
     return made, left - width * len(wanted)
 

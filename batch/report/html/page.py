@@ -97,7 +97,7 @@ def _links(number: int, section: ReportSection, report: Report) -> list[tuple[st
 
 def _signals_name(section: ReportSection) -> str:
     found = section.simulation
-    drawn = found is not None and any(each.scene is not None for each in found.structures)
+    drawn = found is not None and any(each.arm.scene is not None for each in found.structures)
     return "Arm and signals" if drawn else "Signals"
 
 

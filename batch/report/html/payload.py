@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.arms.scene import scene_json
+from batch.arms.drawn import drawn_json
 from batch.queries.colours import Reach, reach
 from batch.queries.pool import ENDED, CaseColumn
 from batch.queries.signals import pretty_unit
@@ -231,20 +231,9 @@ def _structure(found: SimulatedStructure) -> dict[str, Any]:
             for name, values in found.metrics
         ],
         "panels": [list(columns) for columns in found.panels],
-        "scene": None if found.scene is None else _visible_texts(scene_json(found.scene)),
-        "channels": list(found.channels),
-        "lacking": [visible(name) for name in found.lacking],
+        "arm": drawn_json(found.arm),
         "before": None if found.before is None else _structure(found.before),
     }
-
-
-def _visible_texts(value: Any) -> Any:
-    """The same data, with what cannot be seen in its texts as escapes."""
-    if isinstance(value, str):
-        return visible(value)
-    if isinstance(value, dict):
-        return {key: _visible_texts(each) for key, each in value.items()}
-    return [_visible_texts(each) for each in value] if isinstance(value, list) else value
 
 
 def _stability(found: Stability) -> dict[str, Any]:

@@ -42,6 +42,11 @@ run brief like nominal {
 sweep ways of brief { vary integrator = [modified_euler, rk4];  vary gearbox.kp = [0.005, 0.01, 0.02] V*s/rad; }
 sweep many of brief { vary gearbox.kp = linspace(0.005, 0.02, 8) V*s/rad; }
 run blind like brief { record = [qd]; }
+run shoved like brief {
+    record += [reaction.force];
+    environment { shove = wrench { link = upper; force = [0, 3, 0] N; from = 0.5 s; } }
+}
+sweep shoves of shoved { vary environment.shove.force.y = [2, 4] N; }
 """
 
 SAID = "document.querySelector('.computed').textContent"
@@ -56,10 +61,11 @@ def gathered(path: Path) -> Report:
 def sent(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with reports of archives without histories, and these archives."""
     folder = tmp_path_factory.mktemp("again")
-    for name in ("ways", "many", "blind"):
+    for name in ("ways", "many", "blind", "shoves"):
         batch.run(archives.compiled(folder, name, deck=DECK), output=folder / f"{name}.h5", histories="none")
         report(folder / f"{name}.h5")
-    batch.run(archives.compiled(folder, "ways", deck=DECK), output=folder / "whole.h5", histories="all")
+    for name, whole in (("ways", "whole"), ("shoves", "shoved")):
+        batch.run(archives.compiled(folder, name, deck=DECK), output=folder / f"{whole}.h5", histories="all")
     return folder
 
 
@@ -70,7 +76,7 @@ class TestWhatIsInIt:
         with ArchiveFile(sent / "ways.h5") as file:
             experiments = file.plan().experiments
             for each, group, experiment in zip(found.structures, file.groups, experiments, strict=True):
-                assert each.same_code and each.lacking == () and each.scene is not None
+                assert each.same_code and each.arm.lacking == () and each.arm.scene is not None
                 rows = np.searchsorted(experiment.cases.table, each.cases)
                 assert sorted(each.cases.tolist()) == group.values("case").tolist()
                 assert np.array_equal(each.inputs, inputs(experiment, rows))
@@ -277,6 +283,31 @@ class TestInTheBrowser:
         quiet(page)
         page.close()
 
+    def test_what_acts_on_the_arm_is_drawn_and_its_switch_takes_it_away(self, chromium: Chromium, sent: Path) -> None:
+        page = opened(chromium, sent / "shoves.html")
+        stage = "MET.models[0].stage()"
+        with xarray.open_dataset(sent / "shoved.h5") as data:
+            forces = data["reaction.force"].values.reshape(2, -1, 2, 3)
+        for case, force in enumerate((2.0, 4.0)):
+            page.run(f"MET.models[0].choose({case})")
+            page.settle()
+            page.run(f"new Promise(d => {{ const f = () => {stage}.legend.looked() ? d() : setTimeout(f, 20); f(); }})")
+            for row in (0, 30):
+                found = page.run(f"{stage}.legend.reactions({0.04 * row})")
+                assert [each[1:] for each in found] == forces[case, row].tolist()
+            vectors = [page.run(f"{stage}.legend.now({time}).map(each => each.vector)") for time in (0.3, 1)]
+            assert vectors == [[[0, 0, 0], [0, 0, 0]], [[0, force, 0], [0, 0, 0]]]  # no moment
+            chips = "Array.from(document.querySelectorAll('.stage .legend .chip:not([hidden])'), e => e.textContent)"
+            told = page.run(chips)
+            assert told[0].startswith("joint forceslongest ") and told[1] == f"loadslongest {force:g} N"
+        page.run(f"{stage}.seek(1)")
+        roles = f"{stage}.around().map(each => each.role)"
+        assert {"force", "load"} == set(page.run(roles))
+        page.run("document.querySelector('.stage .legend .chip.load').click()")
+        assert "load" not in page.run(roles)
+        quiet(page)
+        page.close()
+
     def test_a_run_that_records_no_position_says_what_to_record(self, chromium: Chromium, sent: Path) -> None:
         page = chromium.open(sent / "blind.html")
         page.run("document.querySelector('.arm').scrollIntoView()")
@@ -311,11 +342,13 @@ class TestInTheBrowser:
             "metrics": [{**each, "name": HOSTILE} for each in one.told["metrics"]],
             "inputs": [{**each, "name": HOSTILE} for each in one.told["inputs"]],
         }
-        assert one.scene is not None
-        bodies = tuple(replace(each, name=HOSTILE) for each in one.scene.bodies)
+        assert one.arm.scene is not None
+        bodies = tuple(replace(each, name=HOSTILE) for each in one.arm.scene.bodies)
         metrics = tuple((HOSTILE, values + 1.0) for _, values in one.metrics)
-        one = replace(one, told=told, metrics=metrics, scene=replace(one.scene, bodies=bodies))
-        other = replace(other, scene=None, lacking=(HOSTILE,))
+        one = replace(
+            one, told=told, metrics=metrics, arm=replace(one.arm, scene=replace(one.arm.scene, bodies=bodies))
+        )
+        other = replace(other, arm=replace(other.arm, scene=None, lacking=(HOSTILE,)))
         again = replace(section.simulation, structures=(one, other), said=(HOSTILE,))
         wild = replace(hostile(replace(section, simulation=None)), simulation=again)
         (tmp_path / "wild.html").write_text(html_page(replace(hostile(found), sections=(wild,))), encoding="utf-8")

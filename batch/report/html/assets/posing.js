@@ -28,17 +28,14 @@ MET.posing = (() => {
       return [...first, ...Array.from({ length: count }, (_, n) => rest[Math.floor((n * rest.length) / count)])];
     }
 
-    function taken(take, found) {
-      const { own } = found;
-      const rows = (column) => Float64Array.from({ length: found.rows }, (_, row) => found.numbers[row * own.kernel.columns + column]);
-      const values = Object.fromEntries(own.names.map((name, n) => [name, found.values[n]]));
-      return take(values, own.time.subarray(0, found.rows), own.channels.map(rows));
-    }
+    // The numbers of a case, as the arm takes them.
+    const runOf = ({ own, values, rows, numbers }) => ({ values: Object.fromEntries(own.names.map((name, n) => [name, values[n]])), time: own.time.subarray(0, rows), numbers, width: own.kernel.columns });
 
     // An arm of the other archive that has the same bodies and shapes, whatever their sizes; else null.
-    function earlierArm({ scene, before }) {
-      const alike = before && before.scene && scene && ["bodies", "shapes"].every((each) => JSON.stringify(scene[each]) === JSON.stringify(before.scene[each]));
-      return alike ? MET.arm.make(before.scene) : null;
+    function earlierArm({ arm: { scene }, before }) {
+      const was = before && before.arm.scene;
+      const alike = was && scene && ["bodies", "shapes"].every((each) => JSON.stringify(scene[each]) === JSON.stringify(was[each]));
+      return alike ? MET.arm.make(was) : null;
     }
 
     function bad(case_, found) {
@@ -51,10 +48,10 @@ MET.posing = (() => {
       if (shown === room) return;
       shown = room;
       rooms.forEach((each) => { each.box.hidden = each !== room; });
-      const { scene, lacking } = room.own;
-      if (scene) room.stage ??= MET.stage.make(room.box, scene, { seen: (time) => model.point && model.point(time) });
+      const { arm } = room.own;
+      if (arm.scene) room.stage ??= MET.stage.make(room.box, arm, { seen: (time) => model.point && model.point(time) });
       else if (!room.box.firstChild) {
-        room.box.append(node("p", { class: "note" }, `The arm is not drawn, for the run does not record ${lacking.join(", ")}: `, node("code", null, `record += [${lacking.join(", ")}];`)));
+        room.box.append(node("p", { class: "note" }, `The arm is not drawn, for the run does not record ${arm.lacking.join(", ")}: `, node("code", null, `record += [${arm.lacking.join(", ")}];`)));
       }
     }
 
@@ -71,7 +68,7 @@ MET.posing = (() => {
       said.textContent = words;
       enter(room);
       if (!room.stage) return;
-      if (found.rows) room.stage.show(taken(room.stage.take, found), `case #${case_}`);
+      if (found.rows) room.stage.show(runOf(found), `case #${case_}`);
       haunt(room);
       if (seen) gather(room);
     }
@@ -82,7 +79,12 @@ MET.posing = (() => {
         return;
       }
       const was = simulation.run(chosen, true);
-      room.stage.haunt(was.rows ? [{ bad: false, taken: taken(room.earlier.take, was) }] : [], `in ${model.data.against[0]}`);
+      room.stage.haunt(was.rows ? [{ bad: false, taken: earlierTaken(room, was) }] : [], `in ${model.data.against[0]}`);
+    }
+
+    function earlierTaken(room, was) {
+      const run = runOf(was);
+      return room.earlier.take(run.values, run.time, MET.arm.columns(run, was.own.arm.columns));
     }
 
     // Ghosts are run one after another, while the page is looked at.
@@ -96,7 +98,7 @@ MET.posing = (() => {
         while (room.wanted.length && performance.now() - begun < SLICE) {
           const case_ = room.wanted.shift();
           const found = simulation.run(case_);
-          if (found.rows) room.ghosts.push({ case: case_, bad: bad(case_, found), taken: taken(room.stage.take, found) });
+          if (found.rows) room.ghosts.push({ case: case_, bad: bad(case_, found), taken: room.stage.take(runOf(found)) });
         }
         spent += performance.now() - begun;
         haunt(room);

@@ -1,0 +1,76 @@
+"""An arm as a page draws it: its scene, what acts on it, and where a run's rows have the numbers for both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from batch.arms.acting import ActingOnArm, acting_json, acting_on
+from batch.arms.scene import ArmScene, arm_scene, lacking, scene_json
+from met.frozen import frozen
+from met.messages.visible import visible
+from met.plan import Experiment
+
+
+@frozen
+class DrawnArm:
+    """An arm, or why it is not drawn.
+
+    recorded  channels of the run, in the order of the columns of its rows
+    scene     None where the run does not record the signals that it is `lacking`
+    acting    None where nothing acts on the arm
+    """
+
+    recorded: tuple[str, ...]
+    scene: ArmScene | None
+    acting: ActingOnArm | None
+    lacking: tuple[str, ...]
+
+
+def drawn_arm(experiment: Experiment, recorded: Sequence[str]) -> DrawnArm:
+    """The arm of an experiment whose rows have these channels."""
+    scene = arm_scene(experiment, recorded)
+    if missing := lacking(scene, recorded):
+        return DrawnArm(tuple(recorded), None, None, missing)
+    acting = acting_on(experiment, scene, recorded)
+    shown = acting.arrows or acting.payloads or acting.not_drawn
+    return DrawnArm(tuple(recorded), scene, acting if shown else None, ())
+
+
+def drawn_json(arm: DrawnArm) -> dict[str, Any]:
+    """The arm as a page's script takes it. Characters that cannot be seen are escapes there.
+
+    columns    of the run's rows, in the order of the scene's channels; in `acting` in the order of its own
+    reactions  body, and the columns of x, y and z, of each joint whose force on its link is recorded
+    """
+    if arm.scene is None:
+        return {"lacking": [visible(name) for name in arm.lacking]}
+    places = {channel: place for place, channel in enumerate(arm.recorded)}
+
+    def columns(channels: Sequence[str]) -> list[int]:
+        return [places[channel] for channel in channels]
+
+    bodies = {shape.joint: shape.body for shape in reversed(arm.scene.shapes) if shape.role == "joint"}
+    forces = []
+    for number, joint in enumerate(arm.scene.joints):
+        channels = [f"{joint}.reaction.force.{axis}" for axis in "xyz"]
+        if number in bodies and all(channel in places for channel in channels):
+            forces.append([bodies[number], *columns(channels)])
+    found: dict[str, Any] = {
+        "scene": scene_json(arm.scene),
+        "columns": columns(arm.scene.channels),
+        "reactions": forces,
+    }
+    if arm.acting is not None:
+        found["acting"] = acting_json(arm.acting) | {"columns": columns(arm.acting.channels)}
+    shown: dict[str, Any] = visible_texts(found)
+    return shown
+
+
+def visible_texts(value: Any) -> Any:
+    """The same data, with escapes in place of characters of its texts that cannot be seen."""
+    if isinstance(value, str):
+        return visible(value)
+    if isinstance(value, dict):
+        return {visible(key): visible_texts(each) for key, each in value.items()}
+    return [visible_texts(each) for each in value] if isinstance(value, list) else value
