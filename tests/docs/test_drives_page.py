@@ -53,7 +53,7 @@ def test_its_bench_on_serial_lines_is_one_with_the_other_keys_of_that(tmp_path: 
 def test_it_says_how_fast_serial_lines_are() -> None:
     texts = (b"c 0 -0.1234567", b"f 0", b"r axis0.current_state", b"-1000.000000 -1000.000000", b"16777216")
     frames = [CanFrame(1, text) for text in texts]
-    assert on_lines(frames, None) == 1.6e-3 and "reckoned as 1.6 ms over USB, 500 Hz" in PAGE
+    assert on_lines(frames, None) == 1.6e-3 and "estimated as 1.6 ms over USB, 500 Hz" in PAGE
     assert on_lines(frames, 921600) == pytest.approx(1.5e-3, rel=0.01) and "1.5 ms an exchange" in PAGE
     accelerated = (0.4 + 3.0 * 0.06) / 1.3e-4
     assert accelerated * (SKEW + 0.55e-3) == pytest.approx(3.3, abs=0.05) and "3.3 rad/s" in PAGE
