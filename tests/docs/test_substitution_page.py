@@ -16,6 +16,7 @@ from met.plan import Experiment
 from tests.paper.stability_map import limits
 
 PAGE = (Path(__file__).parents[2] / "docs" / "substitution.md").read_text(encoding="utf-8")
+PROSE = " ".join(PAGE.split())
 LINEAR = (Path(__file__).parents[2] / "docs" / "linear.md").read_text(encoding="utf-8")
 DECK, MOTORS, CRANE = re.findall(r"```c\n(.*?)```", PAGE, re.DOTALL)
 RATIO, SLOW = 1570.0, 0.03
@@ -42,7 +43,7 @@ def test_as_many_motors_pass_as_the_page_says(tmp_path: Path) -> None:
     (said, of) = re.search(r"met by (\d+) of (\d+) cases", PAGE).groups()  # type: ignore[union-attr]
     assert (met.sum(), met.size) == (int(said), int(of))
     passing = met.reshape(100, 3).sum(axis=1)
-    assert f"{(passing == 3).sum()} motors pass and {(passing == 0).sum()} do not" in PAGE
+    assert f"{(passing == 3).sum()} motors pass and {(passing == 0).sum()} do not" in PROSE
     worst = int(np.argmax(result.metrics["late"]))
     assert f"--case '#{worst}'" in PAGE
 
@@ -65,7 +66,7 @@ def test_the_crane_of_the_page_is_off_by_what_it_says(tmp_path: Path) -> None:
     for name in ("lab", "faulty"):
         two = f"{off(name, 'software')} \\| {off(name, 'larger')}"
         assert re.search(rf"^\| `{name}`, [^|]* \| {two} \|$", PAGE, re.MULTILINE), name
-    assert f"differs from `software` by {off('larger', 'software')}." in PAGE
+    assert f"differs from `software` by {off('larger', 'software')}." in PROSE
 
 
 DRIVES = re.findall(r"^\| `(\w+)` \| (\S+) % \| (\S+) % \|$", PAGE, re.MULTILINE)
@@ -103,8 +104,8 @@ def test_so_is_one_that_is_slow_or_gives_too_much_or_has_faults(tmp_path: Path) 
         "torque_drive(delay = 1, faults = typical, bandwidth = 1 kHz)", "emulated(delay = 1, faults = typical)",
     ]  # fmt: skip
     slow, much, typical, voltage = off_on_beds(tmp_path, dict.fromkeys(beds, "velocity_tracking"))
-    assert f"by {slow} % with a current loop of 300 Hz, by {much} % with a drive" in PAGE
-    assert f"and by {typical} % with typical faults and one of 1 kHz (`emulated`: {voltage} %)" in PAGE
+    assert f"is {slow} % with a current loop of 300 Hz. It is {much} % with a drive that gives 7 % too much" in PROSE
+    assert f"It is {typical} % with typical faults and a loop of 1 kHz (`emulated`: {voltage} %)" in PROSE
 
 
 SOFT = "velocity_tracking(drift = 1e-3 N^2*m^2/s)"
@@ -155,9 +156,10 @@ def test_a_drive_told_a_rate_is_off_by_what_the_page_says(tmp_path: Path) -> Non
         row = f"| {words} | {off(there, plain)} % | {bed} % | {soft} % |" if n else f"| {words} | | {bed} % | |"
         assert row in PAGE
     said = {name: off(rate(name), plain) for name in ("at_once", "faulty", "measured", "balance")}
-    assert f"without a delay it is {said['at_once']} %" in PAGE
-    assert f"With typical faults it is {said['faulty']} %" in PAGE
-    assert f"and is off by {said['measured']} %; `torque_balance` believes the deck's loop, {said['balance']} %" in PAGE
+    assert f"Without a delay the error is {said['at_once']} %" in PROSE
+    assert f"With typical faults it is {said['faulty']} %" in PROSE
+    assert f"`measured_acceleration` needs no torque: its error is {said['measured']} %" in PROSE
+    assert f"follows no other: its error is {said['balance']} %" in PROSE
 
 
 @pytest.mark.slow
