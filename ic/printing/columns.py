@@ -62,4 +62,5 @@ def _width(text: str) -> int:
         return len(text)
     import unicodedata
 
-    return sum(0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text)
+    sizes = {c: 0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in {*text}}
+    return sum(text.count(c) * columns for c, columns in sizes.items())

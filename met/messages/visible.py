@@ -6,18 +6,19 @@ direction of what follows. So nothing that somebody else wrote is printed but th
 
 from __future__ import annotations
 
+import re
 import sys
-import unicodedata
 
-# Marks that turn the direction of what follows: a name with one reads as another name.
-TURNING = frozenset("\u200e\u200f\u061c\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+# Control characters but the line end and the tab, other ends of lines, halves of pairs; and marks that turn the
+# direction of what follows: a name with one reads as another name.
+HIDDEN = re.compile(
+    r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\u200e\u200f\u061c\u202a-\u202e\u2066-\u2069]"
+)
 
 
 def visible(text: str) -> str:
     """The text with what cannot be seen, or cannot be written as UTF-8, as an escape: `\\x00`, `\\u202e`."""
-    if text.isascii() and text.isprintable():
-        return text
-    return "".join(_shown(character) for character in text)
+    return HIDDEN.sub(_escape, text)
 
 
 def line(text: str) -> str:
@@ -31,11 +32,6 @@ def say(text: str = "", *, end: str = "\n", err: bool = False, exact: bool = Fal
     print(text if exact and not stream.isatty() else visible(text), end=end, file=stream, flush=True)
 
 
-def _shown(character: str) -> str:
-    if character in "\n\t":
-        return character
-    hidden = unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp") or character in TURNING
-    if not hidden:
-        return character
-    code = ord(character)
+def _escape(found: re.Match[str]) -> str:
+    code = ord(found[0])
     return f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}"
