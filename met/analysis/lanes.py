@@ -111,19 +111,20 @@ class LaneTape:
 ZERO = np.float64(0.0)
 
 
-def to_both_sides(start: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def to_both_sides(start: np.ndarray, size: np.ndarray, moved: slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
     """Each of some values moved to both sides while the others stay: [value, any], that many times as many lanes, side
-    by side; and the differences of the two sides, [lane, value].
+    by side; and the differences of the two sides, [lane, moved].
 
-    start, size  [value, lane]
+    start, size  [value, lane];  moved: of these values those that are moved
     """
     n, lanes = start.shape
-    made = np.empty((n, lanes, n, 2))
+    each, size = np.arange(n)[moved], np.broadcast_to(size, start.shape)
+    made = np.empty((n, lanes, len(each), 2))
     made[:] = start[:, :, None, None]
-    each = np.arange(n)
-    made[each, :, each, 0] += size
-    made[each, :, each, 1] -= size
-    return made.reshape(n, -1), (made[each, :, each, 0] - made[each, :, each, 1]).T
+    at = np.arange(len(each))
+    made[each, :, at, 0] += size[each]
+    made[each, :, at, 1] -= size[each]
+    return made.reshape(n, -1), (made[each, :, at, 0] - made[each, :, at, 1]).T
 
 
 def spread_over(read: Callable[[str], Any], times: int) -> Callable[[str], Any]:

@@ -9,7 +9,7 @@ one. Where it does not, the second has the change of A within the step too, and 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -28,6 +28,9 @@ from met.program.evaluation import brake_levels
 from met.program.motion import bodies
 from met.program.step import STAGE
 from met.program.system import System
+
+AT_ONCE = 2000
+"""Lanes over which the program is run at once: more take more memory, and are slower where they leave the cache."""
 
 
 @frozen
@@ -127,14 +130,15 @@ class Linearizer:
         self.laws = tuple(each for each in driven if each.ticks)
         self.held = tuple(name for each in self.laws for name in laws.memory(each))
         own = tuple(f"{each.path}.{part.name}" for each in self.laws for part in each.parts.memory)
-        wide, moved, sizes = self._moved((*self.cells, *own))
-        with np.errstate(all="ignore"):
-            wide.cells.update({name: moved[name] for name in own})
-            wide.cells.update({cell_names.FIRST(name): moved[name] for name in own})
-            slope = self._slopes(wide, moved, sizes)
-        self.slope = np.zeros((*slope.shape[:2], len(self.cells) + len(self.held)))
-        places = {name: at for at, name in enumerate((*self.cells, *self.held))}
-        self.slope[:, :, [places[name] for name in (*self.cells, *own)]] = slope
+        self.slope = np.zeros((2 * lanes, len(self.cells), len(self.cells) + len(self.held)))
+        numbers = {name: at for at, name in enumerate((*self.cells, *self.held))}
+        places = np.array([numbers[name] for name in (*self.cells, *own)], dtype=int)
+        for block in _blocks(len(places), max(1, AT_ONCE // (4 * lanes))):
+            wide, moved, sizes = self._moved((*self.cells, *own), block)
+            with np.errstate(all="ignore"):
+                wide.cells.update({name: moved[name] for name in own})
+                wide.cells.update({cell_names.FIRST(name): moved[name] for name in own})
+                self.slope[:, :, places[block]] = self._slopes(wide, moved, sizes)
 
     def map(self, *, stages: bool = False) -> StepMap:
         """The map of each case, as it begins and loose. stages: M is of the program's stages."""
@@ -200,15 +204,16 @@ class Linearizer:
         """Coordinates of free bodies that are turns: at the start they are 0."""
         return tuple(name for body in bodies.bodies(self.system) for name in body.coordinates[3:])
 
-    def _moved(self, cells: Sequence[str]) -> tuple[LaneTape, dict[str, Any], np.ndarray]:
-        """A tape with a lane to each side of each of these cells, their values, and the differences: [lane, cell]."""
+    def _moved(self, cells: Sequence[str], block: slice = slice(None)) -> tuple[LaneTape, dict[str, Any], np.ndarray]:
+        """A tape with a lane to each side of each of these cells that are in a block, the values of all, and the
+        differences: [lane, moved]."""
         tape, turned = self.tape, {f"{name}.q" for name in self._turned}
         plain = 2 * len(self.builder.step.coordinates)
         start = np.array([np.zeros(tape.lanes) if name in turned else tape.lane(name) for name in cells])
         size = np.abs(start) * SMALL + SMALL
         size[plain:] = np.abs(start[plain:]) * 1e-7 + SMALL_STATE
-        moved, sizes = to_both_sides(start, size)
-        return tape.spread(2 * len(cells)), dict(zip(cells, moved, strict=True)), sizes
+        moved, sizes = to_both_sides(start, size, block)
+        return tape.spread(2 * sizes.shape[1]), dict(zip(cells, moved, strict=True)), sizes
 
     def _slopes(self, wide: LaneTape, moved: Mapping[str, Any], sizes: np.ndarray) -> np.ndarray:
         """Slopes of the state: [lane, cell, what was moved]."""
@@ -270,6 +275,11 @@ class Linearizer:
         for body in free:
             ends |= _turns(body, wide, len(self.cells))
         return differences(ends, self.cells, sizes)
+
+
+def _blocks(count: int, size: int) -> Iterator[slice]:
+    """Numbers from 0 on in blocks of this size."""
+    return (slice(first, first + size) for first in range(0, count, size))
 
 
 def linear_step(integrator: Integrator, A: np.ndarray, positions: int, h: float) -> np.ndarray:

@@ -14,6 +14,7 @@ from met import run as engine
 from met.analysis.modes import modes, slowest
 from met.analysis.step_map import Linearizer, StepMap, linear_step
 from met.plan import Experiment
+from met.program.step import StepPhases
 from tests.ic.small_decks import changed, experiment
 
 SWING = """\
@@ -205,3 +206,16 @@ sweep several of hold {{ vary links.bar.com.x = [0.5, 0.4, 0.3] m; }}
     several = Linearizer(made, [0, 1, 2]).map()
     lighter = held or ("until" not in brake and "from" not in brake)  # 0.4 m and less: 4 N m hold that
     assert [bool(each) for each in several.slope[1::2, 1, 0] == 0.0] == [held, lighter, lighter]
+
+
+def test_slopes_are_equal_to_the_bit_in_blocks_of_any_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    deck = SWING + "sweep several of hold { vary sprung.stiffness = [25, 250, 2500] N*m/rad; }\n"
+    (tmp_path / "deck.ic").write_text(deck)
+    made = ic.compile(tmp_path / "deck.ic", select=["several"]).experiments[0]
+    whole = Linearizer(made, [0, 1, 2]).slope
+    ran = []
+    plain = StepPhases.slope
+    monkeypatch.setattr(StepPhases, "slope", lambda self, tape: (ran.append(tape.lanes), plain(self, tape)))
+    monkeypatch.setattr("met.analysis.step_map.AT_ONCE", 1)
+    assert np.array_equal(Linearizer(made, [0, 1, 2]).slope, whole)
+    assert ran == [12, 12]  # three cases as they are and loose, to both sides: a block for q, and one for qd
