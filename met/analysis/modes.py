@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -102,14 +103,18 @@ class Mode:
 def modes(found: StepMap, integrator: Integrator) -> Iterator[Mode]:
     """All modes that are not slow, of all lanes; of a pair the one that turns forward."""
     h = found.h
-    lanes = np.flatnonzero(np.isfinite(found.slope).all((1, 2)) & np.isfinite(found.step).all((1, 2)))
+    lanes = np.flatnonzero(np.isfinite(found.slope).all((1, 2)))
     truths = np.linalg.eigvals(found.slope[lanes])
     wanted = np.any(np.abs(truths) * h > SLOW, axis=1)
     lanes, truths = lanes[wanted], truths[wanted]
+    A = found.slope[lanes]
+    with np.errstate(all="ignore"):
+        M = found.step[lanes] if found.step is not None else linear_step(integrator, A, found.positions, h)
+    numbers = np.isfinite(M).all((1, 2))
+    lanes, truths, A, M = (each[numbers] for each in (lanes, truths, A, M))
     if not lanes.size:
         return
-    A = found.slope[lanes]
-    factors, right = np.linalg.eig(found.step[lanes])
+    factors, right = np.linalg.eig(M)
     left = np.linalg.pinv(right)
     weights = left * np.swapaxes(right, 1, 2)
     sums = weights.sum(2)
@@ -151,14 +156,18 @@ def _answers(A: np.ndarray, integrator: Integrator, h: float) -> tuple[np.ndarra
     return np.repeat(roots, 3, axis=1), every.reshape(len(A), -1)
 
 
-def of_lane(found: StepMap, lane: int, integrator: Integrator, h: float) -> StepMap:
-    """One lane alone, with the step that an integrator makes of h s."""
-    here = slice(lane, lane + 1)
-    A = found.slope[here]
-    M = linear_step(integrator, A, found.positions, h)
-    return StepMap(
-        found.case[here], found.loose[here], found.names, found.positions, A, M, found.rate[here], h
-    )  # fmt: skip
+def of_lane(found: StepMap, lane: int, h: float) -> StepMap:
+    """One lane alone, with a step of h s."""
+    one = slice(lane, lane + 1)
+    return replace(
+        found,
+        case=found.case[one],
+        loose=found.loose[one],
+        slope=found.slope[one],
+        step=None,
+        rate=found.rate[one],
+        h=h,
+    )
 
 
 def finer(schedule: Schedule) -> list[tuple[float, int]]:
@@ -179,7 +188,7 @@ def slowest(found: StepMap, mode: Mode, integrator: Integrator, schedule: Schedu
         middle = (low + high) // 2
         hz, steps = rates[middle]
         h = 1.0 / hz
-        at = of_lane(found, mode.lane, integrator, h)
+        at = of_lane(found, mode.lane, h)
         if all(_fits(each, h, steps, follows) for each in modes(at, integrator)):
             high = middle
         else:

@@ -259,10 +259,7 @@ def remedy_of(experiment: Experiment, found: Lasting) -> Remedy:
 def as_run(found: StepMap) -> StepMap:
     """The lanes that are as the run has them, numbered by instant."""
     own = ~found.loose
-    return replace(
-        found, case=found.case[own], loose=found.loose[own], slope=found.slope[own], step=found.step[own],
-        rate=found.rate[own],
-    )  # fmt: skip
+    return replace(found, case=found.case[own], loose=found.loose[own], slope=found.slope[own], rate=found.rate[own])
 
 
 def _stretches(passed: Passed) -> list[tuple[int, int]]:

@@ -43,7 +43,8 @@ class StepMap:
     names    of what is changed: `shoulder.q`, `shoulder.qd`, states of servos and sensors
     counts   of these, positions (and as many rates); the rest are states
     slope    A: [lane, name, name], 1/s
-    step     M: [lane, name, name], of one step
+    step     M: [lane, name, name], of one step as the program's stages make it, where these were asked for; None: what
+             the integrator makes of A (`linear_step`)
     rate     largest rate of turning at that state, of a joint or a free body, rad/s: [lane]
     h        length of the step, s
     """
@@ -53,7 +54,7 @@ class StepMap:
     names: tuple[str, ...]
     positions: int
     slope: np.ndarray
-    step: np.ndarray
+    step: np.ndarray | None
     rate: np.ndarray
     h: float
 
@@ -141,7 +142,7 @@ class Linearizer:
                 self.slope[:, :, places[block]] = self._slopes(wide, moved, sizes)
 
     def map(self, *, stages: bool = False) -> StepMap:
-        """The map of each case, as it begins and loose. stages: M is of the program's stages."""
+        """The map of each case, as it begins and loose. stages: with M of the program's stages."""
         step, system, n = self.builder.step, self.system, len(self.cells)
         straight = {joint.name for joint in system.joints if joint.kind == "prismatic"}
         straight |= {name for body in bodies.bodies(system) for name in body.coordinates[:3]}
@@ -149,7 +150,7 @@ class Linearizer:
         rate = np.max(np.abs(turning), axis=0) if turning else np.zeros(self.tape.lanes)
         A, h, positions = self.slope[:, :, :n], step.schedule.step, len(step.coordinates)
         with np.errstate(all="ignore"):
-            M = self._of_stages() if stages else linear_step(system.integrator, A, positions, h)
+            M = self._of_stages() if stages else None
         return StepMap(np.repeat(self.cases, 2), self.loose, self.cells, positions, A, M, rate, h)
 
     def opened(self) -> Linearizer:

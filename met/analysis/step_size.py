@@ -83,7 +83,7 @@ class StepSize:
     def without_matrices(self) -> StepSize:
         """The same in little memory: of the map only what says of which cases it is."""
         nothing = np.empty(0)
-        return replace(self, map=replace(self.map, names=(), slope=nothing, step=nothing))
+        return replace(self, map=replace(self.map, names=(), slope=nothing))
 
 
 def chosen_cases(experiment: Experiment, also: Iterable[int] = ()) -> tuple[int, ...]:
@@ -295,7 +295,7 @@ def _owner(name: str) -> tuple[str, str]:
 
 def _followed(found: StepMap, mode: Mode, integrator: Integrator, steps: int) -> bool:
     """True where another integrator makes no mode of the lane grow with this step, and misses none."""
-    for each in modes(of_lane(found, mode.lane, integrator, found.h), integrator):
+    for each in modes(of_lane(found, mode.lane, found.h), integrator):
         run, truth, _ = each.missed(found.h, steps)
         if each.grown(found.h, steps) > np.log1p(TELLING) or abs(run - truth) > TELLING:
             return False
