@@ -30,7 +30,7 @@ from met.program.step import STAGE
 from met.program.system import System
 
 AT_ONCE = 2000
-"""Lanes over which the program is run at once: more take more memory, and are slower where they leave the cache."""
+"""Lanes over which the program is run at once: more take more memory, fewer more time (600 joints: 0.5 GB, 4 s)."""
 
 
 @frozen
