@@ -1,2 +1,1 @@
-"""Questions to an experiment's models and program, apart from its runs: effects, contacts, margins, run time, and
-the error of its steps."""
+"""Analyses of an experiment's models and program without its runs: effects, contacts, margins, run time, step error."""

@@ -1,4 +1,4 @@
-"""Inputs of a sweep that change nothing: the program is recorded, and followed back from all that it gives.
+"""Inputs of a sweep that change nothing: the program is recorded and followed back from all of its results.
 
 Nothing is compiled. A number of a case has an effect where something that the program records, gives or decides by is
 computed from it, through however many steps; that is a question about the program, not about values.
@@ -23,8 +23,9 @@ from met.trace.recording import CodeSection
 def idle_inputs(experiment: Experiment, memo: AnalysisMemo | None = None) -> tuple[str, ...]:
     """Inputs of the experiment's program that change nothing: paths of coordinates, `met.plan.REPEAT` and `SEED`.
 
-    Of an arm whose chains do not act on each other, no more is recorded than it takes to see that all have an effect.
-    memo: of other experiments, which may have equal chains. Raises Problem where a model cannot be recorded.
+    Where the chains of an arm do not act on each other, only as much is recorded as shows that all inputs have an
+    effect. memo: answers about other experiments, which may have equal chains. Raises Problem where a model cannot be
+    recorded.
     """
     memo = memo if memo is not None else AnalysisMemo()
     every = {*(each.path for each in experiment.cases.coordinates), *experiment.cases.noise}
@@ -42,7 +43,7 @@ def _idle_inputs(experiment: Experiment) -> tuple[str, ...]:
 
 
 def _idle_inputs_of_chain(chain: Experiment) -> tuple[str, ...]:
-    """The same of a chain, of which the rest of a step is recorded only where it takes that to see an effect."""
+    """The idle inputs of one chain; the rest of a step is recorded only where an effect does not show without it."""
     program = build(chain)
     made = SectionRecorder(program)
     made.steps(program.start, "start")
@@ -73,7 +74,7 @@ def _unread(program: Program, sections: Iterable[CodeSection]) -> tuple[str, ...
 
 
 def _reads(section: CodeSection, needed: set[str], given: set[int]) -> tuple[set[str], set[str]]:
-    """Inputs and cells from which the section computes these cells, these outputs and what it records."""
+    """Inputs and cells from which the section computes the needed cells, the given outputs and its recorded values."""
     roots = [ref for cell, ref in section.stores if cell in needed]
     roots += [ref for _, ref in section.records]
     roots += [ref for number, ref in section.outputs if number in given]

@@ -1,6 +1,7 @@
-"""Which servo loop is to blame for what grows, and what of it would help: of loops that are closed over the arm.
+"""The servo loop that causes an instability, and the change of it that would help, for loops closed over the arm.
 
-A loop is to blame for what grows with its gain, and does not without: what falls or drifts by itself is none of it.
+A loop is to blame for modes that grow with its gain and do not grow without it. Modes that fall or drift without the
+loop are not counted.
 """
 
 from __future__ import annotations
@@ -17,19 +18,19 @@ from met.analysis.step_map import Linearizer, SampledLoops
 from met.frozen import frozen
 
 SMALLEST, LARGEST = 1e-3, 30.0
-"""Shares of a gain between which one that fits is looked for."""
+"""Smallest and largest share of a gain between which a stable one is searched for."""
 
 POOR = 0.02
-"""Share of a gain up to which one that fits is little help: then single numbers of the law are looked at."""
+"""Share of a gain up to which a stable one helps little, so that single numbers of the law are tried."""
 
 STRIDE = 0.8
-"""Share from one gain to the next that is tried."""
+"""Ratio of one tried gain to the one before."""
 
 WORSE = 1.5
-"""Times the growth without a loop, above which the loop is to blame where as much grows without it."""
+"""Factor over the growth without a loop above which the loop is to blame although the arm grows without it too."""
 
 BY_TICKS = 2.0
-"""Times the growth of the arm with laws that have no ticks, above which the ticks are to blame."""
+"""Factor over the growth of the arm with laws that have no ticks, above which the ticks are to blame."""
 
 
 @frozen
@@ -61,8 +62,8 @@ class Unstable:
 def closed(
     linearizer: Linearizer, found: SampledLoops, lanes: Iterable[tuple[int, float, bool]]
 ) -> tuple[Unstable, ...]:
-    """The loops that make lanes grow, the one that wants the largest change first; lanes: as
-    `met.analysis.loops.growing` has them."""
+    """The loops that make lanes grow, the one that needs the largest change first; lanes: as from
+    `met.analysis.loops.growing`."""
     several, seen, opened = dict[tuple[str, ...], Unstable](), set[str](), Opened(linearizer, found)
     for lane, limit, ticks in lanes:
         case = opened.lane(lane, limit, ticks)
@@ -76,12 +77,12 @@ def closed(
 
 
 def needs(each: Unstable) -> tuple[float, float]:
-    """The smaller, the more has to be done."""
+    """Sort key of a finding: the smaller, the larger the change that is needed."""
     return _change(each.gain), each.every
 
 
 def _change(share: float | None) -> float:
-    """A number that is the larger, the less a gain has to change."""
+    """A measure of how little a gain has to change: the larger, the smaller the change."""
     return 0.0 if share is None else min(share, 1.0 / share)
 
 
@@ -96,11 +97,11 @@ class _Growing:
         return math.inf if math.inf in self.rates else len(self.rates)
 
     def adds_to(self, without: _Growing, limit: float, times: float = WORSE) -> bool:
-        """True where more modes grow than without something, or they grow faster."""
+        """True where more modes grow than without a part of the loop, or where they grow faster."""
         return self.count > without.count or sum(self.rates) > times * sum(without.rates) + limit
 
     def beyond(self, without: _Growing) -> float:
-        """The largest rate that is not there without a loop."""
+        """The largest growth rate that does not occur without a loop."""
         left = list(self.rates)
         for each in without.rates[: max(0, len(left) - 1)]:
             left.remove(min(left, key=lambda one: abs(one - each)))
@@ -133,20 +134,20 @@ class Lane:
         return _Growing(tuple(sorted(rates[rates > above * self.limit].tolist(), reverse=True)))
 
     def without(self, own: _Growing, joints: Sequence[str], gains: Gains | None = None) -> _Growing | None:
-        """The growth without the loops of these joints, where that is less than with them; else None."""
+        """The growth without the loops of these joints, where it is less than with them; None where it is not."""
         found = self.growing({**(gains or {}), **dict.fromkeys(joints, 0.0)}, above=0.5)
         return found if own.adds_to(found, self.limit) else None
 
     def concerned(self) -> frozenset[str]:
-        """The joints whose loops are to blame, each by itself."""
+        """The joints whose loops are each to blame without the others."""
         own = self.growing()
         return frozenset(law.joint for law in self.loops.laws if self.without(own, (law.joint,)) is not None)
 
     def blamed(self) -> list[Unstable]:
         """The loops that make the lane grow; none where they do not.
 
-        Of loops that are unstable together the one is named whose gain has to change least, then what is still
-        unstable.
+        Among loops that are unstable together, the one whose gain has to change least comes first, then those that are
+        still unstable.
         """
         own = self.growing()
         if not 0 < own.count < math.inf:
@@ -170,7 +171,8 @@ class Lane:
         return told or self._too_weak(own)
 
     def _gain(self, own: _Growing, without: _Growing, joints: Sequence[str], gains: Gains) -> float | None:
-        """The share of the gains of these joints at which no more grows than without their loops; None: none."""
+        """The share of the gains of these joints at which no more modes grow than without their loops; None where there
+        is none."""
 
         def count(share: float) -> float:
             return self.growing({**gains, **dict.fromkeys(joints, share)}).count
@@ -178,7 +180,7 @@ class Lane:
         return fitting(count, min(without.count, own.count - 1))
 
     def _unstable(self, own: _Growing, joints: tuple[str, ...], gain: float | None, rate: float) -> Unstable:
-        """Loops that are to blame, and whether ticks or sensors are."""
+        """The loops to blame, and whether their ticks or their sensors cause it."""
         ticks, sensed = False, any(law.joint in joints and law.direct.shape[1] for law in self.loops.laws)
         if self.ticks:
             analog = self.growing(above=0.5, ticks=False)
@@ -187,7 +189,7 @@ class Lane:
         return Unstable(int(self.loops.case[self.lane]), joints, gain, 1.0 / rate, ticks, sensed)
 
     def _too_weak(self, own: _Growing) -> list[Unstable]:
-        """The loops of position that do not hold what falls without them, and with more gain would."""
+        """The position loops that do not hold a load which falls without them, and would hold it with more gain."""
         told = []
         for law in self.loops.laws:
 
@@ -204,7 +206,7 @@ class Lane:
 
 
 class Opened:
-    """The loops of an experiment's cases with every gain in reach, those of laws that are continuous too."""
+    """The loops of an experiment's cases, opened so that every gain can be scaled, those of continuous laws too."""
 
     def __init__(self, linearizer: Linearizer, found: SampledLoops) -> None:
         self._linearizer, self._found = linearizer, found
@@ -233,7 +235,7 @@ class Opened:
         return [each if each.ticks and (each.gain or 0.0) > POOR else self._remedied(lane, each) for each in several]
 
     def _remedied(self, lane: Lane, found: Unstable) -> Unstable:
-        """The same with the parameters that help, each alone."""
+        """The findings with the parameters that help, each tried alone."""
         if len(found.joints) > 1:
             return found
         (joint,), own = found.joints, lane.growing()
@@ -251,8 +253,8 @@ class Opened:
 
 
 def fitting(count: Callable[[float], float], aim: float) -> float | None:
-    """The largest share below 1 at which no more than so many modes grow, to a thousandth; else the smallest above 1;
-    None: there is none."""
+    """The largest share below 1 at which at most `count` modes grow, to a thousandth; else the smallest above 1; None
+    where there is none."""
     for stride in (STRIDE, 1.0 / STRIDE):
         bad, good = 1.0, stride
         while count(good) > aim:

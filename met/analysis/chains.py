@@ -1,8 +1,9 @@
 """Chains of a large arm that do not act on each other, each as an experiment of its own.
 
-Chains on a base that stands are coupled by nothing but what is about several of them: payloads, guides, sensors of
-links, models of the environment. Where there is none of these, what a chain does by itself it does in the whole arm, up
-to rounding, and what has an effect on a chain has one on the whole. The work of an analysis grows faster than an arm.
+Chains on a fixed base are coupled only by payloads, guides, sensors of links and models of the environment that concern
+several of them. Without these a chain alone moves as it does in the whole arm, up to rounding, and an input with an
+effect on a chain has one on the whole. Chains are analysed apart because the work grows faster than the number of
+joints.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from met.plan import BASE, Experiment, Formula, Quantity, Structure
 from met.trace.graph import Formulas
 
 MANY_JOINTS = 50
-"""Moving joints from which on an arm is looked at chain by chain."""
+"""Number of moving joints from which on an arm is analysed chain by chain."""
 
 APART = ("gravity",)
-"""Models of the environment that act on each link by itself."""
+"""Models of the environment that act on each link without regard to the others."""
 
 
 def chains(experiment: Experiment) -> tuple[Experiment, ...]:
@@ -36,14 +37,14 @@ def chains(experiment: Experiment) -> tuple[Experiment, ...]:
 
 
 def ticks_and_steps(structure: Structure) -> int:
-    """Ticks of servos, and steps, until all of these fall together again."""
+    """The number of ticks of servos, and of steps, until all of these coincide again."""
     divisors = [structure.schedule.dynamics, *(use.divisor for use in structure.servos)]
     return sum(math.lcm(*divisors) // each for each in divisors)
 
 
 def numbered(chain: Experiment) -> tuple[Experiment, Mapping[str, str]]:
-    """The chain with joints and links that are called by their numbers, so that of equal chains the experiments are
-    equal; and what its joints are called, by these numbers."""
+    """The chain with its joints and links renamed to numbers, so that equal chains give equal experiments; and the
+    joints' names by these numbers."""
     structure = chain.structure
     joints = {each.name: str(number) for number, each in enumerate(structure.joints)}
     links = {each.name: str(number) for number, each in enumerate(structure.links)} | {BASE: BASE}

@@ -17,8 +17,8 @@ from met.run import inputs
 
 @frozen
 class Contact:
-    """A stop of one case, by its name in the environment: the joint, what is behind that at the start (kg m^2; kg), and
-    the steps that a contact takes there."""
+    """A stop of one case, by its name in the environment: the joint, the inertia at the joint at the start (kg m^2;
+    kg), and the steps that a contact takes there."""
 
     stop: str
     joint: str
@@ -29,8 +29,8 @@ class Contact:
 def contacts(experiment: Experiment, case: int = 0) -> tuple[Contact, ...]:
     """The contacts with every stop that may push its joint, for the arm as it begins in this case.
 
-    `inertia` is what the joint feels where all others keep their modes, and its rotor's. A joint that feels none is
-    left out.
+    `inertia` is that of the arm at the joint, where all others keep their modes, and of its rotor. A joint without
+    inertia is left out.
     """
     system = System(experiment)
     stops = [(name, model) for name, model in system.environment if model.springs]
@@ -55,7 +55,7 @@ def contacts(experiment: Experiment, case: int = 0) -> tuple[Contact, ...]:
             if actuator is not None and actuator.gives:
                 continue
             inertia = float(arm.effective[number][0] + arm.derivative.solved.rotor[number])
-            if not inertia > 0.0:  # masses so small that the arithmetic has no more of them
+            if not inertia > 0.0:  # masses so small that the inertia is 0 after rounding
                 continue
             lasts = math.pi * math.sqrt(inertia / stiffness) if stiffness > 0.0 else math.inf
             found.append(Contact(name, str(joint), inertia, lasts / experiment.structure.schedule.step))

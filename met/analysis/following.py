@@ -1,7 +1,7 @@
 """Joints and guided points that do not follow what they are commanded: found at instants that cases have passed.
 
-A command is judged where it stays what it is for a last part of the run, in which the joint has time to come to it:
-told is who is off by a large share of what it was told to do, on the mean of that part, and does not come nearer. The
+A command is judged where it stays the same for a last part of the run, long enough for the joint to reach it. A joint
+is reported where its mean error over that part is a large share of the commanded motion and does not shrink. The
 setpoints are those of the program's own functions, and positions and rates those of the run.
 """
 
@@ -22,24 +22,25 @@ from met.program.control import guiding, setpoints
 from met.program.system import PARAMETER, System
 
 SHARE = 0.2
-"""Of what was commanded over the run: whoever is off by no more follows, if not well."""
+"""Share of the commanded motion up to which an error counts as followed, if not well."""
 
 STAYS, STRAYS = 1e-3, 0.2
-"""rad, m, rad/s, m/s: what is told to do no more than the first is told to stay, and strays if off by the second."""
+"""A command that changes by less than the first is to stay in place, and a joint strays if off by the second; rad, m,
+rad/s, m/s."""
 
 SETTLED = 0.01
-"""Share of what was commanded, by which a command that has settled still changes."""
+"""Share of the commanded motion within which a command still changes once it has settled."""
 
 FIRST, LEAST = 0.75, 0.1
-"""Shares of the run: what is judged lies after the first of it, and is not shorter than the second."""
+"""Shares of the run: the judged part begins after the first of it, and is at least as long as the second."""
 
 FALLS = 0.25
-"""Whoever loses this share of its error in a time as long as the run is on its way."""
+"""Share of its error that a joint which is still on its way loses in a time as long as the run."""
 
 
 @frozen
 class Unfollowed:
-    """Joint or guided point that is not where, or as fast as, it is commanded to be as a case ends.
+    """A joint or guided point that is not where it is commanded to be, or not as fast, as a case ends.
 
     of     name of the joint, or of the guide;  kind: `position` or `rate` of a joint, `path` of a guide
     off    root of the mean square of the distance from the setpoint, from `since` to `until`, s
@@ -63,8 +64,8 @@ def unfollowed(
     experiment: Experiment, ticks: Sequence[int], memories: Mapping[int, np.ndarray], cells: Sequence[str]
 ) -> list[Unfollowed]:
     """The joints with a command of position or rate, and the guides, that are not followed: each in its worst case,
-    worst first. Not looked at are joints whose servo fails, which the deck wants, and those of which a requirement
-    wants more than a limit. Raises Problem where a model's function does.
+    worst first. Joints whose servo fails, as the deck asks, are left out, and so are those of which a requirement asks
+    more than a limit. Raises Problem where a model's function does.
 
     ticks     of the base rate, rising;  memories: row of the case table -> [tick, cell], as `cells` names these
     """
@@ -105,14 +106,15 @@ def unfollowed(
 
 
 def _is_own(experiment: Experiment, command: object) -> bool:
-    """True for a course in time; the setpoint of a guide that steers is judged by the guide's own error."""
+    """True for a course in time; the setpoint of a steering guide is judged by the guide's own error."""
     guide = getattr(command, "guide", "")
     use = next((use for use in experiment.structure.guides if use.name == guide), None)
     return use is None or models.find("guide", use.model, use.place).course is not None
 
 
 def _is_required(experiment: Experiment, joint: str, kind: str) -> bool:
-    """True where a requirement wants much of a joint's position or rate: it judges how much is come to."""
+    """True where a requirement judges the joint's position or rate by more than a limit: it says how close is close
+    enough."""
     most = {each.metric for each in experiment.requirements if each.comparison.startswith(">")}
     channel = f"{joint}.{'q' if kind == 'position' else 'qd'}"
     return any(use.name in most and use.of == channel for use in experiment.structure.metrics)
@@ -125,7 +127,7 @@ def _lanes(
     cases: Sequence[int],
     cells: Sequence[str],
 ) -> LaneTape:
-    """A lane for each instant of each case, with all that is in its memory, and the parameters of its own."""
+    """A lane for each instant of each case, with the case's memory and its own parameters."""
     experiment = system.experiment
     rows = np.repeat(cases, len(ticks))
     given = {each.path: each.values[rows] for each in experiment.cases.coordinates}
@@ -165,7 +167,7 @@ def _told(
 
 
 def _limit(experiment: Experiment, joint: str, counted: Mapping[str, float], steps: int) -> str:
-    """The limit of a joint's servo at which more than half of so many steps began: of several that nearest to the
+    """The limit of a joint's servo at which more than half of these steps began; among several, the one nearest to the
     joint.
 
     counted  change of the memory over these steps, by cell

@@ -12,10 +12,12 @@ from met.trace import Real, Truth
 from met.trace.program import CallPhase, Control, Every, RunPhase, Unless0, WhileAny
 
 SMALL = 1e-6
-"""Change of a position or a rate by which differences are taken, as a share of it, or of 1 rad, 1 m, 1 rad/s, 1 m/s."""
+"""Change of a position or a rate over which differences are taken, as a share of it, or of 1 rad, 1 m, 1 rad/s, 1
+m/s."""
 
 SMALL_STATE = 1e-9
-"""The same of a state of a servo or sensor, in its unit: some live in micrometres, and none of them turns the arm."""
+"""Change of a state of a servo or sensor over which differences are taken, in its unit: some states live in
+micrometres, and none of them turns the arm."""
 
 
 class LaneTape:
@@ -56,20 +58,20 @@ class LaneTape:
         return found
 
     def record(self, column: int, value: Real) -> None:
-        """Nothing is kept of a row."""
+        """Drop the recorded value: no rows are kept."""
 
     def output(self, name: str, value: Real) -> None:
-        """Nothing is kept of an end."""
+        """Drop the output: no results are kept."""
 
     def part(self, name: str) -> AbstractContextManager[None]:
         return nullcontext()
 
     def lane(self, name: str) -> np.ndarray:
-        """A cell, one number a lane."""
+        """The value of a cell in each lane."""
         return np.broadcast_to(np.asarray(self.read(name), dtype=float), (self.lanes,))
 
     def spread(self, times: int) -> LaneTape:
-        """The same with every lane that often, one beside the other."""
+        """A tape with every lane repeated that many times, side by side."""
         made = LaneTape(self.base_hz, {}, self.lanes * times)
         made.k = self.k
         made.inputs = {name: np.repeat(value, times) for name, value in self.inputs.items()}
@@ -80,7 +82,7 @@ class LaneTape:
         return made
 
     def only(self, lanes: np.ndarray) -> LaneTape:
-        """Some of its lanes; lanes: a truth for each."""
+        """The tape of some lanes only; lanes: a truth for each."""
         made = LaneTape(self.base_hz, {}, int(np.count_nonzero(lanes)))
         made.k = self.k
         made.inputs = {name: value[lanes] for name, value in self.inputs.items()}
@@ -91,8 +93,8 @@ class LaneTape:
         return made
 
     def follow(self, body: Iterable[Control]) -> None:
-        """Runs the body once, at the tape's tick; of loops those in which payloads change hands: what repeats until
-        something is decided is not run."""
+        """Run the body once, at the tape's tick. Loops in which payloads change hands run once; loops that repeat until
+        something is decided are skipped."""
         for node in body:
             match node:
                 case RunPhase(phase) | CallPhase(phase):
@@ -128,7 +130,7 @@ def to_both_sides(start: np.ndarray, size: np.ndarray, moved: slice = slice(None
 
 
 def spread_over(read: Callable[[str], Any], times: int) -> Callable[[str], Any]:
-    """Reads a cell with each of its lanes that often, one beside the other."""
+    """Wrap the reading of a cell so that each of its lanes is repeated that many times, side by side."""
 
     def spread(name: str) -> Any:
         value = read(name)

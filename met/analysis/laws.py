@@ -1,8 +1,8 @@
 """Laws of servos linearised, with the sensors through which they see: differences of the functions that run.
 
-A law is a function of what it sees and of what it holds, and a sensor one of the quantity, of its circuit's states and
-of its own memory. The slopes of both are put together here: what a tick makes of a law's outputs and integrals and of
-its sensors' memory, by the arm's state and by all that is held. Nothing is known of a particular model.
+A law is a function of its inputs and of its memory, and a sensor is one of the quantity, of its circuit's states and of
+its memory. Their slopes are combined here into the derivative of a law's outputs, integrals and sensors' memory after a
+tick, by the arm's state and by all memory. No particular model is assumed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from met.sensors.sensor import Reading, Sensed
 from met.servos.servo import JointMotion, Parts, Seen, Setpoint
 
 READINGS = 10.0 ** np.arange(-6, 3)
-"""Changes of what a sensor reads over which its slope is taken, in its unit: a converter has steps, a range an end."""
+"""Changes of a sensor's quantity over which its slope is taken, in its unit: a converter has steps, and a range
+ends."""
 
 
 @frozen
@@ -51,7 +52,7 @@ class SampledLaw:
 
 
 def memory(actuator: Actuator) -> tuple[str, ...]:
-    """The cells of a law's memory, and of its sensors'."""
+    """The cells of a law's memory and of its sensors' memory."""
     own = [f"{actuator.path}.{name}" for name in _held(actuator.parts)]
     return (*own, *(f"{each.path}.{part.name}" for each in actuator.sensors for part in each.memory))
 
@@ -65,7 +66,7 @@ def linearised(
     continuous: bool,
     scaled: Mapping[str, float] | None = None,
 ) -> SampledLaw:
-    """A law's slopes on a tape, under a command that its joint be as it is.
+    """A law's slopes on a tape, under a command that keeps its joint as it is.
 
     cells   the state, then all servos' memory
     scaled  what parameters of the servo are multiplied by, by name
@@ -95,7 +96,7 @@ def linearised(
 
 
 def gains(builder: Builder, actuator: Actuator, tape: LaneTape) -> tuple[Parameter, ...]:
-    """The numbers of a servo that its law's slopes depend on, and what nature does with its outputs does not."""
+    """The parameters of a servo on which its law's slopes depend, but the physics under its outputs does not."""
     found = _Linearised(builder, actuator, tape, ())
     law_now, drive_now = found.law({}), found.drive({})
     told = []
@@ -118,7 +119,7 @@ class _Linearised:
         return self._places[cell]
 
     def quantities(self) -> dict[str, np.ndarray]:
-        """The slopes of what the law sees, as it is: `q`, `qd` and states of the servo, by name."""
+        """The slopes of the law's true inputs: `q`, `qd` and states of the servo, by name."""
         joint, path, tape = self.actuator.use.joint, self.actuator.path, self.tape
         natural = [each.name for each in self.actuator.parts.natural]
         cells = [f"{joint}.q", f"{joint}.qd", *(f"{path}.{name}" for name in natural)]
@@ -138,8 +139,8 @@ class _Linearised:
         return found
 
     def through_sensors(self, true: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        """The slopes of what the law sees through its sensors, and what a tick makes of their memory, [lane, memory,
-        cell]."""
+        """The slopes of the law's inputs as its sensors give them, and of the sensors' memory after a tick, [lane,
+        memory, cell]."""
         seen, held = dict(true), [np.zeros((self.tape.lanes, 0, len(self.cells)))]
         for fitted in self.actuator.sensors:
             of = sensing.quantity(fitted)
@@ -153,7 +154,7 @@ class _Linearised:
         return seen, np.concatenate(held, axis=1)
 
     def law(self, scaled: Mapping[str, float]) -> np.ndarray:
-        """Outputs and integrals after a tick, by what is seen, and by what is held: [lane, of, by]."""
+        """The slopes of outputs and integrals after a tick by the law's inputs and by its memory: [lane, of, by]."""
         actuator, parts, tape = self.actuator, self.actuator.parts, self.tape
         joint, own = actuator.use.joint, _held(parts)
         natural = [each.name for each in parts.natural]
@@ -171,7 +172,7 @@ class _Linearised:
         return differences(after, own, sizes)
 
     def drive(self, scaled: Mapping[str, float]) -> tuple[Any, ...]:
-        """The slopes of nature under outputs and states of no particular size, to be compared."""
+        """The slopes of the servo's physics by its outputs and states, at a nominal size, for comparison."""
         actuator, parts = self.actuator, self.actuator.parts
         held = dict.fromkeys(_held(parts), 0.3)
         states = NamedValues(actuator.owner, {part.name: 0.2 for part in parts.natural})
@@ -182,7 +183,7 @@ class _Linearised:
         return tuple(tuple(np.atleast_1d(np.asarray(each, dtype=float)).tolist()) for each in numbers)
 
     def _seen(self) -> list[np.ndarray]:
-        """A law's inputs without its sensors: joint's motion as measured, then states of the servo."""
+        """The law's inputs without its sensors: the joint's motion as measured, then states of the servo."""
         actuator, tape = self.actuator, self.tape
         states: Any = {each.name: tape.lane(f"{actuator.path}.{each.name}") for each in actuator.parts.natural}
         q, qd = (tape.lane(f"{actuator.use.joint}.{part}") for part in ("q", "qd"))
@@ -202,7 +203,8 @@ class _Linearised:
 
     def _reading(self, fitted: Fitted) -> np.ndarray:
         """The slopes of a sensor's reading, and of its memory after a tick, by quantity, states and memory: [lane, of,
-        by], without noise. Of those over several changes the one that agrees with its neighbour best."""
+        by], without noise. The slope is taken over several changes; the one that agrees best with its neighbour is
+        kept."""
         tape, states, held = self.tape, [part.name for part in fitted.states], [part.name for part in fitted.memory]
         (at,) = (k for k, name in enumerate(self.quantity_names()) if name == sensing.quantity(fitted))
         start = np.array([self._seen()[at], *(tape.lane(f"{fitted.path}.{name}") for name in (*states, *held))])
@@ -219,7 +221,7 @@ class _Linearised:
         return _agreed(slopes.reshape(tape.lanes, sizes, 1 + len(held), count))
 
     def quantity_names(self) -> tuple[str, ...]:
-        """Names of what the law sees."""
+        """Names of the law's inputs."""
         return ("q", "qd", *(each.name for each in self.actuator.parts.natural))
 
 
@@ -229,15 +231,15 @@ def _held(parts: Parts) -> list[str]:
 
 
 def _sizes(start: np.ndarray, plain: int) -> np.ndarray:
-    """Changes by which slopes are taken, of which the first few are of a joint's motion."""
+    """The changes over which slopes are taken, of which the first are those of the joint's motion."""
     sizes = np.abs(start) * 1e-7 + SMALL_STATE
     sizes[:plain] = np.abs(start[:plain]) * SMALL + SMALL
     return sizes
 
 
 def _agreed(slopes: np.ndarray) -> np.ndarray:
-    """The slopes, of those over changes of several sizes, [lane, size, of, by], that differ least from that of the next
-    size; 0 where none is anything else."""
+    """Of slopes over changes of several sizes, [lane, size, of, by], those that differ least from the slope of the next
+    size; 0 where all are 0."""
     one, other = slopes[:, :-1], slopes[:, 1:]
     larger = np.maximum(np.abs(one), np.abs(other))
     with np.errstate(all="ignore"):

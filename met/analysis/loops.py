@@ -1,10 +1,9 @@
 """Servo loops closed over the linearised arm: the map from one frame of all computers to the next, and its growth.
 
-A frame is as long as it takes until the dynamics and all servos tick together again. Its map is put together of the
-integrator's steps and of the laws' own slopes, both found by differences of the functions that run (`step_map`,
-`laws`). So the delay of sampling is in it, that of sensors and the lag of their filters, and so are memory that is
-held, and its course over a step where servos are faster than the dynamics (docs/physics.md, section 4). Laws that are
-continuous are closed before.
+A frame is as long as it takes until the dynamics and all servos tick together again. Its map combines the integrator's
+steps and the laws' slopes, both found by differences of the functions that run (`step_map`, `laws`). It includes the
+delays of sampling and of sensors, the lag of their filters, held memory, and its course over a step where servos are
+faster than the dynamics (docs/physics.md, section 4). Continuous laws are closed first.
 """
 
 from __future__ import annotations
@@ -19,26 +18,26 @@ from met.analysis.laws import SampledLaw
 from met.analysis.step_map import SampledLoops, linear_step
 
 MOST_EVENTS = 2000
-"""Ticks and steps in a frame, above which it is not looked at."""
+"""Ticks and steps in a frame above which it is not analysed."""
 
 GROWS = 1.0
 """ln of the growth over a run above which a loop is called unstable."""
 
 LEAST = 1e-5
-"""Growth of a frame, its logarithm, that differences are good for: a body that drifts freely is no nearer to 0."""
+"""Smallest growth of a frame, its logarithm, that differences resolve: a freely drifting body is no nearer to 0."""
 
 SLOWEST = 1e-3
-"""The same of a second, of the arm with laws that have no ticks, 1/s."""
+"""Smallest growth rate that differences resolve for the arm with laws that have no ticks, 1/s."""
 
 WHOLE = 200
-"""States and memory up to which an arm is looked at as a whole, though parts of it be uncoupled."""
+"""States and memory up to which an arm is analysed as a whole, even where parts of it are uncoupled."""
 
 Gains = Mapping[str, float]
-"""Shares of the gains of joints' laws; 1 where nothing is said."""
+"""Factors on the gains of joints' laws; 1 where a joint is not listed."""
 
 
 def _rows(law: SampledLaw, lane: int | np.ndarray, gains: Gains | None, direct: bool) -> np.ndarray:
-    """The slopes of a law whose gain is scaled; direct: that sees what is so."""
+    """The slopes of a law whose gain is scaled; direct: of the law without its sensors."""
     rows = (law.direct if direct and law.direct.shape[1] else law.slope)[lane].copy()
     rows[..., : law.outputs, :] *= (gains or {}).get(law.joint, 1.0)
     return rows
@@ -72,8 +71,8 @@ def _over(
 def frame(
     found: SampledLoops, lane: int | np.ndarray, gains: Gains | None = None, *, direct: bool = False
 ) -> np.ndarray:
-    """The map of one frame, of state, memory, memory at the step's first tick, and the state a step before; of state
-    and memory alone where all tick with the dynamics. Of a lane, or of several.
+    """The map of one frame for a lane or several: of state, memory, memory at the step's first tick, and the state a
+    step before; of state and memory alone where all laws tick with the dynamics.
 
     gains   what the outputs of a joint's law are multiplied by, 1 where nothing is said
     direct  whether laws see what is so, without their sensors
@@ -127,8 +126,8 @@ def frame(
 def _frame_of_a_step(
     found: SampledLoops, A: np.ndarray, n: int, cells: np.ndarray, laws: Sequence[tuple[SampledLaw, np.ndarray]]
 ) -> np.ndarray:
-    """The frame of laws that all tick with the dynamics, of state and memory: what is held at a step's first tick is
-    held over it, and no tick sees a state that is carried on.
+    """The frame of laws that all tick with the dynamics, of state and memory: memory is constant over a step, and no
+    tick sees an extrapolated state.
 
     A, n, cells  as of `_over`;  laws: those that tick, with their slopes by all states and memory
     """
@@ -145,7 +144,8 @@ def _frame_of_a_step(
 
 
 def _carried(n: int, positions: int, m: int, since: float, h: float) -> np.ndarray:
-    """The state that a tick sees `since` s after an instant, of a frame's state: carried on as over the step before."""
+    """The state that a tick sees `since` s after an instant, from a frame's state, extrapolated from the step
+    before."""
     p, size = positions, 2 * n + 2 * m
     carried = np.eye(n, size)
     if since:
@@ -164,19 +164,19 @@ def ticking(found: SampledLoops) -> frozenset[str]:
 
 
 def seconds(found: SampledLoops) -> float:
-    """The length of a frame."""
+    """The length of a frame, s."""
     return _length(found) / found.base_hz
 
 
 def _length(found: SampledLoops) -> int:
-    """Ticks of the base rate in a frame."""
+    """The number of base-rate ticks in a frame."""
     return math.lcm(found.divisor, *(each.divisor for each in found.laws if not each.continuous))
 
 
 def growths(
     found: SampledLoops, lanes: np.ndarray, gains: Gains | None = None, *, ticks: bool, direct: bool = False
 ) -> np.ndarray:
-    """Rates at which modes grow, or decay, 1/s: [lane, mode]; infinite where one is no number.
+    """Rates at which modes grow, or decay, 1/s: [lane, mode]; infinite where one is not finite.
 
     ticks  of a frame; else of the arm with all laws continuous, without delays of ticks
     """
@@ -184,7 +184,7 @@ def growths(
     if len(parts) > 1:
         return np.concatenate([growths(each, lanes, gains, ticks=ticks, direct=direct) for each in parts], axis=1)
     if ticks:
-        with np.errstate(all="ignore"):  # what overflows is no number
+        with np.errstate(all="ignore"):  # an overflow gives no finite number
             sizes = np.abs(_eigenvalues(frame(found, lanes, gains, direct=direct)))
             return np.asarray(np.log(sizes) / seconds(found))
     try:
@@ -194,8 +194,8 @@ def growths(
 
 
 def uncoupled(found: SampledLoops) -> tuple[SampledLoops, ...]:
-    """Parts of a large arm that do not act on each other in any lane, such as chains on a base that stands, each with
-    its own laws; else the whole. A frame of a part is no longer than the whole's."""
+    """Parts of a large arm that do not act on each other in any lane, such as chains on a fixed base, each with its own
+    laws; else the whole. A frame of a part is no longer than the whole's."""
     n, p, count = found.states, found.positions, found.states + len(found.held)
     if count <= WHOLE:
         return (found,)
@@ -243,7 +243,7 @@ def _components(joined: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _eigenvalues(matrices: np.ndarray) -> np.ndarray:
-    """Those of each of several: infinite where one is no number."""
+    """Eigenvalues of each matrix: infinite where one is not finite."""
     found = np.full(matrices.shape[:2], math.inf, dtype=complex)
     numbers = np.isfinite(matrices).all((1, 2))
     found[numbers] = np.linalg.eigvals(matrices[numbers])
@@ -251,8 +251,8 @@ def _eigenvalues(matrices: np.ndarray) -> np.ndarray:
 
 
 def fastest(found: SampledLoops) -> np.ndarray:
-    """The rate at which each lane grows most, 1/s: infinite where it is no number, or a frame is too long to be looked
-    at."""
+    """The largest growth rate of each lane, 1/s: infinite where it is not finite, or a frame is too long to be
+    analysed."""
     length, rates = _length(found), np.full(len(found.case), math.inf)
     if length // found.divisor + sum(length // each.divisor for each in found.laws) <= MOST_EVENTS:
         lanes = np.flatnonzero(_numbers(found))
@@ -262,7 +262,7 @@ def fastest(found: SampledLoops) -> np.ndarray:
 
 
 def _numbers(found: SampledLoops) -> np.ndarray:
-    """True for the lanes all of whose slopes are numbers."""
+    """True for the lanes whose slopes are all finite."""
     numbers = np.isfinite(found.slope).all((1, 2))
     for law in found.laws:
         numbers &= np.isfinite(law.slope).all((1, 2))
@@ -270,13 +270,14 @@ def _numbers(found: SampledLoops) -> np.ndarray:
 
 
 def least(found: SampledLoops, duration: float) -> float:
-    """The rate of growth above which a frame's is told, 1/s: by e over this time, where differences are good for it."""
+    """The growth rate above which a frame is reported, 1/s: growth by e over this time, where differences resolve
+    it."""
     return max(LEAST / seconds(found), GROWS / duration)
 
 
 def growing(found: SampledLoops, rates: np.ndarray, duration: float) -> Iterator[tuple[int, float, bool]]:
-    """Lanes that grow by e and more over this time: the rate above which that is, 1/s, and whether ticks have a part in
-    it; what grows too slowly for a frame's differences is looked at without.
+    """Lanes that grow by e and more over this time: the rate above which that is so, 1/s, and whether ticks have a part
+    in it; growth too slow for a frame's differences is analysed without ticks.
 
     rates  as `fastest` has them
     """

@@ -2,8 +2,8 @@
 
 The measure is r = J_eff/(N^2 J_m), the arm's inertia at the joint against the rotor's. Each r is a question to the
 linear analysis: of the joint's bed, servo and law by themselves, opened where the arm is felt (`linear.bed_loop`). The
-loop is stable where no pole of a tick is larger than one. What the linear analysis of a case has none of is here: r of
-that case as its run begins, of one joint and of motions of all of them, and the range of r around it that is stable.
+loop is stable where no pole of a tick is larger than one. This module adds r of a case as its run begins, for one joint
+and for motions of all of them, and the stable range of r around it.
 """
 
 from __future__ import annotations
@@ -26,10 +26,11 @@ from met.program.system import System
 from met.servos.motor import Motor
 
 LIGHTEST, HEAVIEST, STEPS = 0.05, 2000.0, 40
-"""Range of r that is searched, wider for an arm that lies outside it; and how many values, a constant share apart."""
+"""Range of r that is searched, wider for an arm that lies outside it; and the number of values, spaced
+geometrically."""
 
 NARROW, AT_ONCE = 1e-3, 30
-"""Share to which an end of a range is found, and how many r are looked at side by side to find it."""
+"""Relative accuracy of an end of a range, and the number of r tried side by side to find it."""
 
 _Stretches = tuple[tuple[float, float | None], ...]
 
@@ -75,7 +76,7 @@ class Margin:
 
     @property
     def room(self) -> float:
-        """`factor`, as far as was searched; nothing has less than an arm whose r is no number."""
+        """The smaller factor, as far as was searched; below any other where the arm's r is no number."""
         found = self.searched / self.together if self.factor is None else self.factor
         return found if found == found else 0.0
 
@@ -90,12 +91,12 @@ class Margin:
 
     @property
     def stable(self) -> bool:
-        """True where the loop is stable with this arm; False where its r is no number, so that nothing is known."""
+        """True where the loop is stable with this arm; False where its r is not a number, so that nothing is known."""
         return self.lower < self.least and self.together < (self.searched if self.limit is None else self.limit)
 
 
 def remedy(one: Margin) -> str:
-    """Help that may make an unstable joint stable."""
+    """Help text with a change that may make an unstable joint stable."""
     if one.too_light:
         return "a lower gain of the servo's rate loop, a faster servo or a heavier arm"
     changed = "lower gains" if one.limit == 0.0 else "a lighter arm"
@@ -112,8 +113,8 @@ def margins(
 ) -> tuple[tuple[Margin, ...], ...]:
     """Every substituted joint of an experiment: one tuple a case (all by default).
 
-    The loop is taken round for each joint by itself, and held against the lightest and the heaviest that the arm is in
-    any motion of all of them together: their loops are one through the arm.
+    The loop is analysed for each joint alone, and compared with the lightest and the heaviest that the arm is in any
+    motion of all of them together: their loops are one through the arm.
 
     progress  called with the number of cases done so far. Limits are looked for once for all cases that share the
               parameters of servo, bed and law
@@ -152,8 +153,8 @@ def ends_of_motion(Lambda: np.ndarray, rotors: np.ndarray) -> tuple[float, float
 
 @frozen
 class _Known:
-    """A loop and its results: the stretches of r in which it is stable (from 0: any; to None: as far as searched), and
-    whether it grows at the r of arms so far."""
+    """A loop with its results so far: the stretches of r in which it is stable (from 0: any; to None: as far as
+    searched), and whether it grows at the r of arms so far."""
 
     loop: CaseLoop
     stretches: _Stretches
@@ -169,8 +170,8 @@ class _Known:
 
 
 class BedExperiment:
-    """An experiment with beds that have no faults, whose noise and converters would be taken for slopes, and whose
-    current has no limit, at which there is none; and what is known of its loops."""
+    """An experiment whose beds have no faults, since their noise and converters would be taken for slopes, and no
+    current limit, at which there is no slope; with the results for its loops."""
 
     def __init__(self, experiment: Experiment) -> None:
         self.experiment = _faultless(experiment)
@@ -187,13 +188,13 @@ class BedExperiment:
         return self.loops[joint].of_case(self.given(case), motor)
 
     def given(self, case: int) -> dict[str, float]:
-        """The inputs of a case. Of what noise is its own any will do: beds are without faults here."""
+        """The inputs of a case. Any value serves as its noise seed: beds have no faults here."""
         cases = self.experiment.cases
         values = {each.path: float(each.values[case]) for each in cases.coordinates}
         return values | dict.fromkeys(cases.noise, 0.0)
 
     def begun(self, case: int) -> PlainTape:
-        """A case after its first tick, in plain numbers; of no observer's covariance more than a turn is made."""
+        """A case after its first tick, in plain numbers; the loop for an observer's covariance runs only once."""
         tape = PlainTape(self.program, self.given(case), 1)
         with np.errstate(all="ignore"):
             follow(tape, self.program.start, settled=np.inf)
@@ -220,7 +221,7 @@ def _margins(on_beds: BedExperiment, case: int, span: tuple[float, float] | None
     for each, motor, r in zip(beds.mounted, motors, (Lambda.diagonal() / rotors).tolist(), strict=True):
         heads = (f"{each.joint}.servo.", f"{each.joint}.bed.", f"{each.joint}.law.")
         own = [path for path in experiment.parameters if path.startswith(heads) and ".command." not in path]
-        # Its own r is always among those searched. Where a loop grows, or not, beyond them is not known.
+        # Its own r is always among those searched. Whether a loop grows beyond them is not known.
         lightest, heaviest = LIGHTEST, HEAVIEST
         if least > 0.0 and together < np.inf:
             lightest, heaviest = min(lightest, 0.5 * least / reach), max(heaviest, 2.0 * reach * together)
@@ -237,7 +238,7 @@ def _margins(on_beds: BedExperiment, case: int, span: tuple[float, float] | None
 
 
 def _around(known: _Known, own: tuple[float, float], searched: tuple[float, float]) -> tuple[float, float | None]:
-    """The stretch around the heavier of the arm's own r, else the nearest to it; (0, 0): there is none.
+    """The stretch around the heavier of the arm's own r, else the nearest to it; (0, 0) where there is none.
 
     At its own r it is as the loop is there, also where the search has gone past a narrow stretch.
     """
@@ -260,7 +261,7 @@ def _around(known: _Known, own: tuple[float, float], searched: tuple[float, floa
 
 
 def _finite(*own: float) -> list[float]:
-    """Those r of an arm for which a loop can be looked at, rising."""
+    """The r of an arm at which a loop can be analysed, ascending."""
     return sorted({r for r in own if 0.0 < r < np.inf})
 
 
@@ -270,7 +271,7 @@ def _holds(stretch: tuple[float, float | None], r: float) -> bool:
 
 
 def grow(loop: CaseLoop, ratios: Sequence[float]) -> list[bool]:
-    """Tells of each r whether the loop grows there."""
+    """Whether the loop grows, for each r."""
     return (loop.radii(ratios) > 1.0 + STABLE).tolist()
 
 
@@ -298,8 +299,8 @@ def stretches(loop: CaseLoop, looked_at: Sequence[float], growing: Sequence[bool
 
 
 def _faultless(experiment: Experiment) -> Experiment:
-    """The experiment with beds that have no faults, whose noise and converters would be taken for slopes, and whose
-    current has no limit, at which there is none."""
+    """The experiment with beds that have no faults, since their noise and converters would be taken for slopes, and no
+    current limit, at which there is no slope."""
     from met import models
 
     parameters = dict(experiment.parameters)

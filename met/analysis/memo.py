@@ -1,8 +1,8 @@
-"""Answers of the analysis, each kept under a digest of all that it follows from, so that each is found once.
+"""Answers of analyses, each kept under a digest of everything that it depends on, so that each is computed once.
 
 The digest goes by structure, parameters and cases (`met.plan.keys.content_digest`), never by where a deck writes them:
-a deck whose lines have moved asks the same, and so do two runs that are equal. Nothing says when an answer is out of
-date, since another experiment has another digest.
+a deck whose lines have moved has the same digest, and so have two equal runs. An answer never expires, since another
+experiment has another digest.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from met.plan import Experiment, keys
 T = TypeVar("T")
 
 MOST = 500
-"""Answers that are kept where it is not known yet which are asked for; each is some kilobytes."""
+"""Number of answers kept while it is not known which will be asked for; each takes some kilobytes."""
 
 
 @frozen
 class KeptAnswer:
-    """An answer, and the digests of the questions that were asked to find it: while it is known they are not asked, and
-    yet their answers are good for another experiment that has an equal part."""
+    """An answer, and the digests of the questions that were asked to find it: these are not asked again while it is
+    known, but their answers also serve an experiment that has an equal part."""
 
     answer: Any
     within: tuple[bytes, ...]
 
 
 class AnalysisMemo:
-    """The answers that were asked for, and those that were brought along from another time.
+    """The answers of this process, and those loaded from an earlier one.
 
     asked  by their digests: what is to be brought along next time
     """
@@ -42,7 +42,7 @@ class AnalysisMemo:
         self._found = found
         self.asked: dict[bytes, KeptAnswer] = {}
         self._of_now: dict[bytes, Any] = {}
-        self._open: list[list[bytes]] = []  # digests of what was asked within each question that is being answered
+        self._open: list[list[bytes]] = []  # digests of the questions asked within each one being answered
 
     def answer(self, question: str, experiment: Experiment, find: Callable[[], T], rows: Sequence[int] = ()) -> T:
         """The answer to a question about an experiment and these rows of its case table; what `find` raises is no
@@ -65,7 +65,7 @@ class AnalysisMemo:
         return answer
 
     def _bring(self, key: bytes) -> None:
-        """Take an answer that was brought along among those that are asked for, with all that are within it."""
+        """Take a loaded answer among those that were asked for, with all that it depends on."""
         if key in self._known and key not in self.asked:
             self.asked[key] = self._known[key]
             for each in self._known[key].within:
@@ -74,7 +74,7 @@ class AnalysisMemo:
     def answer_of_now(
         self, question: str, experiment: Experiment, find: Callable[[], T], rows: Sequence[int] = ()
     ) -> T:
-        """The same of an answer that is large: it is not brought along."""
+        """The answer to a question whose answers are large: it is never loaded or saved."""
         key = keys.content_digest(question, experiment, rows)
         if key not in self._of_now:
             self._of_now[key] = find()
@@ -83,7 +83,7 @@ class AnalysisMemo:
 
     @property
     def so_far(self) -> dict[bytes, KeptAnswer]:
-        """The answers that were asked for, and before them those that were brought along and may be asked for yet: no
-        more than `MOST`, of which the first leave."""
+        """The answers that were asked for, after the loaded ones that may be asked for yet: at most `MOST`, the oldest
+        dropped first."""
         found = {**{key: each for key, each in self._known.items() if key not in self.asked}, **self.asked}
         return dict(list(found.items())[-MOST:])

@@ -1,10 +1,9 @@
-"""The modes of a linearised step, each beside what it is in truth: which of them a step makes grow, damps, or misses.
+"""The modes of a linearised step, each with the true mode: which of them the step makes grow, damps, or misses.
 
 An eigenvalue mu of the step's map M belongs to the one of dx/dt = A x whose motion it follows: with the left and right
 eigenvectors l and r of M, lambda = l A r/(l r), which is exact where M is a function of A, as of every Runge-Kutta
-method. Where eigenvectors fall together, as of a swing at the limit of damping, it is
-the eigenvalue of A of which the integrator alone makes the number that is nearest. In truth a step multiplies the mode
-by exp(lambda h).
+method. Where eigenvectors fall together, as of a swing at the limit of damping, it is the eigenvalue of A that the
+integrator maps nearest to mu. In truth a step multiplies the mode by exp(lambda h).
 """
 
 from __future__ import annotations
@@ -21,33 +20,34 @@ from met.integrators.integrator import Integrator
 from met.plan import Schedule
 
 SLOW = 0.01
-"""h |lambda| up to which a step follows anything."""
+"""h |lambda| up to which every step follows the mode."""
 
 FAST = 0.5
-"""h |lambda| above which a step is long for a mode, though it may be stable: `modified_euler` is then 3 % off in a
-step of a decay."""
+"""h |lambda| above which a step is long for a mode, though it may be stable: `modified_euler` is then 3 % off in a step
+of a decay."""
 
 TELLING = 0.1
 """Share of a mode's size at its start by which the run may differ from the truth."""
 
 TURNS = 0.1
-"""Rate of turning of the arm, as a share of |lambda|, above which a mode is no mode: it changes while it swings."""
+"""Rate of rotation of the arm, as a share of |lambda|, above which a mode is not analysed: it changes while it
+swings."""
 
 FITS = 0.01
-"""The same by which it may differ at a rate that is proposed, where it grows."""
+"""Share of a mode's size by which the run may differ from the truth at a proposed rate, where the mode grows."""
 
 FINEST = 1000
-"""Times the base rate: beyond, no rate is proposed."""
+"""Factor on the base rate beyond which no rate is proposed."""
 
 NEAR = 0.1
-"""Share by which lambda may differ from the nearest eigenvalue of A, which is taken beyond: a double root that
-semi-implicit Euler makes two of."""
+"""Share by which lambda may differ from the nearest eigenvalue of A; beyond, that eigenvalue is used: semi-implicit
+Euler splits a double root."""
 
 TOGETHER = 300.0
-"""Sum of |l_i r_i|, where that of l_i r_i is 1, above which eigenvectors have fallen together."""
+"""Sum of |l_i r_i|, where that of l_i r_i is 1, above which eigenvectors count as coincident."""
 
 LEAST = 1e-7
-"""Growth of a step, its logarithm, that differences are good for."""
+"""Smallest growth of a step, its logarithm, that differences resolve."""
 
 
 @frozen
@@ -70,23 +70,23 @@ class Mode:
 
     @property
     def shares(self) -> tuple[tuple[str, float], ...]:
-        """How much each name takes part in it, largest first: the sum is 1."""
+        """The share of each name in the mode, largest first: the sum is 1."""
         sizes = np.abs(self.weights) / np.sum(np.abs(self.weights))
         return tuple((self.names[k], float(sizes[k])) for k in np.argsort(-sizes).tolist())
 
     @property
     def growth(self) -> float:
-        """ln |mu|, of a step."""
+        """ln |mu|, the growth of a step."""
         return math.log(abs(self.factor)) if self.factor else -math.inf
 
     def grown(self, h: float, steps: int) -> float:
-        """ln of what the steps of a run make of it, where that grows and in truth does not so; else 0."""
+        """ln of the growth over the steps of a run, where the mode grows and in truth does not; else 0."""
         if self.turns or self.growth <= LEAST:
             return 0.0
         return max(0.0, steps * (self.growth - max(0.0, h * self.root.real)))
 
     def grows_in_truth(self, h: float) -> bool:
-        """True where half of its growth and more is none of the step's."""
+        """True where at least half of its growth is not due to the step."""
         return 0.0 < self.growth <= 2.0 * h * self.root.real
 
     def missed(self, h: float, steps: int) -> tuple[float, float, int]:
@@ -101,7 +101,7 @@ class Mode:
 
 
 def modes(found: StepMap, integrator: Integrator) -> Iterator[Mode]:
-    """All modes that are not slow, of all lanes; of a pair the one that turns forward."""
+    """All modes that are not slow, of all lanes; of a pair, the one with positive frequency."""
     h = found.h
     lanes = np.flatnonzero(np.isfinite(found.slope).all((1, 2)))
     truths = np.linalg.eigvals(found.slope[lanes])
@@ -142,7 +142,7 @@ def modes(found: StepMap, integrator: Integrator) -> Iterator[Mode]:
 
 
 def _answers(A: np.ndarray, integrator: Integrator, h: float) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues of A, [lane, any], each with what the integrator makes of it: as of a swing, or of a lone state."""
+    """Eigenvalues of A, [lane, any], each with the integrator's factor for it: as of a swing, or of a lone state."""
     if not len(A):
         return np.zeros((0, 0)), np.zeros((0, 0))
     roots = np.linalg.eigvals(A)

@@ -1,7 +1,7 @@
-"""The step against the arm at instants that cases pass, where a run has been: what grows there, and is not followed.
+"""Checks of the step at instants that cases have passed: modes that grow there, and modes that the step misses.
 
-At an instant the arm moves, and its modes are those of A as it is then. They are believed over the time between
-neighbouring instants that both have them, and no longer: what comes and goes between is not seen.
+At an instant the arm moves, and its modes are those of A as it is then. They count over the time between neighbouring
+instants that both show them; modes that come and go in between are missed.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from met.passing import BESIDE
 from met.plan import Experiment
 
 GROWS = 1.0
-"""ln of the growth from one instant to others, above which something is said: what was there is lost in it."""
+"""ln of the growth from one instant to others above which it is reported: the earlier state is lost in it."""
 
 NAMES = 2000
-"""Names times instants that are looked at, at most: it bounds the time, some 20 ms."""
+"""Largest number of names times instants that is analysed: it bounds the time, to some 20 ms."""
 
 LEAST_INSTANTS, MOST_INSTANTS = 8, 64
-"""Of all cases together."""
+"""Smallest and largest number of instants, of all cases together."""
 
 Found = TypeVar("Found")
 
 Owner = tuple[str, str]
-"""What takes part in a mode most, as `met.analysis.step_size.owner_of` has it."""
+"""The part that has the largest share in a mode, as from `met.analysis.step_size.owner_of`."""
 
 
 @frozen
@@ -54,7 +54,7 @@ class Passed:
     memory: Mapping[str, np.ndarray]
 
     def only(self, lanes: np.ndarray) -> Passed:
-        """Some of its lanes."""
+        """The instants of some lanes only."""
         return Passed(self.case[lanes], self.tick[lanes], {name: values[lanes] for name, values in self.memory.items()})
 
 
@@ -75,13 +75,13 @@ class Lasting:
 
 
 def instants(experiment: Experiment) -> int:
-    """The number of instants that are looked at, of all cases together."""
+    """The number of instants that are analysed, of all cases together."""
     names = 2 * len(experiment.structure.moving) + 6 * len(experiment.structure.servos) + 12
     return min(MOST_INSTANTS, max(LEAST_INSTANTS, NAMES // names))
 
 
 def telling(experiment: Experiment, memory: np.ndarray, cells: Sequence[str], count: int) -> np.ndarray:
-    """Places of so many of a case's instants: where a joint is at its ends, or fastest, and others evenly; always with
+    """Places of `count` of a case's instants: where a joint is at its ends, or fastest, and others evenly; always with
     the one that follows.
 
     memory  [instant, cell]
@@ -101,10 +101,9 @@ def telling(experiment: Experiment, memory: np.ndarray, cells: Sequence[str], co
 
 
 def lasting(experiment: Experiment, passed: Passed) -> tuple[Lasting, ...]:
-    """The findings that last, one of each kind: the worst that is unstable, that is damped, that is fast, and of
-    loops; none of a kind
-    that the poses show in which cases begin, for the check has told it. Raises Problem where the program cannot be
-    built."""
+    """The findings that last, one of each kind: the worst that is unstable, that is damped, that is fast, and of loops;
+    kinds that the starting poses show are left out, since the check has reported them. Raises Problem where the program
+    cannot be built."""
     integrator, schedule = models.find("integrator", experiment.structure.integrator), experiment.structure.schedule
     linearizer = Linearizer(experiment, passed.case.tolist(), passed.memory)
     sampled, as_it_is, times = linearizer.sampled(), linearizer.sampled(loose=False), passed.tick / schedule.base_hz
@@ -134,7 +133,7 @@ def lasting(experiment: Experiment, passed: Passed) -> tuple[Lasting, ...]:
 
 @frozen
 class _Candidate:
-    """A finding that the lanes `first` to `last` show, and `lane` most, and how much it matters among those of its
+    """A finding that the lanes `first` to `last` show, most clearly at `lane`, and its weight among those of its
     kind."""
 
     weight: float
@@ -167,7 +166,7 @@ class _Seen:
         return found
 
     def missed(self, held: frozenset[str]) -> list[_Candidate]:
-        """The mode that swings and is damped, or not damped, as it is not in truth: all the time, as of the best
+        """The mode that swings and is damped, or not, unlike in truth over the whole time, judged at its best
         instant."""
         shown = self._of(lambda mode, _: abs(mode.root.imag) > abs(mode.root.real))
         found = []
@@ -199,7 +198,7 @@ class _Seen:
         return found
 
     def _of(self, telling: Callable[[Mode, int], bool]) -> list[dict[Owner, list[Mode]]]:
-        """The modes of each lane and owner that tell something."""
+        """The modes of each lane and owner that pass a test."""
         return [
             {owner: those for owner, each in of_lane.items() if (those := [m for m in each if telling(m, lane)])}
             for lane, of_lane in enumerate(self.modes)
@@ -207,7 +206,7 @@ class _Seen:
 
 
 def _by_owner(found: StepMap, integrator: Integrator, lanes: int) -> list[dict[Owner, list[Mode]]]:
-    """Modes that the arm does not turn away from before they have swung, of each lane by their owners."""
+    """The modes of each lane by owner, without those that the arm turns away from before they have swung."""
     out: list[dict[Owner, list[Mode]]] = [{} for _ in range(lanes)]
     for mode in modes(found, integrator):
         if not mode.turns:
@@ -216,13 +215,14 @@ def _by_owner(found: StepMap, integrator: Integrator, lanes: int) -> list[dict[O
 
 
 def _over(growths: Sequence[float], times: np.ndarray, length: float) -> float:
-    """ln of the growth over all these instants, of what grows so much in a length of time: of neighbours the less."""
+    """ln of the growth over these instants, from growths over a length of time: of two neighbours, the smaller
+    counts."""
     return float(np.sum(np.minimum(growths[1:], growths[:-1]) * np.diff(times)) / length)
 
 
 def lasting_beds(experiment: Experiment, passed: Passed) -> list[tuple[Margin, float]]:
     """The joints on beds that are unstable with the heaviest or the lightest arm that neighbouring instants of a case
-    both show, and the first of these, s; none that are with the arm of the pose in which the case begins."""
+    both show, and the first of these, s; joints that are unstable in the starting pose are left out."""
     if not experiment.structure.substitutions:
         return []
     Lambda = Linearizer(experiment, passed.case.tolist(), passed.memory).loads()
@@ -257,7 +257,7 @@ def remedy_of(experiment: Experiment, found: Lasting) -> Remedy:
 
 
 def as_run(found: StepMap) -> StepMap:
-    """The lanes that are as the run has them, numbered by instant."""
+    """The lanes with the run's own state, numbered by instant."""
     own = ~found.loose
     return replace(found, case=found.case[own], loose=found.loose[own], slope=found.slope[own], rate=found.rate[own])
 
@@ -287,7 +287,7 @@ def _lasting_ones(
 def _loops(
     opened: Opened, times: np.ndarray, stretches: Sequence[tuple[int, int]], duration: float
 ) -> list[_Candidate]:
-    """The loops that are unstable for longest: with nothing wound up in their laws, as in all loose lanes."""
+    """The loops that are unstable for longest, with laws that have no stored integrals, as in all loose lanes."""
     found = opened.loops
     rates, ticks = np.full(len(times), -math.inf), np.zeros(len(times), bool)
     for lane, limit, by_ticks in growing(found, fastest(found), duration):
@@ -308,7 +308,7 @@ def _loops(
 
 
 def _news(experiment: Experiment, found: Sequence[Lasting]) -> tuple[Lasting, ...]:
-    """Those of a kind that the poses in which cases begin do not show: the check has told these."""
+    """The findings of kinds that the starting poses do not show: the check has reported those."""
     if not found:
         return ()
     begun = step_size(experiment, chosen_cases(experiment))

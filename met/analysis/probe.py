@@ -1,7 +1,7 @@
-"""Uses of a servo's inputs, found by recording its functions once with names for numbers: no engine is built.
+"""Uses of a servo's inputs, found by recording its functions once with placeholders for numbers: no engine is built.
 
-For what a compiler says before any program is built. A model that cannot be recorded so says nothing here: what is
-wrong with it is told where its program is built.
+A compiler asks this before any program is built. A model that cannot be recorded gives no answer here: its fault is
+reported where its program is built.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ def reads(use: ServoUse, values: Mapping[str, Any]) -> frozenset[str] | None:
 
 
 def of_law(use: ServoUse, values: Mapping[str, Any]) -> Hashable:
-    """All that `reads` goes by: uses of a servo in which this is equal read the same."""
+    """The part of a servo's use that determines `reads`: uses with equal parts read the same."""
     decides = tuple((each.name, values[each.name]) for each in servo_parts(use).parameters if not _is_input(each))
     kind = use.command.kind if use.command is not None else "none"
     return use.model, use.words, use.continuous, kind, decides
 
 
 def accelerates(use: ServoUse, values: Mapping[str, Any]) -> bool | None:
-    """True where the servo gives its joint's acceleration, at least at times. None: it could not be recorded."""
+    """True where the servo prescribes its joint's acceleration, at least at times. None: it could not be recorded."""
     servo, parts, graph = models.find("servo", use.model, use.place), servo_parts(use), Graph()
     q, qd, time, begin = (graph.input(name) for name in ("q", "qd", ":time", ":begin"))
     joint = JointMotion(q, qd, time, begin, use.command.kind if use.command is not None else "none")
@@ -63,7 +63,7 @@ def accelerates(use: ServoUse, values: Mapping[str, Any]) -> bool | None:
 
 
 def _parameters(graph: Graph, declared: Iterable[Any], values: Mapping[str, Any]) -> SimpleNamespace:
-    """Names for numbers; words, lists and numbers that decide the program as they are."""
+    """Placeholders for numbers; words, lists and numbers that shape the program keep their values."""
     made: dict[str, Any] = {}
     for each in declared:
         path = f":{each.name}"
@@ -77,7 +77,7 @@ def _parameters(graph: Graph, declared: Iterable[Any], values: Mapping[str, Any]
 
 
 def _is_input(parameter: Parameter) -> bool:
-    """True of a parameter that has a name for its number."""
+    """True for a parameter whose number has a placeholder."""
     return parameter.shape == "vector" or (parameter.shape == "number" and not parameter.decides)
 
 
@@ -87,7 +87,7 @@ def _named(graph: Graph, parts: Iterable[Any]) -> SimpleNamespace:
 
 
 def _tried(function: Callable[..., T], *arguments: Any) -> T | None:
-    """Call a model's function; None where it raises anything, for it is its author's code."""
+    """The result of a model's function; None where it raises anything, since it is its author's code."""
     try:
         return function(*arguments)
     except KeyboardInterrupt:

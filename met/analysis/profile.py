@@ -2,8 +2,8 @@
 
 How a part's time is found. The kernel is made of sections, pieces of straight code. Each is compiled alone, called
 again and again from a state that the run went through, and its best time taken; times how often the run calls it a
-step, which is counted. What is told apart within a section (servo physics, environment, dynamics) shares its time by
-operations. What two parts have in common is counted where it was first asked for.
+step, which is counted. Parts within a section (servo physics, environment, dynamics) share its time by operations. An
+operation that two parts share is counted where it was first used.
 
 The whole run is timed as well, in turns with its sections. The parts never add up to it exactly: alone, a section has
 its code and data at hand, and in the run short ones are put in their caller's place.
@@ -36,7 +36,7 @@ from met.trace.recorder import record
 from met.trace.recording import Branch, CodeSection, RecordedControl, Recording, RecordSection, RunSection
 
 FLOPS = {"add": 1, "sub": 1, "mul": 1, "div": 1, "sqrt": 1, "fma": 2}
-"""Operations that count as arithmetic, and for how much; comparing, choosing and moving count for none."""
+"""Weights of the operations that count as arithmetic; comparing, choosing and moving do not count."""
 
 WORK = {
     "bed": "emulated beds",
@@ -66,10 +66,10 @@ WORK = {
 WITHIN = ("servo physics", "environment", "dynamics", "sensors")
 """Parts of a stage (met/program/evaluation.py), in order."""
 
-_BLOCKS, _MANY = 4, 256  # blocks of cases that are timed together, and of a short run at most
+_BLOCKS, _MANY = 4, 256  # blocks of cases that are timed together, and at most of a short run
 _STEPS = 5_000  # steps times blocks of the run that is timed, at most: well under a second, some 100 MB of rows
-_CALLS, _STARTS = 1000, 4  # calls of a section alone from one state, and how often from that state again
-_TURNS = 9  # times that each is timed
+_CALLS, _STARTS = 1000, 4  # calls of a section alone from one state, and the number of repeats from that state
+_TURNS = 9  # number of times that each is timed
 
 Work = Callable[[], object]
 
@@ -153,7 +153,7 @@ class RunProfile:
 
 
 def profile(experiment: Experiment) -> RunProfile:
-    """Measures an experiment's kernel on this core. Raises Problem where the experiment cannot be built."""
+    """Measure an experiment's kernel on this core. Raises Problem where the experiment cannot be built."""
     begun = time.perf_counter()
     recording = record(build(experiment))
     recorded = time.perf_counter()
@@ -197,7 +197,7 @@ def profile(experiment: Experiment) -> RunProfile:
 
 
 def _chains() -> tuple[Work, int]:
-    """Work that keeps a core at its peak, and how many fused multiply-adds it is: enough chains to hide latency."""
+    """Work that keeps a core at its peak, and the number of its fused multiply-adds: enough chains to hide latency."""
     chains, length, blocks, ticks = 12, 16, 4, 2000
 
     def start(tape: Tape) -> None:
@@ -232,7 +232,7 @@ def _chains() -> tuple[Work, int]:
 
 
 def hoisted(experiment: Experiment, recording: Recording) -> Iterator[Input]:
-    """For each coordinate, the work that is done before the first step, and what is left to a step."""
+    """For each coordinate, the work that is done before the first step, and the work left to a step."""
     sections = {step.section for step in _all(recording.start) if isinstance(step, RunSection)}
     ticking = {step.section for step in _all(recording.tick) if isinstance(step, (RunSection, RecordSection))}
     for coordinate in experiment.cases.coordinates:
@@ -261,7 +261,7 @@ def _reads(section: CodeSection, cells: set[str]) -> int:
 
 
 def by_part(section: CodeSection) -> dict[str, tuple[int, int]]:
-    """Live operations and flops of a section by the part that they belong to, in order of first appearance."""
+    """Live operations and flops of a section by part, in order of first appearance."""
     found: dict[str, tuple[int, int]] = {}
     parts = iter((*section.parts, (len(section.nodes), "")))
     name, (until, following) = "", next(parts)
@@ -286,7 +286,7 @@ def _parts(
     found: dict[tuple[str, str, bool], WorkCost] = {}
     for (number, event), rate in calls.items():
         section = recording.sections[number]
-        shares = by_part(section) or {section.parts[0][1]: (0, 0)}  # what only moves numbers has no operations
+        shares = by_part(section) or {section.parts[0][1]: (0, 0)}  # without any operation
         whole = sum(ops for ops, _ in shares.values()) or 1
         for path, (ops, flops) in shares.items():
             phase, _, part = path.partition("/")
@@ -323,11 +323,11 @@ def _calls(made: Kernel, cases: np.ndarray, ticks: int) -> dict[tuple[int, bool]
     found: dict[tuple[int, bool], float] = {}
 
     def ticks_of(first: int, divisor: int) -> int:
-        """Ticks from the first to the last that the divisor divides."""
+        """The number of multiples of the divisor from the first tick to the last."""
         return ticks // divisor - (first + divisor - 1) // divisor + 1
 
     def note(body: tuple[RecordedControl, ...], first: int, divisor: int, event: float | None) -> None:
-        """event: how often a loop turns that the body stands in."""
+        """Count the calls in a body. event: number of turns of the enclosing loop"""
         for node in body:
             match node:
                 case RunSection(section):
@@ -343,7 +343,7 @@ def _calls(made: Kernel, cases: np.ndarray, ticks: int) -> dict[tuple[int, bool]
                     note(inner, first, divisor, next(turns))
 
     note(made.recording.start, 0, 1, None)
-    found.clear()  # of the start only the loops' counters were of interest: they come first
+    found.clear()  # of the start only the loops' counters matter: they come first
     note(made.recording.tick, 0, 1, None)
     return found
 
@@ -359,7 +359,7 @@ def _alone(made: Kernel, number: int, state: Block) -> Work:
     else:
         program = replace(program, tick=())
     single = Recording(program, (section,), (), (step,), (), recording.cells)
-    # Not inlined: within a loop of its own, a compiler would find that nothing changes, and do much of it once.
+    # Not inlined: in a loop of its own a compiler would find that nothing changes, and skip much of the work.
     alone = backends.find().load(single, lanes=made.lanes, inline=False).block(state.inputs.T)
 
     def work() -> None:
@@ -376,7 +376,7 @@ def _alone(made: Kernel, number: int, state: Block) -> Work:
 def _cases(experiment: Experiment, lanes: int, steps: int) -> np.ndarray:
     """Inputs of whole blocks, [case, input], taken evenly from the case table; few cases are repeated.
 
-    A few blocks; as many more as a short run needs for its time to be that of its steps, not of the call.
+    There are a few blocks, and more for a short run, so that its time is that of its steps and not of the call.
     """
     count = experiment.cases.count
     blocks = max(min(_BLOCKS, -(-count // lanes)), min(_MANY, -(-_STEPS // steps)))
@@ -384,7 +384,8 @@ def _cases(experiment: Experiment, lanes: int, steps: int) -> np.ndarray:
 
 
 def _best(works: Sequence[Work]) -> list[float]:
-    """Least seconds of the core of several turns each, after one to warm up: what else the machine does hits all alike.
+    """The shortest CPU time of several turns of each, in s, after one to warm up: the machine's other load then hits
+    all alike.
 
     The core's own time, not the clock's: waiting for a core that another process has is not counted.
     """

@@ -1,8 +1,8 @@
-"""An experiment with a shorter step of the dynamics, for solution verification (NASA-STD-7009): what the step costs.
+"""An experiment with a shorter step of the dynamics, for solution verification (NASA-STD-7009).
 
 Only the dynamics are refined. Servos, guides, sensors, beds, recorded rows and noise keep their instants in time, so
-that what differs between an experiment and its refinement is the error of the integration, and how often what is
-observed at each step is looked at.
+that an experiment and its refinement differ only in the error of integration, and in how often quantities that are
+observed at each step are sampled.
 """
 
 from __future__ import annotations

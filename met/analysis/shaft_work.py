@@ -1,4 +1,4 @@
-"""The work of the two motors of a bed: torques, rate and acceleration of their shaft, as cases of a run have them.
+"""The work of a bed's two motors: torques, rate and acceleration of their shaft, in cases of a run.
 
 Of a joint whose motor is on a bed already, the simulated bed says it, at the ticks of its servo:
 
@@ -36,18 +36,19 @@ from met.substitution.bed import DriveCommand
 from met.substitution.bed_scale import BedScale
 
 BLOCK_BYTES = 128 << 20
-"""Size of the histories that are held at once, where one case's are not larger."""
+"""Size of the histories that are held at once; a single case may exceed it."""
 
 OF_JOINT = ("qdd", "servo.motor_rate", "servo.motor_torque", "servo.voltage", "tau_load", "J_eff")
 ELECTRICAL = {"kt": "N*m/A", "resistance": "ohm"}
-"""What a bed's motor has by its servo's motor and the scale, where its model does not declare it."""
+"""Quantities of a bed's motor that follow from its servo's motor and the scale where its model does not declare
+them."""
 
 OF_BED = ("qdd", "bed.shaft_rate", "law.torque", "J_eff")
 
 
 @frozen
 class ShaftWork:
-    """Some cases' work, [case, instant]; not-a-number after a case has failed. Shaft side.
+    """The work of some cases, [case, instant]; not-a-number after a case has failed. Shaft side.
 
     case          positions in the table of the sweep, [case];  time: of the instants, s, [instant]
     rate          w, rad/s;  acceleration: w', rad/s^2
@@ -80,7 +81,7 @@ class ShaftWork:
     limited: np.ndarray
 
     def load_on(self, inertia: float | np.ndarray) -> np.ndarray:
-        """The load motor's torque on a shaft of another inertia, kg m^2, N m, [case, instant]."""
+        """The load motor's torque on a shaft of another inertia (kg m^2), N m, [case, instant]."""
         return self.load + (np.broadcast_to(inertia, self.shaft.shape) - self.shaft)[:, None] * self.acceleration
 
 
@@ -146,7 +147,7 @@ def shaft_work(
 
 
 def _recording(experiment: Experiment, joint: str, names: Sequence[str]) -> Experiment:
-    """The experiment with these channels of a joint as its records, at each instant at which they change."""
+    """The experiment with these channels of a joint as its only records, at each instant at which they change."""
     structure = experiment.structure
     use = servo_of(experiment, joint)
     assert use is not None
@@ -159,13 +160,13 @@ def _recording(experiment: Experiment, joint: str, names: Sequence[str]) -> Expe
 
 
 def drive_of(use: Substitution) -> DriveCommand:
-    """The quantity that the drive of a joint's bed is told."""
+    """The quantity that the drive of a joint's bed is commanded."""
     told: DriveCommand = models.find("bed", use.bed, use.place).drive
     return told
 
 
 def _names(experiment: Experiment, joint: str) -> tuple[str, ...]:
-    """The channels of a joint that its motors' work is made of."""
+    """The channels of a joint that the work of its motors is computed from."""
     use = substitution_of(experiment, joint)
     if use is None:
         return OF_JOINT
@@ -255,8 +256,8 @@ def parameter(experiment: Experiment, path: str, rows: np.ndarray) -> np.ndarray
 
 
 def on_bed(experiment: Experiment, joint: str, *, delay: int) -> Experiment:
-    """The experiment with the joint's motor on an emulated bed without faults, as a deck that names nothing has it; as
-    it is where the deck has one. The law is that of the other joints on beds, where there are some."""
+    """The experiment with the joint's motor on an emulated bed without faults, with all defaults; unchanged where the
+    deck has a bed. The law is that of the other joints on beds, where there are some."""
     if substitution_of(experiment, joint) is not None:
         return experiment
     from met.substitution import BEDS, LAWS

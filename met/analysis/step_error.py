@@ -1,10 +1,9 @@
-"""The error of a number by the length of the step, from runs with the step, half and a quarter of it.
+"""The error of a number due to the length of the step, from runs with the step, half and a quarter of it.
 
-Richardson's extrapolation: where x(h) = x + c h^p, the differences d1 = x(h) - x(h/2) and d2 = x(h/2) - x(h/4) give
-p = log2(d1/d2) and the error c h^p = d1 2^p/(2^p - 1). Where the observed p is not that of the integrator, or that of
-a number which is looked at once a step and no better (1), the estimate has nothing to stand on; then three times the
-larger difference is a cautious bound, as the grid convergence index has it for two grids (P. J. Roache, Journal of
-Fluids Engineering 116, 1994, 405-413).
+Richardson's extrapolation: where x(h) = x + c h^p, the differences d1 = x(h) - x(h/2) and d2 = x(h/2) - x(h/4) give p =
+log2(d1/d2) and the error c h^p = d1 2^p/(2^p - 1). Where the observed p is not that of the integrator, nor that of a
+number sampled once a step (1), the estimate is not valid; then three times the larger difference is a cautious bound,
+as the grid convergence index has it for two grids (P. J. Roache, Journal of Fluids Engineering 116, 1994, 405-413).
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ import math
 from met.frozen import frozen
 
 NEAR = 0.3
-"""How far an observed order may be from the expected one."""
+"""Largest difference of an observed order from the expected one."""
 
 ROUNDING = 1e-10
 """Differences below this share of the number are rounding, from which no order follows."""
@@ -22,7 +21,7 @@ ROUNDING = 1e-10
 
 @frozen
 class StepError:
-    """The error of one number by the step.
+    """The error of one number due to the step.
 
     error  estimate of |x(h) - x(0)|, or a bound of it where the order is unclear; in the number's unit
     order  the observed power of the step; not a number where differences are of rounding, or not finite
@@ -64,9 +63,9 @@ def step_error(first: float, second: float, scale: float, expected: int) -> Step
 def instant_error(first: float, second: float, both: float, instant: float) -> StepError:
     """The error at the step h of an instant that is seen at whole steps alone, such as a settling time: a bound.
 
-    With a quarter of the step it is known to `instant`, a quarter of h, and to what the quarter's own integration may
-    err, which is below the difference from the half where the error falls at all. Such differences are whole steps, so
-    no order follows from them; they are clear where they do not grow by more than what is seen of them.
+    With a quarter of the step it is known to `instant`, a quarter of h, and to the error of that run's integration,
+    which is below its difference from the run with half the step where the error falls at all. Such differences are
+    whole steps, so no order follows from them; they are clear where they do not grow by more than their resolution.
 
     first    |x(h) - x(h/2)|, s
     second   |x(h/2) - x(h/4)|, s

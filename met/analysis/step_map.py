@@ -1,10 +1,10 @@
-"""The step of the dynamics linearised: what it makes of a small change of the state, and what the truth does.
+"""The linearised step of the dynamics, and the true linear motion over the same time.
 
 The program's own phases are run over arrays, once for all changes: the derivative's slopes give A of dx/dt = A x, with
 all that has a part in the motion, and the inertia that the joints have at that pose: springs, gears, damping, filters,
-laws that are continuous, models of other packages. What computers hold is held, and friction keeps its modes. M of
-x+ = M x is what the integrator makes of A; or of the program, stage by stage. About a state that stands still these are
-one. Where it does not, the second has the change of A within the step too, and is no measure of the integrator.
+laws that are continuous, models of other packages. The outputs of computers are held, and friction keeps its modes. M
+of x+ = M x is the integrator's map for A, or that of the program, stage by stage. About a state at rest the two are
+equal. About a moving state the second includes the change of A within the step, and is no measure of the integrator.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class SampledLoops:
 
 class Linearizer:
     """The program of an experiment at an instant, the first one or another, for several cases at once: each as it is
-    there, where what is at rest and rubs is held, and loose. A motor on a bed lets its joint turn on as it does."""
+    there, with resting parts held by their friction, and loose. A motor on a bed lets its joint keep turning."""
 
     def __init__(
         self,
@@ -94,8 +94,7 @@ class Linearizer:
         opened: bool = False,
     ) -> None:
         """memory: cells of these cases at instants that they pass, [lane]; a case may be there several times. None:
-        where they begin. opened: laws that are continuous are no part of the slopes, but beside them as those that
-        tick."""
+        where they begin. opened: continuous laws are kept apart from the slopes, as laws that tick are."""
         structure, self._given = experiment.structure, (experiment, cases, memory)
         self.continuous = frozenset(use.joint for use in structure.servos if use.continuous)
         if opened:
@@ -105,7 +104,7 @@ class Linearizer:
         self.cases = np.asarray(cases, dtype=np.int64)
         table = {each.path: each.values[self.cases] for each in experiment.cases.coordinates}
         lanes = len(self.cases)
-        # of what noise is a case's own, any will do: none of it is changed
+        # any value serves as the noise seed: none of it is changed
         given = table | dict.fromkeys(experiment.cases.noise, np.zeros(lanes))
         begun, step = LaneTape(self.builder.schedule.base_hz, given, lanes), self.builder.step
         with np.errstate(all="ignore"):
@@ -154,14 +153,14 @@ class Linearizer:
         return StepMap(np.repeat(self.cases, 2), self.loose, self.cells, positions, A, M, rate, h)
 
     def opened(self) -> Linearizer:
-        """The same with laws that are continuous beside the slopes."""
+        """The slopes with continuous laws kept apart."""
         return Linearizer(*self._given, opened=True)
 
     def sampled(
         self, *, loose: bool = True, scaled: Mapping[str, Mapping[str, float]] | None = None
     ) -> SampledLoops | None:
-        """The cases with their laws, loose or as the run has them; None where there is no law that is closed over the
-        arm, or a motor is on a bed.
+        """The cases with their laws, loose or as the run has them; None where no law is closed over the arm, or a motor
+        is on a bed.
 
         scaled  by joint: what parameters of its servo are multiplied by in its law, by name
         """
@@ -187,7 +186,7 @@ class Linearizer:
         )  # fmt: skip
 
     def gains(self, joint: str) -> tuple[Parameter, ...]:
-        """The parameters of a joint's servo that are of its law alone."""
+        """The parameters of a joint's servo that only its law uses."""
         (actuator,) = (each for each in self.laws if each.use.joint == joint)
         with np.errstate(all="ignore"):
             return laws.gains(self.builder, actuator, self.tape.only(self.loose))
@@ -202,7 +201,7 @@ class Linearizer:
 
     @property
     def _turned(self) -> tuple[str, ...]:
-        """Coordinates of free bodies that are turns: at the start they are 0."""
+        """Rotation coordinates of free bodies: at the start they are 0."""
         return tuple(name for body in bodies.bodies(self.system) for name in body.coordinates[3:])
 
     def _moved(self, cells: Sequence[str], block: slice = slice(None)) -> tuple[LaneTape, dict[str, Any], np.ndarray]:
@@ -217,7 +216,7 @@ class Linearizer:
         return tape.spread(2 * sizes.shape[1]), dict(zip(cells, moved, strict=True)), sizes
 
     def _slopes(self, wide: LaneTape, moved: Mapping[str, Any], sizes: np.ndarray) -> np.ndarray:
-        """Slopes of the state: [lane, cell, what was moved]."""
+        """Slopes of the state: [lane, cell, moved cell]."""
         step = self.builder.step
         wide.cells.update({STAGE + name: moved[name] for name in self.cells})
         wide.write(f"{STAGE}fraction", 0.0)
@@ -229,8 +228,8 @@ class Linearizer:
         return differences(slopes, self.cells, sizes)
 
     def _braked(self, tape: LaneTape) -> dict[str, np.ndarray]:
-        """The joints that brakes hold where a case begins, and are as strong as the run ends: a truth for each lane.
-        Where one slips later, the instants that the case passes show it."""
+        """The joints that brakes hold where a case begins, and as strong as at the run's end: a truth for each lane. A
+        brake that slips later shows at the instants that the case passes."""
         system, step = self.system, self.builder.step
         if not system.braked:
             return {}
@@ -248,8 +247,8 @@ class Linearizer:
         }
 
     def _loosen(self, held: Mapping[str, np.ndarray]) -> None:
-        """Lets go in the loose lanes: rates and what computers hold are 0, and all dry friction is of sliding, but for
-        that of joints which brakes hold."""
+        """Release the loose lanes: rates and computers' outputs are 0, and all dry friction is sliding, except at
+        joints held by brakes."""
         tape, step, loose = self.tape, self.builder.step, self.loose
         memory = [f"{each.path}.{part.name}" for each in self.system.working for part in each.parts.memory]
         first = [cell_names.FIRST(name) for name in memory]
@@ -264,7 +263,7 @@ class Linearizer:
             tape.cells[name] = np.where(lets_go, 1.0, tape.lane(name))
 
     def _of_stages(self) -> np.ndarray:
-        """M as the program's own phases make it of changed states."""
+        """M from the program's own phases, run from changed states."""
         step, free, turned = self.builder.step, bodies.bodies(self.system), self._turned
         wide, moved, sizes = self._moved(self.cells)
         wide.cells.update({name: value for name, value in moved.items() if name.removesuffix(".q") not in turned})
@@ -284,8 +283,8 @@ def _blocks(count: int, size: int) -> Iterator[slice]:
 
 
 def linear_step(integrator: Integrator, A: np.ndarray, positions: int, h: float) -> np.ndarray:
-    """M of a step of h s of dx/dt = A x, where x is that many positions, as many rates, then states; A may be several,
-    [..., name, name]."""
+    """M of a step of h s of dx/dt = A x, where x is `positions` positions, as many rates, then states; A may be
+    several, [..., name, name]."""
     n, size = positions, A.shape[-1]
 
     def motion(x: np.ndarray) -> Motion:
@@ -303,7 +302,8 @@ def linear_step(integrator: Integrator, A: np.ndarray, positions: int, h: float)
 
 
 def _turns(body: bodies.FreeBody, tape: LaneTape, n: int) -> dict[str, np.ndarray]:
-    """The turns between the orientations of lanes, and that of the first lane of their case: rotation vectors, rad."""
+    """The rotations from the orientation of the first lane of each case to those of its lanes: rotation vectors,
+    rad."""
     now = np.stack([tape.lane(cell) for cell in body.orientation]).reshape(4, -1, 2 * n)
     w0, x0, y0, z0 = (part[:, :1] for part in now)
     w, x, y, z = now

@@ -1,4 +1,4 @@
-"""Modes of an arm with all that acts on it which the step of the dynamics makes grow, damps, or is long for."""
+"""Modes of the whole linearised arm which the step of the dynamics makes grow, damps, or is long for."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from met.analysis.blame import Unstable
 
 LANES = 300
-"""Names times cases that are looked at, at most: it bounds the time, some 50 ms."""
+"""Largest number of names times cases that is analysed: it bounds the time, to some 50 ms."""
 
 
 @frozen
@@ -65,9 +65,9 @@ class Remedy:
 
 @frozen
 class StepSize:
-    """The findings on some cases: cases that were looked at; the fastest mode of the first, its owner and joint,
-    where there is one; the largest h |lambda|; ln of the largest growth over a run; faults, the worst of each kind;
-    whether all slopes are numbers; loops of servos that tick and are unstable; the map that all this is of."""
+    """The findings on some cases: the cases; the fastest mode of the first, its owner and joint, where there is one;
+    the largest h |lambda|; ln of the largest growth over a run; the worst fault of each kind; whether all slopes are
+    finite; unstable loops of sampled servos; and the map that all this comes from."""
 
     cases: tuple[int, ...]
     mode: Mode | None
@@ -81,13 +81,13 @@ class StepSize:
     map: StepMap
 
     def without_matrices(self) -> StepSize:
-        """The same in little memory: of the map only what says of which cases it is."""
+        """The findings without matrices, to save memory: of the map, only the cases are kept."""
         nothing = np.empty(0)
         return replace(self, map=replace(self.map, names=(), slope=nothing))
 
 
 def chosen_cases(experiment: Experiment, also: Iterable[int] = ()) -> tuple[int, ...]:
-    """The first case, those in which each coordinate is least and largest, and `also`; as many as time allows."""
+    """The first case, those in which each coordinate is smallest and largest, and `also`; as many as time allows."""
     wanted = [0, *also]
     for coordinate in experiment.cases.coordinates:
         wanted += ends(coordinate.values)
@@ -101,10 +101,11 @@ def chosen_cases(experiment: Experiment, also: Iterable[int] = ()) -> tuple[int,
 
 
 def step_size(experiment: Experiment, cases: Sequence[int], memo: AnalysisMemo | None = None) -> StepSize:
-    """The step of these cases against what it should follow. Raises Problem where the program cannot be built.
+    """The modes of these cases that the step should follow, and its faults. Raises Problem where the program cannot be
+    built.
 
-    Chains of a large arm that do not act on each other are looked at one by one, and only where there is something to
-    say of one the whole arm is. memo: of other experiments, which may have equal chains
+    Chains of a large arm that do not act on each other are analysed one by one, and the whole arm only where one has a
+    fault. memo: answers about other experiments, which may have equal chains
     """
     parts = chains(experiment) if ticks_and_steps(experiment.structure) <= MOST_EVENTS else ()
     memo = memo if memo is not None else AnalysisMemo()
@@ -120,8 +121,7 @@ def step_size(experiment: Experiment, cases: Sequence[int], memo: AnalysisMemo |
 
 
 def _of_chain(chain: Experiment, cases: Sequence[int], memo: AnalysisMemo) -> StepSize | None:
-    """The findings on a chain, in little memory; None where there is something to say of it, for which the whole arm is
-    looked at."""
+    """The findings on a chain, without matrices; None where it has a fault, so that the whole arm is to be analysed."""
     looked = _look(chain, cases, memo)
     if looked.may_grow(chain):
         return None
@@ -129,21 +129,21 @@ def _of_chain(chain: Experiment, cases: Sequence[int], memo: AnalysisMemo) -> St
     if found.faults or not found.finite:
         return None
     mode = found.mode
-    if mode is not None:  # of what takes part in it, the owner alone is asked for
+    if mode is not None:  # of the mode's participants only the owner is needed
         owner = next(name for name in mode.names if _owner(name) == (found.owner, found.joint))
         mode = replace(mode, names=(owner,), weights=np.ones(1))
     return replace(found.without_matrices(), mode=mode)
 
 
 def _look(part: Experiment, cases: Sequence[int], memo: AnalysisMemo) -> _Look:
-    """The look at a chain, which is the same however long it runs."""
+    """The modes and frames of a chain, which are the same however long it runs."""
     schedule = replace(part.structure.schedule, ticks=part.structure.schedule.dynamics)
     endless = replace(part, structure=replace(part.structure, schedule=schedule))
     return memo.answer_of_now("look", endless, lambda: _Look(endless, cases), cases)
 
 
 def _named(found: StepSize, names: Mapping[str, str]) -> StepSize:
-    """The findings on a chain with its joints called as the arm calls them. names: by what they are called"""
+    """The findings on a chain with the arm's own names for its joints. names: the arm's names by the chain's"""
     if found.mode is None:
         return found
     ways = (name.partition(".") for name in found.mode.names)
@@ -153,7 +153,7 @@ def _named(found: StepSize, names: Mapping[str, str]) -> StepSize:
 
 
 def _together(parts: Sequence[StepSize]) -> StepSize:
-    """The findings on an arm of which nothing is to be said, from those on its chains."""
+    """The findings on an arm without faults, from those on its chains."""
     first = parts[0].without_matrices()
     shown = max((each for each in parts if each.mode is not None), key=_shown, default=first)
     return replace(
@@ -167,7 +167,7 @@ def _together(parts: Sequence[StepSize]) -> StepSize:
 
 
 def _shown(found: StepSize) -> tuple[float, bool]:
-    """The order of the fastest modes of the first case."""
+    """The sort key of findings by the fastest mode of the first case."""
     assert found.mode is not None
     return _speed(found.mode, found.map.h)
 
@@ -177,7 +177,7 @@ def _speed(mode: Mode, h: float) -> tuple[float, bool]:
 
 
 class _Look:
-    """An arm's modes and frames in some cases, whatever time a run takes."""
+    """An arm's modes and frames in some cases, without regard to the length of a run."""
 
     def __init__(self, experiment: Experiment, cases: Sequence[int]) -> None:
         self.cases = cases
@@ -187,7 +187,7 @@ class _Look:
         self.rates = fastest(self.sampled) if self.sampled is not None else np.zeros(len(cases))
 
     def may_grow(self, experiment: Experiment) -> bool:
-        """True where something is to be said of loops, or a frame is no number."""
+        """True where a loop may be unstable, or a frame is not finite."""
         if self.sampled is None:
             return False
         duration = experiment.structure.schedule.duration
@@ -252,7 +252,7 @@ def _faults(
 def remedy(
     experiment: Experiment, found: StepMap, fault: StepFault, memory: Mapping[str, np.ndarray] | None = None
 ) -> Remedy:
-    """The rate and the integrators that would do, and what of the environment is the cause.
+    """The rate and the integrators that remove a fault, and the environment model that causes it.
 
     found   the map that has the mode;  memory: of the case at its instant, one lane, as `Linearizer` takes it
     """
@@ -271,7 +271,7 @@ def remedy(
 
 
 def owner_of(mode: Mode) -> tuple[str, str]:
-    """The owner of a mode, which takes part in it most, in words; and the joint's name where it is one, or its
+    """The owner of a mode, which has the largest share in it, in words; and the joint's name where it is one, or its
     servo."""
     sums: dict[tuple[str, str], float] = {}
     for name, share in mode.shares:
@@ -303,7 +303,7 @@ def _followed(found: StepMap, mode: Mode, integrator: Integrator, steps: int) ->
 
 
 def _cause(experiment: Experiment, mode: Mode, kind: str, memory: Mapping[str, np.ndarray] | None) -> str:
-    """The environment model without which the case has no such mode: none that fast, or none that grows so."""
+    """The environment model without which the case has no mode that fast, or none that grows so."""
     structure = experiment.structure
     integrator = models.find("integrator", structure.integrator)
     for use in structure.environment:

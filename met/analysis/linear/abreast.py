@@ -1,7 +1,7 @@
-"""Cases under way side by side, and their periods linearised at once: numbers are columns, of a row a case.
+"""Cases carried side by side, and their periods linearised together: numbers are columns with a row for each case.
 
-The operations are those that one case by itself has (`flow`), rounded alike: a case has the same bits in any company.
-A case that an event comes to on the way is noted, and is to be looked at by itself.
+The operations and their rounding are those of a single case (`flow`), so that a case has the same bits in any company.
+A case with an event on the way is noted, and has to be linearised alone.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from met.trace.tangents import PRODUCTS, TangentSection
 Key = TypeVar("Key")
 
 EVENTS = frozenset({"crossing", *HANDS_OVER})
-"""Loops that have a turn where something happens across which there is no derivative, by the cell that they go by."""
+"""Loops that run where something happens across which there is no derivative, by the cell that counts them."""
 
 SETTLED = 1e-12
-"""Share of its numbers by which a turn of a loop changes them once they have settled."""
+"""Relative change of its numbers by which a settled loop still moves in a turn."""
 
 MOST_ABREAST = 64
-"""Cases that are carried side by side: more take hardly less time each, and more memory."""
+"""Largest number of cases carried side by side: more hardly save time, and take more memory."""
 
 
 class FlowAbreast(Flow):
@@ -58,24 +58,24 @@ class FlowAbreast(Flow):
         return cls(flows[0].program, inputs, cells, flows[0].tick, len(flows))
 
     def case(self, place: int) -> Flow:
-        """A case by itself, without its tangents."""
+        """A single case, without its tangents."""
         inputs, cells = ({n: of_case(x, place) for n, x in some.items()} for some in (self.inputs, self.cells))
         return Flow(self.program, inputs, cells, self.tick)
 
     def begin_settled(self) -> None:
-        """The start of a run, in which what goes round until it has settled goes no farther than that."""
+        """Start the run; a loop that repeats until it has settled stops at `SETTLED`."""
         self._settles = True
         self.begin()
         self._settles = False
 
     def begin_as(self, begun: Mapping[str, Any]) -> None:
-        """The start of cases of which one has begun as these cells say, with all that loops have settled: of the others
-        what differs from case to case."""
+        """Start the cases from the cells of one that has begun, with all loops settled; only numbers that differ
+        between cases are computed."""
         self._follow(step for step in self.program.recording.start if not isinstance(step, Branch))
         self.cells = dict(begun) | {name: each for name, each in self.cells.items() if np.ndim(each)}
 
     def run(self, number: int) -> None:
-        """One section, of all cases."""
+        """Run one section for all cases."""
         section, moves = self.program.sections[number], bool(self.tangents)
         with np.errstate(all="ignore"):
             of = values_abreast(section, self._leaf, self.opposite.get(self._runs, {}), plain=not moves)
@@ -100,7 +100,8 @@ class FlowAbreast(Flow):
         self.unusual |= self._of_each(truth)
 
     def modes(self) -> dict[str, Any]:
-        """Modes of all that may have dry friction, as columns or numbers; 1 of what has none in a case."""
+        """Modes of everything that may have dry friction, as columns or numbers; 1 where a case has no friction
+        there."""
         found = {}
         for each in self.program.builder.step.sticking:
             has, mode = each.level is not None or self.rubs(each) != 0.0, self.mode(each)
@@ -108,7 +109,7 @@ class FlowAbreast(Flow):
         return found
 
     def _of_each(self, truth: Any) -> np.ndarray:
-        """A truth of each case, [case]."""
+        """A truth for each case, [case]."""
         return np.broadcast_to(truth, (self.count, 1))[:, 0]
 
     def _any(self, move: Any) -> np.ndarray:
@@ -134,7 +135,7 @@ class FlowAbreast(Flow):
         self._going = outer
 
     def _stay(self, cells: Mapping[str, Any], tangents: Mapping[str, Any], goes: np.ndarray) -> None:
-        """The memory as it was before, of the cases that do not go round. goes: [case, 1]"""
+        """Keep the former memory of the cases that do not repeat the loop. goes: [case, 1]"""
         memory: tuple[tuple[Any, Mapping[str, Any]], ...] = ((self.cells, cells), (self.tangents, tangents))
         for now, before in memory:
             for name in now.keys() | before.keys():
@@ -144,7 +145,7 @@ class FlowAbreast(Flow):
 
 
 def together(flows: Sequence[Flow], go: Callable[[Flow], object]) -> list[Flow]:
-    """The flows, of one program at one tick, after something is done with each that needs no tangents."""
+    """The flows, of one program at one tick, after an action that needs no tangents is done with them side by side."""
     found = []
     for at in range(0, len(flows), MOST_ABREAST):
         moved = side_by_side(flows[at : at + MOST_ABREAST])
@@ -154,12 +155,13 @@ def together(flows: Sequence[Flow], go: Callable[[Flow], object]) -> list[Flow]:
 
 
 def side_by_side(flows: Sequence[Flow]) -> Flow:
-    """Flows of one program at one tick, without their tangents; of one flow a copy, which takes least time."""
+    """The flows of one program at one tick, side by side and without their tangents; a single flow is copied, which
+    takes least time."""
     return flows[0].copy(tangents=False) if len(flows) == 1 else FlowAbreast.of(flows)
 
 
 def alike(keys: Iterable[Key]) -> Iterator[tuple[Key, list[int]]]:
-    """Each key with the places where it stands, so few at a time as are carried side by side."""
+    """Each key with the places where it stands, at most `MOST_ABREAST` at a time."""
     places = dict[Key, list[int]]()
     for place, key in enumerate(keys):
         places.setdefault(key, []).append(place)
@@ -168,7 +170,7 @@ def alike(keys: Iterable[Key]) -> Iterator[tuple[Key, list[int]]]:
 
 
 def of_case(value: Any, place: int) -> float:
-    """The number of a case, of one that all have or a column."""
+    """The number of one case, from a number that all share or from a column."""
     return float(value[place, 0]) if np.ndim(value) else float(value)
 
 
@@ -184,11 +186,10 @@ def _joined(several: Sequence[Mapping[str, float]]) -> dict[str, Any]:
 def values_abreast(
     section: TangentSection, leaf: Callable[[Node], Any], opposite: Mapping[int, np.ndarray], *, plain: bool
 ) -> Callable[[int], Any]:
-    """The worth of each reference of a section, as `met.trace.tangents.values` has it, where numbers may be columns.
-    opposite: of nodes that take the other side, the cases in which they do, [case, 1]"""
+    """The value of each reference of a section, as from `met.trace.tangents.values`, where numbers may be columns."""
     nodes = section.nodes
     found: list[Any] = [None] * len(nodes)
-    done: Mapping[int, list[int]] = {} if plain else section.last_uses  # as tangents of many cases are large
+    done: Mapping[int, list[int]] = {} if plain else section.last_uses  # tangents of many cases are large
     for i in section.plain_order if plain else section.order:
         node = nodes[i]
         op, count = node[0], OPERANDS[node[0]]
@@ -202,7 +203,7 @@ def values_abreast(
                 value = _not(value) if nodes[ref >> 1][0] in TRUTHS else -value
             several = several or value.__class__ is np.ndarray
             operands.append(value)
-        # what all have alike is chosen by for all: an arm of it may be a column
+        # a condition shared by all cases selects for all: its arm may be a column
         of_columns = op != "fma" and (several if op != "where" else operands[0].__class__ is np.ndarray)
         value = (ARRAYS if of_columns else PRODUCTS)[op](*operands, *node[1 + count :])
         if i in opposite:

@@ -1,4 +1,4 @@
-"""Linear answers about one case at an instant: states, A, B, C, D, poles with who takes part, natural modes, loops."""
+"""Linear answers about one case at an instant: states, A, B, C, D, poles with participation, natural modes, loops."""
 
 from __future__ import annotations
 
@@ -28,24 +28,24 @@ MOST_TICKS = 5000
 """Ticks of the base rate in a period, at most: each takes some 10 ms."""
 
 MOST_TOGETHER = 256
-"""Cases that are run up to an instant together, so that their memory fits beside all else."""
+"""Cases that are run up to an instant together: so many that their memory stays small."""
 
 SETTLED = 1e-12
-"""Size of a pole, of a period, up to which nothing is left of it after one."""
+"""Size of a pole, per period, up to which its mode has vanished after one period."""
 
 STAYS = 1e6
-"""Periods in which a pole hardly decays or grows that is said to stay."""
+"""Number of periods within which a pole hardly decays or grows, for its mode to count as lasting."""
 
 GROWS = 0.01
-"""Growth over the length of a run up to which an arm is not called unstable: as it moves, its poles move too."""
+"""Growth over the length of a run up to which an arm is not called unstable: while it moves, its poles move too."""
 
 TINY = 1e-14
-"""Share of the largest number of a column at which a state takes no part in another."""
+"""Share of the largest number of a column at which a state does not act on another."""
 
 
 @frozen
 class Pole:
-    """A mode of a linear map or of a plant; of a conjugate pair the one that turns forward.
+    """A mode of a linear map or of a plant; of a conjugate pair, the one with positive frequency.
 
     z       what a period makes of it; of a plant 0
     s       1/s: ln z over the period; of a plant its root. -inf: gone within a period
@@ -58,23 +58,24 @@ class Pole:
 
     @property
     def hz(self) -> float:
-        """Its frequency without damping, |s|/(2 pi)."""
+        """The undamped natural frequency, |s|/(2 pi), Hz."""
         return abs(self.s) / (2.0 * math.pi) if math.isfinite(self.s.real) else math.inf
 
     @property
     def damping(self) -> float:
-        """Ratio of damping, -Re s/|s|: 1 of what decays without swinging, below 0 of what grows; 0 of what stays."""
+        """The damping ratio, -Re s/|s|: 1 without oscillation, below 0 for growth, 0 for a mode that neither grows nor
+        decays."""
         if not math.isfinite(self.s.real):
             return 1.0
         return -self.s.real / abs(self.s) if self.s else 0.0
 
     def stays(self, seconds: float) -> bool:
-        """True of what neither decays nor grows, of periods so long: a place with a loop of rate."""
+        """True where the mode neither decays nor grows, with periods of this length: a position under a rate loop."""
         return self.seconds > STAYS * seconds
 
     @property
     def seconds(self) -> float:
-        """Time in which it decays, or grows, by e; infinite of what does neither."""
+        """The time in which the mode decays, or grows, by e, s; infinite where it does neither."""
         return 1.0 / abs(self.s.real) if self.s.real else math.inf
 
 
@@ -106,7 +107,7 @@ class OpenLoop:
 
     @property
     def unstable(self) -> bool:
-        """True of a loop that grows; of what grows where nothing comes back no gain is the cause."""
+        """True for a loop that grows; where nothing comes back, growth is not due to its gain."""
         return self.returns and not self.stable
 
 
@@ -146,7 +147,7 @@ class Linearized:
 
     @property
     def where(self) -> str:
-        """The instant, or that it stands still, in words."""
+        """The instant in words, or that the arm stands still."""
         return "where it stands still" if self.stands else f"at t = {self.time:.6g} s"
 
     @property
@@ -171,7 +172,7 @@ class Linearized:
 
 @frozen
 class LinearQuestion:
-    """A question to the cases of an experiment, at the last begin of a period up to `at`, s.
+    """A question about an experiment's cases at the last start of a period up to `at`, s.
 
     inputs   channels of servos that tick: commands, outputs of laws
     outputs  channels, or what records several (`q`, `links.tip.position`)
@@ -188,8 +189,8 @@ class LinearQuestion:
 
     @cached_property
     def program(self) -> PeriodProgram:
-        """The program, once for all cases. Raises Problem D372 where `at` is not in the run, D373 where a name is none
-        of these, D374 where the period is too long."""
+        """The program, one for all cases. Raises Problem D372 where `at` is not in the run, D373 for an unknown name,
+        D374 where the period is too long."""
         experiment = self.experiment
         if not 0.0 <= self.at <= experiment.structure.schedule.duration:
             raise _outside(experiment, self.at)
@@ -203,16 +204,17 @@ class LinearQuestion:
 
     @property
     def loops(self) -> list[tuple[str, ...]]:
-        """The loops that are opened, each by the signals at which it is: those of `opened`, and all of them at once."""
+        """The loops to open, each as its signals: those of `opened` one by one, and all of them at once."""
         return [(path,) for path in self.opened] + ([self.opened] if len(self.opened) > 1 else [])
 
     def flows(self, given: np.ndarray, threads: int | None = None) -> list[Flow | None]:
-        """Cases where the answer's period begins, as the run has them; None of one that has failed before. given: the
+        """The cases where the answer's period begins, as in the run; None for one that has failed before. given: the
         program's inputs, [case, input]"""
         return at_instants(self.program, given, self.program.begin(self.at), threads)
 
     def lifted(self, flows: Sequence[Flow]) -> list[LiftedPeriod | Problem]:
-        """The maps of the periods that begin where flows of `program` stand; the Problem D370 of one across an event"""
+        """The maps of the periods that begin where flows of `program` stand; Problem D370 in place of one across an
+        event."""
         return [
             found if isinstance(found, Problem) else _lifted(self.program, found)
             for found in period_maps(self.program, flows)
@@ -247,7 +249,7 @@ class LinearQuestion:
             yield from (refused[k] if k in refused else next(answers) for k in range(len(some)))
 
     def _answers(self, cases: Sequence[int], flows: Sequence[Flow]) -> Iterator[Linearized | Problem]:
-        """The answers about cases where their flows stand, or why there are none."""
+        """The answers about cases where their flows stand, or the Problems in their place."""
         found = self.lifted(flows)
         there = [(flow, each) for flow, each in zip(flows, found, strict=True) if not isinstance(each, Problem)]
         own = [flow for flow, _ in there]
@@ -272,7 +274,7 @@ class LinearQuestion:
 
 
 def _lifted(program: PeriodProgram, found: PeriodMap) -> LiftedPeriod:
-    """A period's map, of those states that act on something."""
+    """The map of a period, restricted to the states that act on something."""
     kept = _kept(program, found)
     states = tuple(found.states[place] for place in kept)
     return LiftedPeriod(
@@ -322,7 +324,8 @@ def question_of(
     opened: Sequence[str] = (),
 ) -> LinearQuestion:
     """The question of a run's `linear` block where one is named, or where nothing is asked and there is only one; else
-    that of what is asked, at 0 s where no instant is. Raises Problem D376, and ValueError where both are asked."""
+    one made of the arguments, at 0 s where no instant is given. Raises Problem D376, and ValueError where both are
+    asked."""
     asks = [key for key, value in (("inputs", inputs), ("outputs", outputs), ("opened", opened)) if value]
     asks = ["at", *asks] if at is not None else asks
     if of is not None and asks:
@@ -334,7 +337,7 @@ def question_of(
 
 @frozen
 class LiftedPeriod:
-    """A period's map with each tick of each input by itself, of those states that act on something.
+    """The map of a period with each tick of each input apart, restricted to the states that act on something.
 
     A, B, C, Wx, Wu  as `PeriodMap` has them, of these states
     """
@@ -350,17 +353,17 @@ class LiftedPeriod:
 
     @property
     def drift(self) -> float:
-        """Growth of a period that is none."""
+        """Growth of a period up to which it counts as none."""
         return max(STABLE, GROWS * self.found.seconds / self.program.schedule.duration)
 
     @property
     def poles(self) -> list[Pole]:
-        """Its modes, without who takes part, in no order."""
+        """The poles without participation, unordered."""
         roots = np.linalg.eigvals(self.A).tolist() if len(self.A) else []
         return [_of_period(complex(z), (), self.found.seconds) for z in roots]
 
     def opened(self, paths: tuple[str, ...]) -> OpenLoop:
-        """Opened at these signals: what stands there is given, and what comes back is asked for."""
+        """The loop opened at these signals: the map from the signals put in to those that come back."""
         ticks = [k for k, each in enumerate(self.found.ticks) if self.program.inputs[each.entry].path in paths]
         Wx, inverse, B = self.Wx[ticks], np.linalg.inv(self.Wu[np.ix_(ticks, ticks)]), self.B[:, ticks]
         A, b, c, d = self.A - B @ inverse @ Wx, B @ inverse, inverse @ Wx, np.eye(len(ticks)) - inverse
@@ -376,7 +379,7 @@ class LiftedPeriod:
 
 
 def _kept(program: PeriodProgram, found: PeriodMap) -> np.ndarray:
-    """Places of the states of the arm, and of those through which it, or an input, acts on it or on an output."""
+    """Places of the arm's states, and of those through which it, or an input, acts on the arm or on an output."""
     n, step = len(found.states), program.builder.step
     arm = {*program.positions, *program.rates, *step.states, *program.of_beds}
     links = np.abs(found.A) > TINY * np.max(np.abs(found.A), axis=0, initial=0.0)
@@ -387,7 +390,7 @@ def _kept(program: PeriodProgram, found: PeriodMap) -> np.ndarray:
 
 
 def _closed(links: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """All that can be reached from the first ones. links: [to, from]"""
+    """Everything that can be reached from the first ones. links: [to, from]"""
     found = first.copy()
     while True:
         more = found | np.any(links[:, found], axis=1)
@@ -397,8 +400,8 @@ def _closed(links: np.ndarray, first: np.ndarray) -> np.ndarray:
 
 
 def _modes(A: np.ndarray, names: Sequence[str]) -> Iterable[tuple[complex, tuple[tuple[str, float], ...]]]:
-    """Eigenvalues, of a pair the one that turns forward, with the share of each state: |l_i r_i| of the left and the
-    right eigenvector."""
+    """Eigenvalues, the one with positive frequency of each pair, with each state's participation |l_i r_i| from the
+    left and the right eigenvector."""
     if not len(A):
         return
     roots, right = np.linalg.eig(A)

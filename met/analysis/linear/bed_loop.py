@@ -1,11 +1,11 @@
-"""The loop of one joint on a bed, by itself: its servo, bed and law with an arm of one link, for arms of any inertia.
+"""The loop of one joint on a bed, alone: its servo, bed and law with an arm of one link of any inertia.
 
 The loop is an experiment of its own, linearised as any other (`period`), one tick of the servo a period. It is opened
 at the bed, where the arm is felt: the arm's inertia there is an input of the program, so that many arms are linearised
 side by side. Its operating point is a shaft that turns at a steady rate, at which no limit is reached and no friction
-changes its sign: at rest friction holds the shaft, and there is no loop. There are no faults, whose noise and
-converters would be taken for slopes, and no limits of torque, voltage and the load's current, at which nothing would
-come back.
+changes its sign: at rest friction holds the shaft, and there is no loop. Faults are left out, since their noise and
+converters would be taken for slopes; so are limits of torque, voltage and the load's current, since nothing comes back
+from a loop at its limit.
 """
 
 from __future__ import annotations
@@ -32,27 +32,27 @@ ARM, RATE, COMMAND = "bench:arm", "bench:rate", "bench:command"
 the joint, and the one that it is commanded, rad/s (m/s). No path of a deck's has a colon."""
 
 PUSHES = (1.0, 2.0, 5.0, 11.0, 40.0, 200.0, 1000.0)
-"""Times its rate that a joint is commanded, one after the other, until its shaft goes on in its direction for a tick:
-where the motor that is there is not as its law takes it to be, the load may turn it back, and an emulated bed stops it
-then, for the rest of a substep. Without limits a push changes no derivative."""
+"""Factors on the rate that a joint is commanded, tried in turn until its shaft keeps its direction for a tick: where
+the real motor differs from the law's model, the load may turn the shaft back, and an emulated bed then stops it for the
+rest of a substep. Without limits the factor changes no derivative."""
 
 BEYOND = 1e9
-"""Limit of torque, N m (N), and of voltage, V, that no loop is at, also where the motor that is there is not as its law
-takes it to be, and the shaft does not go on as it turned."""
+"""Limit of torque, N m (N), and of voltage, V, that no loop reaches, even where the real motor differs from the law's
+model and the shaft slows down."""
 
 LONG = 1000.0
-"""Periods for which a position command goes on at that rate; one of them is looked at."""
+"""Number of periods for which a position command goes on at that rate; one of them is linearised."""
 
 
 class BedLoop:
-    """The loop of a joint of an experiment, for any of its cases."""
+    """The loop of one joint of an experiment, for any of its cases."""
 
     def __init__(self, experiment: Experiment, joint: str) -> None:
         self.joint, self.program = joint, PeriodProgram(by_itself(experiment, joint))
 
     def of_case(self, given: Mapping[str, float], motor: Motor) -> CaseLoop:
         """The loop of a case. given: its inputs of the experiment's program;  motor: the joint's"""
-        # back-EMF alone then takes half of the torque there is
+        # back-EMF alone then takes half of the available torque
         rate = 0.5 * motor.tau_max * motor.resistance / (motor.kt * motor.kt * motor.ratio)
         inputs = {**given, ARM: 1.0, RATE: float(rate), COMMAND: float(rate)}
         begun = FlowAbreast(self.program, inputs, {}, 0, 1)
@@ -66,7 +66,7 @@ class BedLoop:
 class CaseLoop:
     """The loop of a case, before its first tick.
 
-    inputs, cells  of its program;  rotor: N^2 J_m, kg m^2 (kg);  turning: names of what turns on, cells
+    inputs, cells  of its program;  rotor: N^2 J_m, kg m^2 (kg);  turning: cells of turning parts, by name
     """
 
     program: PeriodProgram
@@ -76,9 +76,9 @@ class CaseLoop:
     turning: frozenset[str]
 
     def maps(self, ratios: Sequence[float]) -> tuple[np.ndarray, tuple[str, ...]]:
-        """The map from tick to tick with an arm of each of these r, [arm, state, state], no numbers where an event is
-        in the tick, or the shaft turns back; and its states: those that act on more than themselves, such as no angle
-        that only adds up."""
+        """The map from tick to tick with an arm of each of these r, [arm, state, state], not-a-number where an event is
+        in the tick or the shaft turns back; and its states: those that act on others, which leaves out an angle that
+        only adds up."""
         names = self.program.states
         found = np.full((len(ratios), len(names), len(names)), np.nan)
         left = np.arange(len(ratios))
@@ -93,9 +93,9 @@ class CaseLoop:
         return found[:, act][:, :, act], tuple(names[place] for place in act)
 
     def _maps(self, ratios: np.ndarray, push: float) -> np.ndarray:
-        """The maps over all states, [arm, state, state], while the joint is commanded so many times its rate."""
+        """The maps over all states, [arm, state, state], while the joint is commanded `push` times its rate."""
         program, arms = self.program, self.rotor * ratios[:, None]
-        inputs = {**self.inputs, ARM: arms, COMMAND: np.full_like(arms, push * self.inputs[RATE])}  # as what differs
+        inputs = {**self.inputs, ARM: arms, COMMAND: np.full_like(arms, push * self.inputs[RATE])}
         flow = FlowAbreast(program, inputs, {}, 0, len(arms))
         flow.begin_as(self.cells)
         flow.ticks()
@@ -111,7 +111,7 @@ class CaseLoop:
         return found
 
     def radii(self, ratios: Sequence[float]) -> np.ndarray:
-        """The largest size of a pole of a tick, with an arm of each of these r, [arm]; infinite where one is none."""
+        """The spectral radius of a tick with an arm of each of these r, [arm]; infinite where it is not finite."""
         maps, _ = self.maps(ratios)
         found, numbers = np.full(len(maps), np.inf), np.isfinite(maps).all((1, 2))
         found[numbers] = np.abs(np.linalg.eigvals(maps[numbers])).max(1, initial=0.0)
@@ -119,7 +119,7 @@ class CaseLoop:
 
 
 def by_itself(experiment: Experiment, joint: str) -> Experiment:
-    """The experiment of one substituted joint without the rest of its arm, at the ticks of its servo."""
+    """The experiment reduced to one substituted joint without the rest of its arm, at the ticks of its servo."""
     structure, formulas = experiment.structure, experiment.formulas
     servo = next(use for use in structure.servos if use.joint == joint)
     moved = next(each for each in structure.joints if each.name == joint)

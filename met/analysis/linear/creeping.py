@@ -1,8 +1,8 @@
 """Sliding with dry friction so slowly that friction stops it within a step, were it to act the other way.
 
 What slides is linearised as sliding: its friction is a constant force. That is so for moves whose rate is less than its
-own; a larger one turns friction around. Where the rate is so small that one step's slowing by friction undoes it, the
-run tells it from rest by nothing else.
+own; a larger one turns friction around. A rate that friction undoes within one step cannot be told from rest in the
+run.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from met.program.sticking import Sticking
 
 @frozen
 class CreepingRate:
-    """A rate that is as good as none: of a joint, or of a state of its servo, by name; SI, with its unit."""
+    """A sliding rate that hardly differs from rest, of a joint or of a state of its servo, by name; SI, with its
+    unit."""
 
     name: str
     rate: float

@@ -1,4 +1,4 @@
-"""One case's memory carried through a period with its tangents, and the events on the way at which there are none."""
+"""The memory of one case carried through a period with its tangents, and the events at which there are no tangents."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from met.trace.recording import Branch, RecordedControl, RecordSection
 from met.trace.tangents import HEAD, Kink, TangentSection, values
 
 HANDS_OVER = {"grappling": "grappled", "releasing": "released"}
-"""Loops in which payloads change hands, by the cell that they go by, in words."""
+"""The words for loops in which payloads change hands, by the cell that counts them."""
 
 
 MOST_CELLS = 3
-"""Cells that are named of what is compared; of more the phase is."""
+"""Largest number of compared cells that a message names; with more, it names the phase."""
 
 
 @frozen
 class Edge:
-    """A kink that the memory stands on.
+    """A kink on which the memory stands.
 
     run    the section's number in the order of the period;  nodes: of the kink;  phase: the section's name
     tick   of the base rate;  cells: those that move what is compared
@@ -45,7 +45,7 @@ class Edge:
 
     @property
     def subject(self) -> str:
-        """The part that is just there, in words."""
+        """The subject of a message: the part that is exactly on the kink."""
         if 0 < len(self.cells) <= MOST_CELLS:
             return listed(list(self.cells))
         return f"a number of `{self.phase}`"
@@ -55,7 +55,7 @@ class Flow:
     """The memory of a case under way, cells by name: numbers, and tangents of those that move, [direction]."""
 
     shape: tuple[int, ...] = ()
-    """The dimensions of cases, before those of a tangent."""
+    """The shape of the cases, before the dimension of a tangent."""
 
     def __init__(
         self, program: PeriodProgram, inputs: Mapping[str, float], cells: Mapping[str, float], tick: int
@@ -76,22 +76,22 @@ class Flow:
         return made
 
     def begin(self) -> None:
-        """The start of a run, up to the instant 0, at which nothing has ticked yet."""
+        """Run the start, up to the instant 0, at which nothing has ticked yet."""
         self._follow(self.program.recording.start)
 
     def finish(self) -> None:
-        """The step that ends at the next tick."""
+        """Finish the step that ends at the next tick."""
         self.tick += 1
         self._follow(self.program.finish)
 
     def ticks(self, *, recording: bool = False) -> None:
-        """All that is done at this tick once the step is finished. recording: whether its columns are kept."""
+        """Run everything at this tick once the step is finished. recording: whether its columns are kept."""
         self._recording = recording
         self._follow(self.program.rest)
         self._recording = False
 
     def period(self) -> None:
-        """All ticks and steps of a period."""
+        """Run all ticks and steps of a period."""
         for _ in range(self.program.ticks):
             self.ticks()
             self.finish()
@@ -118,11 +118,11 @@ class Flow:
         return bool(drive.given) and float(drive.qdd) == 0.0
 
     def tangent(self, name: str) -> Any:
-        """The tangent of a cell, [direction]; 0 of one that does not move."""
+        """The tangent of a cell, [direction]; 0 for a cell that does not move."""
         return self.tangents.get(name, 0.0)
 
     def run(self, number: int) -> None:
-        """One section."""
+        """Run one section."""
         section, moves = self.program.sections[number], bool(self.tangents)
         with np.errstate(all="ignore"):
             of = values(section, self._leaf, self.opposite.get(self._runs, frozenset()), plain=not moves)
@@ -143,7 +143,7 @@ class Flow:
         cells: Iterable[tuple[str, Any]],
         tangents: Iterable[tuple[str, Any]],
     ) -> None:
-        """Take over what a section came to. of: the value of a reference;  cells, tangents: of its stores"""
+        """Store the results of a section. of: the value of a reference; cells, tangents: of its stores"""
         moves = bool(self.tangents)
         for cell, value in cells:
             self.cells[cell] = value
@@ -154,7 +154,7 @@ class Flow:
             self.row_tangents.update({column: of(ref) for column, ref in section.record_tangents})
 
     def _moved(self, section: TangentSection, kink: Kink) -> tuple[str, ...]:
-        """The cells that move what a kink compares."""
+        """The moving cells that a kink compares."""
         nodes = (section.nodes[i] for i in live(section.nodes, kink.sides))
         return tuple(node[1] for node in nodes if node[0] == "cell" and node[1] in self.tangents)
 
@@ -195,16 +195,17 @@ class Flow:
                 raise self.event(f"a payload is {HANDS_OVER[condition.cell]}")
 
     def modes(self) -> dict[str, float]:
-        """Modes of all that has dry friction in this case, by the name of a joint or a servo's state: 0 sticks."""
+        """Modes of everything with dry friction in this case, by the name of a joint or a servo's state: 0 sticks."""
         sticking = self.program.builder.step.sticking
         return {each.name: self.mode(each) for each in sticking if each.level is not None or self.rubs(each) != 0.0}
 
     def rubs(self, each: Sticking) -> float:
-        """Not 0 where a joint or a servo's state, whose friction is a parameter, has dry friction in this case."""
+        """A number other than 0 where a joint or a servo's state, whose friction is a parameter, has dry friction in
+        this case."""
         return self.cells.get(cell_names.HAS_FRICTION(each.name), 0.0)
 
     def mode(self, each: Sticking) -> float:
-        """The mode of what has dry friction: 0 sticks."""
+        """The friction mode of a joint or a servo's state: 0 sticks."""
         return self.cells.get(cell_names.FRICTION_MODE(each.name), 0.0)
 
     def _rate(self, name: str) -> float:
@@ -215,8 +216,8 @@ class Flow:
         return [name for name, mode in self.modes().items() if mode != 0.0 and self._rate(name) == 0.0]
 
     def limits(self) -> dict[str, float]:
-        """Steps that began at each limit so far, by its path: of motors and of what acts on the arm. Limits of a joint
-        do nothing, and a command comes to its own by time alone."""
+        """Steps that began at each limit so far, by its path: limits of motors and of loads on the arm. Limits of a
+        joint have no effect, and a command reaches its own by time alone."""
         uses = [use for use in self.program.builder.limits.uses if use.channels or use.owner]
         return {use.path: self.cells.get(cell_names.AT_LIMIT(use.path), 0.0) for use in uses}
 
@@ -249,11 +250,11 @@ def listed(names: list[str]) -> str:
 
 
 def added(path: str) -> str:
-    """The cell of what is added to an input."""
+    """The cell that is added to an input."""
     return ADDED + path
 
 
 def derive(flow: Flow) -> None:
-    """The slopes of the arm where a flow stands."""
+    """Compute the slopes of the arm where a flow stands."""
     (number,) = (k for k, section in enumerate(flow.program.recording.sections) if section.name == "derive")
     flow.run(number)

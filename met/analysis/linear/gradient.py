@@ -1,9 +1,9 @@
 """Gradients of a run's metrics by its numbers: exact, of the program that runs, carried along from start to end.
 
-The derivative is that of the program as it goes, through sampled laws, held values, delays and splits of steps where
-friction brings something to rest: where that is, moves too. What is decided at ticks, as breaking away or a limit, is
-decided where it is; between two such decisions the program is smooth, and on the edge of one it has no derivative. So
-each gradient is held against the program itself a little to each side, and where the two differ none is given.
+The derivative is that of the running program, through sampled laws, held values, delays and splits of steps where
+friction brings something to rest, whose instant moves too. Decisions at ticks, such as breaking away or a limit, are
+taken as they are: between two of them the program is smooth, and on the edge of one it has no derivative. So each
+gradient is held against the program itself a little to each side, and where the two differ none is given.
 """
 
 from __future__ import annotations
@@ -31,19 +31,19 @@ from met.trace.recorder import record
 from met.trace.recording import Recording
 
 NEAR = (1e-6, 1e-5)
-"""Shares of a number, to each side, over which its gradients are held against the change that they are to make; of 0
-these in SI. An edge is told where both differ: the first alone may be the rounding of a metric that hardly moves."""
+"""Shares of a number, to each side, over which its gradients are compared with the change that they predict; for 0,
+these in SI. An edge is reported where both differ: the first alone may be rounding of a metric that hardly moves."""
 
 SAME, ROUNDED = 1e-3, 1e-11
-"""Shares of that change, and of the metric, by which the two may differ."""
+"""Shares of that change, and of the metric, within which the two may differ."""
 
 _POINTS = (0.0, *(sign * near for near in NEAR for sign in (-1.0, 1.0)))
 
 MOST_LANES = 100_000
-"""Runs of the kernel that are held in memory at once."""
+"""Largest number of runs of the kernel held in memory at once."""
 
 FAILED = "the case fails"
-"""Why a case that fails has no slopes."""
+"""Reason why a failing case has no slopes."""
 
 Place = tuple[int, int, int]
 """(case, metric, number), as positions in `MetricGradients`."""
@@ -51,7 +51,7 @@ Place = tuple[int, int, int]
 
 @frozen
 class MetricGradients:
-    """Metrics of cases, and how they move with numbers of the deck.
+    """Metrics of cases and their derivatives by numbers of the deck.
 
     cases    rows of the case table;  metrics: names;  paths: of the numbers
     value    [case, metric], SI; of a metric that moves in steps of a sample as it is between samples
@@ -158,10 +158,8 @@ class GradientProgram:
 
 @frozen
 class _Found:
-    """The answers of the kernel: [case, number, point, output], the points as `_POINTS`, or the first of them alone.
-
-    steps  [case, number]: of each number, by which points are multiplied
-    """
+    """The answers of the kernel: [case, number, point, output], with the points of `_POINTS`, or the first of them
+    alone."""
 
     names: tuple[str, ...]
     outputs: np.ndarray
@@ -169,7 +167,7 @@ class _Found:
 
     @classmethod
     def of(cls, program: GradientProgram, given: np.ndarray, points: tuple[float, ...], threads: int | None) -> _Found:
-        """Each case at each point of each number, with the tangent of that number: lanes of one run."""
+        """Run each case at each point of each number, with the tangent of that number, as lanes of one run."""
         kernel, n = program.kernel, len(program.paths)
         cases, own = given.shape
         steps = np.abs(given[:, :n])
@@ -221,7 +219,7 @@ class _Found:
         return np.moveaxis(on_edge, 1, 2)
 
     def event(self, case: int, number: int) -> str:
-        """The event that comes or goes within a little of a case, in words."""
+        """The event that occurs on one side of a case and not on the other, in words."""
         share = f"{NEAR[0]:g} of the number"
         counts = self.outputs[case, number, :, : len(self.names)]
         for name in (FAILURE[0], "friction.splits", "friction.clamped", *_limits(self.names)):

@@ -1,4 +1,4 @@
-"""The program of an experiment with inputs: numbers added to what servos are asked, and to what their laws put out."""
+"""A program with additional inputs: numbers added to the commands of servos and to the outputs of their laws."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from met.servos.servo import Seen, Setpoint
 from met.trace.program import Tape
 
 ADDED = "added:"
-"""Before the path of an input: the cell of what is added to it, 0 where nothing is."""
+"""Prefix of an input's path: the cell of the number added to it, normally 0."""
 
 
 class InjectedBuilder(Builder):
-    """A program's phases with something added to inputs where they are made."""
+    """Builder of a program's phases that adds the inputs where commands and outputs are made."""
 
     def __init__(self, system: System, inputs: Sequence[InputSignal]) -> None:
         super().__init__(system)

@@ -1,8 +1,8 @@
-"""The exact Jacobian of a program over one period: what it makes of a small change of its states and its inputs.
+"""The exact Jacobian of a program over one period, by its states and its inputs.
 
-What sticks is held: it stays at rest under small changes, so its position and rate are no states. Across an event there
-is no derivative, and none is given: where something comes to rest or breaks away, where a limit is reached or left, and
-where the memory stands on a kink whose other side has another derivative.
+A sticking joint stays at rest under small changes, so its position and rate are no states. Across an event there is no
+derivative, and none is given: where something comes to rest or breaks away, where a limit is reached or left, and where
+the memory stands on a kink whose other side has another derivative.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from met.frozen import frozen
 from met.plan import Experiment
 
 SAME = 1e-9
-"""Share of the largest number of its row by which the derivatives of two sides may differ and be one."""
+"""Share of the largest number of its row by which derivatives from the two sides may differ and count as equal."""
 
 NOTHING = 1e-12
-"""Difference of two numbers, SI, that is rounding."""
+"""Difference of two numbers, SI, that counts as rounding."""
 
 
 @frozen
@@ -68,7 +68,7 @@ class PeriodMap:
 
 
 def at_instant(program: PeriodProgram, case: int, tick: int) -> Flow:
-    """A case at an instant, from which a period goes on: as the run has it there. Raises Problem D371."""
+    """A case at an instant, from which a period goes on, as in the run. Raises Problem D371."""
     from met import run as engine
 
     (flow,) = at_instants(program, engine.inputs(program.experiment, np.array([case])), tick)
@@ -78,7 +78,7 @@ def at_instant(program: PeriodProgram, case: int, tick: int) -> Flow:
 
 
 def at_instants(program: PeriodProgram, given: np.ndarray, tick: int, threads: int | None = None) -> list[Flow | None]:
-    """Cases at an instant; None of one that has failed before. given: the program's inputs, [case, input]."""
+    """Cases at an instant; None for one that has failed before. given: the program's inputs, [case, input]."""
     prepared = program.prepared
     inputs = [dict(zip(prepared.program.inputs, row, strict=True)) for row in given.tolist()]
     if not tick:
@@ -102,7 +102,7 @@ def at_instants(program: PeriodProgram, given: np.ndarray, tick: int, threads: i
 
 
 def failed(experiment: Experiment, tick: int) -> Problem:
-    """The refusal of an instant that a run does not come to."""
+    """The refusal of an instant that a run does not reach."""
     time = tick / experiment.structure.schedule.base_hz
     return Problem(
         error(
@@ -129,9 +129,9 @@ def period_map(program: PeriodProgram, flow: Flow) -> PeriodMap:
 
 
 def period_maps(program: PeriodProgram, flows: Sequence[Flow]) -> list[PeriodMap | Problem]:
-    """The linearised periods that begin where these flows stand, all at one tick: what `period_map` returns or raises
-    of each, to the bit. They are carried side by side, those in which the same is held; what an event or a kink is in
-    the way of is looked at by itself."""
+    """The linearised periods that begin where these flows stand, all at one tick: each is the map of `period_map`, or
+    the Problem that it raises, to the bit. Flows with the same held states are carried side by side; one with an event
+    or a kink on the way is linearised alone."""
     found: list[PeriodMap | Problem | None] = [None] * len(flows)
     helds = list[_Held | None]()
     for place, (flow, after) in enumerate(zip(flows, together(flows, Flow.ticks), strict=True)):
@@ -149,14 +149,14 @@ def period_maps(program: PeriodProgram, flows: Sequence[Flow]) -> list[PeriodMap
 
 
 def _side_by_side(flows: Sequence[Flow], states: tuple[str, ...], helds: Sequence[_Held]) -> Iterator[PeriodMap | None]:
-    """The maps of flows in which the same is held; None of one that is to be looked at by itself."""
+    """The maps of flows with the same held states; None for one that has to be linearised alone."""
     carried = partial(_carried, partial(FlowAbreast.of, flows), states)
     found = carried({})
     flow: Any = found.flow
     unusual = flow.unusual | ~found.finite
     if flow.on_kink.any():
         other = carried(flow.kinks)
-        # of one that jumps at a kink others may be led another way: its kinks are then not those of the other side
+        # where one jumps at a kink others may be led another way: its kinks are then not those of the other side
         led: Any = other.flow
         astray = led.unusual | (led.sections_run != flow.sections_run)
         unusual = unusual | (flow.on_kink & (astray | found.differs(other)))
@@ -173,7 +173,8 @@ def _by_itself(program: PeriodProgram, flow: Flow) -> PeriodMap | Problem:
 
 @frozen
 class _Held:
-    """Names of states that are held in a case where a period begins, of locked joints among them, and of all others."""
+    """Names of the states that are held in a case where a period begins, of the locked joints among them, and of all
+    others."""
 
     held: tuple[str, ...]
     locked: tuple[str, ...]
@@ -181,7 +182,8 @@ class _Held:
 
 
 def _held(start: Flow, after: Flow) -> _Held:
-    """Find what is held where a period begins. after: its first ticks. Raises Problem where something breaks away."""
+    """Find the states that are held where a period begins. after: its first ticks. Raises Problem where something
+    breaks away."""
     locked, rates = start.locked(), held_rates(start)
     held = (*(name for name, mode in after.modes().items() if mode == 0.0), *rates.values(), *locked)
     if going := after.breaking_away():
@@ -192,7 +194,7 @@ def _held(start: Flow, after: Flow) -> _Held:
 
 @frozen
 class _Carried:
-    """A period carried out with tangents, as `PeriodMap` has them; of a `FlowAbreast` [case, ...] each.
+    """A period carried out with tangents, named as in `PeriodMap`; of a `FlowAbreast`, each is [case, ...].
 
     numbers   states at its end, and what is recorded at its begin
     at_limit  paths of limits, with the number of steps that begin at them;  flow: at the end
@@ -216,18 +218,18 @@ class _Carried:
 
     @property
     def finite(self) -> Any:
-        """True where all are numbers."""
+        """True where all numbers are finite."""
         return reduce(and_, (np.isfinite(each).all((-2, -1)) for each in self._matrices()))
 
     def differs(self, other: _Carried) -> Any:
-        """True where a derivative is another, of states, of what comes to inputs, or of outputs by states; or what they
-        are derivatives of."""
+        """True where the derivatives differ: of states, of inputs, of outputs by states, or the cells that they belong
+        to."""
         *pairs, _ = zip(self._matrices(), other._matrices(), strict=True)
         jumps = np.any(np.abs(self.numbers - other.numbers) > SAME * np.abs(self.numbers) + NOTHING, axis=-1)
         return reduce(or_, (_differ(a, b) for a, b in pairs), jumps)
 
     def map_of(self, held: _Held, place: int | None = None) -> PeriodMap:
-        """The map, of a `FlowAbreast` that of the case at a place."""
+        """The map; of a `FlowAbreast`, that of the case at a place."""
         program, own = self.flow.program, [each if place is None else each[place] for each in self._matrices()]
         A, B, C, Wx, Wu, D = own
         at_limit = tuple(path for path, steps in self.at_limit.items() if of_case(steps, place or 0))
@@ -238,13 +240,13 @@ class _Carried:
 
 
 def _differ(a: np.ndarray, b: np.ndarray) -> Any:
-    """True where some entry of two matrices differs by more than a rounding error of its row."""
+    """True where some entry of two matrices differs by more than the rounding error of its row."""
     largest = np.max(np.abs(a), axis=-1, keepdims=True, initial=0.0)
     return ~np.all(np.abs(a - b) <= SAME * np.maximum(largest, 1e-300), axis=(-2, -1))
 
 
 def _carried(begin: Callable[[], Flow], states: tuple[str, ...], opposite: Mapping[int, Any]) -> _Carried:
-    """A period from where a flow begins. opposite: as the flow has it"""
+    """Carry a period from where a flow begins. opposite: as for the flow"""
     flow = begin()
     program, tick, n = flow.program, flow.tick, len(states)
     ticks = tuple(
@@ -296,14 +298,14 @@ def _carried(begin: Callable[[], Flow], states: tuple[str, ...], opposite: Mappi
 
 
 def tangent_rows(flow: Flow, moves: Sequence[Any], width: int) -> np.ndarray:
-    """Tangents as rows, [row, direction], of a `FlowAbreast` [case, row, direction]. A zero has no sign, by which else
-    it might be seen which cases were carried together."""
+    """Tangents as rows, [row, direction], of a `FlowAbreast` [case, row, direction]. Zeros have no sign, so that the
+    result does not depend on which cases were carried together."""
     rows = [np.broadcast_to(move, (*flow.shape, width)) for move in moves]
     return np.stack(rows, axis=-2) + 0.0 if rows else np.zeros((*flow.shape, 0, width))
 
 
 def seeds(program: PeriodProgram, flow: Flow, states: Sequence[str], width: int) -> dict[str, np.ndarray]:
-    """Tangents of cells, of which each state is a direction."""
+    """Tangents of cells, with one direction for each state."""
     unit, found = np.eye(len(states), width), dict[str, np.ndarray]()
     places = {name: unit[place] for place, name in enumerate(states)}
     for body in program.bodies:

@@ -1,9 +1,9 @@
-"""Margins of a sampled loop: how much gain, phase, delay, or both of gain and phase, it may get before it is unstable.
+"""Margins of a sampled loop: the gain, phase, delay, or both gain and phase, that it tolerates before it is unstable.
 
-A loop is P(z) = C (z I - A)^-1 B + D from what stands at an open place to what comes back to it, closed where the two
-are equal: so of a loop with negative feedback L = -P. Where |P| has a value on the unit circle, or P is real there, is
-found as eigenvalues of a pencil (S. Boyd, V. Balakrishnan and P. Kabamba, A bisection method for computing the H-inf
-norm of a transfer matrix, 1989, of discrete systems), not on a grid, so no narrow peak is missed.
+A loop is P(z) = C (z I - A)^-1 B + D from the signal put in at an open place to the one that comes back, closed where
+the two are equal: a loop with negative feedback has L = -P. The frequencies at which |P| has a given value on the unit
+circle, or P is real there, are eigenvalues of a pencil (S. Boyd, V. Balakrishnan and P. Kabamba, A bisection method for
+computing the H-inf norm of a transfer matrix, 1989, of discrete systems), not on a grid, so no narrow peak is missed.
 """
 
 from __future__ import annotations
@@ -20,17 +20,16 @@ import numpy as np
 from met.frozen import frozen
 
 ON_CIRCLE = 1e-4
-"""Distance from the unit circle at which a root of a pencil is looked at: double roots are no nearer."""
+"""Distance from the unit circle within which a root of a pencil is tried: rounding moves double roots so far."""
 
 APART = 1e-10
-"""A state that is moved by less than this share of what moves others is not moved."""
+"""Share of the largest coupling below which a state counts as not moved."""
 
 EDGE = 1e-7
-"""Of a gain: so near to 1 is a loop that is at its edge as it is."""
+"""Distance from a gain of 1 within which a loop counts as being at its stability limit."""
 
 STABLE = 1e-7
-"""Growth of a period up to which a loop is not called unstable, at least: a drift in place and rate has poles so near
-to 1."""
+"""Smallest growth of a period that counts as unstable: a drift in position and rate has poles this near to 1."""
 
 
 @frozen
@@ -66,22 +65,22 @@ class ScalarLoop:
 
     @cached_property
     def poles(self) -> np.ndarray:
-        """The poles of the states, as the loop is open."""
+        """The open-loop poles."""
         found: np.ndarray = np.linalg.eigvals(self.A)
         return found
 
     def closed(self, gain: float = 1.0) -> np.ndarray:
-        """A of the loop closed with this times its gain."""
+        """The closed loop's A, with the gain multiplied by this."""
         return self.A + gain / (1.0 - gain * self.D) * np.outer(self.B, self.C)
 
     def grows(self, gain: float = 1.0) -> bool:
-        """True where it is unstable, closed with this times its gain."""
+        """True where the loop is unstable, closed with the gain multiplied by this."""
         if gain * self.D == 1.0:
             return True
         return bool(np.max(np.abs(np.linalg.eigvals(self.closed(gain))), initial=0.0) > 1.0 + self.drift)
 
     def minimal(self) -> ScalarLoop:
-        """The same loop with those states alone that it moves and sees: others have poles that are none of its own."""
+        """The loop reduced to its controllable and observable states: others have poles that are not the loop's own."""
         from scipy.linalg import matrix_balance
 
         n = len(self.A)
@@ -96,11 +95,11 @@ class ScalarLoop:
 
 
 def _krylov(A: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """An orthonormal basis, [state, basis], of all that a vector becomes by powers of A."""
+    """An orthonormal basis, [state, basis], of the span of a vector under all powers of A."""
     n, length = len(A), float(np.linalg.norm(start))
     basis = np.zeros((n, 0)) if length == 0.0 else start[:, None] / length
     while 0 < basis.shape[1] < n:
-        new = A @ basis[:, -1] - basis[:, -1]  # of a slow A too, this is far from what it is made of
+        new = A @ basis[:, -1] - basis[:, -1]  # the difference stays accurate for a slow A too
         before = float(np.linalg.norm(new))
         for _ in range(2):
             new = new - basis @ (basis.T @ new)
@@ -113,7 +112,7 @@ def _krylov(A: np.ndarray, start: np.ndarray) -> np.ndarray:
 
 @frozen
 class LoopMargins:
-    """The margins of a loop that is stable; frequencies are angular, rad/s.
+    """The margins of a stable loop; frequencies are angular, rad/s.
 
     gain_up, gain_down  times its gain from which on it is unstable, above 1 and below; None: at none
     phase    rad;  delay: s;  None where |L| is 1 nowhere
@@ -135,7 +134,7 @@ class LoopMargins:
 
     @property
     def disk_gain(self) -> tuple[float, float]:
-        """Times its gain, from and to, that the disk allows."""
+        """The lowest and the highest factor on the gain that the disk allows."""
         half = min(1.0, 0.5 * self.disk)
         return (1.0 - half) / (1.0 + half), (1.0 + half) / (1.0 - half) if half < 1.0 else math.inf
 
@@ -146,7 +145,7 @@ class LoopMargins:
 
 
 def margins(loop: ScalarLoop) -> LoopMargins | None:
-    """The margins of a loop; None where it is unstable as it is."""
+    """The margins of a loop; None where it is already unstable."""
     if loop.grows():
         return None
     loop = loop.minimal()
@@ -213,11 +212,11 @@ def _where_size_is(loop: ScalarLoop, size: float) -> list[float]:
 
 
 def _is_number(loop: ScalarLoop, w: float) -> bool:
-    """True where L, of a loop with no states but its own, has a value: no pole lies there. A pole of several turns out
-    as several beside it, by the root of the rounding error that is as many times."""
+    """True where L, of a loop with its own states only, has a value: there is no pole. A multiple pole is computed as
+    several beside it, at a distance of that root of the rounding error."""
     z = cmath.exp(1j * w * loop.period)
     poles = loop.poles[np.argsort(np.abs(loop.poles - z))]
-    # rounding spreads a pole of several around itself, by the root of it that is as many times; their mean stays
+    # rounding spreads a multiple pole around itself, by that root of it; their mean stays
     return not any(
         abs(poles[many - 1] - z) <= 20.0 * 2.2e-16 ** (1.0 / many) + 1e-9 and abs(poles[:many].mean() - z) <= 1e-9
         for many in range(1, min(len(poles), 4) + 1)
@@ -225,7 +224,7 @@ def _is_number(loop: ScalarLoop, w: float) -> bool:
 
 
 def _refined(found: Sequence[float], zero: Callable[[float], float], nyquist: float) -> list[float]:
-    """Roots of a function near these, each in an interval in which the function changes its sign."""
+    """Roots of a function near these, each refined in an interval in which the function changes its sign."""
     from scipy.optimize import brentq
 
     made: list[float] = []
@@ -266,7 +265,7 @@ def _disk(loop: ScalarLoop) -> tuple[float, float]:
 
 
 def comes_back(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> bool:
-    """False where nothing comes back of what stands at the open places: P is 0. Arrays as `gain_limits` has them."""
+    """False where nothing comes back from the open places: P is 0. Arrays as in `gain_limits`."""
     moved, largest = B, np.max(np.abs(D), initial=0.0)
     for _ in range(len(A)):
         largest = max(largest, np.max(np.abs(C @ moved), initial=0.0))
@@ -275,26 +274,27 @@ def comes_back(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> bo
 
 
 FARTHEST, STRIDE = 1e4, 1.05
-"""Times the gain up to which a limit of several ticks or loops is looked for, and from one tried to the next."""
+"""Largest factor on the gain up to which a limit of several ticks or loops is searched for, and the ratio of
+neighbouring tries."""
 
 AT_ONCE = 16
 """Gains that are tried at once."""
 
 HUGE = 1e300
-"""A pole of a loop that has no value."""
+"""Stands for a pole of a loop that has no value."""
 
 
 def gain_limits(
     A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, drift: float = STABLE
 ) -> tuple[float | None, float | None]:
     """Times the gain of all loops at once at which they become unstable, the nearest below and above 1, to 1e-12; None:
-    at none that was looked at, or they are unstable as they are. C x + D u comes back, of u that stands at the open
-    places; drift: as `ScalarLoop` has it."""
+    at none that was tried, or they are already unstable. C x + D u comes back for u put in at the open places; drift:
+    as in `ScalarLoop`."""
 
     from scipy.optimize import brentq
 
     def sizes(gains: Sequence[float]) -> np.ndarray:
-        """The largest of the closed loop's poles for each gain."""
+        """The spectral radius of the closed loop for each gain."""
         each = np.array(gains)[:, None, None]
         try:
             back = np.linalg.solve(np.eye(len(D)) - each * D, np.broadcast_to(C, (len(gains), *C.shape)))

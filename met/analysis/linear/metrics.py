@@ -1,8 +1,8 @@
-"""Metrics of linear answers: of each case, after it has run, its loops and poles at the instant that the run names.
+"""Metrics of linear answers: the loops and poles of each case, after it has run, at the instant that the run names.
 
 A case's numbers follow from the case alone: it is run up to the instant by the same machine code, and linearised by
-itself. What a loop has no limit of is infinite, and a gain whose limit was looked for as far as it was; one that is
-unstable as it is has no margin at all.
+itself. A margin without a limit is infinite, and a gain limit that was not found is given as far as it was searched; an
+unstable loop has no margin.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from met.plan.linear_uses import (
 from met.program.build import METRIC
 
 QUESTION = "linear question: "
-"""Before the name of a `LinearUse`: the question to it, among the companions of a prepared experiment."""
+"""Prefix of a `LinearUse`'s name: its question, among the companions of a prepared experiment."""
 
 
 def compute(
@@ -79,13 +79,13 @@ def check(prepared: engine.Prepared) -> None:
 
 
 def _asked(prepared: engine.Prepared) -> list[LinearUse]:
-    """The linear answers of which an experiment has metrics; none of one that is driven on beds."""
+    """The linear answers of which an experiment has metrics; none where it is driven on beds."""
     named = {each.of for each in prepared.experiment.linear_metrics}
     return [use for use in prepared.experiment.linear if use.name in named and not prepared.wire]
 
 
 def question(prepared: engine.Prepared, use: LinearUse) -> LinearQuestion:
-    """The question of a deck to an experiment, kept with what is prepared of it."""
+    """The deck's question about an experiment, kept with its prepared program."""
     key = QUESTION + use.name
     if key not in prepared.companions:
         made = of_deck(prepared.experiment, use.name)
@@ -124,15 +124,15 @@ def _answer(
 
 
 def _standing(asked: LinearQuestion, flows: Sequence[Flow]) -> Sequence[Flow | None]:
-    """The flows where the question is about: None of one that is to stand still and does not."""
+    """The flows for the question: None for an arm that is to stand still and does not."""
     return settled(asked.program, flows) if asked.stands else flows
 
 
 def _figures(
     asked: LinearQuestion, wanted: Sequence[MetricUse], lifted: LiftedPeriod | Problem | int
 ) -> tuple[list[float], float]:
-    """The figures of a case, and why one or all of them are none: `ANSWERED` where they all are. lifted: its period, or
-    why it has none"""
+    """The figures of a case, and the reasons why one or all are missing: `ANSWERED` where none is. lifted: its period,
+    or why it has none"""
     if not isinstance(lifted, LiftedPeriod):
         return [math.nan] * len(wanted), float(EVENT if isinstance(lifted, Problem) else lifted)
     loops = [lifted.opened(each) for each in asked.loops] if any(FIGURES[e.model].of_loops for e in wanted) else []

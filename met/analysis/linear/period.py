@@ -1,9 +1,9 @@
-"""The program of an experiment over one period of all its computers, with tangents: what is a state, and how it flows.
+"""The program of an experiment over one period of all its computers, with tangents, and its states.
 
 A period is as long as it takes until the dynamics and all computers tick together again. It begins at an instant, when
-the step that ends there is finished and nothing has ticked yet: so what a computer computes at once of what it sees is
-no state, and what it holds is. A state is a cell that the period reads before it writes it, and that moves with the
-arm or with an input.
+the step that ends there is finished and nothing has ticked yet: so a value that a computer computes anew from its
+inputs is no state, and its memory is. A state is a cell that the period reads before it writes it, and that moves with
+the arm or with an input.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class PeriodProgram:
 
     @cached_property
     def prepared(self) -> engine.Prepared:
-        """The experiment as it is run, without inputs and with records of its own."""
+        """The experiment as it is run, without inputs and with its own records."""
         from met import run as engine
 
         return engine.prepare(self.experiment)
@@ -83,7 +83,8 @@ class PeriodProgram:
         return math.lcm(self.schedule.dynamics, *divisors)
 
     def begin(self, time: float) -> int:
-        """The tick of the last begin of a period up to a time, s. Tick 0 is none where a bed is not under way yet."""
+        """The tick of the last start of a period up to a time, s. Tick 0 is excluded where a bed is not under way
+        yet."""
         found = math.floor(time * self.schedule.base_hz * (1.0 + 1e-12)) // self.ticks * self.ticks
         waits = any(isinstance(step, Branch) and isinstance(step.condition, Unless0) for step in self.rest)
         return self.ticks if waits and found == 0 else found
@@ -95,7 +96,7 @@ class PeriodProgram:
 
     @cached_property
     def moving(self) -> frozenset[str]:
-        """The cells that move with the arm, or with what is added to an input."""
+        """The cells that move with the arm, or with a number added to an input."""
         found = {*self._arm, *(ADDED + each.path for each in self.inputs)}
         sections, last = [self.recording.sections[n] for n in self._used], 0
         while len(found) != last:
@@ -106,7 +107,7 @@ class PeriodProgram:
 
     @cached_property
     def sections(self) -> dict[int, TangentSection]:
-        """The sections of start and tick with tangents, by number."""
+        """The sections of the start and a tick, with tangents, by number."""
         return {n: with_tangents(self.recording.sections[n], self.moving, is_converter) for n in self._used}
 
     @cached_property
@@ -115,8 +116,8 @@ class PeriodProgram:
 
     @cached_property
     def states(self) -> tuple[str, ...]:
-        """The names of the states, those of the arm first: positions, rates and the rest. A body's turn has the names
-        of its coordinates, for the quaternion that is kept of it."""
+        """The names of the states, those of the arm first: positions, rates and the rest. A body's orientation is named
+        by its three coordinates, in place of its quaternion."""
         read, written, ever = set[str](), set[str](), set[str]()
         for k in range(1, self.ticks + 1):
             for body, tick in ((self.rest, self.ticks + k - 1), (self.finish, self.ticks + k)):
@@ -127,7 +128,8 @@ class PeriodProgram:
 
     @cached_property
     def remembered(self) -> frozenset[str]:
-        """The cells that go on from tick to tick: what the end of a step and a period read before they write it."""
+        """The cells that last from tick to tick: those that the end of a step and a period read before they write
+        them."""
         read, written, ever = set[str](), set[str](), set[str]()
         self._look(self.finish, self.ticks, read, written, ever)
         for k in range(1, self.ticks + 1):
@@ -138,7 +140,8 @@ class PeriodProgram:
     def _look(
         self, body: Iterable[RecordedControl], tick: int, read: set[str], written: set[str], ever: set[str]
     ) -> None:
-        """Adds the cells that a body of control reads before it writes them, that it writes each time, and ever."""
+        """Add the cells that a body of control reads before it writes them, those that it writes each time, and those
+        that it ever writes."""
         for step in body:
             if isinstance(step, RecordSection):
                 continue
@@ -163,7 +166,7 @@ class PeriodProgram:
 
 
 def is_converter(section: CodeSection, position: int) -> bool:
-    """True for a node in the part of a section where a sensor reads: what rounds there is a converter, or counts."""
+    """True for a node in the part of a section where a sensor reads: rounding there is a converter's, or counting."""
     name = ""
     for begin, part in section.parts:
         if begin > position:

@@ -1,4 +1,4 @@
-"""The arm without its computers, in continuous time: dx/dt = A x + B u, u being what computers hold."""
+"""The arm without its computers, in continuous time: dx/dt = A x + B u, with u the outputs that computers hold."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from met.program import cell_names
 
 @frozen
 class PlantModel:
-    """Slopes of the arm's states by these and by what its computers hold: A [state, state], 1/s; B [state, input]."""
+    """Slopes of the arm's states by themselves and by the computers' outputs: A [state, state], 1/s; B [state,
+    input]."""
 
     states: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -26,8 +27,8 @@ class PlantModel:
 
 
 def plants(program: PeriodProgram, flows: Sequence[Flow], kept: Sequence[Sequence[str]]) -> list[PlantModel]:
-    """The plant where each of these flows stands, before its computers tick there. kept: states of each, of which those
-    of the arm are its own"""
+    """The plant where each of these flows stands, before its computers tick there. kept: the states of each, of which
+    those of the arm are used"""
     step, found = program.builder.step, dict[int, PlantModel]()
     arm = {*program.positions, *program.rates, *step.states}
     own = [tuple(name for name in names if name in arm) for names in kept]
@@ -45,7 +46,7 @@ def plants(program: PeriodProgram, flows: Sequence[Flow], kept: Sequence[Sequenc
 
 
 def _slopes(now: Flow, states: tuple[str, ...], inputs: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """A and B where a flow stands, of a `FlowAbreast` [case, ...] each."""
+    """A and B where a flow stands; of a `FlowAbreast`, [case, ...] each."""
     program, n, width = now.program, len(states), len(states) + len(inputs)
     step = program.builder.step
     now.ticks()
@@ -61,7 +62,7 @@ def _slopes(now: Flow, states: tuple[str, ...], inputs: tuple[str, ...]) -> tupl
         slopes[f"{name}.qd"] = now.tangent(f"{name}.qdd")
     for name in step.states:
         slopes[name] = now.tangent(cell_names.SLOPE(name))
-    for body in program.bodies:  # of a small turn theta from how it turns: d(theta)/dt = dw + theta x w
+    for body in program.bodies:  # a small rotation theta changes by d(theta)/dt = dw + theta x w
         w = [now.cells[f"{name}.qd"] for name in body.coordinates[3:]]
         theta, dw = ([unit[states.index(f"{name}.{part}")] for name in body.coordinates[3:]] for part in ("q", "qd"))
         for k, name in enumerate(body.coordinates[3:]):

@@ -1,8 +1,8 @@
 """Operating points that are solved for: an arm that stands still in a pose, held by its servos.
 
-It starts from a run that begins `balanced` (docs/physics.md): each servo asked to stay where it is, its states and its
-law's memory what keeps its joint from accelerating. From there it is solved for: nothing changes from one period to the
-next. Where a motor is too weak for that, or something moves that no servo holds, there is no operating point.
+It starts from a run that begins `balanced` (docs/physics.md): each servo is asked to stay where it is, and its states
+and its law's memory keep its joint from accelerating. From there the point is solved for at which nothing changes from
+one period to the next. Where a motor is too weak, or something moves that no servo holds, there is no operating point.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from met.program.control.substituted import LIMITED, QUEUE
 from met.program.unheld import Unheld, holding_torques, unheld
 
 CLOSE = 1e-11
-"""Change of a number over a period, as a share of it and at most this itself, that is none."""
+"""Change of a number over a period, relative to it where it is large, that counts as none."""
 
 HOLD = (".bed.drive_", ".bed.load_current", ":queue.")
-"""Cells of a bed in which what a law asks for waits and acts, after the joint's name."""
+"""Endings, after the joint's name, of a bed's cells in which a law's request waits and acts."""
 
 MOST_STEPS = 8
-"""Steps of Newton's method: what it starts from is nearly there, or there is nothing."""
+"""Largest number of Newton steps: the start is nearly at the point, or there is none."""
 
 Reason = str
 """Why an arm does not stand in a pose, in words."""
 
 
 def standing(experiment: Experiment, q: Sequence[float] = ()) -> Experiment:
-    """The experiment begun at rest at these positions of its moving joints, rad (m), in their order; none: those
-    that it begins with. Servos are asked to stay; guides are gone, and signals that are made of them."""
+    """The experiment begun at rest at these positions of its moving joints, rad (m), in their order; by default those
+    that it begins with. Servos are asked to stay; guides, and signals made of them, are removed."""
     structure = experiment.structure
     lost = tuple(f"guides.{each.name}." for each in structure.guides)
     servos = tuple(
@@ -86,16 +86,16 @@ def _of_unheld(of: Unheld) -> str:
 
 
 def settled(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow | None]:
-    """Each of these flows where nothing changes over a period, by Newton's method with the exact derivative; None of
-    one that has no such place.
+    """Each of these flows moved to where nothing changes over a period, by Newton's method with the exact derivative;
+    None for one that has no such point.
 
-    The joints stay where they are; what is sought is all else that the arm and its laws remember, and what is added to
+    The joints stay where they are; the unknowns are all other memory of the arm and its laws, and a number added to
     each servo's command: behind a gear that is wound up, a law sees another position than the joint's.
     """
     found: list[Flow | None] = [None] * len(flows)
     if program.bodies:
         return found
-    never = dict.fromkeys(program.states, 0.0)  # what the run has not written yet
+    never = dict.fromkeys(program.states, 0.0)  # cells that the run has not written yet
     commanded = (_commanded(program, each) for each in flows)
     begun = [Flow(program, each.inputs, never | each.cells, each.tick) for each in commanded]
     moving = dict(enumerate(_under_way(program, begun)))
@@ -114,8 +114,8 @@ def settled(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow | None]:
 
 
 def _step(flow: Flow, after: Flow, found: PeriodMap) -> bool | None:
-    """A step of Newton's method: the flow is moved. True where it stands already, False where it never will. after: a
-    period later;  found: of that period"""
+    """Do a step of Newton's method on the flow. True where it stands already, False where it never will. after: a
+    period later; found: of that period"""
     program = flow.program
     now = np.array([flow.cells[name] for name in found.states])
     change = np.array([after.cells[name] for name in found.states]) - now
@@ -124,7 +124,7 @@ def _step(flow: Flow, after: Flow, found: PeriodMap) -> bool | None:
     if np.all(np.abs(change) <= CLOSE * np.maximum(np.abs(now), 1.0)):
         return True
     fixed = _places(program)
-    # while friction holds a joint, several torques do, of which the one that it begins with is as good as any
+    # while friction holds a joint, several torques do; the one that it begins with is as good as any
     of_torque, held = _of_torque(program), {*found.held}
     stays = {path for path, joint in of_torque.items() if {joint, f"{joint}.bed"} & held}
     commands = [k for k, each in enumerate(program.inputs) if not each.is_output and each.path not in stays]
@@ -133,7 +133,7 @@ def _step(flow: Flow, after: Flow, found: PeriodMap) -> bool | None:
     columns = [(found.A - np.eye(len(now)))[:, sought], *(found.B[:, ticks].sum(1)[:, None] for ticks in added)]
     moves_by = np.hstack(columns)
     sizes = np.linalg.norm(moves_by, axis=0)
-    sizes[sizes == 0.0] = 1.0  # what moves nothing stays as it is, as the integral of a joint that sticks
+    sizes[sizes == 0.0] = 1.0  # a state that moves nothing stays as it is, as the integral of a joint that sticks
     step = np.linalg.lstsq(moves_by / sizes, -change, rcond=1e-13)[0] / sizes
     for place, size in zip(sought, step, strict=False):
         flow.cells[found.states[place]] += float(size)
@@ -144,14 +144,14 @@ def _step(flow: Flow, after: Flow, found: PeriodMap) -> bool | None:
 
 
 def _of_torque(program: PeriodProgram) -> dict[str, str]:
-    """Joints whose servos are commanded a torque that can be solved for, by the paths of these commands."""
+    """Joints whose servos take a torque command that can be solved for, by the paths of these commands."""
     kinds = {actuator.use.joint: actuator.command_kind for actuator in program.system.working}
     return {each.path: each.joint for each in program.inputs if not each.is_output and kinds[each.joint] == "torque"}
 
 
 def _commanded(program: PeriodProgram, flow: Flow) -> Flow:
-    """The flow as it is where servos that are commanded a torque are commanded, from the run's start on, the one that
-    keeps their joints from accelerating: from 0 on it would be sought across all torques that friction holds."""
+    """The flow with torque-commanded servos given, from the run's start on, the torque that keeps their joints from
+    accelerating: from 0 the search would cross all torques that friction holds."""
     of_torque = _of_torque(program)
     if not of_torque:
         return flow
@@ -166,8 +166,8 @@ def _commanded(program: PeriodProgram, flow: Flow) -> Flow:
 
 
 def _under_way(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow]:
-    """The flows with beds under way: their amplifiers hold, and their queues have, what laws ask for where they stand.
-    All else stays as the run begins it."""
+    """The flows with beds under way: amplifiers and queues hold what laws ask for at that point. All else stays as at
+    the run's start."""
     found = [flow.copy(tangents=False) for flow in flows]
     heads = tuple(f"{each.use.joint}{part}" for each, _, _ in program.system.mounted for part in HOLD)
     rates = {cell_names.REFERENCE_RATE(each.use.joint): 0.0 for each, _, law in program.system.mounted if law.observer}
@@ -178,7 +178,7 @@ def _under_way(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow]:
 
 
 def _places(program: PeriodProgram) -> tuple[str, ...]:
-    """Cells of where joints are, and shafts of beds."""
+    """Cells of the positions of joints and of shafts of beds."""
     return (*program.positions, *(cell_names.SHAFT_ANGLE(each.use.joint) for each, _, _ in program.system.mounted))
 
 
@@ -192,7 +192,7 @@ def _faults(program: PeriodProgram) -> Iterator[str]:
 
 
 def moves(program: PeriodProgram, flow: Flow) -> Reason:
-    """The part of an arm that changes its rate most within a period that begins where a flow stands, in words."""
+    """The part of an arm whose rate changes most within a period that begins where a flow stands, in words."""
     if program.bodies:
         return f"`{program.bodies[0].name}` moves freely"
     (flow,) = _under_way(program, [_commanded(program, flow)])
@@ -231,7 +231,7 @@ def moves(program: PeriodProgram, flow: Flow) -> Reason:
 
 
 def refusal(experiment: Experiment, why: Reason) -> Problem:
-    """The refusal of an operating point that is none."""
+    """The refusal of an operating point that does not exist."""
     message = f"`{experiment.name}` has no operating point in this pose: {why}"
     helps = "another pose, a stronger servo or bed; `at = TIME` asks of a motion instead"
     return Problem(error("D377", message, experiment.place, help=helps))
