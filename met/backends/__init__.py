@@ -1,7 +1,7 @@
-"""Back ends: what a recorded program becomes so that a computer can carry it out.
+"""Back ends: each turns a recorded program into a form that a computer can run.
 
-A back end is a folder here, and a line in `HOMES`; `met.backends.backend` says what it offers. All of them give the
-same bits for the same recording, among them the reference, which is for debugging.
+A back end is a folder here, and a line in `HOMES`; `met.backends.backend` has its protocol. All of them give the same
+bits for the same recording, including the reference, which is for debugging.
 """
 
 from __future__ import annotations
@@ -31,5 +31,5 @@ def find(name: str = DEFAULT) -> Backend:
 
 
 def load(recording: Recording, lanes: int | None = None, *, name: str = DEFAULT) -> Kernel:
-    """A recorded program, ready to run. lanes: cases a block; None for what is fastest here."""
+    """A recorded program, ready to run. lanes: cases a block; None for the fastest number on this machine."""
     return find(name).load(recording, lanes=lanes)

@@ -1,4 +1,4 @@
-"""Protocols of a back end (`Backend`) and of what it makes of a recorded program (`Kernel`, `Block`).
+"""Protocols of a back end (`Backend`) and of the kernels that it makes of a recorded program (`Kernel`, `Block`).
 
 Four implement it: `LlvmKernel` and `LlvmBlock`, `Library` and `CBlock` in C, `WasmKernel` and `WasmBlock`,
 `Interpreter` and `InterpretedBlock`.
@@ -28,10 +28,10 @@ class Block(Protocol):
     state: np.ndarray
 
     def step(self, first: int, last: int) -> None:
-        """Ticks first to last, both done, then `end`. Tick 0 starts afresh."""
+        """Run ticks first to last, both included, then `end`. Tick 0 starts afresh."""
 
     def recorded(self, first: int, last: int) -> np.ndarray:
-        """The same, with the rows [case, row, column] of those ticks."""
+        """Run these ticks as `step` does; returns the rows [case, row, column] of those ticks."""
 
     def cells(self) -> Mapping[str, np.ndarray]:
         """The state by name, [lane] each: views. Cells that nothing reads are not kept."""
@@ -51,7 +51,7 @@ class Kernel(Protocol):
 
     @property
     def program(self) -> Program:
-        """The program that the kernel runs."""
+        """The program of the recording."""
 
     @property
     def lanes(self) -> int: ...
@@ -79,7 +79,7 @@ class Kernel(Protocol):
         threads: int | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> tuple[np.ndarray | None, np.ndarray]:
-        """Runs cases from tick 0 to tick `ticks`, both done.
+        """Run cases from tick 0 to tick `ticks`, both included.
 
         inputs    [case, input], in the order of `program.inputs`
         threads   None: as many as this process may use
@@ -88,11 +88,11 @@ class Kernel(Protocol):
         """
 
     def block(self, inputs: np.ndarray) -> Block:
-        """A block of at most `lanes` cases to step by hand. inputs: [case, input]."""
+        """A block of at most `lanes` cases to step one call at a time. inputs: [case, input]."""
 
 
 def checked_inputs(program: Program, inputs: np.ndarray) -> np.ndarray:
-    """The inputs of cases as a kernel takes them: [case, input], float64 in one piece. Raises ValueError."""
+    """The inputs of cases as a kernel takes them: [case, input], contiguous float64. Raises ValueError."""
     inputs = np.ascontiguousarray(inputs, dtype=np.float64)
     if inputs.ndim != 2 or inputs.shape[1] != len(program.inputs):
         raise ValueError(f"inputs of shape {inputs.shape} for a program with {len(program.inputs)} inputs")
@@ -115,10 +115,10 @@ class Backend(Protocol):
         """The program as text, as `load` would compile it here; for people, and for `met dump kernel`."""
 
     def listing(self, recording: Recording) -> str:
-        """The processor's code as text, for `met dump assembly`; `emit`'s text where there is no other."""
+        """The processor's code as text, for `met dump assembly`; `emit`'s text where a back end has no other."""
 
     def load(self, recording: Recording, *, lanes: int | None = None, inline: bool = True) -> Kernel:
-        """The program, ready to run. inline: False where the time of each section by itself is asked for."""
+        """The program, ready to run. inline: False where the time of each section alone is measured."""
 
     def libraries(self) -> Mapping[str, str]:
-        """Versions of the libraries that decide what is computed, by name, as archives name them."""
+        """Versions, by name, of the libraries that affect the computed bits, as archives record them."""

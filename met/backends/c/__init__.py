@@ -15,7 +15,7 @@ from met.trace.recording import Recording
 
 @frozen
 class C:
-    """C11, as `met.backends.backend.Backend` has it."""
+    """C11, as a `met.backends.backend.Backend`."""
 
     name: str = "c"
     version: int = 1
@@ -29,7 +29,7 @@ class C:
         return self.emit(recording)
 
     def load(self, recording: Recording, *, lanes: int | None = None, inline: bool = True) -> Kernel:
-        """The program, compiled by `cc`. Raises RuntimeError where there is none, or it refuses."""
+        """The program, compiled by `cc`. Raises RuntimeError where there is no `cc`, or it fails."""
         from met.backends.c.library import Library
 
         return Library(recording)

@@ -30,7 +30,7 @@ _INFIX = {"mul": "*", "div": "/", "lt": "<", "le": "<=", "eq": "==", "and": "&&"
 
 @frozen
 class CSource:
-    """A program in C: its text, and what its inputs, outputs and cells are called there, by name."""
+    """A program in C: its text, and the C names of its inputs, outputs and cells, by their names in the program."""
 
     text: str
     inputs: Mapping[str, str]
@@ -44,7 +44,7 @@ def emit(recording: Recording) -> CSource:
 
 
 def literal(value: float) -> str:
-    """A finite double in C, exactly: in decimals where a few are all there are, else in hexadecimal digits."""
+    """A finite double in C, exactly: in decimals where few suffice, else in hexadecimal digits."""
     value = float(value)
     short = repr(value)
     if Fraction(short) == Fraction(value):
@@ -54,7 +54,7 @@ def literal(value: float) -> str:
 
 
 def _members(prefix: str, names: Iterable[str]) -> dict[str, str]:
-    """Names of members of the C struct, by the program's names of numbers; no two alike."""
+    """Distinct names of members of the C struct, by the names of the program's numbers."""
     made: dict[str, str] = {}
     for name in names:
         base = member = prefix + "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
@@ -67,7 +67,7 @@ def _members(prefix: str, names: Iterable[str]) -> dict[str, str]:
 
 
 class _CEmitter:
-    """Writes one program."""
+    """Writer of one program's C text."""
 
     def __init__(self, recording: Recording) -> None:
         self.recording = recording
@@ -117,7 +117,7 @@ class _CEmitter:
         return _function("met_end(void)", self._steps(self.recording.end, 1))
 
     def _now(self, tick: str) -> list[str]:
-        """The tick's number, and its time where it is asked for."""
+        """Lines that give the tick's number, and its time where it is needed."""
         time = [f"    met.time = met.tick / {literal(self.program.base_hz)};"] if self.timed else []
         return [f"    met.tick = {tick};", *time]
 
@@ -167,7 +167,7 @@ class _CEmitter:
         return _function(f"{self.names[number]}(void)", lines)
 
     def _value(self, nodes: Sequence[Node], node: Node) -> str:
-        """The C expression of a node that is no constant."""
+        """The C expression of a node that is not a constant."""
         op = node[0]
         if op == "input":
             return f"met.{self.inputs[node[1]]}"
@@ -190,7 +190,7 @@ class _CEmitter:
         return self._call(op, nodes, node)
 
     def _call(self, op: str, nodes: Sequence[Node], node: Node, *more: str) -> str:
-        """A call of the function for a node, with its operands and what else it says."""
+        """A call of the function for a node, with its operands and further arguments."""
         self.called.add(op)
         count = OPERANDS[op]
         words = [self._of(nodes, ref) for ref in node[1 : 1 + count]]
@@ -199,7 +199,7 @@ class _CEmitter:
         return f"met_{op}({', '.join([*words, *more])})"
 
     def _of(self, nodes: Sequence[Node], ref: int) -> str:
-        """The value of a reference, sign and all."""
+        """The C expression of a reference, including its sign."""
         node = nodes[ref >> 1]
         if node[0] == "const":
             value = -node[1] if ref & 1 else node[1]

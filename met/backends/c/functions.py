@@ -1,4 +1,5 @@
-"""The C functions that `met.backends.c.emit` calls: operations that C has not, or leaves to a library, to the last bit.
+"""The C functions that `met.backends.c.emit` calls: operations that C lacks, or leaves to a library, exact to the last
+bit.
 
 They need no library and no header but stdint.h and float.h, so they hold on a bare controller too. Doubles are IEEE's,
 rounded to nearest; `met_fma` and `met_sqrt` are rounded correctly, with whole numbers alone.
@@ -14,7 +15,7 @@ from met.trace.philox import GROWTH, MULTIPLIERS, ROUNDS
 
 @frozen
 class Function:
-    """One function's text, and the names of those that it calls."""
+    """The text of one function, and the names of those that it calls."""
 
     text: str
     calls: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""A program in C, compiled here and called: each block is a library of its own, since all that lasts is static."""
+"""A program in C, compiled here and called: each block is a library of its own, since its memory is static."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ double *met_cells(void) {{ return {cells}; }}
 
 
 class Library:
-    """A recording that is ready to run, as `met.backends.backend.Kernel` has it: one case at a time.
+    """A recording that is ready to run, one case at a time, as a `met.backends.backend.Kernel`.
 
-    Raises RuntimeError where there is no `cc`, or it refuses.
+    Raises RuntimeError where there is no `cc`, or it fails.
     """
 
     lanes = 1
@@ -78,7 +78,7 @@ class Library:
 
 
 class CBlock:
-    """One case that is stepped by hand, as `met.backends.backend.Block` has it."""
+    """One case that is stepped call by call, as a `met.backends.backend.Block`."""
 
     def __init__(self, library: Library, inputs: np.ndarray) -> None:
         program = library.program

@@ -17,7 +17,7 @@ from met.trace.recording import Recording
 
 @frozen
 class Llvm:
-    """LLVM, as `met.backends.backend.Backend` has it."""
+    """LLVM, as a `met.backends.backend.Backend`."""
 
     name: str = "llvm"
     version: int = 1

@@ -1,8 +1,8 @@
 """A recorded program as LLVM IR, as text.
 
-One lane is one case: every value is a vector of `lanes` doubles, every section straight-line code over it. Where
-results could depend on the compiler nothing is left to it: no fast-math flag, no contraction; a fused multiply-add is
-an `llvm.fma` that `met.trace.fuse` asked for. So the bits are the same for any width, instruction set and level.
+One lane is one case: every value is a vector of `lanes` doubles, every section straight-line code over it. Nothing that
+could change results is left to the compiler: no fast-math flag, no contraction; a fused multiply-add is an `llvm.fma`
+that `met.trace.fuse` asked for. So the bits are the same for any width, instruction set and level.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from met.trace.recording import CodeSection, Recording
 
 _CALLS = {"sqrt": "llvm.sqrt", "floor": "llvm.floor", "rint": "llvm.roundeven", "abs": "llvm.fabs", "fma": "llvm.fma"}
 _ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
-# of functions: small, large and seldom called ones; of the entry
+# of functions: large ones, and small or seldom called ones; of the entry
 _WIDE = 'nounwind "prefer-vector-width"="512"'
 ATTRIBUTES = (f"alwaysinline {_WIDE}", f"noinline {_WIDE}", "noinline", _WIDE)
 _COMPARE = {"lt": "olt", "le": "ole", "eq": "oeq"}
@@ -38,7 +38,7 @@ def emit(
     shortest: int = SHORTEST,
     longest: int = LONGEST,
 ) -> str:
-    """The IR of a program. All of this is a matter of speed alone.
+    """The IR of a program. The parameters affect speed alone.
 
     lanes   cases a block
     vector  cases that one value of the code holds; a block of several takes each piece of code for one after the
@@ -79,7 +79,8 @@ class _Numbers(dict[str, str]):
 
 
 def numbered(text: str) -> str:
-    """The text of a module without remarks, its names replaced by numbers: what decides the code that it becomes.
+    """The text of a module without comments, its names replaced by numbers: the part that determines the generated
+    code.
 
     The code of sections has numbers for names as it is written, and is nearly all of the text.
     """
@@ -95,12 +96,12 @@ def numbered(text: str) -> str:
 
 
 def _remark(name: str) -> str:
-    """A comment of a line of IR: the name of what it is about, for readers."""
+    """A comment at the end of a line of IR, for readers: the name of its subject."""
     return f"  ; {name}" if name.isprintable() and name else ""
 
 
 class _LlvmEmitter:
-    """Writes one module."""
+    """Writer of one module."""
 
     def __init__(
         self, recording: Recording, lanes: int, vector: int, width: int, inline: bool, sizes: tuple[int, int, int]
@@ -170,7 +171,7 @@ class _LlvmEmitter:
         drawn: dict[tuple[int, ...], PhiloxWriter] = {}
 
         def op(text: str, remark: str = "") -> str:
-            """The name of what an instruction makes: the number of its line."""
+            """Write an instruction; returns the name of its result, which is the number of its line."""
             name = f"%v{len(lines)}"
             put(f"  {name} = {text}{remark}")
             return name
@@ -182,7 +183,7 @@ class _LlvmEmitter:
             return op(f"load {V}, ptr {slot(base, i)}, align {self.align}", _remark(name))
 
         def plain(i: int) -> str:
-            """The value at position i, loaded or spread over the lanes where it is not there yet."""
+            """The value at position i, loaded or spread over the lanes if it is not there yet."""
             value = have.get(i)
             if value is not None:
                 return value
@@ -207,7 +208,7 @@ class _LlvmEmitter:
             return value
 
         def of(ref: int) -> str:
-            """The value of a reference, sign and all."""
+            """The value of a reference, including its sign."""
             i = ref >> 1
             if not ref & 1:
                 return plain(i)

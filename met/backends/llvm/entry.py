@@ -31,7 +31,7 @@ def number(value: float) -> str:
 
 
 class _Entry:
-    """Writes the entry function. `calls` are the symbols of each section's pieces."""
+    """Writer of the entry function. `calls` are the symbols of each section's pieces."""
 
     def __init__(
         self, recording: Recording, calls: Sequence[Sequence[str]], lanes: int, vector: int, scratch: int
@@ -50,7 +50,7 @@ class _Entry:
         self.counters: list[str] = []
         self.labels = 0
         self.now = ("0", "0.0", "0.0")
-        # depth of what runs seldom: its sections are called, not put in place, which compiles in half the time
+        # depth of code that seldom runs: its sections are called, not inlined, which compiles in half the time
         self.rare = 0
 
     def put(self, *lines: str) -> None:
@@ -145,7 +145,7 @@ class _Entry:
         self.guarded(f"%{n}", "record", body)
 
     def row_done(self) -> None:
-        """Counts a row, and spreads the tile when it is full."""
+        """Count a row, and spread the tile when it is full."""
         due = self.due(self.program.record_divisor)
         self.put(f"  %row = and i1 {due}, %recording")
 
@@ -261,7 +261,7 @@ class _Entry:
         return "\n".join([*head, *self.lines])
 
     def _work(self) -> tuple[list[str], list[str]]:
-        """Lines that make `scratch` and `tile`, aligned to 64 bytes, and lines that give them back."""
+        """Lines that allocate `scratch` and `tile`, aligned to 64 bytes, and lines that free them."""
         tile = max(1, self.tile_rows * self.program.columns) * self.lanes
         scratch = -(-max(1, self.scratch) * self.lanes // 8) * 8
         if 8 * (scratch + tile) <= _STACK:
@@ -302,8 +302,8 @@ def entry(recording: Recording, calls: Sequence[Sequence[str]], lanes: int, vect
 def spread(lanes: int, width: int) -> str:
     """The function that turns a tile, [value][lane], into each case's own row of values.
 
-    Squares of `width` values and lanes are transposed in registers; what is left over goes one by one. Lanes beyond
-    the last case (`most`) write what that case writes, where it does.
+    Squares of `width` values and lanes are transposed in registers; the rest is copied one by one. Lanes beyond the
+    last case (`most`) write the same values to the same place as that case.
     """
     lines = [
         "define private void @spread(ptr noalias readonly %tile, i64 %count, ptr %to, i64 %stride, i64 %most) #1 {",
@@ -339,7 +339,7 @@ def spread(lanes: int, width: int) -> str:
 
 
 def _squares(lanes: int, width: int) -> list[str]:
-    """The loop over all values of the lanes at `from`: squares first, then what is left, one by one."""
+    """The loop over all values of the lanes at `from`: squares first, then the rest one by one."""
     vector = f"<{width} x double>"
     lines = [
         "  br label %ask",

@@ -46,7 +46,7 @@ _SIGNATURE = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4, *[ctypes.c_int64] * 
 def compile(
     program: Program, lanes: int | None = None, cpu: str | None = None, *, level: int | None = None
 ) -> LlvmKernel:
-    """Machine code of a program.
+    """Compile a program to machine code.
 
     lanes   cases a block: 2, 4, 8, 16 or 32; by default what is fastest here. Decides nothing but speed.
     cpu     one of LLVM's names of processors; the one we run on by default
@@ -64,7 +64,7 @@ def from_recording(
     level: int | None = None,
     inline: bool = True,
 ) -> LlvmKernel:
-    """Machine code of a program that is recorded already. inline: as `met.backends.llvm.emit.emit` has it."""
+    """Compile a recorded program to machine code. inline: as in `met.backends.llvm.emit.emit`."""
     from met.backends.llvm import machine as llvm
 
     machine = llvm.machine(cpu)
@@ -79,8 +79,8 @@ def from_recording(
 def written(
     recording: Recording, machine: Machine, lanes: int | None = None, *, inline: bool = True
 ) -> tuple[int, str]:
-    """Cases a block, chosen where none are asked for, and the IR: several registers' worth of cases, which hide each
-    other's latency."""
+    """The number of cases a block, chosen where none is given, and the IR: several registers' worth of cases, which
+    hide each other's latency."""
     largest = max((len(operations(section)) for section in recording.sections), default=0)
     small = largest <= _SMALL
     if lanes is None:
@@ -110,7 +110,7 @@ def _refuse_or_warn(machine: Machine) -> None:
 
 @frozen
 class LlvmKernel:
-    """Machine code of a program. `cached` says whether it was found rather than made."""
+    """Machine code of a program. `cached` is True where it was loaded from the cache."""
 
     recording: Recording
     lanes: int
@@ -120,38 +120,39 @@ class LlvmKernel:
 
     @property
     def program(self) -> Program:
-        """The program that the kernel runs."""
+        """The program of the recording."""
         return self.recording.program
 
     @property
     def vector(self) -> int:
-        """Cases that a register holds."""
+        """The number of cases in a register."""
         return min(self.lanes, self.machine.width)
 
     @property
     def processor(self) -> str:
-        """LLVM's name of the processor that the code was made for."""
+        """LLVM's name of the processor that the code was compiled for."""
         return self.machine.cpu
 
     @property
     def code_bytes(self) -> int:
-        """Bytes of instructions."""
+        """The number of bytes of instructions."""
         from met.backends.llvm import machine
 
         return machine.size(self.loaded.code)
 
     @property
     def functions(self) -> int:
-        """Functions that the sections became."""
+        """The number of functions into which the sections were compiled."""
         return sum(len(cut(section)) for section in self.recording.sections)
 
     @property
     def entry(self) -> Callable[..., None]:
-        """The entry function (met/backends/llvm/entry.py says what it takes); runs without Python's lock."""
+        """The address of the entry function (its arguments are in met/backends/llvm/entry.py); it runs without Python's
+        lock."""
         return _SIGNATURE(self.loaded.address)
 
     def rows(self, first: int, last: int) -> int:
-        """Rows recorded by ticks first to last, both done."""
+        """Number of rows recorded by ticks first to last, both included."""
         divisor = self.program.record_divisor
         return last // divisor - (first + divisor - 1) // divisor + 1
 
@@ -163,7 +164,7 @@ class LlvmKernel:
         threads: int | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> tuple[np.ndarray | None, np.ndarray]:
-        """Runs cases from tick 0 to tick `ticks`, both done.
+        """Run cases from tick 0 to tick `ticks`, both included.
 
         inputs    [case, input], in the order of `program.inputs`
         progress  told how many cases are done, from the thread that called, again and again while a case takes long;
@@ -222,8 +223,8 @@ class LlvmKernel:
         ended: threading.Event,
         between: Callable[[], None],
     ) -> None:
-        """Some cases, in this thread; all blocks use one state in turn. A long run of one block goes by stretches,
-        between which it is looked whether all has ended, and `between` is called."""
+        """Run some cases in this thread; all blocks use one state in turn. A long run of a single block is cut into
+        stretches; after each, `between` is called, and the run stops if all cases have ended."""
         cases, lanes = len(inputs), self.lanes
         blocks = -(-cases // lanes)
         packed = _aligned((blocks, inputs.shape[1], lanes))
@@ -257,12 +258,12 @@ class LlvmKernel:
         outputs[:] = flat.transpose(0, 2, 1).reshape(blocks * lanes, width)[:cases]
 
     def block(self, inputs: np.ndarray) -> LlvmBlock:
-        """One block whose state stays from call to call. inputs [case, input]; at most `lanes` cases."""
+        """A block whose state persists from call to call. inputs: [case, input], at most `lanes` cases."""
         return LlvmBlock(self, inputs)
 
 
 class LlvmBlock:
-    """Up to `lanes` cases, stepped by hand: the bed's loop, a debugger.
+    """Up to `lanes` cases, stepped call by call, for a bed's loop or a debugger.
 
     inputs    [input, lane], to be changed at will between steps
     outputs   [output, lane], as of the last step
@@ -287,11 +288,11 @@ class LlvmBlock:
         self._outputs = (self.outputs if len(program.outputs) else self._spare).ctypes.data
 
     def step(self, first: int, last: int) -> None:
-        """Ticks first to last, both done, then `end`. Tick 0 starts afresh."""
+        """Run ticks first to last, both included, then `end`. Tick 0 starts afresh."""
         self._entry(self._inputs, self._state, None, self._outputs, 1, first, last, self.cases, 0, 0)
 
     def recorded(self, first: int, last: int) -> np.ndarray:
-        """The same, with the rows [case, row, column] of those ticks."""
+        """Run these ticks as `step` does; returns the rows [case, row, column] of those ticks."""
         count = max(0, self.kernel.rows(first, last))
         rows = np.empty((self.cases, count, self.kernel.program.columns))
         self._entry(
@@ -314,7 +315,7 @@ class LlvmBlock:
 
 
 def _threads(asked: int | None) -> int:
-    """Threads to use: as many as asked for, else as many as this process may run on."""
+    """The number of threads to use: as many as asked for, else as many as this process may run on."""
     if asked is not None:
         return max(1, asked)
     if hasattr(os, "sched_getaffinity"):
@@ -331,7 +332,7 @@ def _aligned(shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _pack(inputs: np.ndarray, packed: np.ndarray) -> None:
-    """[case, input] into [block][input][lane]; lanes beyond the last case repeat it."""
+    """Pack [case, input] into [block][input][lane]; lanes beyond the last case repeat it."""
     blocks, width, lanes = packed.shape
     whole = len(inputs) // lanes
     packed[:whole] = inputs[: whole * lanes].reshape(whole, lanes, width).transpose(0, 2, 1)

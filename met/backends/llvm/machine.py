@@ -1,7 +1,6 @@
 """Machine code: IR text to object bytes to an address. The only file that knows llvmlite.
 
-Where results could depend on the compiler nothing is left to it (met/backends/llvm/emit.py); only speed is decided
-here.
+Nothing that could change results is left to the compiler (met/backends/llvm/emit.py); this module affects only speed.
 """
 
 from __future__ import annotations
@@ -20,7 +19,8 @@ from met.trace import check
 
 @frozen
 class Machine:
-    """The target of machine code: LLVM's names of processor and features, doubles in a register, whether it has fma.
+    """The target of machine code: LLVM's names of processor and features, the number of doubles in a register, and
+    whether it has fma.
 
     triple   LLVM's name of architecture and system; "" for those of this process
     fixed    whether code may name places in memory; it is otherwise right wherever it is put
@@ -67,7 +67,7 @@ def machine(cpu: str | None = None) -> Machine:
 
 
 def arm64(cpu: str = "generic") -> Machine:
-    """A Linux machine of the arm64 kind, whatever we run on: objects made for it are to be run elsewhere."""
+    """A Linux machine of the arm64 kind, whatever this machine is: its objects run elsewhere."""
     return Machine(cpu, "", 2, True, "aarch64-unknown-linux-gnu")
 
 
@@ -89,13 +89,13 @@ def _target_machine(target: Machine, level: int | None = None) -> Any:
 
 
 def versions() -> str:
-    """Versions of all that decides the code which a text becomes, besides the text."""
+    """Versions of everything besides the text that determines the generated code."""
     return f"llvmlite {llvmlite.__version__} llvm {'.'.join(map(str, llvm.llvm_version_info))}"
 
 
 QUICK = -1
-"""A level of `assemble`: neither the optimiser nor what a code generator does besides generating code. It takes half
-the time, the code is a fifth longer and slower, and computes the same bits."""
+"""A level of `assemble`: without the optimiser, and with the code generator's fastest settings. It takes half the time,
+the code is a fifth longer and slower, and computes the same bits."""
 
 
 def assemble(text: str, target: Machine, *, level: int | None = None) -> bytes:
@@ -137,7 +137,7 @@ def _prepared(text: str, machine_: Any, level: int | None) -> Any:
 
 
 def size(code: bytes) -> int:
-    """Bytes of instructions in an object file."""
+    """The number of bytes of instructions in an object file."""
     _ready()
     return sum(part.size() for part in llvm.ObjectFileRef.from_data(code).sections() if part.is_text())
 

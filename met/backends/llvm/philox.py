@@ -6,12 +6,13 @@ from collections.abc import Callable, Sequence
 
 from met.trace.philox import GROWTH, LOW, MULTIPLIERS, ROUNDS
 
-# the pattern of 2^52: added to it, a whole number below 2^52 stands in the lowest bits of the sum's pattern
+# the pattern of 2^52: a whole number below 2^52 that is added to it stands in the lowest bits of the sum's pattern
 _SHIFT_BITS = 0x433 << 52
 
 
 class PhiloxWriter:
-    """The rounds over one set of operands, as LLVM IR over vectors of `lanes` doubles; `word` gives each of the four.
+    """The rounds over one set of operands, as LLVM IR over vectors of `lanes` doubles; `word` returns each of the four
+    words.
 
     op        takes an instruction, and gives the name of what it makes
     operands  values of IR: four words of the counter, two of the key
@@ -34,7 +35,7 @@ class PhiloxWriter:
         self.words = self._rounds(*words)
 
     def word(self, n: int) -> str:
-        """Word n as a double; not a number where an operand is no word."""
+        """Word n as a double; not-a-number where an operand is not a word."""
         value = self._double(self.words[n])
         nan = "splat (double 0x7FF8000000000000)"
         return self._op(f"select {self.truths} {self.valid}, {self.doubles} {value}, {self.doubles} {nan}")
@@ -43,13 +44,13 @@ class PhiloxWriter:
         return self._op(f"and {self.integers} {x}, splat (i64 {LOW})")
 
     def _double(self, x: str) -> str:
-        """The number in the low 32 bits."""
+        """The number in the low 32 bits, as a double."""
         pattern = self._op(f"or {self.integers} {self._low(x)}, splat (i64 {_SHIFT_BITS})")
         shifted = self._op(f"bitcast {self.integers} {pattern} to {self.doubles}")
         return self._op(f"fsub {self.doubles} {shifted}, splat (double 0x{_SHIFT_BITS:X})")
 
     def _rounds(self, c0: str, c1: str, c2: str, c3: str, k0: str, k1: str) -> tuple[str, str, str, str]:
-        """The same rounds over vectors; high halves of words hold anything, and are taken off before a product."""
+        """The rounds over vectors; the high halves of words hold anything, and are masked off before a product."""
         bits, op = self.integers, self._op
         for n in range(ROUNDS):
             if n:

@@ -1,9 +1,9 @@
-"""A section cut into pieces that a compiler handles well, and where each value is kept between them.
+"""Cutting of a section into pieces that a compiler handles well, and the places of values between them.
 
 One function of many thousands of operations ruins register allocation and takes long to compile. So a long section
-becomes several functions of some hundred operations, cut where the fewest values are alive; those cross through
-scratch memory. What is read from memory anyway is read again in each piece. Pieces this short also let a processor
-overlap one part of a block with the next (`emit`'s `vector`): 405 to 317 ns at 30 joints, 79 to 69 at 7.
+becomes several functions of some hundred operations, cut where the fewest values are alive; those cross through scratch
+memory. Values that come from memory anyway are read again in each piece. Pieces this short also let a processor overlap
+one part of a block with the next (`emit`'s `vector`): 405 to 317 ns at 30 joints, 79 to 69 at 7.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Piece:
 
 
 def operations(section: CodeSection) -> list[int]:
-    """Positions of the live nodes that are to be computed."""
+    """Positions of the live nodes that have to be computed."""
     return [i for i in section.order if section.nodes[i][0] not in LEAVES]
 
 
@@ -97,8 +97,8 @@ def cut(section: CodeSection, above: int = CUT_ABOVE, shortest: int = SHORTEST, 
 
 
 def check(section: CodeSection, pieces: list[Piece]) -> None:
-    """Raises ValueError where the pieces are not the section: an operation or a store that is missing, or a value that
-    a piece takes and does not have."""
+    """Raise ValueError where the pieces do not add up to the section: an operation or a store is missing, or a piece
+    takes a value that it does not have."""
     nodes = section.nodes
     if [i for piece in pieces for _, i in piece.body] != operations(section):
         raise ValueError(f"{section.name}: its pieces are not its operations, once and in order")
@@ -151,7 +151,7 @@ def _bounds(section: CodeSection, body: list[int], number: dict[int, int], short
 
 
 def _assign_scratch(pieces: list[Piece], body: list[int], piece_of: list[int], asked: dict[int, int]) -> None:
-    """A slot for each value that crosses, free again after the last piece that asks for it."""
+    """A slot for each value that crosses between pieces, free again after the last piece that uses it."""
     free: list[int] = []
     slots = 0
     ending: dict[int, list[int]] = {}

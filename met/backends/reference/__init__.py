@@ -1,4 +1,4 @@
-"""The reference back end: a recording carried out operation by operation over numpy arrays, with the others' bits.
+"""The reference back end: it runs a recording operation by operation over numpy arrays, with the bits of the others.
 
 listing    a recording as text
 interpret  running it;  plain: a program by itself, phase by phase over floats
@@ -15,7 +15,7 @@ from met.trace.recording import Recording
 
 @frozen
 class Reference:
-    """The interpreter, as `met.backends.backend.Backend` has it. Thousands of times slower than machine code."""
+    """The interpreter, as a `met.backends.backend.Backend`. It is thousands of times slower than machine code."""
 
     name: str = "reference"
     version: int = 1

@@ -1,4 +1,4 @@
-"""A recording carried out over numpy arrays: one operation at a time, all cases of a block at once."""
+"""Interpretation of a recording over numpy arrays: one operation at a time, all cases of a block at once."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from met.trace.recording import Branch, RecordedControl, Recording, RecordSectio
 
 @frozen
 class Interpreter:
-    """A recording that is ready to run, as `met.backends.backend.Kernel` has it. lanes: cases of a block at most."""
+    """A recording that is ready to run, as a `met.backends.backend.Kernel`. lanes: largest number of cases a block."""
 
     recording: Recording
     lanes: int
@@ -53,7 +53,7 @@ class Interpreter:
 
 
 class InterpretedBlock:
-    """Cases that are stepped together, as `met.backends.backend.Block` has it."""
+    """Cases that are stepped together, as a `met.backends.backend.Block`."""
 
     def __init__(self, recording: Recording, inputs: np.ndarray) -> None:
         given = np.atleast_2d(np.asarray(inputs, dtype=np.float64))
@@ -90,7 +90,7 @@ class InterpretedBlock:
         return {name: self.state[slot] for name, slot in self._cell.items()}
 
     def _follow(self, body: Iterable[RecordedControl]) -> None:
-        """Runs a body of control at this tick."""
+        """Run a body of control at this tick."""
         for step in body:
             if not isinstance(step, Branch):
                 if not isinstance(step, RecordSection) or self._tick % step.divisor == 0:
@@ -128,7 +128,7 @@ class InterpretedBlock:
         records = [(column, value(ref)) for column, ref in section.records]
         for slot, ref in section.outputs:
             self.outputs[slot] = value(ref)
-        # all values are taken before the first store: a cell may be given what another held before
+        # all values are taken before the first store: a cell may be given the former value of another
         for slot, stored in [(slot, np.array(stored)) for slot, stored in stores]:
             self.state[slot] = stored
         for column, recorded in records:

@@ -1,4 +1,4 @@
-"""A recorded program as text: control, then each section, operation by operation; `%n` is what number n gives."""
+"""A recorded program as text: control, then each section, operation by operation; `%n` is the result of operation n."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def lines(recording: Recording) -> Iterator[str]:
 
 
 def _control(steps: Sequence[RecordedControl], names: Sequence[str], indent: str) -> Iterator[str]:
-    """Control, one line a step with the section's name, the bodies of blocks indented."""
+    """The lines of control, one a step with the section's name, the bodies of blocks indented."""
     for step in steps:
         if isinstance(step, Branch):
             match step.condition:

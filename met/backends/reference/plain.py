@@ -64,7 +64,7 @@ class PlainTape:
 def execute(
     program: Program, inputs: Mapping[str, float] | Sequence[float], ticks: int
 ) -> tuple[np.ndarray, dict[str, float]]:
-    """Runs one case from tick 0 to tick `ticks`, both done: (rows [rows, columns], outputs by name).
+    """Run one case from tick 0 to tick `ticks`, both included: (rows [rows, columns], outputs by name).
 
     inputs   by name, or in the order of `program.inputs`
     """
@@ -81,7 +81,7 @@ def execute(
 
 
 def follow(tape: PlainTape, body: tuple[Control, ...], *, settled: float = 0.0) -> None:
-    """Runs the body once, at the tape's tick.
+    """Run the body once, at the tape's tick.
 
     settled  loops also end after a turn in which no cell changes by more than this share of its value; 0: they do not
     """

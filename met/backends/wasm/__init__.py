@@ -16,7 +16,7 @@ from met.trace.recording import Recording
 
 @frozen
 class Wasm:
-    """WebAssembly, as `met.backends.backend.Backend` has it."""
+    """WebAssembly, as a `met.backends.backend.Backend`."""
 
     name: str = "wasm"
     version: int = 1
@@ -27,13 +27,13 @@ class Wasm:
         return text(recording)
 
     def listing(self, recording: Recording) -> str:
-        """The code as LLVM's assembler writes WebAssembly."""
+        """The code in the WebAssembly text of LLVM's assembler."""
         from met.backends.llvm import machine
 
         return machine.listing(self.emit(recording), machine.wasm32())
 
     def load(self, recording: Recording, *, lanes: int | None = None, inline: bool = True) -> Kernel:
-        """The program, compiled; running it raises RuntimeError where there is no node. It has two lanes, always."""
+        """The program, compiled, always with two lanes; running it raises RuntimeError where there is no node."""
         from met.backends.wasm.module import compiled
         from met.backends.wasm.node import WasmKernel
 

@@ -1,9 +1,10 @@
 """An exact fused multiply-add of two doubles a register, as LLVM IR, for machines whose WebAssembly has none.
 
-Product and sum are made without error (Dekker 1971, Knuth 1969), what is left is rounded to odd, and the last sum then
-rounds as the exact value would (Boldo and Melquiond, "Emulation of a FMA and correctly-rounded sums: proved algorithms
-using rounding to odd", IEEE Trans. Computers 57, 2008). That holds where no part overflows or falls below 2^-1074: of
-usual sizes it is done as it is, else with powers of two taken off first and put back last.
+Product and sum are computed without error (Dekker 1971, Knuth 1969), the remainder is rounded to odd, and the last sum
+then rounds as the exact value would (Boldo and Melquiond, "Emulation of a FMA and correctly-rounded sums: proved
+algorithms using rounding to odd", IEEE Trans. Computers 57, 2008). That holds where no part overflows or falls below
+2^-1074: operands of usual sizes are used as they are, others are scaled by powers of two first, and the result is
+scaled back.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def _whole(value: int) -> str:
 
 
 class _FmaWriter:
-    """Writes instructions, each the name of what it makes."""
+    """Writer of instructions; each method returns the name of its result."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -140,7 +141,7 @@ class _FmaWriter:
 
 
 def _usual(w: _FmaWriter) -> None:
-    """The function's beginning: it is done here where both lanes are of usual sizes, or have a factor 0."""
+    """The function's first part: the result where both lanes have usual sizes, or a factor 0."""
     a, b, c = w.size("%a"), w.size("%b"), w.size("%c")
     order = w.is_("olt", a, b)
     less, more = w.where(order, a, b), w.where(order, b, a)
@@ -157,7 +158,7 @@ def _usual(w: _FmaWriter) -> None:
 
 
 def _any(w: _FmaWriter) -> None:
-    """The function's end: operands of any size."""
+    """The function's last part: operands of any size."""
     a, ka = w.significand("%a")
     b, kb = w.significand("%b")
     c, kc = w.significand("%c")
@@ -166,7 +167,7 @@ def _any(w: _FmaWriter) -> None:
     k = w.whole("add", ka, kb)
     apart = w.where(none, "zeroinitializer", w.whole("sub", kc, k), _B)
     near = w.clamped(apart, -_APART, _APART)
-    # where what is added is beyond reach, all is smaller than it should be
+    # where the addend is out of range, everything is scaled down
     beyond = w.whole("sub", apart, near)
     above = w.op(f"icmp sgt {_B} {beyond}, zeroinitializer")
     k = w.whole("add", k, w.where(above, beyond, "zeroinitializer", _B))
@@ -186,7 +187,7 @@ def _any(w: _FmaWriter) -> None:
     half = w.whole("ashr", k, _whole(1))
     value = w.mul(w.mul(value, w.power(half)), w.power(w.whole("sub", k, half)))
 
-    # what is not finite, or has a factor 0, is right as it is
+    # results that are not finite, or have a factor 0, need no scaling
     finite = [w.is_("olt", w.size(x), _double(float("inf"))) for x in ("%a", "%b", "%c")]
     factors = w.truth("and", finite[0], finite[1])
     some = w.truth("and", w.is_("une", "%a", "zeroinitializer"), w.is_("une", "%b", "zeroinitializer"))
@@ -197,7 +198,7 @@ def _any(w: _FmaWriter) -> None:
 
 
 def function(attributes: str) -> str:
-    """The function `met_fma`: a b + c, rounded once, in both lanes. attributes: of it, as IR."""
+    """The function `met_fma`: a b + c, rounded once, in both lanes. attributes: of the function, as IR."""
     w = _FmaWriter()
     steps: tuple[Callable[[_FmaWriter], None], ...] = (_usual, _any)
     for step in steps:

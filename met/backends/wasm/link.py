@@ -1,7 +1,7 @@
-"""An object file of WebAssembly, as LLVM writes one, made a module that runs: no linker is asked for.
+"""A linker from LLVM's WebAssembly object file to a module that runs, so that none has to be installed.
 
-One object holds the whole program, so little is left to be done: constants and tables get their place in memory, which
-is written where the code asks for it; memory, stack and exports are said. The formats are those of the WebAssembly core
+One object holds the whole program, so little is left to be done: constants and tables get addresses, which are written
+where the code refers to them; memory, stack and exports are declared. The formats are those of the WebAssembly core
 specification 2.0 and of "WebAssembly Object File Linking" (WebAssembly/tool-conventions, Linking.md).
 
 Memory is: the stack, so that one that is too small ends in a trap; constants; and from `heap` on what a caller puts
@@ -13,7 +13,7 @@ from __future__ import annotations
 from met.frozen import frozen
 
 STACK = 1 << 19
-"""Bytes of the stack: what `met.backends.llvm.entry` puts there at most, twice."""
+"""Bytes of the stack: twice the most that `met.backends.llvm.entry` puts there."""
 
 PAGE = 1 << 16
 
@@ -28,12 +28,12 @@ _UNDEFINED, _EXPLICIT_NAME = 0x10, 0x40  # flags of symbols
 _FUNCTION_INDEX, _ADDRESS, _SIGNED_ADDRESS, _WHOLE_ADDRESS, _GLOBAL_INDEX = 0, 3, 4, 5, 7  # kinds of relocations
 _WITH_ADDEND = (_ADDRESS, _SIGNED_ADDRESS, _WHOLE_ADDRESS)
 _CALL = 0x10
-_PADDED = 5  # bytes that an object leaves for each number that a linker writes
+_PADDED = 5  # bytes that an object reserves for each number that a linker writes
 
 
 @frozen
 class LinkedModule:
-    """A module; `heap` is the first byte of memory that is free, `fma_calls` how often it calls the multiply-add."""
+    """A linked module; `heap` is the first free byte of memory, `fma_calls` the number of calls of the multiply-add."""
 
     code: bytes
     heap: int
@@ -41,7 +41,7 @@ class LinkedModule:
 
 
 class _ByteReader:
-    """Reads an object file's bytes from one end to the other."""
+    """Reader of an object file's bytes, from the start to the end."""
 
     def __init__(self, data: bytes, at: int = 0) -> None:
         self.data, self.at = data, at
@@ -55,7 +55,7 @@ class _ByteReader:
         return self.data[self.at - count : self.at]
 
     def number(self) -> int:
-        """An unsigned number, LEB128."""
+        """Read an unsigned number, LEB128."""
         value = shift = 0
         while True:
             byte = self.byte()
@@ -74,7 +74,7 @@ class _ByteReader:
 
 
 def number(value: int, width: int = 1) -> bytes:
-    """An unsigned number as LEB128, of at least so many bytes."""
+    """An unsigned number as LEB128, of at least `width` bytes."""
     parts = [value & 0x7F]
     while value > 0x7F or len(parts) < width:
         value >>= 7
@@ -83,7 +83,7 @@ def number(value: int, width: int = 1) -> bytes:
 
 
 def _signed(value: int) -> bytes:
-    """A number that is not negative, as signed LEB128."""
+    """A non-negative number as signed LEB128."""
     made = number(value)
     return number(value, len(made) + 1) if made[-1] & 0x40 else made
 
@@ -104,7 +104,7 @@ class _ObjectSymbol:
 
 @frozen
 class _Relocation:
-    """A number to be written at `at`, from the beginning of its section."""
+    """A number to be written at `at`, counted from the beginning of its section."""
 
     kind: int
     at: int
@@ -169,8 +169,8 @@ class _ObjectFile:
         return _ObjectSymbol(kind, read.name() if named else "", index)
 
     def _only_globals_and_memory(self) -> None:
-        """Raises ValueError where the object asks for a function that it does not hold, or for another global than the
-        stack's pointer: then its numbers of functions and globals are the module's."""
+        """Raise ValueError where the object imports a function, or a global other than the stack's pointer: without
+        such imports its numbers of functions and globals are the module's."""
         read = _ByteReader(self.sections.get(_IMPORT, b"\0"))
         for _ in range(read.number()):
             read.name()
@@ -219,7 +219,7 @@ def link(data: bytes, exported: str, fused: str) -> LinkedModule:
 
 
 def _data(found: _ObjectFile) -> tuple[list[int], bytes, int]:
-    """Where each segment of data lies, the section of data, and the first byte behind all, in whole cache lines."""
+    """The address of each segment of data, the section of data, and the first byte after it, in whole cache lines."""
     read = _ByteReader(found.sections.get(_DATA, b"\0"))
     places, parts, at = [], [], STACK
     moved = {relocation.at for relocation in found.relocations.get(_DATA, [])}
@@ -240,7 +240,7 @@ def _data(found: _ObjectFile) -> tuple[list[int], bytes, int]:
 
 
 def _code(found: _ObjectFile, places: list[int], fused: int) -> tuple[bytes, list[int]]:
-    """The section of code with what it lacked, and where in it the function `fused` is called."""
+    """The section of code with its relocations applied, and the places in it where the function `fused` is called."""
     body = found.sections[_CODE]
     written = iter(sorted(found.relocations.get(_CODE, []), key=lambda each: each.at))
     following = next(written, None)
@@ -274,7 +274,7 @@ def _code(found: _ObjectFile, places: list[int], fused: int) -> tuple[bytes, lis
 
 
 def _written(found: _ObjectFile, asked: _Relocation, places: list[int], fused: int) -> bytes:
-    """The number that a relocation asks for, as short as it can be; in two bytes where `fused` is called."""
+    """The number for a relocation, as short as it can be; in two bytes where `fused` is called."""
     symbol = found.symbols[asked.index]
     if asked.kind == _FUNCTION_INDEX:
         made = number(symbol.index, 2 if symbol.index == fused else 1)

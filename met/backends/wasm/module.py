@@ -1,4 +1,4 @@
-"""A recorded program as a module of WebAssembly, and what a caller must know to run it.
+"""A recorded program as a module of WebAssembly, and the description by which a caller runs it.
 
 The code is the LLVM back end's text, two cases a block, which a register of WebAssembly holds. A module calls an exact
 multiply-add of its own (`met.backends.wasm.fma`); where a machine fuses by itself, which `kernel.js` finds out, the
@@ -24,7 +24,7 @@ from met.trace.recording import Recording
 LANES = 2
 
 KERNEL_JS = Path(__file__).with_name("kernel.js")
-"""The script that runs a module, for pages and for node."""
+"""The script that runs a module, in a page and in node."""
 
 _FUSED = "@llvm.fma.v2f64"
 _ATTRIBUTES = ("noinline nounwind willreturn memory(none)", "noinline nounwind")
@@ -37,7 +37,7 @@ _LIBRARY = (
 
 @frozen
 class WasmModule:
-    """A program in WebAssembly. recording: of which; code: the module; heap: the first free byte of its memory.
+    """A program in WebAssembly. recording: of the program; code: the module; heap: the first free byte of its memory.
 
     cached  whether it was found in the cache rather than made;  fma_calls: places where it multiplies and adds
     """
@@ -73,7 +73,7 @@ class WasmModule:
 
 
 def text(recording: Recording) -> str:
-    """The program as LLVM IR, with all that it calls."""
+    """The program as LLVM IR, with all functions that it calls."""
     made = llvm_text.emit(recording, LANES, vector=LANES, width=LANES)
     lines = [
         line
@@ -94,8 +94,8 @@ _VECTOR = "<2 x double>"
 
 
 def _memory(attributes: str) -> str:
-    """`malloc` and `free` for the one piece of memory that an entry may ask for, always of the same size: memory grows
-    once, and what it grew by is kept."""
+    """`malloc` and `free` for the one block of memory that an entry may ask for, always of the same size: memory grows
+    once, and the block is kept."""
     return f"""\
 @work = private global ptr null
 define private ptr @malloc(i64 %bytes) {attributes} {{
@@ -128,13 +128,14 @@ declare void @llvm.trap()"""
 
 
 def compiled(recording: Recording, *, quick: bool = False) -> WasmModule:
-    """The module of a program, from the cache where it is there. quick: made in half the time, a fifth slower, with the
-    same bits."""
+    """The module of a program, from the cache where it is there. quick: compiled in half the time, a fifth slower, with
+    the same bits."""
     return _linked(recording, *cache.kept(*_object(recording, quick)))
 
 
 def begun(recording: Recording, *, quick: bool = False) -> Callable[[], WasmModule]:
-    """Gives `compiled` of these when it is called. LLVM works meanwhile, in a thread, where it holds up no Python."""
+    """Start to compile in a thread; the returned function waits for `compiled`'s result. LLVM does not hold Python's
+    lock."""
     with_one = ThreadPoolExecutor(1)
     made = with_one.submit(cache.kept, *_object(recording, quick))
     with_one.shutdown(wait=False)
@@ -142,7 +143,7 @@ def begun(recording: Recording, *, quick: bool = False) -> Callable[[], WasmModu
 
 
 def _object(recording: Recording, quick: bool) -> tuple[str, Callable[[], bytes]]:
-    """The name of a program's object in the cache, and what makes it."""
+    """The name of a program's object in the cache, and the function that compiles it."""
     target, level = machine.wasm32(), machine.QUICK if quick else None
     source = text(recording)
     of_level = ["quick"] if quick else []

@@ -1,4 +1,4 @@
-"""A module of WebAssembly run by node, through the script that a page runs it by: each call is a process of its own."""
+"""Running a module of WebAssembly in node, by the script that pages use: each call is a process of its own."""
 
 from __future__ import annotations
 
@@ -18,15 +18,14 @@ from met.trace.program import Program
 from met.trace.recording import Recording
 
 _SCRIPT = Path(__file__).with_name("node.js")
-# numbers of rows that one process writes at most
+# largest number of row values that one process writes
 _ROWS = 1 << 24
 
 
 @frozen
 class NodeRun:
-    """Results of a module, and how they were computed. rows [case, row, column], outputs [case, output], state [cell,
-    lane]; fused: whether the machine's multiply-add was used; compile_ms, run_ms: time to begin, and of each time it
-    ran."""
+    """Results of a module. rows [case, row, column], outputs [case, output], state [cell, lane]; fused: whether the
+    machine's multiply-add was used; compile_ms, run_ms: time to begin, and of each run."""
 
     rows: np.ndarray
     outputs: np.ndarray
@@ -47,7 +46,7 @@ def ask(
     machine: bool | None = None,
     times: int = 1,
 ) -> NodeRun:
-    """Ticks first to last of some cases. inputs [case, input], state [cell, lane].
+    """Run ticks first to last of some cases. inputs [case, input], state [cell, lane].
 
     machine  True for the machine's multiply-add, False for the module's; None for the machine's where it proves right
     times    how often, for who measures
@@ -90,14 +89,14 @@ def ask(
 
 
 def _rows(program: Program, first: int, last: int) -> int:
-    """Rows recorded by ticks first to last, both done."""
+    """Number of rows recorded by ticks first to last, both included."""
     divisor = program.record_divisor
     return max(0, last // divisor - -(-first // divisor) + 1)
 
 
 @frozen
 class WasmKernel:
-    """A module that node runs, as `met.backends.backend.Kernel` has it."""
+    """A module that node runs, as a `met.backends.backend.Kernel`."""
 
     module: WasmModule
     lanes: int = LANES
@@ -152,7 +151,7 @@ class WasmKernel:
 
 
 class WasmBlock:
-    """At most two cases that are stepped by hand, as `met.backends.backend.Block` has it."""
+    """At most two cases that are stepped call by call, as a `met.backends.backend.Block`."""
 
     def __init__(self, module: WasmModule, inputs: np.ndarray) -> None:
         given = np.atleast_2d(np.asarray(inputs, dtype=np.float64))
