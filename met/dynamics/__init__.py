@@ -1,1 +1,1 @@
-"""Motion of a tree of rigid bodies: which accelerations from which torques, and the reverse (docs/physics.md, 1)."""
+"""Motion of a tree of rigid bodies: accelerations from torques, and torques from accelerations (docs/physics.md, 1)."""

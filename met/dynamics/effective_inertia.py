@@ -1,7 +1,8 @@
-"""The effective inertia of a joint: the arm behind it as an inertia and a torque (docs/physics.md, section 1).
+"""The effective inertia of a joint: the rest of the arm, reduced to an inertia and a torque (docs/physics.md, section
+1).
 
-One outward sweep serves all joints. Y_i is link i's answer to a wrench on it, everything outboard of it cut away
-and all joints in their modes: a six by six from wrench to acceleration.
+One outward sweep serves all joints. Y_i is the mobility of link i, everything outboard of it cut away and all joints in
+their modes: a six by six from wrench to acceleration.
 """
 
 from __future__ import annotations

@@ -26,7 +26,8 @@ from met.dynamics.tree import Tree
 
 
 class Energy(NamedTuple):
-    """Energy and momentum of all that the joints move; of the base, and of links fixed to it, where it moves freely.
+    """Energy and momentum of all bodies that the joints move; and of the base, with links fixed to it, where it moves
+    freely.
 
     kinetic    J, 1/2 rotor qd^2 included, and what the rotation of the links that carry `momenta` adds to these
     potential  J, of uniform gravity, zero at the world's origin

@@ -1,4 +1,4 @@
-"""A base that moves freely: what it is to the recursion, and the six equations that its motion follows.
+"""A base that moves freely: its part in the recursion, and the six equations of its motion.
 
     IA_0 [wd; a] = -pA_0        IA_0, pA_0 as of any link (`recursion`); a is less gravity
 
@@ -83,7 +83,7 @@ def accelerated(found: Factors, moment: Vector, force: Vector) -> tuple[Vector, 
 
 
 def mobility(found: Factors) -> Symmetric:
-    """IA_0^-1: the answer to wrenches, angular over linear."""
+    """IA_0^-1: the accelerations under unit wrenches, angular over linear."""
     columns = []
     for k in range(6):
         unit = [1.0 if i == k else 0.0 for i in range(6)]

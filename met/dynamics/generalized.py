@@ -1,4 +1,4 @@
-"""Motion of a free base that follows from joint rates where nothing pushes: its part of the generalized Jacobian.
+"""The motion of a free base due to joint rates where no external force acts: its part of the generalized Jacobian.
 
     H V_b + sum_i h_i qd_i = P          V_b the base's twist, P the momentum, H of all bodies together
 
@@ -60,5 +60,6 @@ def base_answers(tree: Tree, q: Sequence[Real], base: Pose = HERE) -> tuple[tupl
 
 
 def _momentum(body: Rigid, w: Vector, v: Vector) -> tuple[Vector, Vector]:
-    """Angular momentum about the origin, and momentum, of a body that turns with w as its point at the origin has v."""
+    """Angular momentum about the origin, and momentum, of a body with angular velocity w and velocity v of its point at
+    the origin."""
     return add(apply_symmetric(body.I, w), cross(body.h, v)), sub(scale(body.mass, v), cross(body.h, w))

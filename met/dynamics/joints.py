@@ -1,4 +1,4 @@
-"""A moving joint: how its child frame lies in its parent frame, and what it carries from one to the other.
+"""A moving joint: the pose of its child frame in its parent frame, and the transforms from one to the other.
 
 Frames here are the recursion's own, chosen by `tree` so that little is left to compute: the motion is always about
 or along z, and from a parent's frame to its child's one goes by
@@ -83,7 +83,7 @@ class Joint:
         return 2 if self.kind == "revolute" else 5
 
     def at(self, q: Real) -> JointTransform:
-        """The way from the parent frame to the child frame at position q."""
+        """The transform from the parent frame to the child frame at position q."""
         if self.kind == "prismatic":
             return JointTransform(self.swing, self.offset, self.twist, self.zero, self.slide + q)
         angle = q if is_zero(self.angle) else q + self.angle
@@ -94,7 +94,7 @@ class Joint:
 
 
 class JointTransform(NamedTuple):
-    """The five shifts and turns of a joint at one position (head of this file)."""
+    """The five shifts and rotations of a joint at one position (see the head of this file)."""
 
     swing: Turn
     offset: Vector
@@ -122,7 +122,7 @@ class JointTransform(NamedTuple):
         return wd, shift_motion(Z, self.slide, wd, a)
 
     def raise_force(self, moment: Vector, force: Vector) -> tuple[Vector, Vector]:
-        """A wrench about the child's origin, in child axes, about the parent's origin in the parent's axes."""
+        """A wrench about the child's origin, in child axes, moved to the parent's origin and axes."""
         moment = shift_force(Z, self.slide, moment, force)
         moment, force = raise_vector(Z, self.turn, moment), raise_vector(Z, self.turn, force)
         moment, force = raise_vector(X, self.twist, moment), raise_vector(X, self.twist, force)
@@ -133,7 +133,7 @@ class JointTransform(NamedTuple):
     ) -> tuple[Symmetric, Vector, Vector]:
         """An articulated inertia and its bias wrench in the parent's frame.
 
-        The inertia also answers the acceleration `offset_product`, whose wrench is added to the bias half way.
+        The acceleration `offset_product` acts on the inertia too; its wrench is added to the bias half way.
         """
         M = raise_turned(X, self.twist, raise_turned(Z, self.turn, raise_shifted(Z, self.slide, M)))
         moment = shift_force(Z, self.slide, moment, force)
@@ -148,7 +148,7 @@ class JointTransform(NamedTuple):
         return raise_turned(Z, self.swing, M), moment, force
 
     def lower_mobility(self, Y6: Symmetric) -> Symmetric:
-        """X Y X', the parent's answer to wrenches at the child's origin: a map from wrench to acceleration."""
+        """X Y X': the parent's mobility at the child's origin, a map from wrench to acceleration."""
         # Linear over angular, a mobility moves like an inertia shifted the other way.
         M = swapped(raise_turned(Z, _back(self.swing), Y6))
         for axis in (X, Y, Z):
@@ -164,7 +164,7 @@ class JointTransform(NamedTuple):
         return Pose(R, raise_vector(Z, self.swing, add(self.offset, slid)))
 
     def below(self, outer: Pose) -> Pose:
-        """The child frame in the frame in which the parent frame is `outer`."""
+        """The child frame in the frame in which the parent frame has the pose `outer`."""
         own = self.pose()
         return Pose(product(outer.R, own.R), add(outer.p, turn_vector(outer.R, own.p)))
 

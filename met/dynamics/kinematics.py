@@ -116,8 +116,8 @@ def link_acceleration(
 ) -> tuple[Vector, Vector]:
     """Angular acceleration of a link, and acceleration of its frame's origin, in link axes, rad/s^2, m/s^2.
 
-    Of a motion, however it came about: all products of velocities are in it. base_rate, base_acceleration: the
-    base frame's angular velocity; its angular acceleration and that of its origin; in its own axes.
+    All products of velocities are included, so it holds for any motion. base_rate, base_acceleration: the base frame's
+    angular velocity; its angular acceleration and that of its origin; in its own axes.
     """
     steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
     frame = tree.frames[link]
@@ -167,7 +167,7 @@ def jacobian(
 
 
 def fixed_acceleration(w: Vector, acceleration: tuple[Vector, Vector], inner: Pose) -> tuple[Vector, Vector]:
-    """The same of accelerations: of a frame that turns at w, to one fixed to it at the given pose, in its own axes."""
+    """The acceleration of a frame fixed, at the given pose, to one that turns at w; in its own axes."""
     wd, a = acceleration
     there = add(a, add(cross(wd, inner.p), cross(w, cross(w, inner.p))))
     return turn_vector_back(inner.R, wd), turn_vector_back(inner.R, there)

@@ -5,7 +5,8 @@ factors of the mass matrix.
 
 The derivatives of ID are those of J. Carpentier and N. Mansard, Analytical Derivatives of Rigid Body Dynamics
 Algorithms, RSS 2018, in the terms of S. Singh, R. Russo and P. Wensing, Efficient Analytical Derivatives of Rigid-Body
-Dynamics Using Spatial Vector Algebra, IEEE Robotics and Automation Letters 7, 2022: of body i's motion axis S they ask
+Dynamics Using Spatial Vector Algebra, IEEE Robotics and Automation Letters 7, 2022: for body i's motion axis S they
+need
 
     psi   the rate of S as a part of the link before it;   psi'  the rate of that, less S x what accelerates the link
     E, p  of a subtree, E = -2 sum m r x v x, p = 2 sum m v: with a rate dw more, Coriolis forces are E dw, dw x p
@@ -67,8 +68,8 @@ Entries = dict[tuple[int, int], Real]
 
 @frozen
 class LinearisedDynamics:
-    """The derivative of `recursion.solve` by q, qd, tau, the accelerations that are given, and wrenches, where it was
-    solved; the base moves as it is told.
+    """The derivative of `recursion.solve` by q, qd, tau, the given accelerations and wrenches, at the solved state; the
+    base's motion is given.
 
     M             mass matrix, without rotors: (i, j) where i is j or inboard of it, kg m^2 (kg)
     by_q, by_qd   of the torques of inverse dynamics, N m/rad, N m s/rad ...
@@ -92,8 +93,8 @@ class LinearisedDynamics:
         qdd: Sequence[Real],
         wrenches: Mapping[str, Wrench] | None = None,
     ) -> tuple[list[Real], list[Real]]:
-        """How `qdd` and `tau_load` of `Solved` move, where what `solve` was given moves so. Of tau is read what belongs
-        to joints in torque mode, of qdd to those in acceleration mode; None: wrenches stay."""
+        """The change of `qdd` and `tau_load` of `Solved` for these changes of the arguments of `solve`. tau counts for
+        joints in torque mode, qdd for those in acceleration mode; wrenches None: unchanged."""
         solved, joints = self.solved, range(len(self.tree.joints))
         lacking = self._load_torques(wrenches)
         for (i, j), entry in self.by_q.items():
@@ -116,7 +117,7 @@ class LinearisedDynamics:
         return found, felt
 
     def _less_inertia(self, torques: Sequence[Real], qdd: Sequence[Real]) -> list[Real]:
-        """torques - M qdd"""
+        """torques - M qdd."""
         left = list(torques)
         for (i, j), entry in self.M.items():
             left[i] = left[i] - entry * qdd[j]
@@ -150,8 +151,8 @@ def _inboard(tree: Tree, i: int) -> list[int]:
 
 @frozen
 class _Subtree:
-    """All that is outboard of a frame, about its origin: its bodies as one, E and p (head of this file), and the
-    wrench that moves it."""
+    """Everything outboard of a frame, about its origin: its bodies as one, E and p (head of this file), and the wrench
+    that moves it."""
 
     body: Rigid
     E: Nine
@@ -159,7 +160,7 @@ class _Subtree:
     wrench: Wrench
 
     def shifted(self, d: Vector, b: Vector) -> _Subtree:
-        """About another origin, from which this one is at d and moves at b."""
+        """The subtree about another origin, from which this one is at d and moves at b."""
         body = rigid_shift(self.body, d)
         E = _less(_less(self.E, _two_cross(d, self.p)), _two_cross(scale(2.0, body.h), b))
         moment, force = self.wrench
@@ -168,14 +169,14 @@ class _Subtree:
         return _Subtree(body, E, add(self.p, scale(2.0 * self.body.mass, b)), (moment, force))
 
     def turned(self, axis: int, turn: tuple[Real, Real]) -> _Subtree:
-        """In the axes in which these are turned."""
+        """The subtree in axes turned about this axis."""
         m, h, J = self.body
         both = raise_turned(axis, turn, Symmetric(J, self.E, (0.0,) * 6))
         h, p, moment, force = (raise_vector(axis, turn, a) for a in (h, self.p, *self.wrench))
         return _Subtree(Rigid(m, h, both.A), both.B, p, (moment, force))
 
     def with_rigid(self, other: _Subtree) -> _Subtree:
-        """Both."""
+        """The subtree with another one fixed to it."""
         E = tuple(a + b for a, b in zip(self.E, other.E, strict=True))
         return _Subtree(
             rigid_sum(self.body, other.body), E, add(self.p, other.p), _sum(self.wrench, other.wrench)  # type: ignore[arg-type]
@@ -184,7 +185,7 @@ class _Subtree:
 
 @frozen
 class _Answer:
-    """t1 to t4 of a joint's subtree (head of this file), in a frame that is raised towards the base."""
+    """t1 to t4 of a joint's subtree (head of this file), in a frame that is moved towards the base."""
 
     t1: Vector
     t2: Wrench
@@ -192,8 +193,8 @@ class _Answer:
     t4: Wrench
 
     def raised(self, step: JointTransform, far: Vector, near: Vector) -> _Answer:
-        """In the parent's frame. far, near: velocities, of the child's origin from before its slide, in the child's
-        axes, and of that place from the parent's origin, in its axes after the swing."""
+        """The terms in the parent's frame. far, near: velocity of the child's origin before its slide, in the child's
+        axes, and of that place from the parent's origin, in the parent's axes after the swing."""
         t1 = add(self.t1, cross(far, scale(2.0, self.t4[1])))
         t1 = raise_vector(X, step.twist, raise_vector(Z, step.turn, t1))
         force = raise_vector(X, step.twist, raise_vector(Z, step.turn, self.t4[1]))
@@ -202,7 +203,7 @@ class _Answer:
 
 
 def linearised(tree: Tree, qd: Sequence[Real], solved: Solved) -> LinearisedDynamics:
-    """The derivative of a pass of the recursion, at what it found.
+    """The derivative of a pass of the recursion, at its solution.
 
     qd  as it was given; zeros where velocity products were left out
     """
@@ -213,7 +214,7 @@ def linearised(tree: Tree, qd: Sequence[Real], solved: Solved) -> LinearisedDyna
     M: Entries = {}
     by_q: Entries = {}
     by_qd: Entries = {}
-    # by joint, the answers of it and of all that is outboard of it, in its frame
+    # by joint, the terms of it and of everything outboard of it, in its frame
     answers: list[dict[int, _Answer]] = [{} for _ in joints]
     for i in reversed(tree.order):
         joint, k = joints[i], joints[i].axis
@@ -269,7 +270,7 @@ def _factor(tree: Tree, solved: Solved, M: Entries) -> tuple[Entries, list[Real]
 
 
 def _own(tree: Tree, solved: Solved, i: int) -> _Subtree:
-    """A joint's own body."""
+    """The body of joint i alone."""
     m, h, J = body = tree.joints[i].dynamic
     w, wd, a = solved.w[i], solved.wd[i], solved.a[i]
     Jw = apply_symmetric(J, w)
@@ -347,11 +348,11 @@ def _sum(a: Wrench, b: Wrench) -> Wrench:
 
 
 MOVING = ("q", "qd", "tau", "qdd", "wrenches")
-"""What `recursion.solve` is given that its derivative is known by, by its words."""
+"""The arguments of `recursion.solve` by which its derivative is known, by name."""
 
 
 def tell(tree: Tree, given: Mapping[str, Any], solved: Solved) -> None:
-    """Tells the graph in which `recursion.solve` was recorded the derivative of what it found (`met.trace.known`).
+    """Give the graph in which `recursion.solve` was recorded the derivative of its results (`met.trace.known`).
 
     given  what `solve` was given, by its words, `velocity_products` with them
     """
@@ -360,7 +361,7 @@ def tell(tree: Tree, given: Mapping[str, Any], solved: Solved) -> None:
     if tree.floating is not None or not scalars:
         return
     held = _scalars({"tree": tree} | {name: value for name, value in given.items() if name not in MOVING})
-    # a result that was there before all that it is found from is another pass's too, which knows less, or is given
+    # a result that existed before the arguments belongs to another pass, which knows less, or was given
     last = max(x.ref >> 1 for x in (*scalars, *held))
     found = (
         *solved.qdd,
@@ -401,12 +402,12 @@ def _scalars(value: Any) -> list[Scalar]:
 
 
 def _in_graph(value: Any, graph: Nodes) -> Any:
-    """The same with the numbers of another graph that has the nodes of the first one."""
+    """The value with its numbers moved to another graph that has the nodes of the first one."""
     return each_number("", value, lambda _, x: type(x)(graph, x.ref) if isinstance(x, (Scalar, Mask)) else x)
 
 
 def _tangents(graph: Nodes, value: Any, tangent: Tangent) -> Any:
-    """The moves of the numbers in nested tuples and dictionaries."""
+    """The tangents of the numbers in nested tuples and dictionaries."""
     if isinstance(value, dict):
         return {name: _tangents(graph, each, tangent) for name, each in value.items()}
     if isinstance(value, tuple):

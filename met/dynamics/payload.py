@@ -1,8 +1,8 @@
 """A payload: a rigid body that flies freely, or is a part of the link that has grappled it (docs/physics.md).
 
 The grapple is a plastic impact: it lasts no time, and after it body and link move as one. With I_p the body's spatial
-inertia, dV its velocity less that of the link where it is caught, and J the link's Jacobian there, the rates of all
-that may move jump by
+inertia, dV its velocity less that of the link where it is caught, and J the link's Jacobian there, the joint rates jump
+by
 
     (M + J' I_p J) d(qd) = J' I_p dV
 
@@ -46,13 +46,14 @@ Twist = tuple[Vector, Vector]
 
 
 def in_tree(tree: Tree, link: str, body: Rigid, pose: Pose) -> Rigid:
-    """A body that has this pose in a link's frame, in the recursion's frame of the joint that carries the link."""
+    """A body with this pose in a link's frame, expressed in the recursion's frame of the joint that carries the
+    link."""
     return rigid_raise(body, compose(tree.frames[link].pose, pose))
 
 
 def loaded(tree: Tree, link: str, body: Rigid) -> Tree:
-    """The tree with a body on a link, as `in_tree` gives it; of one without mass, the same tree. On a link that is
-    fixed to a base whose motion is given, it is nothing to the arm."""
+    """The tree with a body on a link, as from `in_tree`; without mass, the same tree. On a link that is fixed to a base
+    whose motion is given, the body does not change the arm's motion."""
     number = tree.frames[link].joint
     if number >= 0:
         joint = tree.joints[number]
@@ -83,13 +84,13 @@ def momentum(body: Rigid, twist: Twist) -> Wrench:
 
 
 def twist_against(body: LinkMotion, link: LinkMotion) -> Twist:
-    """dV: how a body moves against the link's material that is where the body's frame is, in the body's axes."""
+    """dV: the motion of a body relative to the link's material at the body's frame, in the body's axes."""
     w, v = fixed_motion((link.w, link.v), compose(inverse(link.pose), body.pose))
     return sub(body.w, w), sub(body.v, v)
 
 
 def raised(wrench: Wrench, pose: Pose) -> Wrench:
-    """A wrench about the origin of a frame that has this pose in another, about the other's and in its axes."""
+    """A wrench about the origin of a frame with this pose in another frame, moved to the other's origin and axes."""
     moment, force = (turn_vector(pose.R, part) for part in wrench)
     return add(moment, cross(pose.p, force)), force
 

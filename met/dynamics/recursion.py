@@ -71,7 +71,8 @@ SINGULAR = 1e-13
 
 
 class FreeRotor(NamedTuple):
-    """A rotor in the link before a joint, about whose axis it turns otherwise than the joint: behind an elastic gear.
+    """A rotor, in the link before a joint, that turns about the joint's axis at a rate of its own: behind an elastic
+    gear.
 
     inertia   J, kg m^2, also part of its link's; 0 while it does not turn against its link
     torque    on it about its axis, N m
@@ -260,7 +261,7 @@ def solve(
         )
         base_acceleration = _of_base_frame(tree, gravity, base_rate, base_wd, base_a)
 
-    # Base to tips: accelerations, and what was to be solved.
+    # Base to tips: the accelerations and the results.
     wd: list[Vector] = [ZERO] * n
     a: list[Vector] = [ZERO] * n
     about: list[Real] = [0.0] * n
@@ -331,7 +332,7 @@ def reactions(tree: Tree, solved: Solved) -> tuple[Wrench, ...]:
         R, origin = tree.frames[tree.carried[i]].pose
         result[i] = (turn_vector_back(R, sub(moment, cross(origin, force))), turn_vector_back(R, force))
         if joint.parent >= 0:
-            if not is_zero(solved.spin[i]):  # of the rotor, which the parent carries
+            if not is_zero(solved.spin[i]):  # the share of the rotor, which the parent carries
                 turning = (0.0, 0.0, solved.spin[i] * solved.qdd[i])
                 gyroscopic = cross(solved.w[i], (0.0, 0.0, solved.spin[i] * solved.rate[i]))
                 moment = add(moment, add(turning, gyroscopic))
@@ -364,7 +365,7 @@ def _resolve(mode: Truth, D0: Real, rotor: Real, spin: Real, u: Real, qdd: Real)
 
 
 def _handed_on(M: Symmetric, k: int, U: Six, Dinv: Real, rest: Real, spin: Real) -> Symmetric:
-    """Ia: what of IA resists the parent."""
+    """Ia: the part of IA that resists the parent."""
     g = [x * Dinv for x in U]
     column = U if is_zero(spin) else M.column(k)
 
@@ -415,7 +416,7 @@ def _base(tree: Tree, gravity: Vector, acceleration: tuple[Vector, Vector], rate
 
 
 def _of_base_frame(tree: Tree, gravity: Vector, rate: Vector, wd: Vector, a: Vector) -> Wrench:
-    """The other way round of `_base`: the deck's base frame from the recursion's; rate in the deck's base axes."""
+    """The inverse of `_base`: the deck's base frame from the recursion's; rate in the deck's base axes."""
     R, p = tree.base
     wd, a = turn_vector(R, wd), add(turn_vector(R, a), gravity)
     return wd, sub(a, add(cross(wd, p), cross(rate, cross(rate, p))))

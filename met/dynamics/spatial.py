@@ -90,7 +90,7 @@ NOTHING = Symmetric((0.0,) * 6, (0.0,) * 9, (0.0,) * 6)
 
 
 def settled(x: Real) -> Real:
-    """x as a plain number where a trace has found that it is one."""
+    """x as a plain number where a trace has found that it is constant."""
     if isinstance(x, Scalar):
         known = x.graph.value(x.ref)
         return x if known is None else known
@@ -108,12 +108,12 @@ def is_zero(x: Real) -> bool:
 
 
 def root(x: Real) -> Real:
-    """The square root, a constant of a constant."""
+    """The square root; constant if x is."""
     return float(sqrt(x)) if constant(x) else sqrt(x)
 
 
 def choose(condition: Truth, a: Real, b: Real) -> Real:
-    """a where the condition holds, else b; untouched where the condition is known."""
+    """a where the condition holds, else b; no selection is recorded where the condition is known."""
     if isinstance(condition, bool):
         return a if condition else b
     return where(condition, a, b)
@@ -215,7 +215,7 @@ def _others(axis: int) -> tuple[int, int]:
 
 
 def _quarter(turn: Turn) -> int | None:
-    """The number of quarter turns that this turn is, exactly; None where it is no whole number of them."""
+    """The number of quarter turns in this turn, exactly; None where it is not whole."""
     c, s = turn
     if not (constant(c) and constant(s)):
         return None

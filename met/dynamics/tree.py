@@ -1,7 +1,7 @@
 """The arm as the recursion sees it: moving joints in frames of its own choice, fixed joints merged away.
 
-A `Body` is what a deck says: a link, the joint that carries it, where, and its inertia. `Tree.build` turns bodies
-into `Joint`s once, so that the work repeated at every instant is as small as the structure allows:
+A `Body` is the description from a deck: a link, the joint that carries it, its place, and its inertia. `Tree.build`
+turns bodies into `Joint`s once, so that the work repeated at every instant is as small as the structure allows:
 
 1. Links behind fixed joints become part of the link that carries them (or of the base).
 2. Each link frame is turned so that its joint's axis is z. Where the joint that follows is known when the tree is
@@ -10,8 +10,8 @@ into `Joint`s once, so that the work repeated at every instant is as small as th
 3. What of a link's inertia moves alike with its parent is handed to the parent (base parameters; Khalil and Dombre,
    2002, ch. 9). Motion and torques are the same; reactions are taken from the bodies' own inertia.
 
-A number that is not a plain Python float (a traced one, or numpy's) is a case's: no choice depends on it, and what
-is made of it is ordinary arithmetic. `Tree.each` keeps such numbers in a case's memory, so that they are made once.
+A number that is not a plain Python float (a traced one, or numpy's) varies by case: no choice depends on it, and it is
+only used in arithmetic. `Tree.each` keeps such numbers in a case's memory, so that they are computed once.
 
 Link frames of the deck are found again in `Tree.frames`.
 """
@@ -131,7 +131,7 @@ class Tree:
         """The tree with function(name, value) for every number that a case may vary.
 
         A phase that runs once writes them to the case's memory; later phases, building the same tree from the same
-        parameters, read them there, and what they would have computed drops out.
+        parameters, read them there instead of computing them again.
         """
         return each_number("tree", self, function)
 
@@ -277,7 +277,8 @@ def _parents_first(parents: Sequence[int]) -> list[int]:
 
 
 def _split(pose: Pose) -> tuple[Turn, Vector, Turn, Turn, Real]:
-    """swing, offset, twist, zero, slide with which a joint's frame at q = 0 has this pose in its parent's frame."""
+    """The swing, offset, twist, zero and slide with which a joint's frame at q = 0 has this pose in its parent's
+    frame."""
     R, p = _cleaned(pose)
     swing = _direction(-R[1][2], R[0][2])
     if all_constant(R) and swing[0] < 0.0:
@@ -307,7 +308,7 @@ def _split(pose: Pose) -> tuple[Turn, Vector, Turn, Turn, Real]:
 
 
 def _direction(x: Real, y: Real) -> Turn:
-    """(x, y) made a unit vector; (1, 0) where there is nothing to make it of."""
+    """(x, y) as a unit vector; (1, 0) where it has no length."""
     size = x * x + y * y
     nothing = size < 1e-30
     length = root(choose(nothing, 1.0, size))
@@ -315,8 +316,8 @@ def _direction(x: Real, y: Real) -> Turn:
 
 
 def _regrouped(joints: list[Joint], order: Sequence[int], ground: Rigid | None) -> tuple[list[Joint], Rigid | None]:
-    """The joints with `dynamic`: from tips to base, what the joint's motion does not see goes to the parent; and the
-    base's body with what comes to it (None: it is not asked for)."""
+    """The joints with `dynamic`: from tips to base, inertia that the joint's motion does not see goes to the parent;
+    and the base's body with its share (None: it is not needed)."""
     result = list(joints)
     gathered = [joint.body for joint in joints]
     for i in reversed(order):
@@ -337,14 +338,14 @@ def _regrouped(joints: list[Joint], order: Sequence[int], ground: Rigid | None) 
 
 
 def _less(a: Real, b: Real) -> Real:
-    """a - b, nothing where only rounding is left of two constants."""
+    """a - b; 0 where the difference of two constants is only rounding."""
     if constant(a) and constant(b) and abs(a - b) <= 4e-16 * max(abs(a), abs(b)):
         return 0.0
     return a - b
 
 
 def _with_reach(joints: list[Joint], order: Sequence[int], ground: Rigid | None) -> tuple[list[Joint], Rigid | None]:
-    """The joints with `reach`, where no case varies it; and all bodies at q = 0 as one, about the base."""
+    """The joints with `reach`, where no case varies it; and all bodies at q = 0 combined, about the base."""
     result = list(joints)
     composite = [joint.body for joint in joints]
     for i in reversed(order):
@@ -359,12 +360,12 @@ def _with_reach(joints: list[Joint], order: Sequence[int], ground: Rigid | None)
 
 
 def _size(x: Real) -> float:
-    """A number that is not below zero, 0.0 where cases vary it."""
+    """A number that is at least 0; 0.0 where cases vary it."""
     return max(float(x), 0.0) if constant(x) else 0.0
 
 
 def _frame_about(axis: Vector) -> Matrix:
-    """A rotation whose z is the constant unit axis; a permutation of axes where there is one."""
+    """A rotation whose z is the constant unit axis; a permutation of axes where possible."""
     x, y, z = (float(e) for e in axis)
     if abs(z) == 1.0:
         return IDENTITY if z > 0.0 else ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))
@@ -408,7 +409,7 @@ def _cleaned(pose: Pose) -> Pose:
 
 
 def _moved_to(pose: Pose, point: Vector) -> Pose:
-    """The frame with its origin at a point of it; what cancels, cancels whole."""
+    """The frame with its origin moved to a point given in it; cancelling terms cancel exactly."""
     p = compose(pose, Pose(IDENTITY, point)).p
     return Pose(pose.R, _clean_vector(p, _norm(pose.p) + _norm(point)) if all_constant(p) else p)
 
@@ -423,7 +424,7 @@ def _clean_turn(turn: Turn) -> Turn:
 
 
 def each_number(name: str, value: Any, function: Callable[[str, Real], Real]) -> Any:
-    """Rebuilds nested dataclasses, tuples and dictionaries with function applied to numbers that are no constants."""
+    """Rebuild nested dataclasses, tuples and dictionaries with the function applied to non-constant numbers."""
     if is_dataclass(value) and not isinstance(value, type):
         changed = {f.name: each_number(f"{name}.{f.name}", getattr(value, f.name), function) for f in fields(value)}
         return type(value)(**changed)
