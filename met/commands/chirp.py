@@ -48,7 +48,7 @@ def _mean_of_exp(x: Real) -> Real:
 
 
 def content(p: Any, duration: float) -> Content:
-    """Its fastest swing is at one of its ends, or where the run ends before."""
+    """The content of the course: its fastest swing is at one of its ends, or where the run ends before."""
     if p.amplitude == 0.0:
         return NEVER
     done = min(max(duration - p.begin, 0.0) / p.over, 1.0)

@@ -30,7 +30,7 @@ def segment(times: Numbers, t: Real) -> Real:
 
 
 def linear(times: Numbers, values: Numbers, t: Real) -> tuple[Real, Real]:
-    """Value and slope at t of straight lines through the points; at a point the slope of what follows."""
+    """Value and slope at t of straight lines through the points; at a point, the slope of the segment that follows."""
     i = segment(times, t)
     t_0, t_1 = gather(times, i), gather(times, i + 1.0)
     v_0, v_1 = gather(values, i), gather(values, i + 1.0)
@@ -40,7 +40,8 @@ def linear(times: Numbers, values: Numbers, t: Real) -> tuple[Real, Real]:
 
 
 def cubic(times: Numbers, values: Numbers, t: Real) -> tuple[Real, Real]:
-    """Value and slope at t of the clamped cubic spline: C2 between the ends, at rest at both, so C1 with what is held.
+    """Value and slope at t of the clamped cubic spline: C2 between the ends, at rest at both, so C1 with the held
+    values.
 
     It may swing beyond the points' values where these jump.
     """
@@ -80,7 +81,8 @@ def clamped_slopes(times: Sequence[float], values: Sequence[float]) -> Numbers:
 
 
 def ends(of: Callable[[Any, Any], Real]) -> Limit:
-    """The limit of a model with points at `p.times`: it is beyond them. of: (p, t or world) -> time in the table, s."""
+    """The limit of a model with points at `p.times`: it is reached outside of them. of: (p, t or world) -> time in the
+    table, s."""
 
     def beyond(p: Any, at: Any) -> Truth:
         time = of(p, at)
@@ -90,6 +92,6 @@ def ends(of: Callable[[Any, Any], Real]) -> Limit:
 
 
 def _held(times: Numbers, values: Numbers, t: Real, value: Real, slope: Real) -> tuple[Real, Real]:
-    """Value and slope of a curve between its ends; outside of them the ends' own values, exactly, and slope 0."""
+    """Value and slope of a curve between its ends; outside of them exactly the ends' values, and slope 0."""
     value = where(t >= times[-1], values[-1], where(t < times[0], values[0], value))
     return value, where(both(t >= times[0], t < times[-1]), slope, 0.0)

@@ -1,4 +1,4 @@
-"""The declaration of a command profile: a course in time of whatever is commanded.
+"""The declaration of a command profile: the course of a commanded quantity in time.
 
 In a deck a profile stands inside the kind of command: `rate(step(to = slow, at = 1 s))`; a bare value is the
 constant profile. The engine evaluates it at the servo's ticks.

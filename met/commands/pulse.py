@@ -33,7 +33,7 @@ def course(p: Any, t: Real) -> tuple[Real, Real]:
 
 
 def shortest(p: Any) -> Real:
-    """The least `over`, s: the way up and down."""
+    """The shortest `over`, s: the time for the ways up and down."""
     return 2.0 * absolute(p.to - p.start) / p.slope
 
 

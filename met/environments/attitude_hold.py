@@ -48,7 +48,7 @@ def _limit(number: int) -> Limit:
 
 
 def held(p: Any) -> str:
-    """The attitude that it gives: about the axes along which it has a stiffness; a damping alone gives none."""
+    """The attitude that the model holds: the axes along which it has a stiffness; damping alone holds none."""
     about = [axis for axis, stiffness in zip("xyz", p.stiffness, strict=True) if stiffness]
     if not about:
         return ""
@@ -56,7 +56,7 @@ def held(p: Any) -> str:
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
-    """Why these numbers make it nothing, with the parameters that say so."""
+    """The reason why these numbers make the model do nothing, with the parameters that say so."""
     if not any((*p.stiffness, *p.damping)):
         return ("stiffness", "damping"), "it has neither stiffness nor damping"
     if not any(p.limit):

@@ -24,7 +24,8 @@ def loads(p: Any, world: World) -> Loads:
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
-    """Why these numbers make it nothing in a run of this length, with the parameters that say so."""
+    """The reason why these numbers make the model do nothing in a run of this length, with the parameters that say
+    so."""
     if p.torque == 0.0:
         return ("torque",), "it has no torque"
     return never(getattr(p, "from"), p.until, duration)

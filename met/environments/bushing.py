@@ -64,7 +64,7 @@ def restoring(stiffness: Vector, R: Matrix) -> Vector:
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
-    """Why these numbers make it nothing, with the parameters that say so."""
+    """The reason why these numbers make the model do nothing, with the parameters that say so."""
     if not any((*p.stiffness, *p.damping, *p.turning, *p.turning_damping)):
         return ("stiffness", "turning", "damping", "turning_damping"), "it has neither stiffness nor damping"
     if p.link == p.to:
@@ -73,7 +73,8 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
 
 
 def _bending(square: Real) -> Real:
-    """g of the square of the angle, (1 - a cot a)/(4 a^2) with a half the angle: by its series where that cancels."""
+    """g of the square of the angle, (1 - a cot a)/(4 a^2) with a half the angle: by its series where the formula
+    cancels."""
     small = square < 0.01
     a = 0.5 * sqrt(where(small, 1.0, square))
     exact = (1.0 - a * cos(a) / sin(a)) / (4.0 * a * a)

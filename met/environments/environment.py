@@ -1,4 +1,4 @@
-"""The declaration of an environment model: loads on the arm, from where it is and how it moves.
+"""The declaration of an environment model: loads on the arm as functions of its pose and motion.
 
 Evaluated at every stage of every step (`docs/physics.md`, "Rates"), as ordinary functions over numbers that may be
 traced.
@@ -19,7 +19,7 @@ from met.vectors import Matrix, Vector
 
 
 class World(Protocol):
-    """The questions that an environment model may ask of the arm at a stage.
+    """The view of the arm that an environment model has at a stage.
 
     time                 of the stage, s
     begin, step          time at which the dynamics step began that the stage is part of, and its length, s
@@ -99,7 +99,7 @@ class Plate:
 
 @frozen
 class Jet:
-    """Gas that leaves a nozzle, as pictures draw it.
+    """A jet of gas from a nozzle, as pictures draw it.
 
     link      that the nozzle is on, or `WORLD` of `met.parameter`
     point     the nozzle in that link's frame, m

@@ -1,4 +1,5 @@
-"""When a thruster fires: a window, pulses in it, and a list of times at which it is switched; all that is said holds.
+"""The firing times of a thruster: a window, pulses in it, and a list of switching times; it fires where all of them
+allow it.
 
 What a step of the dynamics sees is constant in it: the share of the step in which the thruster fires.
 """
@@ -43,7 +44,7 @@ FIRING = (
 
 
 def share(p: Any, world: World) -> Real:
-    """The share of the step in which it fires."""
+    """The share of the step in which the thruster fires."""
     begins = getattr(p, "from")
     total: Real = 0.0
     for on, off in _intervals(p.switches):
@@ -57,7 +58,7 @@ def share(p: Any, world: World) -> Real:
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
-    """Why it never fires in a run of this length, with the parameters that say so."""
+    """The reason why the thruster never fires in a run of this length, with the parameters that say so."""
     begins = getattr(p, "from")
     if not any(max(on, begins, 0.0) < min(off, p.until, duration) for on, off in _intervals(p.switches)):
         return never(begins, p.until, duration) or (("switches",), "it is never on while the run lasts")
@@ -72,6 +73,6 @@ def _intervals(switches: tuple[float, ...]) -> list[tuple[float, float]]:
 
 
 def _fired(p: Any, time: Real) -> Real:
-    """For how long it has fired, this time after a pulse began."""
+    """The total time that the thruster has fired, this time after a pulse began."""
     whole = floor(time / p.period)
     return whole * (p.duty * p.period) + minimum(time - whole * p.period, p.duty * p.period)

@@ -49,7 +49,8 @@ def world_rate(p: Any, world: World) -> Vector:
 
 
 def _around(p: Any, world: World) -> tuple[Matrix, Vector]:
-    """The acceleration of a part for each way from the origin, of a part at rest; the angular velocity of the orbit."""
+    """The acceleration of a resting part per distance from the origin, as a matrix; and the angular velocity of the
+    orbit."""
     n = sqrt(p.mu / (p.radius * p.radius * p.radius))
     axes = transposed(rotation_rpy(*p.rpy))
     up, along, normal = axes
@@ -68,7 +69,7 @@ def _acceleration(p: Any, field: Matrix, turning: Vector, position: Vector, velo
 
 
 def _on_link(p: Any, world: World, link: str, field: Matrix, turning: Vector) -> Force:
-    """`field` and `turning` of `_around`."""
+    """`field` and `turning` of `_around`, in the link's terms."""
     mass, com = world.mass(link), world.com(link)
     second = _second_moments(world, link)
     acceleration = _acceleration(p, field, turning, world.position(link, com), world.velocity(link, com))
@@ -81,7 +82,7 @@ def _on_link(p: Any, world: World, link: str, field: Matrix, turning: Vector) ->
 
 
 def _field(n: Real, up: Vector, normal: Vector, turning: bool) -> Matrix:
-    """n^2 (3 r r' - 1), and with what a turning world adds, n^2 (1 - z z')."""
+    """n^2 (3 r r' - 1), plus n^2 (1 - z z') in a turning world."""
     square = n * n
     rows = []
     for i in range(3):
@@ -102,7 +103,7 @@ def _second_moments(world: World, link: str) -> Matrix:
 
 
 def _crossing(a: Vector) -> Matrix:
-    """The matrix of a x."""
+    """The matrix of the cross product a x."""
     return ((0.0, -a[2], a[1]), (a[2], 0.0, -a[0]), (-a[1], a[0], 0.0))
 
 

@@ -33,7 +33,7 @@ def loads(p: Any, world: World) -> Loads:
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
-    """Why these numbers make it nothing, with the parameters that say so."""
+    """The reason why these numbers make the model do nothing, with the parameters that say so."""
     if math.isinf(p.lower) and math.isinf(p.upper):
         return ("lower", "upper"), "it has neither a lower nor an upper end"
     if p.stiffness == 0.0:

@@ -89,7 +89,7 @@ def on_plate(p: Any, nozzle: Vector, axis: Vector) -> tuple[Vector, Vector]:
     nozzle, axis  where the plume comes from, m, and its unit direction, in the plate's frame
     """
     behind = nozzle[2] < 0.0
-    side: Real = where(behind, -1.0, 1.0)  # of the plate's z that the gas comes from
+    side: Real = where(behind, -1.0, 1.0)  # the side of the plate, by its z, from which the gas comes
     far = maximum(FLAT, absolute(nozzle[2]))
     toward = -side * axis[2]
     narrow = 3.0 / sqrt(p.exponent + 1.0)
@@ -115,7 +115,8 @@ def on_plate(p: Any, nozzle: Vector, axis: Vector) -> tuple[Vector, Vector]:
 
 
 def _cells(p: Any, length: Real, nozzle: Real, away: Real, dense: Real, narrow: Real) -> list[tuple[Real, Real]]:
-    """Angles under which the nozzle sees a side of the plate, and the parts of its angle that they stand for, rad.
+    """Angles under which the nozzle sees points of a side of the plate, and the width of angle that each stands for,
+    rad.
 
     nozzle  where it is along the side, from its middle;  away: its distance from the line of the side, m
     dense   the angle about which they are close together;  narrow: how close
@@ -138,7 +139,8 @@ def _cells(p: Any, length: Real, nozzle: Real, away: Real, dense: Real, narrow: 
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
-    """Why these numbers make it nothing in a run of this length, with the parameters that say so."""
+    """The reason why these numbers make the model do nothing in a run of this length, with the parameters that say
+    so."""
     if p.thrust == 0.0:
         return ("thrust",), "it has no thrust"
     if p.share == 0.0 and p.reaction == "off":
@@ -147,7 +149,7 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
 
 
 def _on_direction(p: Any, u: Vector, side: Real, axis: Vector) -> Vector:
-    """(P2) for each solid angle and K, in the plate's axes, of the gas that comes along u."""
+    """(P2) for each solid angle and K, in the plate's axes, for gas that comes along u."""
     cosine = dot(u, axis)
     behind = cosine <= 0.0
     dense = where(behind, 0.0, exp(p.exponent * log(where(behind, 1.0, cosine))))

@@ -30,7 +30,7 @@ def loads(p: Any, world: World) -> Loads:
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
-    """Why these numbers make it nothing, with the parameters that say so."""
+    """The reason why these numbers make the model do nothing, with the parameters that say so."""
     if p.stiffness == 0.0 and p.damping == 0.0:
         return ("stiffness", "damping"), "it has neither stiffness nor damping"
     if p.link == p.to:

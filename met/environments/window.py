@@ -1,7 +1,7 @@
 """A window in time, as the steps of the dynamics see it: the share of each step that lies in it, constant in the step.
 
-A load that jumped within a step would cost an integrator its order. Times the share, it gives the right impulse, and a
-window that begins and ends with steps is met exactly.
+A load that jumped within a step would cost an integrator its order. Multiplied by the share, the load has the right
+impulse, and a window that begins and ends with steps is met exactly.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def share(world: Step, begins: Real, ends: Real) -> Real:
 def passed(world: Step, time: Real) -> Real:
     """The share of the step that lies before this time."""
     before = clip((time - world.begin) / world.step, 0.0, 1.0)
-    whole = has_come(time, world.begin + world.step)  # to rounding, as none of it is
+    whole = has_come(time, world.begin + world.step)  # to rounding, as in the case of no share
     return where(has_come(world.begin, time), 0.0, where(whole, 1.0, before))
 
 
@@ -45,7 +45,8 @@ def open_at(p: Any, now: Real) -> Truth:
 
 
 def never(begins: float, until: float, duration: float) -> tuple[tuple[str, ...], str] | None:
-    """Why a window of constants holds nothing of a run of this length, with the parameters that say so."""
+    """The reason why a window of constants contains no part of a run of this length, with the parameters that say
+    so."""
     if begins >= until:
         return ("until", "from"), f"it would begin at {begins:g} s and end at {until:g} s"
     if begins >= duration:

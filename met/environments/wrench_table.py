@@ -25,7 +25,7 @@ from met.trace import Real, Scalar, gather, where
 from met.vectors import Vector
 
 EARLY = 1e-7
-"""Share of a step by which a row may miss the step's end, and still be on it."""
+"""Share of a step by which a row may miss the step's end and still count as lying on it."""
 
 NAMES = tuple(f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz")
 
@@ -39,11 +39,12 @@ def loads(p: Any, world: World) -> Loads:
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
-    """Why these numbers make it nothing in a run of this length, with the parameters that say so."""
+    """The reason why these numbers make the model do nothing in a run of this length, with the parameters that say
+    so."""
     if not any(number for name in NAMES for number in getattr(p, name)):
         return NAMES, "it has neither force nor moment"
     if any(len(getattr(p, name)) not in (0, len(p.times)) for name in NAMES):
-        return None  # which is told
+        return None  # the mistake is reported there
     rows = [any(values[row] for name in NAMES if (values := getattr(p, name))) for row in range(len(p.times))]
     first, last = rows.index(True), len(rows) - 1 - rows[::-1].index(True)
     begins = p.begin + p.times[first - 1] if first else -math.inf
@@ -68,7 +69,7 @@ def _at(p: Any, values: tuple[float, ...], world: World) -> Real:
 
 
 def _steps_meet_rows(p: Any, step: float) -> bool:
-    """True where every row is known to lie on a step of the dynamics, so that lines are all that a step sees."""
+    """True where every row is known to lie on a step of the dynamics, so that a step sees only straight lines."""
     if isinstance(p.begin, Scalar):
         return False
     places = [(p.begin + time) / step for time in p.times]
@@ -76,7 +77,7 @@ def _steps_meet_rows(p: Any, step: float) -> bool:
 
 
 def _integral(times: tuple[float, ...], values: tuple[float, ...], time: Real) -> Real:
-    """The integral of the lines until this time, from a fixed one; the ends go on as they are."""
+    """The integral of the lines until this time, from a fixed one; beyond the ends, the lines are held."""
     done = [0.0]
     for k in range(len(times) - 1):
         done.append(done[-1] + 0.5 * (values[k] + values[k + 1]) * (times[k + 1] - times[k]))

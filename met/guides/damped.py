@@ -1,4 +1,4 @@
-"""Damped least squares, unrolled: rates that carry out a task as well as they can, and stay small where it cannot be.
+"""Damped least squares, unrolled: rates that fulfil a task as closely as possible, and stay small near singularities.
 
     u = J' (J J' + lambda^2 I)^-1 v       makes |J u - v|^2 + lambda^2 |u|^2 least
 
@@ -18,7 +18,8 @@ from met.vectors import dot
 Rows = list[list[Real]]
 
 RESOLVED = 1e-12
-"""Share of the trace of J J' below which no singular value's square is told from zero: four digits above rounding."""
+"""Share of the trace of J J' below which the square of a singular value cannot be told from zero: four digits above
+rounding."""
 
 
 def gram(rows: Sequence[Sequence[Real]]) -> Rows:

@@ -64,7 +64,7 @@ class Sight:
 
 @frozen
 class Steered:
-    """The answer of a guide's computer: each joint's rate, in order, rad/s (m/s), and all its memory by name."""
+    """The result of a guide's computer: each joint's rate, in order, rad/s (m/s), and all its memory by name."""
 
     rates: Sequence[Real]
     memory: Mapping[str, Real] = field(default_factory=dict)

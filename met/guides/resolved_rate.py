@@ -46,7 +46,7 @@ GUIDED = MappingProxyType(
         "yz": ("y", "z"),
     }
 )
-"""Components of the path, by the word that says what is guided."""
+"""Components of the path, by the word for the guided quantity."""
 
 
 def components(p: Any) -> tuple[str, ...]:
@@ -58,7 +58,7 @@ def fastest(p: Any) -> Real:
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
-    """Why its damping never acts, with the parameters that say so."""
+    """The reason why the damping never acts, with the parameters that say so."""
     if p.max_damping > 0.0 and p.threshold == 0.0:
         return ("max_damping", "threshold"), "is never damped: no singular value is below a `threshold` of 0 m"
     return None
@@ -76,7 +76,7 @@ def steer(p: Any, joints: Sequence[Any], seen: Sight) -> Steered:
     w = sub(add(seen.wanted.w, scale(p.gain, aside)), there.w)
     task = _chosen(rows, v, w, p.length)
 
-    units = [p.length if slides else 1.0 for slides in seen.slides]  # of a joint's share in |u|
+    units = [p.length if slides else 1.0 for slides in seen.slides]  # for a joint's share in |u|
     columns = [
         [unit * part for part in _chosen(rows, linear, angular, p.length)]
         for unit, (angular, linear) in zip(units, arm.columns(answers=answers), strict=True)
@@ -111,7 +111,7 @@ def _behind(wanted: Stance, there: Stance) -> tuple[Vector, Vector]:
 
 
 def _chosen(rows: Sequence[int], linear: Vector, angular: Vector, length: Real) -> list[Real]:
-    """The guided components of a motion, its turns as ways at `length`."""
+    """The guided components of a motion, its rotations as lengths at `length`."""
     whole = (*linear, *scale(length, angular))
     return [whole[row] for row in rows]
 

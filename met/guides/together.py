@@ -46,7 +46,7 @@ def course(p: Any, joints: Sequence[Any], begins: Sequence[Real], t: Real) -> li
 
 
 def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
-    """Why it moves nothing in a run of this length, with the parameters that say so."""
+    """The reason why the guide moves nothing in a run of this length, with the parameters that say so."""
     if p.begin >= duration:
         return ("begin",), f"moves nothing: it would begin at {p.begin:g} s, and the run ends at {duration:g} s"
     return None

@@ -1,8 +1,8 @@
-"""The declaration of an integrator: a way from the state at the start of a step to the state at its end.
+"""The declaration of an integrator: the function from the state at the start of a step to the state at its end.
 
-The first stage's slopes are given (they are what is recorded at an instant), the rest is the integrator's.
-Friction modes are fixed during a step, so the slope is smooth in it; the engine finds the crossing of a rate
-through zero on the parabola through both ends (docs/physics.md, "Friction sticks").
+The first stage's slopes are given (they are recorded at an instant); the integrator computes the rest. Friction modes
+are fixed during a step, so the slope is smooth in it; the engine finds the crossing of a rate through zero on the
+parabola through both ends (docs/physics.md, "Friction sticks").
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Motion:
 
 @frozen
 class Slope:
-    """Its derivative: qd of the positions, qdd of the rates, xd of the other states."""
+    """The derivative of a `Motion`: qd of the positions, qdd of the rates, xd of the other states."""
 
     qd: Reals
     qdd: Reals
@@ -43,7 +43,7 @@ def ahead(y: Motion, h: Real, k: Slope) -> Motion:
 
 
 def by_parts(rule: Callable[..., Real], *slopes: Slope) -> Slope:
-    """The slope whose every part is `rule` of the same part of these."""
+    """A function of slopes that applies `rule` to each of their parts."""
     return Slope(
         tuple(rule(*parts) for parts in zip(*(k.qd for k in slopes), strict=True)),
         tuple(rule(*parts) for parts in zip(*(k.qdd for k in slopes), strict=True)),

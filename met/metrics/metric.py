@@ -1,7 +1,7 @@
-"""The declaration of a metric: one number about one channel over a whole run, gathered as the run goes.
+"""The declaration of a metric: one number about one channel over a whole run, accumulated during the run.
 
-It sees its channel at every tick of the channel's owner (the dynamics' for motion and torque, the servo's for what
-its computer holds), whatever is recorded, so its value does not depend on the record.
+It sees its channel at every tick of the channel's owner (the dynamics' for motion and torque, the servo's for its
+computer's memory), whatever is recorded, so its value does not depend on the record.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from met.trace import Real
 
 @frozen
 class OverJoints:
-    """The number that a metric watches where it is asked for several joints: one of theirs, at each sample.
+    """The number that a metric about several joints watches: one computed from theirs, at each sample.
 
     word  what it is called: `max(*.servo.voltage)`
     of    the joints' numbers, one or more -> that number
@@ -69,5 +69,5 @@ class Metric:
 
     @property
     def margin(self) -> bool:
-        """True if it is the margin of a condition, of which more is better."""
+        """True if it is the margin of a condition, which should be large."""
         return self.condition and not self.share

@@ -14,7 +14,7 @@ from met.metrics.metric import Metric
 from met.parameter import Memory, Parameter
 from met.trace import Real, absolute, maximum, where
 
-NEAR = 0.02  # of the way: what comes so near has reached the target, as a settling time's band is by default
+NEAR = 0.02  # of the way: a signal this near has reached the target, as with a settling time's default band
 
 
 def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:

@@ -19,7 +19,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
 
 
 def root_mean_square(values: list[Real]) -> Real:
-    """The root mean square of the joints at one sample: so that of all samples is over joints, too."""
+    """The root mean square of the joints at one sample: over all samples, it gives that over samples and joints."""
     total: Real = 0.0
     for value in values:
         total = total + value * value

@@ -25,7 +25,7 @@ def result(p: Any, held: Any, t: Real) -> Real:
 
 
 def update_between(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
-    """The same, from where the straight line between two samples comes into the band."""
+    """The memory after a sample, with the settling time interpolated on the straight line between two samples."""
     outside = absolute(x - p.target) - (p.band * absolute(p.target) + p.within)
     way = held.outside - outside
     entered = t + where(way > 0.0, dt * outside / where(way > 0.0, way, 1.0), 0.0)

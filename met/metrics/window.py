@@ -1,4 +1,4 @@
-"""The window of a run that a metric of a condition looks at: its samples from `after` on, for `within`.
+"""The window of a run that a metric of a condition looks at: its samples from `after` on, for the duration `within`.
 
 Both ends belong to it. They are decimals, and so is the time of a sample: four units in the last place are allowed for
 the rounding of the three.

@@ -11,12 +11,12 @@ from met.trace import Real
 
 
 def cutoff(only: Only | None = None) -> Parameter:
-    """Its parameter."""
+    """The filter's parameter."""
     return Parameter(name="cutoff", unit="Hz", above=0.0, only=only, doc="cut-off frequency of the filter")
 
 
 def states(only: Only | None = None) -> tuple[State, ...]:
-    """Its output, and the slope of that."""
+    """The filter's states: its output, and the slope of that."""
     return (
         State(name="filtered", unit="of", only=only, doc="output of the filter"),
         State(name="filtered_slope", unit="of/s", only=only, doc="rate of change of the filter's output"),
@@ -31,17 +31,17 @@ def slopes(p: Any, states: Any, value: Real) -> Mapping[str, Real]:
 
 
 def fastest(p: Any) -> Real:
-    """The size of its poles, 1/s."""
+    """The size of the filter's poles, 1/s."""
     found: Real = 2.0 * math.pi * p.cutoff
     return found
 
 
 def swing(p: Any) -> tuple[Real, Real]:
-    """The a and b of its y'' = -a y - b y'."""
+    """The a and b of the filter's y'' = -a y - b y'."""
     w = fastest(p)
     return w * w, math.sqrt(2.0) * w
 
 
 def settled(value: Real) -> Mapping[str, Real]:
-    """Its states, the value having been this for long."""
+    """The filter's states after a long constant input."""
     return {"filtered": value, "filtered_slope": 0.0}

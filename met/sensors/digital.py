@@ -1,4 +1,4 @@
-"""Steps of a number on its way into a computer: noise, steps of a converter, and ticks of delay."""
+"""Steps of a number on its way into a computer: noise, the converter's resolution, and ticks of delay."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from met.sensors.sensor import Reading, Sensed
 from met.trace import Real, rint, where
 
 MOST = 3
-"""Ticks of delay that there is room for."""
+"""Largest delay in ticks."""
 
 NOISE = Parameter(name="noise", unit="of", default=0.0, at_least=0.0, doc="white noise that is added at each tick, rms")
 RESOLUTION = Parameter(
@@ -37,13 +37,13 @@ def noisy(p: Any, value: Real, sensed: Sensed) -> Real:
 
 
 def converted(x: Real, resolution: Real) -> Real:
-    """x to the nearest of a converter's steps; x itself where the resolution is 0."""
+    """The value rounded to the nearest of a converter's steps; unchanged where the resolution is 0."""
     step = where(resolution > 0.0, resolution, 1.0)
     return where(resolution > 0.0, step * rint(x / step), x)
 
 
 def delayed(p: Any, held: Any, value: Real) -> Reading:
-    """The reading of `delay` ticks ago, and the queue a tick on."""
+    """The reading of `delay` ticks ago, and the queue one tick on."""
     queue = [value, *(getattr(held, memory.name) for memory in PAST)]
     seen = value
     for ago in range(1, MOST + 1):
@@ -52,5 +52,5 @@ def delayed(p: Any, held: Any, value: Real) -> Reading:
 
 
 def filled(value: Real) -> Mapping[str, Real]:
-    """The queue where a run begins."""
+    """The queue at the start of a run."""
     return {memory.name: value for memory in PAST}

@@ -36,5 +36,5 @@ def reading(p: Any, held: Any, value: Real, sensed: Sensed) -> Reading:
 
 
 def at_rest(p: Any, value: Real) -> Real:
-    """The reading where a run begins: without noise."""
+    """The reading at the start of a run, without noise."""
     return converted(p.scale * value + p.bias, p.resolution)

@@ -36,11 +36,11 @@ def swing(p: Any) -> tuple[Real, Real] | None:
 
 
 def settled(p: Any, value: Real) -> Mapping[str, Real]:
-    """Its states, the value having been this for long."""
+    """The filter's states after a long constant input."""
     return {} if p.filter == "none" else butterworth.settled(value)
 
 
 def behind(p: Any, states: Any, sensed: Sensed) -> Real:
-    """The number behind the filter at a tick."""
+    """The filter's output at a tick; without a filter, its input."""
     found: Real = sensed.value if p.filter == "none" else states.filtered
     return found

@@ -3,9 +3,9 @@
 A sensor of a joint stands in a servo, between a quantity and the control law that sees it, and reads at the servo's
 ticks. A sensor of a link (`measures`) stands in a run under a name of its own, and reads at ticks of its own.
 
-A sensor is split where the real one is. Its circuit (`follow`, over `State`) is integrated with the arm; what its
-computer makes of that (`read`, over `Memory`) happens at ticks. All are ordinary functions over numbers that may be
-traced (docs/models.md). Units: `of` is that of the quantity.
+A sensor is split where the real one is. Its circuit (`follow`, over `State`) is integrated with the arm; the computer's
+part (`read`, over `Memory`) runs at ticks. All are ordinary functions over numbers that may be traced (docs/models.md).
+Units: `of` is that of the quantity.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from met.vectors import ZERO, Vector
 
 
 class Felt(World, Protocol):
-    """The questions that a sensor of a link may ask of the arm: those to a `World`, and what only shows on board. Links
-    are those of a World, and `base`, whether it moves or not.
+    """The view of the arm that a sensor of a link has: the methods of a `World`, and quantities that only show on
+    board. Links are those of a World, and `base`, whether it moves or not.
 
     acceleration(link, point)    of a point given in the link's frame (m), the second derivative of its position: world
                                  axes, m/s^2
@@ -54,13 +54,13 @@ class Sensed:
 
     @property
     def value(self) -> Real:
-        """The quantity itself: of a link's sensor only where it is no acceleration."""
+        """The quantity itself; for a link's sensor only where it is not an acceleration."""
         return self.find()
 
 
 @frozen
 class Reading:
-    """The answer of a sensor at a tick: the number that is seen, and its new memory, by name."""
+    """The answer of a sensor at a tick: the number read, and its new memory, by name."""
 
     value: Real
     held: Mapping[str, Real] = field(default_factory=dict)
@@ -97,5 +97,5 @@ class Sensor:
 
     @property
     def written(self) -> tuple[Parameter, ...]:
-        """The parameters as a deck writes them: of a link's sensor in its own unit."""
+        """The parameters as a deck writes them; those of a link's sensor in its own unit."""
         return tuple(replace(p, unit=self.unit) if self.unit and p.unit == "of" else p for p in self.parameters)

@@ -39,7 +39,7 @@ ELASTIC = ("gear", ("elastic",))
 
 
 def control(p: Any, held: Any, seen: Seen) -> Control:
-    """Position and rate loop: the current to be driven."""
+    """The position and rate loop: computes the current to be driven."""
     if seen.setpoint.kind == "torque":
         current = seen.setpoint.value / (p.ratio * p.kt)
         return Control({"current_cmd": clip(current, -p.i_max, p.i_max)}, {"integral": 0.0})
@@ -90,12 +90,13 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
 
 
 def _within(error: Real, wanted: Real, most: Real) -> Real:
-    """The error that an integral takes in: none where what is wanted is beyond the limit, and it would be further."""
+    """The error that an integral takes in: none where the wanted value is beyond the limit, and the error would push it
+    further."""
     return where(either(both(wanted > most, error > 0.0), both(wanted < -most, error < 0.0)), 0.0, error)
 
 
 def begin(p: Any, q: Real, qd: Real) -> Mapping[str, Real]:
-    """No current and nothing wound up; the motor turns with the joint."""
+    """Start with no current and no stored integrals; the motor turns with the joint."""
     starts: dict[str, Real] = {"current": 0.0, "amplifier": 0.0}
     if p.gear == "elastic":
         return {**starts, **compliant_gearbox.begin(p, q, qd)}
@@ -103,7 +104,7 @@ def begin(p: Any, q: Real, qd: Real) -> Mapping[str, Real]:
 
 
 def balance(p: Any, torque: Real, seen: Seen) -> Mapping[str, Real]:
-    """The current is what joint, gear and friction take, steady under the amplifier; the integral is what wants it."""
+    """The current that joint, gear and friction take, steady under the amplifier; and the integral that asks for it."""
     w = p.ratio * seen.qd
     if p.gear == "elastic":
         states, tau_m = compliant_gearbox.balanced(p, torque, seen.qd)
@@ -120,7 +121,8 @@ def balance(p: Any, torque: Real, seen: Seen) -> Mapping[str, Real]:
 
 
 def fastest(p: Any) -> Real:
-    """The current loop, no root of L s^2 + (R + k_current) s + ki_current being larger in size; or the gear; 1/s."""
+    """The largest of the current loop's rate constants, the roots of L s^2 + (R + k_current) s + ki_current, and the
+    gear's; 1/s."""
     resistance = p.resistance + p.k_current
     electric = maximum(resistance / p.inductance, sqrt(p.ki_current / p.inductance))
     if p.gear != "elastic":
@@ -129,12 +131,13 @@ def fastest(p: Any) -> Real:
 
 
 def fastest_law(p: Any) -> Real:
-    """As `fastest`, or the rate loop on the motor by itself, 1/s: s^2 + (Kt Kp + F_v)/J_m s + Kt Ki/J_m."""
+    """The larger of `fastest` and the rate loop's on the motor alone, 1/s: s^2 + (Kt Kp + F_v)/J_m s + Kt Ki/J_m."""
     return maximum(fastest(p), maximum((p.kt * p.kp + p.f_v) / p.j_m, sqrt(p.kt * p.ki / p.j_m)))
 
 
 def swings(p: Any, kind: str) -> Mapping[str, tuple[Real, Real]]:
-    """The current loop; the motor on its gear, braked by the rate loop's gain alone: the current is what is asked."""
+    """Oscillations of the current loop, and of the motor on its gear, damped only by the rate loop's gain: the current
+    is the one commanded."""
     found = {"current loop": (p.ki_current / p.inductance, (p.resistance + p.k_current) / p.inductance)}
     if p.gear == "elastic":
         found["gear"] = compliant_gearbox.swing(p, 0.0 if kind == "torque" else p.kt * p.kp)

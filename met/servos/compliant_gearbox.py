@@ -46,7 +46,8 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
 
 
 def geared(p: Any, states: Any, joint: JointMotion, tau_m: Real, strongest: Real, shown: Mapping[str, Real]) -> Drive:
-    """A motor behind the gear that gives this torque, N m, and at most the strongest; shown: its own signals."""
+    """The drive of a motor behind the gear, with this torque, N m, and at most the strongest; shown: its own
+    signals."""
     w = states.motor_rate
     rate = w / p.ratio - joint.qd
     T = gear.torque(p, states.deflection, rate)
@@ -66,44 +67,46 @@ def geared(p: Any, states: Any, joint: JointMotion, tau_m: Real, strongest: Real
 
 
 def begin(p: Any, q: Real, qd: Real) -> Mapping[str, Real]:
-    """Nothing is wound up, and the motor turns with the joint."""
+    """Start with an unwound gear, and the motor turning with the joint."""
     starts: dict[str, Real] = {"deflection": 0.0, "motor_rate": p.ratio * qd}
     return starts | ({"bristle": 0.0} if p.friction == "lugre" else {})
 
 
 def balance(p: Any, torque: Real, seen: Seen) -> Mapping[str, Real]:
-    """The gear is wound up by what the joint takes, and the motor holds it so."""
+    """The gear wound up by the joint's torque, with the motor holding it so."""
     states, tau_m = balanced(p, torque, seen.qd)
-    at_motor = seen.q + states["deflection"]  # seen with nothing wound up
+    at_motor = seen.q + states["deflection"]  # seen with an unwound gear
     return {**states, **rate_loop.balanced(p, tau_m, seen.setpoint, q=at_motor, qd=seen.qd)}
 
 
 def balanced(p: Any, torque: Real, qd: Real) -> tuple[dict[str, Real], Real]:
-    """States behind a gear that drives the joint with this torque at this rate that lasts, and the motor's torque."""
+    """States behind a gear that drives the joint with this torque at this constant rate, and the motor's torque."""
     through = torque + p.f_v_joint * qd + sign(qd) * p.f_c_joint
     drag, bent = steady(p, p.ratio * qd, through / p.ratio)
     return {"deflection": gear.wound(p, through), "motor_rate": p.ratio * qd, **bent}, through / p.ratio + drag
 
 
 def fastest_law(p: Any) -> Real:
-    """As `fastest`, or the rate loop on the motor by itself, 1/s."""
+    """The larger of `fastest` and the rate loop's rate constant on the motor alone, 1/s."""
     return maximum(fastest(p), rate_loop.fastest(p))
 
 
 def fastest(p: Any) -> Real:
-    """The motor with the joint held, 1/s: its damping, or the gear's frequency. Against a light joint it is faster."""
+    """The rate constant of the motor with the joint held, 1/s: its damping, or the gear's frequency. Against a light
+    joint it is faster."""
     inertia = p.ratio * p.ratio * p.j_m
     return maximum(damping(p.kt, p.resistance, p.f_v) / p.j_m + p.damping / inertia, sqrt(p.stiffness / inertia))
 
 
 def swings(p: Any, kind: str) -> Mapping[str, tuple[Real, Real]]:
-    """The motor on its gear, braked by back-EMF and by the loop's gain; a torque command takes both away."""
+    """Oscillations of the motor on its gear, damped by back-EMF and by the loop's gain; a torque command takes both
+    away."""
     by_law = 0.0 if kind == "torque" else p.kt * p.kt / p.resistance + p.kt * p.kp / p.resistance
     return {"gear": swing(p, by_law)}
 
 
 def swing(p: Any, by_law: Real) -> tuple[Real, Real]:
-    """a and b of a motor on its gear. by_law: what the law brakes the shaft with, N m s/rad."""
+    """The a and b of a motor on its gear. by_law: damping of the shaft by the law, N m s/rad."""
     inertia = p.ratio * p.ratio * p.j_m
     return p.stiffness / inertia, (by_law + p.f_v) / p.j_m + p.damping / inertia
 

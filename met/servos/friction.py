@@ -5,8 +5,8 @@
     lugre       bristles that bend by z and slip at the same level g(w); they do not stick, but creep back a little:
                 z' = w - sigma_0 |w| z/g(w),  torque = sigma_0 z + sigma_1 z'
 
-F_v w is added to each. What a gear loses in proportion to the torque T that it transmits is dry friction too: its level
-is loss |T| higher. So a motor that drives needs (1 + loss) T, and one that is driven back holds with (1 - loss) T.
+F_v w is added to each. A gear's loss in proportion to its transmitted torque T is dry friction too: it raises the level
+by loss |T|. So a motor that drives needs (1 + loss) T, and one that is driven back holds with (1 - loss) T.
 
 The bristles are stiff: sigma_0 |w|/g is a rate constant, 1/s, that grows with the shaft's rate, and the dynamics' step
 must be shorter than the integrator's limit over it.
@@ -70,7 +70,7 @@ LOSS = Parameter(
 )
 
 BLOW = 10.0
-"""As many times what its motor gives at most a gear is thought to transmit."""
+"""Largest torque that a gear is assumed to transmit, relative to the largest of its motor."""
 
 BRISTLE = State(name="bristle", unit="rad", only=LUGRE, doc="deflection of the bristles of the friction law")
 
@@ -104,14 +104,14 @@ def friction(p: Any, w: Real, states: Any, transmitted: Real | None = None, stro
     z = states.bristle
     bending = where(slips, w - p.sigma_0 * absolute(w) * z / where(slips, level, 1.0), 0.0)
     bears = maximum(p.f_s, p.f_c)
-    if transmitted is not None:  # a blow through the gear, now past, may have bent them further
+    if transmitted is not None:  # a past blow through the gear may have bent them further
         bears = bears + where(p.loss > 0.0, p.loss * maximum(absolute(transmitted), BLOW * strongest), 0.0)
     out_of_range = p.sigma_0 * absolute(z) > 2.0 * bears
     return Friction(0.0, viscous + p.sigma_0 * z + p.sigma_1 * bending, {"bristle": bending}, out_of_range)
 
 
 def steady(p: Any, w: Real, transmitted: Real | None = None) -> tuple[Real, dict[str, Real]]:
-    """At a shaft's rate w that lasts: all of the friction's torque against the motion, none at rest, and its states."""
+    """Friction at a constant rate w of a shaft: its whole torque against the motion, none at rest, and its states."""
     level = _level(p, w, transmitted)
     bent = {"bristle": sign(w) * level / p.sigma_0} if p.friction == "lugre" else {}
     return p.f_v * w + sign(w) * level, bent

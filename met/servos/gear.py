@@ -54,7 +54,7 @@ def parameters(only: Only | None = None) -> tuple[Parameter, ...]:
 
 
 def deflection(only: Only | None = None) -> State:
-    """The state that winds the gear up."""
+    """The declaration of the state that winds the gear up."""
     doc = "winding of the gear: the motor's angle divided by the ratio, minus the joint's position"
     return State(name="deflection", unit="joint", in_transmission=True, only=only, doc=doc)
 
@@ -82,7 +82,7 @@ def _beyond(p: Any, d: Real) -> Real:
 def wound(p: Any, transmitted: Real) -> Real:
     """The deflection, rad (m), at which the gear transmits this torque, N m (N), and keeps to it.
 
-    The root of the spring's cubic: from no more than twice of it, five of Newton's steps leave rounding.
+    The root of the spring's cubic: from a start of at most twice the root, five Newton steps converge to rounding.
     """
     size, hardens = absolute(transmitted), p.hardening > 0.0
     k3 = where(hardens, p.hardening, 1.0)

@@ -25,7 +25,7 @@ from met.trace import Real
 
 
 def control(p: Any, held: Any, seen: Seen) -> Control:
-    """The servo's computer: it hands the command on."""
+    """The servo's computer: it passes the command on."""
     return Control({"value": seen.setpoint.value, "slope": seen.setpoint.slope, "since": seen.time})
 
 
@@ -43,7 +43,8 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
 
 
 def fastest(p: Any) -> Real:
-    """Both laws have all their roots at -bandwidth, 1/s; under an acceleration command nothing decays."""
+    """The rate constant, 1/s: both laws have all their roots at -bandwidth; under an acceleration command nothing
+    decays."""
     return p.bandwidth
 
 

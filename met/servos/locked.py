@@ -26,7 +26,7 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
 
 
 def at_rest(p: Any) -> Truth:
-    """Locked at the start: a locked joint that moved would move for ever."""
+    """True: a joint that moved while locked would move for ever."""
     return p.release > 0.0
 
 

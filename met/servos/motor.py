@@ -1,4 +1,4 @@
-"""A direct-current motor behind a rigid gearbox, as its data sheet has it, seen from its shaft."""
+"""A direct-current motor behind a rigid gearbox, by its data sheet, seen from its shaft."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Motor:
 
 @frozen
 class RateLoop:
-    """The PI loop on a motor's rate that sets its voltage, as its servo's parameters describe it; shaft side.
+    """The PI loop on a motor's rate that sets its voltage, from its servo's parameters; shaft side.
 
     kp  V s/rad;  ki: V/rad;  v_max: largest voltage, V
     """
@@ -88,7 +88,7 @@ class RateLoop:
 
 
 def damping(kt: Real, resistance: Real, f_v: Real) -> Real:
-    """Back-EMF and viscous friction, for each unit of the shaft's rate, N m s/rad."""
+    """Damping by back-EMF and viscous friction, for each unit of the shaft's rate, N m s/rad."""
     return kt * kt / resistance + f_v
 
 

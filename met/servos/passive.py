@@ -16,7 +16,7 @@ from met.servos.servo import Drive, JointMotion, Servo
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
-    """The damper, the spring and friction."""
+    """The torques of the damper, the spring and friction."""
     return Drive(
         torque=-p.damping * joint.qd - p.stiffness * (joint.q - p.rest),
         dry=p.friction,

@@ -59,7 +59,7 @@ def rate_loop(p: Any, integral: Real, setpoint: Setpoint, *, q: Real, qd: Real) 
 
 
 def balanced(p: Any, tau_m: Real, setpoint: Setpoint, *, q: Real, qd: Real) -> dict[str, Real]:
-    """The integral with which the loop sets the voltage that drives its motor with this torque, N m."""
+    """The integral with which the loop sets the voltage for this torque of its motor, N m."""
     if setpoint.kind == "torque":
         return {"integral": 0.0}
     tau_m = clip(tau_m, -p.tau_max, p.tau_max)
@@ -68,13 +68,15 @@ def balanced(p: Any, tau_m: Real, setpoint: Setpoint, *, q: Real, qd: Real) -> d
 
 
 def wound(p: Any, wanted: Real, error: Real) -> Real:
-    """The integral with which a loop of gains `kp` and `ki` wants this at this error; 0 of one that has none."""
+    """The integral with which a loop of gains `kp` and `ki` gives this output at this error; 0 for a loop without
+    one."""
     integrates = p.ki > 0.0
     return where(integrates, (wanted - p.kp * error) / where(integrates, p.ki, 1.0), 0.0)
 
 
 def fastest(p: Any) -> Real:
-    """The rate loop on a motor by itself, of a continuous law, 1/s: no root of s^2 + b s + c is larger in size,
+    """A bound on the rate constants of the rate loop on a motor alone, with a continuous law, 1/s: no root of s^2 + b s
+    + c is larger in size,
 
     b = (Kt^2/R + F_v + Kt Kp/R)/J_m,  c = Kt Ki/(R J_m)
     """
@@ -93,8 +95,8 @@ def settings(p: Any) -> RateLoop:
 
 
 def rate_wanted(p: Any, q: Real, setpoint: Setpoint) -> Real:
-    """The rate that the loop is given, of the motor over its ratio (rad/s; m/s): its command under a rate command, the
-    position loop's answer under a position command."""
+    """The input of the rate loop, a rate of the motor over its ratio (rad/s; m/s): the command under a rate command,
+    the position loop's output under a position command."""
     if setpoint.kind == "position":
         return setpoint.slope + p.k_position * (setpoint.value - q)
     return setpoint.value

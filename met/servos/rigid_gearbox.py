@@ -54,18 +54,18 @@ def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
 
 
 def balance(p: Any, torque: Real, seen: Seen) -> Mapping[str, Real]:
-    """The motor gives what the joint and friction take; the loop's integral is what that wants."""
+    """The motor's torque for joint and friction, and the loop's integral that commands it."""
     drag, bent = steady(p, p.ratio * seen.qd)
     return {**bent, **rate_loop.balanced(p, torque / p.ratio + drag, seen.setpoint, q=seen.q, qd=seen.qd)}
 
 
 def fastest(p: Any) -> Real:
-    """Back-EMF and viscous friction brake the rotor at most this fast: (Kt^2/R + F_v)/J_m, 1/s."""
+    """Upper bound of the braking of the rotor by back-EMF and viscous friction: (Kt^2/R + F_v)/J_m, 1/s."""
     return motor(p).damping / p.j_m
 
 
 def motor(p: Any) -> Motor:
-    """The motor, which a bed may take the place of."""
+    """The motor, which a bed may replace."""
     return Motor(
         ratio=p.ratio, kt=p.kt, resistance=p.resistance, tau_max=p.tau_max, inertia=p.j_m, f_c=p.f_c, f_v=p.f_v
     )

@@ -1,14 +1,14 @@
 """The declaration of a servo: its parameters, its control law, and the physics that the law drives.
 
-A servo is split where the real one is: the law of its computer (`control`), and what nature does (`drive`). Both are
+A servo is split where the real one is: the law of its computer (`control`), and the physics (`drive`). Both are
 ordinary functions over numbers that may be traced (docs/models.md). The physics is part of the derivative, evaluated at
 every stage of every step. The law is written once and runs in one of two ways, as the deck says:
 
     rate = 1 kHz          sampled: at the servo's ticks; outputs are held between them, an integral x' = x + T slope
     rate = continuous     analog: a part of the derivative; its integrals are integrated with the arm
 
-Everything the servo gives back is on the joint's side of the gearbox, in joint units: rad, rad/s, N m; m, m/s, N
-on a prismatic joint.
+All of the servo's results are on the joint's side of the gearbox, in joint units: rad, rad/s, N m; m, m/s, N on a
+prismatic joint.
 """
 
 from __future__ import annotations
@@ -61,7 +61,8 @@ class Seen:
 
 @frozen
 class Control:
-    """The answer of the control law: its outputs by name, and how fast its integrals change, 1/s of their units."""
+    """The answer of the control law: its outputs by name, and the slopes of its integrals, in their units per
+    second."""
 
     outputs: Mapping[str, Real] = field(default_factory=dict)
     slopes: Mapping[str, Real] = field(default_factory=dict)
@@ -189,12 +190,12 @@ class Servo:
 
     @cached_property
     def parts_by_words(self) -> dict[tuple[tuple[tuple[str, str], ...], bool], Parts]:
-        """The parts that `parts` has found, by words and whether the law is continuous."""
+        """The results of `parts`, by words and whether the law is continuous."""
         return {}
 
     @property
     def deciding(self) -> tuple[str, ...]:
-        """Names of the parameters, words, on which parts of it depend (`only`), in order."""
+        """Names of the word parameters on which parts of the servo depend (`only`), in order."""
         parts: tuple[Parameter | Memory | State | Signal, ...] = (
             *self.parameters,
             *self.outputs,

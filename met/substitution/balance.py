@@ -2,7 +2,7 @@
 
     (diag(N^2 (J_m + c)) + Lambda) qdd = N (net - s F_c) - b_0
 
-net is the motor's torque less viscous friction, and what the observer knows besides; s is the direction of sliding, 0
+net is the motor's torque less viscous friction, plus the observer's unknown torque; s is the direction of sliding, 0
 where a joint is stuck, whose qdd is then 0. c = (Kt^2/R + F_v) T/2 makes qdd the mean over a tick of T: back-EMF and
 viscous friction grow while the shaft gains speed. The joints are solved together: one by one, the loop that runs
 through the arm would have a gain above one from three joints on.
@@ -35,7 +35,7 @@ class JointSide:
 
 @frozen
 class Balanced:
-    """One joint's motion: qdd of the joint, friction that is in it (N m at the shaft), direction of sliding s, net."""
+    """One joint's motion: its qdd, the friction in it (N m at the shaft), the direction of sliding s, and net."""
 
     qdd: Real
     friction: Real
@@ -49,8 +49,8 @@ Matrix = Sequence[Sequence[Real]]
 def balanced(sides: Sequence[JointSide], Lambda: Matrix, b_0: Sequence[Real]) -> list[Balanced]:
     """The motion of all joints. Lambda, b_0: tau_load = Lambda qdd + b_0, joint side.
 
-    At rest a joint begins stuck, and passes follow in which all that friction does not hold break away at once, and
-    what would turn back on its own friction is stuck again.
+    A joint at rest begins stuck; in the passes that follow, all joints that friction does not hold break away at once,
+    and one that would turn back on its own friction is stuck again.
     """
     m = len(sides)
     rest = [absolute(side.w) <= side.band for side in sides]
@@ -72,7 +72,7 @@ def balanced(sides: Sequence[JointSide], Lambda: Matrix, b_0: Sequence[Real]) ->
 
 
 def bare(sides: Sequence[JointSide], Lambda: Matrix, b_0: Sequence[Real]) -> list[Balanced]:
-    """The same without friction, as eq. 10 of the paper has it."""
+    """The motion of all joints without friction, as in eq. 10 of the paper."""
     qdd = solved(sides, Lambda, b_0, [1.0] * len(sides), dry=False)
     return [Balanced(a, 0.0, 1.0, side.net) for side, a in zip(sides, qdd, strict=True)]
 
@@ -92,7 +92,8 @@ def loads(Lambda: Matrix, b_0: Sequence[Real], qdd: Sequence[Real]) -> list[Real
 def solved(
     sides: Sequence[JointSide], Lambda: Matrix, b_0: Sequence[Real], s: Sequence[Real], *, dry: bool = True
 ) -> list[Real]:
-    """qdd for these directions of sliding, exactly 0 where s is: elimination in order, the matrix being definite."""
+    """qdd for these directions of sliding, exactly 0 where s is 0: elimination in order, since the matrix is
+    definite."""
     m = len(sides)
     slides: list[Truth] = [way != 0.0 for way in s]
     rows = [

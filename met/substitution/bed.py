@@ -1,10 +1,10 @@
-"""The declaration of a bed model: a drive motor and a load motor on one shaft, a wire to them, and what is read back.
+"""The declaration of a bed model: a drive motor and a load motor on one shaft, a wire to them, and the reading.
 
 The wire carries the drive motor's voltage and the load motor's current, held by the amplifiers from one tick to the
 next, and brings back the filtered rate of the shaft, once a tick. A bed model simulates that; a real bed takes its
-place at the wire, and the model is then what is believed of it. Drivers of real beds are in hw/beds.
+place at the wire, and the model then serves as its description. Drivers of real beds are in hw/beds.
 
-`PARAMETERS`, `SIMULATION_PARAMETERS` and `MEMORY` are all that code outside a bed model reads of it by name.
+`PARAMETERS`, `SIMULATION_PARAMETERS` and `MEMORY` are all names of a bed model that code outside of it reads.
 """
 
 from __future__ import annotations
@@ -20,29 +20,30 @@ from met.trace import Real, Truth
 
 @frozen
 class Wire:
-    """The values that the amplifiers hold: what the drive is told (`DRIVES`); current of the load motor, A."""
+    """The values that the amplifiers hold: the drive's command (`DRIVES`), and the current of the load motor, A."""
 
     drive: Real
     current: Real
 
     @property
     def voltage(self) -> Real:
-        """Voltage of the drive motor, V, on a bed whose drive is told one."""
+        """Voltage of the drive motor, V, on a bed whose drive is commanded one."""
         return self.drive
 
 
 DriveCommand = Literal["voltage", "torque", "rate"]
-"""The quantity that the drive of a bed is told: where the servo's law ends and the drive's begins."""
+"""The quantity that the drive of a bed is commanded: there the servo's law ends and the drive's begins."""
 
 DRIVES: Mapping[DriveCommand, tuple[str, str]] = {
     "voltage": ("V", "all of the servo's law is ours: its voltage is on the drive motor"),
     "torque": ("N*m", "the drive has a current loop of its own: it takes the torque of the motor as its command"),
     "rate": ("rad/s", "the drive has a rate loop of its own: it takes the rate of the shaft as its command"),
 }
-"""Unit of each, and what the drive then does itself."""
+"""The unit of each command, and the part of the law that the drive then has."""
 
 Draw = Callable[[str], Real]
-"""A normal deviate of mean 0 and variance 1 by the name of what is noisy: one a tick, the same however it is run."""
+"""A function that gives a normal deviate of mean 0 and variance 1, by the name of its channel: one a tick, the same
+however it is run."""
 
 
 PARAMETERS = (
@@ -79,20 +80,20 @@ converters, which become the counts of the wire. Without them, or at 0, a count 
 
 MEMORY = (Memory(name="shaft_rate", unit="rad/s", doc="rate of the shaft itself"),)
 TORQUE = Memory(name="motor_torque", unit="N*m", doc="torque of the drive motor")
-"""Memory that every bed model has; a model whose drive is told a rate has `TORQUE` too, for nothing else says it. A
-model may have `shaft_angle` (rad), which is then what a simulated bed's encoder reads; without it the encoder stays at
-0."""
+"""Memory that every bed model has; a model whose drive is commanded a rate has `TORQUE` too, which is not known
+otherwise. A model may have `shaft_angle` (rad), which a simulated bed's encoder then reads; without it the encoder
+stays at 0."""
 
 
 def of_bed(drive: DriveCommand) -> tuple[tuple[str, str, str], ...]:
-    """Name, unit and meaning of what the engine holds of a bed, besides the memory of its model."""
+    """Name, unit and meaning of the numbers that the engine holds for a bed, besides the memory of its model."""
     meaning = "voltage on the drive motor" if drive == "voltage" else f"{drive} that the drive is commanded"
     return (f"drive_{drive}", DRIVES[drive][0], meaning), ("load_current", "A", "current in the load motor")
 
 
 @frozen(kw_only=True)
 class BedModel:
-    """A bed that the engine simulates; one a file. `check` says what is missing in a declaration.
+    """A bed that the engine simulates; one a file. `check` finds faults of a declaration.
 
     parameters  its numbers; `PARAMETERS` are among them
     memory    its state, recorded under its names; `MEMORY` is among them
@@ -117,7 +118,7 @@ class BedModel:
 
     @property
     def shown(self) -> tuple[tuple[str, str, str], ...]:
-        """Name, unit and meaning of all that can be recorded of a bed of this model, its own memory first."""
+        """Name, unit and meaning of all recordable numbers of a bed of this model, its own memory first."""
         return (*((memory.name, memory.unit, memory.doc) for memory in self.memory), *of_bed(self.drive))
 
 
@@ -155,5 +156,5 @@ def _other_unit(needed: Parameter | Memory, found: Parameter | Memory) -> tuple[
 
 
 def _within(parameter: Parameter, most: float) -> bool:
-    """True where only whole numbers from 0 to `most` are taken."""
+    """True where only whole numbers from 0 to `most` are allowed."""
     return parameter.whole and parameter.at_least == 0.0 and parameter.at_most is not None and parameter.at_most <= most

@@ -1,4 +1,4 @@
-"""The scales of a bed whose motor is not of the size of the joint's: weaker, slower or of less voltage by factors.
+"""The scales of a bed whose motor differs in size from the joint's: factors of torque, rate and voltage.
 
     a number of the joint's motor = its scale x the same number of the bed's
 
@@ -8,8 +8,8 @@ tau w = V i hold on both sides:
     inertia, viscous friction   torque/rate             current      torque rate/voltage
     torque constant, back-EMF   voltage/rate            resistance   voltage^2/(torque rate)
 
-A bed that is not scaled has 1 for all of them. Law, observer and arm know the joint's size alone: what goes over the
-wire, what comes back, and what the deck says of the bed are of the bed's size.
+A bed that is not scaled has 1 for all of them. Law, observer and arm use the joint's size; commands and readings on the
+wire, and the bed's parameters in the deck, are of the bed's size.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
     y' = z,   z' = wc^2 (u - y) - sqrt(2) wc z,   wc = 2 pi f_cut
 
-Its free motion has the decay and the frequency sigma = wc/sqrt(2) alike. What a straight line or an exponential drives
-is that motion about the course that follows the drive: no step size is involved.
+Decay and frequency of its free motion are both sigma = wc/sqrt(2). Its response to a straight line or an exponential is
+that motion about the course that follows the input: no step size is involved.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from met.frozen import frozen
 from met.trace import Real, cos, exp, sin
 
 State = tuple[Real, Real]
-"""y rad/s (filtered rate) and z = y' rad/s^2."""
+"""State of the filter: y rad/s (filtered rate) and z = y' rad/s^2."""
 
 
 @frozen
@@ -30,7 +30,7 @@ class Filter:
 
 
 def over(f_cut: Real, time: Real) -> Filter:
-    """The filter of a cut-off frequency (Hz, 1/s) over some time (s)."""
+    """The filter with a cut-off frequency (Hz, 1/s) over a time (s)."""
     sigma = math.sqrt(2.0) * math.pi * f_cut
     fading, c, s = exp(-sigma * time), cos(sigma * time), sin(sigma * time)
     rows = ((fading * (c + s), fading * s / sigma), (-2.0 * sigma * (fading * s), fading * (c - s)))

@@ -1,15 +1,14 @@
-"""The part of a servo's law that a bed's drive has: what the drive is told, and what its motor then does.
+"""The part of a servo's law that a bed's drive has, by its command, and the torque of the bed's motor.
 
     voltage  all of the law is ours; the motor has back-EMF:      tau_m = Kt/R (V - Kt w), limited
     torque   the drive has a current loop, and the motor's electrical side is ours: tau_m is held from tick to tick
     rate     the drive has a rate loop, and ours is what is above it:   V = Kp (w_told - w) + Ki I, limited
 
-With a drive that is told a torque, the joint's motor is the same as with another: it has its voltage, resistance and
-back-EMF in the balance. What is sent is the mean of its torque over the tick, and back-EMF brakes no bed.
+With a torque command, the joint's motor is modelled as with other drives, with its voltage, resistance and back-EMF in
+the balance. The command is the mean of its torque over the tick, and back-EMF does not brake the bed.
 
-A drive that is told a rate makes its torque by itself, and need not say it: the servo's own rate loop is what is
-believed of the drive's, and stands beside it. What the drive does otherwise is the unknown torque d, as that of a motor
-is that is not its data sheet.
+A drive with a rate command sets its torque itself, and need not report it: the servo's own rate loop serves as its
+model. Deviations of the drive appear as the unknown torque d, like those of a motor from its data sheet.
 """
 
 from __future__ import annotations
@@ -22,12 +21,12 @@ from met.substitution.bed import DriveCommand
 from met.trace import Real, absolute, both, clip, either, where
 
 LEAST = 1e-8
-"""Share of its rate that a shaft loses in a time, at least, where closed forms divide by its damping: without viscous
-friction a bed whose drive is told a torque has none. Rounding and error are then of that size."""
+"""Smallest share of its rate that a shaft loses in a time, where closed forms divide by its damping: without viscous
+friction, a bed whose drive is commanded a torque has none. Rounding and error are then of that size."""
 
 
 def bed_torque(drive: DriveCommand, motor: Motor, command: Real, w: Real) -> Real:
-    """Torque of the bed's motor that is held at a command, N m: at a voltage at w rad/s."""
+    """Torque of the bed's motor at a held command, N m; for a voltage, at a rate of w rad/s."""
     if drive == "voltage":
         return motors.torque(motor.kt, motor.resistance, motor.tau_max, command, w)
     return clip(command, -motor.tau_max, motor.tau_max)
@@ -47,7 +46,7 @@ class LoopTorque:
 
 
 def loop_torque(motor: Motor, loop: RateLoop, integral: Real, command: Real, w: Real, time: float) -> LoopTorque:
-    """Torque of a motor whose drive closes a rate loop, as a tick of `time` s begins.
+    """Torque of a motor whose drive closes a rate loop, at the start of a tick of `time` s.
 
     integral  of the rate's error, rad;  command, w: rates of the shaft, told and true, rad/s
     """
@@ -70,8 +69,8 @@ def wound(loop: RateLoop, integral: Real, error: Real, time: float) -> Real:
 
 
 def bed_damping(drive: DriveCommand, motor: Motor, inertia: Real, time: float, loop: RateLoop | None = None) -> Real:
-    """Torque that brakes the bed's shaft for each unit of its rate, N m s/rad: above 0, for closed forms over `time`
-    s. loop: of a drive that is told a rate."""
+    """Torque that brakes the bed's shaft for each unit of its rate, N m s/rad: above 0, for closed forms over `time` s.
+    loop: of a drive with a rate command."""
     if loop is not None:
         return motor.damping + motor.kt * loop.kp / motor.resistance
     return motor.damping if drive == "voltage" else at_least(motor.f_v, LEAST * inertia / time)

@@ -27,7 +27,7 @@ from met.trace import Real, absolute, sin
 SUBSTEP = 250e-6
 """Longest substep, s. Against one of 50 us a run moves by 0.005 % of its rate, all faults on."""
 
-# where misalignment is worst, rad: any two angles do
+# where misalignment is worst, rad: arbitrary angles
 _ONCE_AT, _TWICE_AT = 0.3, 1.1
 
 
@@ -36,7 +36,7 @@ def begin(p: Any, w: Real) -> Mapping[str, Real]:
 
 
 def substep(time: float) -> float:
-    """Length of the substeps of `time` s."""
+    """Length of the substeps of a time, s."""
     return time / math.ceil(time / SUBSTEP - 1e-9)
 
 

@@ -1,8 +1,8 @@
-"""The declaration of a law: how the load motor is driven, so that the shaft turns as if it carried the arm.
+"""The declaration of a law: the control of the load motor, by which the shaft turns as if it carried the arm.
 
 At a tick the engine has read the filtered rate of every substituted joint, has run its servo for the voltage, and knows
-what the arm is to these joints: tau_load = Lambda qdd + b_0, all together. A law says what load torque each is given,
-and what acceleration the arm is told.
+the arm's load on these joints together: tau_load = Lambda qdd + b_0. A law gives the load torque of each, and the
+acceleration of the arm's joint.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from met.trace import Real
 
 @frozen
 class LawInput:
-    """All that a law is told of one substituted joint at a tick; shaft side but for b_0.
+    """The inputs of a law for one substituted joint at a tick; shaft side but for b_0.
 
     motor    as the servo believes it;  inertia: of the bed's shaft, kg m^2
     rate     filtered rate read now, before: at the tick before, rad/s
@@ -55,13 +55,13 @@ OF_LAW = (
     ("torque", "N*m", "load torque that the law commands"),
     ("rate", "rad/s", "rate of the shaft, as estimated by the law"),
 )
-"""Name, unit and meaning of what the engine holds of every law, besides its own memory."""
+"""Name, unit and meaning of the numbers that the engine holds for every law, besides its own memory."""
 
 OF_OBSERVER = (
     ("unknown_torque", "N*m", "torque on the shaft that the motor's parameters do not explain"),
     ("reference_rate", "rad/s", "rate that the shaft would have on the joint itself"),
 )
-"""Name, unit and meaning of what the engine holds of a law with an observer besides."""
+"""Name, unit and meaning of the further numbers that the engine holds for a law with an observer."""
 
 
 @frozen(kw_only=True)
@@ -88,7 +88,7 @@ class Law:
 
     @property
     def shown(self) -> tuple[tuple[str, str, str], ...]:
-        """Name, unit and meaning of all that can be recorded of this law, its own memory first."""
+        """Name, unit and meaning of all recordable numbers of this law, its own memory first."""
         own = ((memory.name, memory.unit, memory.doc) for memory in self.memory)
         return (*own, *OF_LAW, *OF_OBSERVER * self.observer)
 

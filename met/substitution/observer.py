@@ -1,10 +1,10 @@
-"""The observer: shaft rate, the filter's two states and the torque that the data sheet does not know, from the filtered
-rate alone (a Kalman filter in its steady state).
+"""The observer: a steady-state Kalman filter that estimates shaft rate, the filter's two states and the torque missing
+in the data sheet from the filtered rate alone.
 
     x = (w, y, z, d):  J w' = -damp w + d + u,  y' = z,  z' = wc^2 (w - y) - sqrt(2) wc z,  d' = 0
 
-u is held over a tick, so the prediction is exact. Noise is of a tick: a torque held over it, a step of d, an error of
-the reading.
+u is held over a tick, so the prediction is exact. The noises of a tick are a torque held over it, a step of d, and an
+error of the reading.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class DiscreteModel:
 
 
 def model(*, inertia: Real, damping: Real, f_cut: Real, period: Real) -> DiscreteModel:
-    """The bed that is believed in: shaft inertia (kg m^2), Kt^2/R + F_v (N m s/rad, above 0), filter (Hz), tick (s)."""
+    """The modelled bed: shaft inertia (kg m^2), Kt^2/R + F_v (N m s/rad, above 0), filter (Hz), tick (s)."""
     decay = damping / inertia
     of = butterworth.over(f_cut, period)
     fading = exp(-decay * period)
@@ -72,7 +72,7 @@ class Noise:
 
 
 def gain_of(P: Square, noise: Noise) -> Four:
-    """The gain on the surprise in a reading of y, from the covariance of x before it."""
+    """The gain on the innovation of a reading of y, from the covariance of x before it."""
     total = P[1][1] + noise.reading
     return P[0][1] / total, P[1][1] / total, P[2][1] / total, P[3][1] / total
 

@@ -1,10 +1,11 @@
-"""A shaft with dry friction over a time in which what drives it is held, in closed form.
+"""A shaft with dry friction over a time in which its drive is held, in closed form.
 
     J w' = smooth - a J (w - w_0) - s F_c,   s in {0, +1, -1}
 
 `smooth` is all smooth torque at the beginning, `a` the rate at which it falls as the shaft gains speed (back-EMF and
-viscous friction). s is the sign of w, at rest what breaks it away. A rate that would cross zero stops there exactly:
-what is left of the time is lost, so the time is to be short against the motion, not against 1/a.
+viscous friction). s is the sign of w, and at rest that of a torque which breaks the shaft away. A rate that would cross
+zero stops there exactly: the rest of the time is lost, so the time must be short against the motion, but not against
+1/a.
 """
 
 from __future__ import annotations
@@ -31,5 +32,5 @@ def slid(w: Real, smooth: Real, dry: Real, *, inertia: Real, decay: Real, time: 
 
 
 def lasting(decay: Real, time: Real) -> Real:
-    """(1 - exp(-a t))/a: how long a push lasts that falls with the rate a, s."""
+    """(1 - exp(-a t))/a: the effective duration, s, of a push that decays with the rate a."""
     return (1.0 - exp(-decay * time)) / decay

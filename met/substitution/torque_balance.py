@@ -17,7 +17,7 @@ from met.trace import Real
 
 
 def balanced(inputs: LawInput) -> LawOutput:
-    """The load torque that gives the shaft its part in the balance, and the joint's part."""
+    """The load torque by which the shaft takes its part in the balance, and the joint's part."""
     found = inputs.balance
     assert found is not None
     torque = (inputs.inertia + inputs.extra) * (inputs.motor.ratio * found.qdd) - (found.net - found.friction)
