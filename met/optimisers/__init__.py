@@ -1,7 +1,7 @@
 """Optimisers for searches and tunings: points of the unit cube to try, a generation at a time.
 
-They know nothing of decks and cases. What they ask for follows from the dimension, the seed, the number of points and
-what they were told, to the bit, on every machine: so a campaign that was cut off is told its archive and goes on.
+They know nothing of decks and cases. The points that they ask for depend only on the dimension, the seed, the number of
+points and the values so far, to the bit, on every machine: so an interrupted campaign replays its archive and goes on.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from met.optimisers.worst_case import WorstCaseSearch
 
 
 def hardest(dimension: int, seed: int, at_most: int) -> Optimiser:
-    """A search for the least value with at most this many points; it ends early where it has found -inf."""
+    """A search for the least value with at most this many points; it ends early once it has found -inf."""
     return WorstCaseSearch(dimension, seed, at_most)
 
 
 def tuner(dimension: int, seed: int, at_most: int) -> Optimiser:
-    """CMA-ES, from the middle of the cube, with this many candidates."""
+    """A CMA-ES tuner that starts from the middle of the cube, with this many candidates."""
     return RestartedAdaptation(dimension, seed, at_most)

@@ -12,21 +12,21 @@ import math
 import numpy as np
 
 KEPT = 2.0**30
-"""Logarithms are kept to one part in this: what differs between libraries is far behind it."""
+"""Inverse of the step to which logarithms are rounded: libraries differ only far below it."""
 
 
 def added(values: np.ndarray) -> np.ndarray:
-    """The sum along the first axis, added up in order."""
+    """The sum along the first axis, added in order."""
     return np.asarray(np.add.accumulate(values, axis=0)[-1])
 
 
 def total(values: np.ndarray) -> float:
-    """The sum of a vector, added up in order."""
+    """The sum of a vector, added in order."""
     return float(added(values))
 
 
 def transformed(matrix: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """The matrix times each row, [row, dimension], added up in order."""
+    """The matrix times each row, [row, dimension], added in order."""
     out = np.zeros_like(rows)
     for column in range(rows.shape[1]):
         out += rows[:, column, None] * matrix[None, :, column]
@@ -48,12 +48,12 @@ def lower_factor(matrix: np.ndarray) -> np.ndarray | None:
 
 
 def growth(x: float) -> float:
-    """A factor near to e^x for x in [-1, 1], by one division: that of -x is its inverse, as with e^x."""
+    """A factor near e^x for x in [-1, 1], by one division; that of -x is its inverse, as with e^x."""
     return (2.0 + x) / (2.0 - x)
 
 
 def power(base: float, exponent: int) -> float:
-    """A base in [0, 1] multiplied by itself; 0 for what is too small to matter."""
+    """A base in [0, 1] raised to a whole power by multiplications; 0 for results that are negligible."""
     out = 1.0
     for _ in range(exponent):
         out *= base
@@ -63,5 +63,5 @@ def power(base: float, exponent: int) -> float:
 
 
 def logarithm(x: float) -> float:
-    """The natural logarithm to 30 bits behind the point."""
+    """The natural logarithm, rounded to 30 binary places."""
     return round(math.log(x) * KEPT) / KEPT

@@ -1,4 +1,4 @@
-"""CMA-ES: points are drawn around a mean, with a covariance that is learnt from which of them are best.
+"""CMA-ES: points are drawn around a mean, with a covariance that is learnt from the best of them.
 
 From Hansen, *The CMA Evolution Strategy: A Tutorial* (arXiv:1604.00772): cumulative step-size adaptation, rank-one and
 rank-mu update with negative weights, constants of its table 1. The covariance is C = A A' with A lower triangular, as
@@ -16,20 +16,21 @@ from met.optimisers.arithmetic import added, growth, logarithm, lower_factor, po
 from met.optimisers.draws import Draws
 
 WIDEST = 1.0
-"""The largest step, in edges of the cube: points are as good as even in the cube then."""
+"""The largest step, in edges of the cube: with it, points are practically uniform in the cube."""
 
 WIDENING = 1.5
-"""The step grows by this factor where all points of a generation are equally good."""
+"""Factor by which the step grows where all points of a generation are equally good."""
 
 WORST_CONDITION = 1e14
-"""Largest squared ratio of A's diagonal: rounding spoils the covariance beyond it."""
+"""Largest squared ratio of A's diagonal: beyond, rounding spoils the covariance."""
 
 PATIENCE = 50
-"""A start has converged after this many generations without a better value, and 30 points a dimension more."""
+"""Number of generations without a better value after which a start has converged; 30 points a dimension are added to
+it."""
 
 
 class CovarianceAdaptation:
-    """One start of CMA-ES in the unit cube, whose walls reflect: what would lie behind a wall is mirrored at it.
+    """One start of CMA-ES in the unit cube, whose walls reflect: points beyond a wall are mirrored at it.
 
     Mirrored rather than moved onto the wall or drawn again: of these three it alone reached corners of the cube with
     2,000 points in 8 and 16 dimensions.
@@ -70,12 +71,12 @@ class CovarianceAdaptation:
 
     @property
     def mean(self) -> np.ndarray:
-        """[dimension] a point of the cube around which it draws."""
+        """The point of the cube around which it draws, [dimension]."""
         return mirrored(self._mean)
 
     @property
     def converged(self) -> bool:
-        """True where going on is of no use: all steps are small, or no better value has come for long."""
+        """True where further generations are useless: all steps are small, or no better value has come for long."""
         n = len(self._mean)
         deviation = self._step * math.sqrt(float(self._covariance.diagonal().max()))
         patience = PATIENCE + 30 * n / self.population
@@ -87,7 +88,7 @@ class CovarianceAdaptation:
         return mirrored(self._mean + self._step * transformed(self._factor, self._drawn))
 
     def tell(self, values: np.ndarray) -> None:
-        """Learns from the values of the points that were asked last, [population]."""
+        """Learn from the values of the points that were asked last, [population]."""
         least = float(values.min())
         self._unimproved = 0 if least < self._best else self._unimproved + 1
         self._best = min(least, self._best)
@@ -113,7 +114,7 @@ class CovarianceAdaptation:
         return math.sqrt(total(self._step_path * self._step_path))
 
     def _lengthen_path(self, move: np.ndarray, length: float) -> bool:
-        """Adds a move to the covariance's path, and says that it did: it does not while the step grows quickly."""
+        """Add a move to the covariance's path; returns False while the step grows so quickly that the path stalls."""
         n, rate = len(move), self._path_rate
         usual = math.sqrt(1 - power(1 - self._step_rate, 2 * self._generation)) * self._usual_length
         steady = length < (1.4 + 2 / (n + 1)) * usual
@@ -142,14 +143,14 @@ class CovarianceAdaptation:
 
 
 def mirrored(points: np.ndarray) -> np.ndarray:
-    """Points of the whole space folded into the unit cube at its walls."""
+    """Points of the whole space reflected into the unit cube at its walls."""
     folded = points - 2.0 * np.floor(points / 2.0)
     return np.asarray(np.minimum(folded, 2.0 - folded))
 
 
 def shared_weights(weights: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """The weight of each value by its rank, the least first; equal values share theirs, so that a plateau pulls
-    nowhere."""
+    """The weight of each value by its rank, the least first; equal values share their weights, so that a plateau has no
+    direction."""
     order = np.argsort(values, kind="stable")
     ranked = values[order]
     starts = np.flatnonzero(np.concatenate([[True], ranked[1:] != ranked[:-1]])).tolist()

@@ -1,10 +1,10 @@
 """Descent by exact slopes to the least of a worst value: sequential quadratic programming in a trust region.
 
-What is to be small is the largest of pieces, each a smooth function with hinges on it, w max(0, h): so are the worst of
-several plants, and the price of what lies near to a limit or beyond. Each step solves the same with all functions
-straight, and one curvature for all, that of the Lagrangian by Powell's damped BFGS (Nocedal and Wright, *Numerical
-Optimization*, 2006, procedures 18.2 and 18.5). At a corner where as many pieces and hinges meet as there are dimensions
-it needs no curvature, and in a smooth valley few pieces.
+The function to minimise is the largest of pieces, each a smooth function with hinges w max(0, h) added: such are the
+worst of several plants, and the price of values near a limit or beyond it. Each step solves the problem with all
+functions linearised, and one curvature for all, that of the Lagrangian by Powell's damped BFGS (Nocedal and Wright,
+*Numerical Optimization*, 2006, procedures 18.2 and 18.5). At a corner where as many pieces and hinges meet as there are
+dimensions it needs no curvature, and in a smooth valley few pieces.
 """
 
 from __future__ import annotations
@@ -18,24 +18,26 @@ from met.optimisers.arithmetic import added, total
 from met.optimisers.quadratic import least_within
 
 RADIUS = 0.1
-"""The first step of a coordinate is no longer than this, in edges of the cube; and none longer than LONGEST."""
+"""Largest first step of a coordinate, in edges of the cube; no step is longer than LONGEST."""
 
 LONGEST = 0.3
 
 FINEST = 1e-5
-"""It ends where no step of this length does better: on an edge of an event, beside which the slopes hold no more."""
+"""The descent ends where no step of this length improves: on the edge of an event, beyond which the slopes do not
+hold."""
 
 CONVERGED = 1e-5
-"""It has converged where the straight functions promise no more than this share."""
+"""The descent has converged where the linearised functions promise an improvement of no more than this share."""
 
 STEPS = 60
-"""Points that are asked for, at most."""
+"""Largest number of points that are asked for."""
 
 ON = 1e-9
-"""A move that ends nearer to an end than this ends on it."""
+"""A move that ends nearer to a bound than this ends on it."""
 
 GOOD, POOR = 0.75, 0.25
-"""Shares of what was promised beyond which the next step may be twice as long, and below which it is half as long."""
+"""Shares of the promised improvement above which the next step may be twice as long, and below which it is half as
+long."""
 
 
 @frozen
@@ -55,7 +57,7 @@ class LocalModel:
 
     @property
     def value(self) -> float:
-        """The function there."""
+        """The function's value at the point."""
         return self.after(np.zeros(self.piece_slopes.shape[1]))
 
     def after(self, move: np.ndarray) -> float:
@@ -68,12 +70,12 @@ class LocalModel:
         return float(values.max())
 
     def lagrangian_slope(self, multipliers: np.ndarray) -> np.ndarray:
-        """The slope of pieces and hinges times these multipliers, [piece, then hinge]; [dimension]."""
+        """The slope of pieces and hinges weighted by these multipliers, [piece, then hinge]; [dimension]."""
         return added(np.concatenate([self.piece_slopes, self.hinge_slopes]) * multipliers[:, None])
 
 
 class SlopeDescent:
-    """Points of the unit cube to try, one at a time, from a first one on.
+    """A descent over the unit cube that tries one point at a time, from a given first one.
 
     point      [dimension], the best so far;  worth: of it: smaller is better
     converged  whether the slopes there promise nothing more
@@ -87,7 +89,7 @@ class SlopeDescent:
         self._multipliers = np.zeros(len(model.pieces) + len(model.hinges))
 
     def ask(self) -> np.ndarray:
-        """The next point, [1, dimension]; [0, dimension]: it has ended."""
+        """The next point, [1, dimension]; [0, dimension] after the end."""
         none = np.empty((0, len(self.point)))
         while self._left > 0 and self._radius >= FINEST:
             self._left -= 1
@@ -106,7 +108,7 @@ class SlopeDescent:
         return none
 
     def tell(self, worth: float, model: LocalModel | None) -> None:
-        """Take what the point that was asked last is worth, and the function there; None where it has no slopes."""
+        """Take the worth of the point that was asked last, and the local model there; None where it has no slopes."""
         length = float(np.abs(self._move).max())
         if model is not None and len(model.pieces) + len(model.hinges) == len(self._multipliers):
             change = model.lagrangian_slope(self._multipliers) - self._model.lagrangian_slope(self._multipliers)
@@ -125,8 +127,8 @@ class SlopeDescent:
 def step(
     model: LocalModel, curvature: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """The best move between two ends, [dimension], by the straight functions and the curvature, with the multipliers of
-    pieces and hinges; None where it is not found."""
+    """The best move between two bounds, [dimension], by the linearised functions and the curvature, with the
+    multipliers of pieces and hinges; None where none is found."""
     n, pieces = len(low), len(model.pieces)
     size = abs(model.value) or 1.0
     reach = added((np.abs(model.hinge_slopes) * np.maximum(-low, high)).T) if len(model.hinges) else np.zeros(0)
@@ -157,7 +159,7 @@ def step(
 
 
 def updated(curvature: np.ndarray, move: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """The curvature after a move along which the slope changed so much, by damped BFGS; positive semidefinite."""
+    """The curvature after a move along which the slope changed by `change`, by damped BFGS; positive semidefinite."""
     square, along = total(move * move), total(move * change)
     if not (square > 0.0 and math.isfinite(along)):
         return curvature

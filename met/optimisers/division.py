@@ -2,8 +2,8 @@
 
 After Jones, Perttunen and Stuckman, *Lipschitzian Optimization Without the Lipschitz Constant* (JOTA 79(1), 1993), with
 two changes. Boxes of every size are cut, the best of each (Baker et al., *Aggressive DIRECT*, HPC 2000), rather than
-those on a convex hull of values: so values are only compared, and a batch is as large as is asked for. And a box is cut
-along one of its longest edges, the one that was cut least often (Jones, *DIRECT*, Encyclopedia of Optimization, 2001).
+those on a convex hull of values: so values are only compared, and a batch can have any size. And a box is cut along one
+of its longest edges, the one that was cut least often (Jones, *DIRECT*, Encyclopedia of Optimization, 2001).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 FINEST = 6
-"""How often an edge is cut, at most: what is finer than 3^-6 of the cube's edge is left to polishing."""
+"""Largest number of times that an edge is cut: detail below 3^-6 of the cube's edge is left to polishing."""
 
 
 class BoxDivision:
@@ -25,7 +25,7 @@ class BoxDivision:
         self._cuts: list[np.ndarray] = []
         self._values: list[float] = []
         self._of_size: dict[int, list[int]] = {}
-        """The boxes by how often they were cut."""
+        """The boxes by the number of times they were cut."""
         self._cut_along = np.zeros(dimension, np.int64)
         self._asked: list[tuple[np.ndarray, np.ndarray]] = []
 
@@ -40,7 +40,8 @@ class BoxDivision:
         return np.array([centre for centre, _ in self._asked]).reshape(-1, self._dimension)
 
     def _cut_round(self, count: int) -> bool:
-        """Cuts of each size as many as the root of its boxes' number, the best; False: there is nothing to cut."""
+        """Cut, for each size, the best boxes, as many as the square root of their number; False where there is nothing
+        to cut."""
         before = len(self._asked)
         for size in sorted(self._of_size):
             if size >= FINEST * self._dimension:
@@ -68,7 +69,7 @@ class BoxDivision:
         self._of_size.setdefault(int(cuts.sum()), []).append(box)
 
     def tell(self, values: np.ndarray) -> None:
-        """The values of the centres that were asked last, [centre]."""
+        """Take the values of the centres that were asked last, [centre]."""
         for (centre, cuts), value in zip(self._asked, values, strict=True):
             self._of_size.setdefault(int(cuts.sum()), []).append(len(self._centres))
             self._centres.append(centre)

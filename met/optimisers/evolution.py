@@ -11,17 +11,17 @@ import numpy as np
 from met.optimisers.draws import Draws
 
 LEADING = 0.15
-"""A trial goes towards one of this share of the population, the best."""
+"""Share of the population whose members, the best, are the targets of trials."""
 
 WEIGHTS = (0.4, 1.0)
-"""Between these is what a trial takes of a difference."""
+"""Range of the factor by which a trial adds a difference."""
 
 COLLAPSED = 1e-2
-"""The population has collapsed where no coordinate spreads by more, in edges of the cube."""
+"""The population has collapsed where no coordinate spreads by more than this, in edges of the cube."""
 
 
 class DifferentialEvolution:
-    """A population in the unit cube, whose walls stop what would leave it, so that corners are reached.
+    """A population in the unit cube; moves that would leave the cube stop at its walls, so that corners are reached.
 
     points  [member, dimension];  values [member]
     """
@@ -56,13 +56,13 @@ class DifferentialEvolution:
         return self._trials
 
     def tell(self, values: np.ndarray) -> None:
-        """The values of the trials that were asked last, [count]."""
+        """Take the values of the trials that were asked last, [count]."""
         for member, point, value in zip(self._members, self._trials, values, strict=True):
             if value <= self.values[member]:
                 self.points[member], self.values[member] = point, value
 
     def add(self, point: np.ndarray, value: float) -> None:
-        """A point found elsewhere takes the place of the worst member, if it is better than that."""
+        """Replace the worst member by a point found elsewhere, if that is better."""
         worst = int(np.argmax(self.values))
         if value < self.values[worst]:
             self.points[worst], self.values[worst] = point, value

@@ -2,8 +2,8 @@
 every machine.
 
 Mehrotra's predictor and corrector (SIAM J. Optimization 2 (1992) 575) on the reduced equations, for tens of unknowns.
-Solvers of libraries add in an order that depends on the processor, and a search that branches on what they give would
-run other cases.
+Library solvers add in an order that depends on the processor, and a search that branches on their results would run
+other cases.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import numpy as np
 from met.optimisers.arithmetic import added, lower_factor, total
 
 STEPS = 60
-"""Steps at most; a dozen are usual."""
+"""Largest number of steps; a dozen are usual."""
 
 EXACT = 1e-11
-"""Residuals and gap at which it has converged, of numbers that are of the size of 1."""
+"""Residuals and gap at which it has converged, for numbers of the size of 1."""
 
 LARGEST = 1e15
-"""Multipliers beyond it are of limits that leave nothing."""
+"""Largest multiplier; larger ones mean that the limits leave no point."""
 
 SHORT = 0.995
 """The share of the way to the nearest limit that a step goes."""
@@ -28,7 +28,7 @@ SHORT = 0.995
 def least_within(
     curvature: np.ndarray, slope: np.ndarray, rows: np.ndarray, limits: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """The z with the least z'Hz / 2 + c'z where A z <= b, and the multiplier of each row; None where it is not found.
+    """The z with the least z'Hz / 2 + c'z where A z <= b, and the multiplier of each row; None where none is found.
 
     curvature  H, [n, n], positive semidefinite;  slope: c, [n];  rows: A, [row, n], which bound z;  limits: b, [row]
     """
@@ -68,7 +68,7 @@ def _moves(
     excess: np.ndarray,
     complements: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Newton's step of the unknowns, the slacks and the multipliers, that takes these residuals to 0."""
+    """Newton's step of the unknowns, the slacks and the multipliers, which takes these residuals to 0."""
     right = -steepness - _product(rows.T, (multipliers * excess - complements) / slack)
     move = _solved(factor, right)
     slack_move = -excess - _product(rows, move)
@@ -86,7 +86,7 @@ def _product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 
 def _solved(factor: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """x with L L' x = right."""
+    """The solution x of L L' x = right."""
     out = right.copy()
     for i in range(len(out)):
         out[i] /= factor[i, i]

@@ -1,4 +1,4 @@
-"""CMA-ES with restarts, within a number of candidates."""
+"""CMA-ES with restarts, within a total number of candidates."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from met.optimisers.covariance import CovarianceAdaptation
 from met.optimisers.draws import Draws
 
 STEP = 0.2
-"""The first standard deviation, in edges of the cube. With 0.3 and 3,200 candidates it came less far in 16 dimensions:
-most points were beyond a wall."""
+"""The first standard deviation, in edges of the cube. With 0.3 and 3,200 candidates, results in 16 dimensions were
+worse: most points were beyond a wall."""
 
 FINEST = 1e-7
-"""It has converged where no standard deviation is larger, in edges of the cube."""
+"""The search has converged where no standard deviation is larger than this, in edges of the cube."""
 
 GENERATIONS = 100
-"""A start has so many generations, where there are candidates for generations that are not too small."""
+"""Number of generations of a start, where the candidates suffice for generations that are not too small."""
 
 LARGEST = 64
-"""Candidates of a first generation, at most: more are better spent on further generations."""
+"""Largest number of candidates of a first generation: more are better spent on further generations."""
 
 LANES = 8
-"""Candidates of a generation are a multiple of it: so many cases are computed at once."""
+"""The size of a generation is a multiple of this: so many cases are computed at once."""
 
 
 class RestartedAdaptation:
-    """CMA-ES from the middle of the unit cube; where it has converged, again from a random point with twice the
+    """CMA-ES from the middle of the unit cube; after it has converged, again from a random point with twice the
     population (Auger and Hansen, *A Restart CMA Evolution Strategy*, CEC 2005)."""
 
     def __init__(self, dimension: int, seed: int, at_most: int) -> None:
@@ -38,7 +38,7 @@ class RestartedAdaptation:
         return CovarianceAdaptation(self._draws, mean, STEP, FINEST, self._population)
 
     def ask(self) -> np.ndarray:
-        """The next generation; the last one is as large as what is left."""
+        """The next generation; the last one is as large as the remaining number of candidates."""
         if self._left <= 0:
             return np.empty((0, self._dimension))
         if self._start.converged:
@@ -49,13 +49,13 @@ class RestartedAdaptation:
         return points
 
     def tell(self, values: np.ndarray) -> None:
-        """Learns from the values of a whole generation; there is none after one that was cut short."""
+        """Learn from the values of a whole generation; one that was cut short is the last, and teaches nothing."""
         if len(values) == self._start.population:
             self._start.tell(values)
 
 
 def first_population(dimension: int, at_most: int) -> int:
-    """Candidates of a generation: about 4 + 3 log(dimension) at least, as the tutorial has it."""
+    """The number of candidates of a generation: at least about 4 + 3 log(dimension), as in the tutorial."""
     least = 4 + 2 * (dimension - 1).bit_length()
     wanted = max(least, min(at_most // GENERATIONS, LARGEST))
     return -(-wanted // LANES) * LANES

@@ -1,4 +1,4 @@
-"""Searches of a plan, step by step: which cases are tried next, from what those before gave.
+"""Searches of a plan, step by step: each generation of cases follows from the results of the ones before.
 
 values   what a case is worth to a search
 hardest  a search for the case that hurts most
@@ -19,26 +19,27 @@ from met.searches.slopes import SlopeSource
 
 
 class SearchMethod(Protocol):
-    """The way in which a search goes on: it asks for cases, a generation at a time, each of them once. The cases follow
-    from the search and from what it was told alone, to the bit."""
+    """The method of a search: it asks for cases, a generation at a time and each only once. The cases depend only on
+    the search and on the values so far, to the bit."""
 
     def ask(self) -> np.ndarray:
-        """Coordinates of the next generation's cases, SI, [case, coordinate]; none, when it has ended."""
+        """Coordinates of the next generation's cases, SI, [case, coordinate]; empty after the end."""
 
     def tell(self, values: np.ndarray) -> None:
-        """Take what these cases are worth (met/searches/values.py), [case]."""
+        """Take the worths of these cases (met/searches/values.py), [case]."""
 
 
 def search_method(search: Search, source: SlopeSource | None = None) -> SearchMethod:
-    """The method of a search, at its beginning. source: of slopes for a tuning that goes by them; None: for its first
-    generation alone, or of a search."""
+    """The method of a search, at its beginning. source: of slopes, for a tuning that uses them; None: for its first
+    generation only, or for a search without them."""
     if search.kind != "tune":
         return HardestCase(search)
     return RobustTuning(search, source if search.gradients else None)
 
 
 def steps_of(method: SearchMethod) -> dict[str, Any]:
-    """The fields of a `Search` that say which of its cases were tried along slopes; none of one that goes by none."""
+    """The fields of a `Search` that say which of its cases were tried along slopes; none for a method without
+    slopes."""
     steps = method.steps if isinstance(method, RobustTuning) else None
     return {} if steps is None else {"along_slopes": steps.cases, "without_slopes": steps.why_not}
 

@@ -1,4 +1,4 @@
-"""The best that a search has found, by what its cases gave, and what stands in the way of a better one."""
+"""The best answer of a search, from the results of its cases, and the obstacles to a better one."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class Answer:
 
     @property
     def serves(self) -> bool:
-        """True if a candidate meets all that is required with all plants; of a search, if even the worst case does."""
+        """True if a candidate meets all requirements with all plants; for a search, if even the worst case does."""
         return self.confirmed and not self.failed and not self.missed and self.value == self.value
 
 
@@ -84,8 +84,8 @@ def answer(
     metrics: Mapping[str, np.ndarray],
     requirements: Sequence[NamedLimit],
 ) -> Answer:
-    """The best of these cases. table: their coordinates, [case, coordinate], SI, what is chosen first; done: which of
-    them reached their end; metrics: by name, SI."""
+    """The best of these cases. table: their coordinates, [case, coordinate], SI, chosen parameters first; done: which
+    of them reached their end; metrics: by name, SI."""
     goal, count = metrics[search.metric], len(search.parameters)
     every = max(1, len(search.plants))
     if search.kind == "tune":
@@ -127,7 +127,8 @@ def _nearest_miss(
     metrics: Mapping[str, np.ndarray],
     requirements: Sequence[NamedLimit],
 ) -> NearestMiss | None:
-    """The nearest candidate to that of a case of which a case fails, or misses a requirement; None where none does."""
+    """The candidate nearest to that of a case among those of which some case fails, or misses a requirement; None where
+    there is none."""
     met = np.array([_met(each, metrics[each.metric], done) for each in requirements]).reshape(-1, len(done))
     bad = np.flatnonzero(~(done & met.all(axis=0)))
     if not len(bad):
@@ -141,8 +142,8 @@ def _nearest_miss(
 
 
 def shares_of_range(parameter: SearchedParameter, values: np.ndarray) -> np.ndarray:
-    """Where values of a parameter stand in its range: 0 at the lower end, 1 at the upper one, equal ratios as equal
-    steps where the parameter is searched so."""
+    """Places of a parameter's values in its range: 0 at the lower end, 1 at the upper one; on a logarithmic scale where
+    the parameter is searched so."""
     low, high = parameter.low, parameter.high
     if parameter.logarithmic:
         values, low, high = np.log(np.abs(values)), float(np.log(abs(low))), float(np.log(abs(high)))
@@ -170,4 +171,4 @@ def _ends(search: Search, case: np.ndarray) -> list[tuple[str, str]]:
 
 
 NEAR = 0.005
-"""The share of its range by which a parameter may be off an end of it to count as there."""
+"""The share of its range within which a parameter counts as being at an end of it."""

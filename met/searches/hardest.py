@@ -1,4 +1,4 @@
-"""A search for the case that hurts most: the optimiser's points as cases, none of them twice."""
+"""A search for the case that hurts most: the optimiser's points as cases, each only once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from met.plan.searches import Search
 
 
 class HardestCase:
-    """See `SearchMethod`. Points that are rounded to a case that was tried before are worth what that was."""
+    """Method of a search for the worst case (`SearchMethod`). A point that is rounded to a former case gets that case's
+    worth."""
 
     def __init__(self, search: Search) -> None:
         self._search = search
@@ -19,7 +20,7 @@ class HardestCase:
         self._new: list[bytes] = []
 
     def ask(self) -> np.ndarray:
-        """See `SearchMethod`."""
+        """Coordinates of the next generation's cases (`SearchMethod.ask`)."""
         left = self._search.at_most - len(self._known)
         while left > 0:
             cases = self._search.values(self._optimiser.ask())
@@ -37,7 +38,7 @@ class HardestCase:
         return np.empty((0, len(self._search.parameters)))
 
     def tell(self, values: np.ndarray) -> None:
-        """See `SearchMethod`."""
+        """Take the worths of the cases that were asked last (`SearchMethod.tell`)."""
         self._known.update(zip(self._new, values.tolist(), strict=True))
         self._pass_on()
 

@@ -1,8 +1,8 @@
-"""A tuning against plants, by turns: tune against those that are active, try the best against all, add the worst.
+"""A tuning against plants, in turns: tune against the active ones, try the best against all, add the worst.
 
 Where metrics have slopes, a turn goes on from its best along these: CMA-ES finds the valley, and a few steps its floor.
 So an inner loop of a few plants decides for many (P. Apkarian, M. N. Dao, D. Noll, Parametric robust structured control
-design, IEEE Trans. Automatic Control 60 (2015) 1857). A candidate is worth what it is in the worst of its plants.
+design, IEEE Trans. Automatic Control 60 (2015) 1857). The worth of a candidate is that of its worst plant.
 """
 
 from __future__ import annotations
@@ -18,32 +18,32 @@ from met.searches.slopes import SlopeSource
 from met.searches.values import MET
 
 SHARE = 4
-"""A turn takes one in so many of the cases that are left, while plants may become active."""
+"""Divisor of the remaining cases that gives a turn's number of cases, while plants may become active."""
 
 EARLIER = 8
-"""With slopes a turn of CMA-ES takes one in so many: it need not come to the floor of a valley. After steps that ended
-elsewhere than on a floor it takes one in `SHARE`: they may be in the wrong valley."""
+"""The divisor for a turn of CMA-ES with slopes: it need not reach the floor of a valley. After steps that ended away
+from a floor it is `SHARE`: they may be in the wrong valley."""
 
 GAIN = 1e-3
-"""A turn that improves the goal by less than this share of it brings next to nothing."""
+"""Relative improvement of the goal below which a turn counts as idle."""
 
 IDLE = 2
-"""A tuning ends after so many turns that bring next to nothing; the second has twice as many cases. With slopes it
-begins afresh then, and ends after so many fresh beginnings that bring next to nothing."""
+"""Number of idle turns after which a tuning ends; the second has twice as many cases. With slopes it then begins
+afresh, and ends after this many idle fresh beginnings."""
 
 AFRESH = 2
-"""The first turn of a fresh beginning takes one in so many of the cases that are left. A short turn comes before: where
-it leads into a wrong valley, steps along slopes go to the floor of that one, and no turn around it comes out again."""
+"""Divisor of the remaining cases for the first turn of a fresh beginning. A short turn comes before: where it leads
+into a wrong valley, steps along slopes go to the floor of that one, and no turn around it comes out again."""
 
 INSIDE = 0.05
-"""How far inside the ends of the cube the middle of a turn is, at least: so both sides of it are there."""
+"""Smallest distance of the middle of a turn from the ends of the cube, so that there are points on both sides of it."""
 
 Candidate = bytes
-"""The values of a candidate's parameters, as they are in memory."""
+"""The values of a candidate's parameters, as bytes."""
 
 
 class RobustTuning:
-    """See `SearchMethod`. Without plants the candidates themselves are the cases.
+    """Method of a tuning (`SearchMethod`). Without plants the candidates themselves are the cases.
 
     source  of slopes; None: there are none
 
@@ -73,7 +73,7 @@ class RobustTuning:
         self._begin_turn(None)
 
     def ask(self) -> np.ndarray:
-        """See `SearchMethod`."""
+        """Coordinates of the next generation's cases (`SearchMethod.ask`)."""
         while not self._confirmed:
             self._wanted = self._next()
             if self._wanted:
@@ -84,14 +84,14 @@ class RobustTuning:
         return np.empty((0, len(self._search.parameters) + len(self._plants[0])))
 
     def tell(self, values: np.ndarray) -> None:
-        """See `SearchMethod`."""
+        """Take the worths of the cases that were asked last (`SearchMethod.tell`)."""
         for (candidate, plant), value in zip(self._wanted, values.tolist(), strict=True):
             self._known[candidate][plant] = value
         self._go_on()
 
     def _begin_afresh(self) -> None:
-        """Begin once more after steps along slopes, from the middle of the cube, or where that brought nothing opposite
-        to the best in it; else the tuning is over."""
+        """Begin again after steps along slopes, from the middle of the cube, or, if that was idle, from opposite to the
+        best point; if that was idle too, the tuning is over."""
         worths = {each: max(known.values()) for each, known in self._known.items() if len(known) == len(self._plants)}
         least, before = min(worths.values(), default=math.inf), self._best_before
         better = before is None or (least < before and not hardly_better(least, before))
@@ -108,7 +108,7 @@ class RobustTuning:
         self._begin_turn(1.0 - self._points[best] if self._fruitless else None)
 
     def _begin_turn(self, start: np.ndarray | None) -> None:
-        """Begin a turn, around a good candidate or in the middle, if it has room; else begin afresh."""
+        """Begin a turn, around a good candidate or in the middle, if there are enough cases; else begin afresh."""
         room = self._left - self._reserve
         if room < SHORTEST * len(self._active):
             self._begin_afresh()
@@ -130,11 +130,11 @@ class RobustTuning:
 
     @property
     def _reserve(self) -> int:
-        """Cases that trying the best of a turn against all plants takes."""
+        """Number of cases that it takes to try the best of a turn against all plants."""
         return len(self._plants) - len(self._active)
 
     def _next(self) -> list[tuple[Candidate, int]]:
-        """The next candidates with their plants, but those that were tried before."""
+        """The next candidates with their plants, without those that were tried before."""
         if not self._confirming and (self.steps is None or not self.steps.going):
             before = len(self._batch)
             wanted = self._of_points(around(self._middle, self._tuner.ask()))
@@ -155,7 +155,7 @@ class RobustTuning:
         return [] if self._confirmed else wanted
 
     def _of_points(self, points: np.ndarray) -> list[tuple[Candidate, int]]:
-        """Points of the cube as candidates of the next generation: those that are new, with the active plants."""
+        """Points of the cube as candidates of the next generation: the new ones, with the active plants."""
         self._batch = [each.tobytes() for each in self._search.values(points)]
         for candidate, point in zip(self._batch, points, strict=True):
             self._points.setdefault(candidate, point)
@@ -164,7 +164,7 @@ class RobustTuning:
         return self._unknown(self._batch, self._active)
 
     def _has_room(self, wanted: list[tuple[Candidate, int]]) -> bool:
-        """True if there are candidates, and what is new of them leaves enough to try the best against all plants."""
+        """True if there are candidates, and the new ones leave enough cases to try the best against all plants."""
         return bool(self._batch) and len(wanted) <= self._left - self._reserve
 
     def _step_from(self, candidate: Candidate) -> None:
@@ -181,7 +181,7 @@ class RobustTuning:
         return [(each, plant) for each in once for plant in plants if plant not in self._known[each]]
 
     def _go_on(self) -> None:
-        """Pass on what is known of a generation; or judge the best of a turn, which was tried against all plants."""
+        """Pass on the known worths of a generation; or judge the best of a turn, which was tried against all plants."""
         if not self._confirming:
             if self.steps is not None and self.steps.going:
                 self.steps.tell(np.frombuffer(self._batch[0]), self._active_plants)
@@ -207,8 +207,8 @@ class RobustTuning:
         self._begin_turn(self._points[best])
 
     def _best(self) -> Candidate:
-        """The candidate that is worth most against the active plants, of those that were tried against all of these and
-        were asked for since the beginning."""
+        """The candidate with the best worth against the active plants, among those tried against all of them and asked
+        for since the beginning."""
         tried = [each for each in self._since_beginning if self._known[each].keys() >= set(self._active)]
         return min(tried, key=self._worst)
 
@@ -229,7 +229,7 @@ def around(middle: np.ndarray | None, points: np.ndarray) -> np.ndarray:
 
 
 def hardly_better(now: float, before: float) -> bool:
-    """True if the goal of one that meets all, by its worth (`served`), is hardly better than it was before."""
+    """True if the goal of a candidate that meets all requirements, by its worth (`served`), has hardly improved."""
     if not (abs(now) < MET and abs(before) < MET):
         return False
     one, other = (worth / (1.0 - abs(worth)) for worth in (now, before))

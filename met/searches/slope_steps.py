@@ -1,4 +1,4 @@
-"""Steps of a tuning along slopes: from the best candidate, against the plants that are active."""
+"""Steps of a tuning along slopes: from the best candidate, against the active plants."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class SlopeSteps:
         self._descent.tell(*self._local(candidate, plants))
 
     def _local(self, candidate: np.ndarray, plants: Sequence[tuple[float, ...]]) -> tuple[float, LocalModel | None]:
-        """The worth of a candidate, by its metrics as they are between samples, and what is to be small around it."""
+        """The worth of a candidate, by its metrics between samples, and a local model of the function to minimise."""
         found = self._source.slopes(np.array([[*candidate, *plant] for plant in plants]))
         if isinstance(found, CaseSlopes):
             model = local_model(self._search, self._source.requirements, found, candidate)

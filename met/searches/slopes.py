@@ -1,7 +1,7 @@
-"""Slopes of the metrics of a tuning's cases, and what is to be small of them as a function that a descent may go by.
+"""Slopes of the metrics of a tuning's cases, and the function to minimise in a form for descent.
 
-The worth of a case (met/searches/values.py) falls and rises in tiers. Within a tier it goes with smooth functions of
-the parameters, and with hinges on them: a share of a margin that is missing, a distance beyond a limit.
+The worth of a case (met/searches/values.py) falls and rises in tiers. Within a tier it consists of smooth functions of
+the parameters, with hinges on them: the missing share of a margin, a distance beyond a limit.
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ from met.plan.searches import Search
 from met.searches.values import MetricLimit, served
 
 PENALTY = 100.0
-"""The share of the goal that a limit weighs which is missed by all of itself: so a step does not go beyond one."""
+"""Weight, relative to the goal, of a limit that is missed by all of itself: so large that a step does not go beyond
+one."""
 
 WITHIN = 1e-6
-"""The share of a limit that a step keeps from it, at least, so that what is rounded does not lie beyond."""
+"""The share of a limit that a step keeps from it at least, so that rounded values do not lie beyond."""
 
 
 @frozen
 class CaseSlopes:
-    """Metrics of cases, and how they move with what is chosen, SI.
+    """Metrics of cases, and their derivatives by the chosen parameters, SI.
 
     done     [case]: whether it reached its end;  values: by name, [case], as they are between samples
     slopes   by name, [case, parameter]; not-a-number where there is none
@@ -41,13 +42,13 @@ class CaseSlopes:
 
 
 class SlopeSource(Protocol):
-    """Gives slopes of a tuning's cases, and knows what is required of them."""
+    """Source of slopes of a tuning's cases, with the requirements on them."""
 
     @property
     def requirements(self) -> Sequence[MetricLimit]: ...
 
     def slopes(self, cases: np.ndarray) -> CaseSlopes | str:
-        """The slopes of these cases, [case, coordinate], SI; or why there are none of any."""
+        """The slopes of these cases, [case, coordinate], SI; or the reason why there are none."""
 
 
 def worth_of(search: Search, requirements: Sequence[MetricLimit], found: CaseSlopes) -> float:
@@ -61,7 +62,7 @@ def worth_of(search: Search, requirements: Sequence[MetricLimit], found: CaseSlo
 def local_model(
     search: Search, requirements: Sequence[MetricLimit], found: CaseSlopes, candidate: np.ndarray
 ) -> LocalModel | str:
-    """A model of what is to be small near a candidate, over the unit cube; or why there is none.
+    """A local model, over the unit cube, of the function to minimise near a candidate; or the reason why there is none.
 
     candidate  values of its parameters, SI;  found: of its cases
     """
@@ -106,5 +107,5 @@ def local_model(
 
 
 def _per_share(low: float, high: float, logarithmic: bool, value: float) -> float:
-    """Slope of a parameter by its place in its range, there."""
+    """Slope of a parameter by its place in its range, at this value."""
     return value * logarithm(high / low) if logarithmic else high - low

@@ -1,7 +1,8 @@
 """The worth of a case to a search, as a number to be minimised.
 
-A search looks for what hurts: the goal counts as it is, and a case that fails, or gives the goal no value, hurts
-infinitely. A tuning looks for what serves. Its cases are in tiers, each worse than the one before whatever its numbers:
+A search looks for the worst case: the goal counts unchanged, and a case that fails, or gives the goal no value, is
+infinitely bad. A tuning looks for the best candidate. Its cases are in tiers, each worse than the one before whatever
+its numbers:
 
     (-1, 1)   all requirements are met: the goal, g / (1 + |g|)
     [1, 2]    some are missed, by m in all as shares of their limits: 2 - 1 / (1 + m)
@@ -24,11 +25,11 @@ from typing import Protocol
 import numpy as np
 
 MET, MISSED, UNKNOWN = 1.0, 2.0, 3.0
-"""The ends of the tiers of a tuning's cases: a value below the first is of a case that meets all."""
+"""The ends of the tiers of a tuning's cases: a value below the first is of a case that meets all requirements."""
 
 
 class MetricLimit(Protocol):
-    """A requirement as far as it counts here: the name of its metric, `<` or `>` with or without `=`, its limit."""
+    """A requirement as used here: the name of its metric, `<` or `>` with or without `=`, its limit."""
 
     @property
     def metric(self) -> str: ...
@@ -45,14 +46,14 @@ def hurt(goal: np.ndarray, largest: bool, done: np.ndarray) -> np.ndarray:
 
 
 def missed(limit: MetricLimit, values: np.ndarray) -> np.ndarray:
-    """The distance of the values of its metric beyond a limit, as a share of it, or in SI where that is 0; 0 within;
+    """The distance of a metric's values beyond a limit, as a share of it, or in SI where that is 0; 0 within;
     not-a-number stays so."""
     return np.maximum(0.0, -_inside(limit, values) / (abs(limit.limit) or 1.0))
 
 
 def short(limit: MetricLimit, values: np.ndarray, margin: float) -> np.ndarray:
-    """Which share of the margin that its metric should keep from a limit is missing, from 0 to 1; of a limit of 0 none,
-    which has no share."""
+    """The missing share, from 0 to 1, of the margin that a metric should keep from a limit; 0 for a limit of 0, which
+    has no share."""
     wanted = margin * abs(limit.limit)
     if wanted == 0.0:
         return np.zeros(len(values))

@@ -13,15 +13,15 @@ from bisect import bisect_left
 from typing import Literal
 
 Verdict = Literal["demonstrated", "not shown", "refuted"]
-"""What some cases say of a requirement: that it holds, neither, or that it does not, each with the confidence."""
+"""The verdict of some cases on a requirement: it holds, undecided, or it does not hold, each with the confidence."""
 
 MOST_CASES = 10**12
-"""Where looking for a number of cases ends."""
+"""Largest number of cases that is considered."""
 
 
 def can_be_shown(share: float) -> bool:
     """True unless a share lies within a billionth of none or of all cases: no campaign has the cases that show it."""
-    return min(share, 1.0 - share) > 0.999e-9  # what is a billionth but for rounding is one
+    return min(share, 1.0 - share) > 0.999e-9  # a billionth but for rounding counts as one
 
 
 def lower_bound(cases: int, missed: int, confidence: float) -> float:
@@ -40,7 +40,7 @@ def lower_bound(cases: int, missed: int, confidence: float) -> float:
 
 
 def upper_bound(cases: int, missed: int, confidence: float) -> float:
-    """The share of all cases that meet it at most, with this confidence; 1 where no case missed it."""
+    """The largest share of all cases that meet the requirement, with this confidence; 1 where no case missed it."""
     _check(cases, missed, confidence)
     if not missed:
         return 1.0
@@ -59,7 +59,7 @@ def verdict(cases: int, missed: int, share: float, confidence: float) -> Verdict
 
 
 def cases_needed(share: float, confidence: float, missed: int = 0) -> int:
-    """The fewest cases that demonstrate the share if so many of them miss the requirement. Raises ValueError where
+    """The fewest cases that demonstrate the share if `missed` of them miss the requirement. Raises ValueError where
     more than `MOST_CASES` were needed."""
     if not 0.0 < share < 1.0:
         raise ValueError(f"a share of {share} cannot be demonstrated by any number of cases")
@@ -73,7 +73,8 @@ def cases_needed(share: float, confidence: float, missed: int = 0) -> int:
 
 
 def most_misses(cases: int, share: float, confidence: float) -> int:
-    """The most cases that may miss the requirement and leave the share demonstrated; -1 where not even none."""
+    """The most cases that may miss the requirement with the share still demonstrated; -1 where even no miss is too
+    many."""
     numbers = range(cases + 1)
     return bisect_left(numbers, True, key=lambda missed: lower_bound(cases, missed, confidence) < share) - 1
 

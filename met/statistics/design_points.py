@@ -1,4 +1,4 @@
-"""Design points: cases that share all that was chosen, and differ in what was drawn at random alone."""
+"""Design points: cases that share all chosen values, and differ only in randomly drawn ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parameters that go in step: each value of one comes with one value of the other, as zipped ones do."""
+"""Parameters that vary in step: each value of one comes with one value of the other, as zipped ones do."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 def in_step(inputs: Sequence[np.ndarray]) -> list[list[int]]:
-    """The inputs parted into those that rise together, or one as the other falls; each part by the inputs' order.
+    """The groups of inputs that rise together, or one as the other falls; each in the inputs' order.
 
     inputs  a value a case each; an input that is the same in all cases is in no part
     """

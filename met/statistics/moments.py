@@ -1,5 +1,5 @@
-"""Exact sums of very many values, their mean and variance, and order statistics from one side, in memory that hardly
-grows."""
+"""Exact sums of very many values, their mean and variance, and one-sided order statistics, in nearly constant
+memory."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import math
 import numpy as np
 
 ROOM = 1 << 16
-"""Values that wait until it is seen which of them are far."""
+"""Number of values that are collected before the furthest are selected."""
 
 
 class ExactSum:
-    """A sum of doubles that is rounded once, whatever their order; not a number where one of them is not finite."""
+    """A sum of doubles that is rounded once, whatever their order; not-a-number where one of them is not finite."""
 
     def __init__(self) -> None:
         self._whole, self._finite = 0, True
 
     def add(self, values: np.ndarray) -> None:
-        """Take these, of which the sum is rounded, so that the pieces in which they come must be the same ones."""
+        """Add values whose own sum is rounded, so that they must come in the same pieces each time."""
         try:
             numerator, denominator = math.fsum(values.tolist()).as_integer_ratio()
         except (OverflowError, ValueError):
@@ -35,7 +35,8 @@ class ExactSum:
 
 
 class Moments:
-    """Mean and variance of the finite ones of values that come in blocks: of the distance from the first of them."""
+    """Mean and variance of the finite values among those that come in blocks, computed from their distance to the
+    first."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -65,7 +66,7 @@ class Moments:
 
 
 class Furthest:
-    """The furthest `most` values so far, as large ones: the least of them is an order statistic."""
+    """The `most` furthest values so far, taken as large ones: the least of them is an order statistic."""
 
     def __init__(self, most: int) -> None:
         self._most, self._parts, self._held = most, list[np.ndarray](), 0
@@ -85,7 +86,7 @@ class Furthest:
 
     @property
     def least(self) -> float:
-        """Not a number where there are too few, or it is infinite."""
+        """The least of them; not-a-number where there are too few, or it is infinite."""
         if not self._most or self._held < self._most:
             return math.nan
         self._cut()

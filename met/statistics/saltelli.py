@@ -1,7 +1,7 @@
 """First-order and total indices from cases that were made for them: the scheme of Saltelli.
 
-Of each pair of points a and b that were drawn, the cases are a, a with one input after the other from b, and b: d + 2
-cases of d inputs (`ic/sweeps/designs.py`).
+For each drawn pair of points a and b, the cases are a, a with one input after the other from b, and b: d + 2 cases for
+d inputs (`ic/sweeps/designs.py`).
 
 - First order: A. Saltelli et al., Computer Physics Communications 181 (2010) 259-270, table 2 (b).
 - Total: M. J. W. Jansen, Computer Physics Communications 117 (1999) 35-43; table 2 (f) there. Whatever many inputs do
@@ -19,11 +19,11 @@ import numpy as np
 from met.statistics.sensitivity import GROUPS, ROUNDING, InputShare, Shares, interval, means_of_ends, rank_correlation
 
 FEWEST_PAIRS = 64
-"""Pairs of points below which nothing can be said."""
+"""Smallest number of pairs of points for a result."""
 
 
 def is_saltelli(inputs: Sequence[np.ndarray]) -> bool:
-    """True if the cases are those of the scheme. inputs: of each case, [case] each, in the order of their columns."""
+    """True if the cases are those of the scheme. inputs: [case] each, in the order of their columns."""
     width = len(inputs) + 2
     if not inputs or len(inputs[0]) % width:
         return False

@@ -1,18 +1,18 @@
-"""Which inputs explain the variance of an output, from cases that are there: first-order and total indices.
+"""Sensitivity of an output to the inputs of existing cases: first-order and total indices of its variance.
 
-No design is asked for, only cases whose inputs vary independently of each other: a product of lists, a random sample, a
-Latin hypercube. An input is cut into cells of about equally many cases.
+No particular design is needed, only cases whose inputs vary independently of each other: a product of lists, a random
+sample, a Latin hypercube. An input is cut into cells of about equally many cases.
 
 - A first-order index is the share of the variance that lies between the means of an input's cells, once an additive
-  model has taken out the others: the correlation ratio (K. Pearson, 1905), less what so many cells take up by chance
-  (T. L. Kelley, PNAS 21 (1935) 554-559).
-- The index of a pair is the same of cells in two inputs, of what the inputs leave unexplained alone. It is extrapolated
-  from cells of two widths.
+  model has taken out the others: the correlation ratio (K. Pearson, 1905), less the share that as many cells explain
+  by chance (T. L. Kelley, PNAS 21 (1935) 554-559).
+- The index of a pair is the same for cells in two inputs, of the variance that single inputs leave unexplained. It is
+  extrapolated from cells of two widths.
 - A total index is an input's own with those of its pairs (I. M. Sobol, 1993; A. Saltelli et al., Global Sensitivity
-  Analysis: The Primer, 2008). What three inputs and more do together is in no index; with noise and chance it is the
-  rest.
-- Intervals are by the jackknife, leaving out each of `GROUPS` parts of the cases in turn. Those of totals hold what was
-  extrapolated besides.
+  Analysis: The Primer, 2008). Effects of three inputs and more together are in no index; with noise and chance they
+  make up the rest.
+- Intervals are by the jackknife, leaving out each of `GROUPS` parts of the cases in turn. Those of totals include the
+  extrapolation.
 """
 
 from __future__ import annotations
@@ -25,28 +25,29 @@ import numpy as np
 from met.frozen import frozen
 
 GROUPS = 20
-"""Parts of the cases that are left out in turn."""
+"""Number of parts of the cases that are left out in turn."""
 
 QUANTILE = 2.093
-"""Of Student's distribution with GROUPS - 1 degrees of freedom: 95 % lie within, two-sided."""
+"""Two-sided 95 % quantile of Student's distribution with GROUPS - 1 degrees of freedom."""
 
 ROUNDING = 1e-12
-"""Of an output's mean: values that differ by no more are the same but for rounding, and nothing explains them."""
+"""Relative spread of an output's values, by its mean, below which they differ by rounding alone and nothing explains
+them."""
 
 FEWEST = 64
-"""Cases below which nothing can be said."""
+"""Smallest number of cases for a result."""
 
 MOST_INPUTS = 40
-"""Inputs up to which pairs are looked at: their number grows with the square."""
+"""Largest number of inputs for which pairs are examined: their number grows with the square."""
 
 CELLS, PAIR_CELLS = 64, 32
-"""Cells of an input, alone and in a pair, at most."""
+"""Largest number of cells of an input, alone and in a pair."""
 
 PAIR_CASES = 1 << 18
-"""Cases in which pairs are looked at, evenly chosen from all where there are more."""
+"""Largest number of cases in which pairs are examined, evenly chosen where there are more."""
 
 SWEEPS = 3
-"""Times that what each input explains alone is fitted to what the others leave."""
+"""Number of times that each input's effect is fitted to the residuals of the others."""
 
 
 @frozen
@@ -80,7 +81,7 @@ class Shares:
 
 
 def cells(values: np.ndarray, most: int) -> np.ndarray:
-    """The cell of each value, rising from 0: one a value where there are at most so many, else of equal frequency."""
+    """The cell of each value, counted from 0: one a value where there are at most `most`, else of equal frequency."""
     known = np.unique(values)
     if len(known) > most:
         known = np.unique(np.quantile(values, np.arange(1, most) / most))
@@ -89,7 +90,7 @@ def cells(values: np.ndarray, most: int) -> np.ndarray:
 
 
 def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
-    """The shares of the output's variance that independent inputs explain.
+    """The shares of an output's variance that independent inputs explain.
 
     inputs  of each case, [case] each;  output: of each case, finite. Raises ValueError with fewer than FEWEST cases
     """
@@ -134,7 +135,7 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
                     _halved(sums, counts[i], counts[j], is_cut[i], is_cut[j]),
                 )
             )
-            # what cells hide falls with the square of their width
+            # the variance hidden within cells falls with the square of their width
             together = fine + (fine - wide) / 3.0
             for each in (i, j):
                 total[each] += together
@@ -160,8 +161,8 @@ def shares(inputs: Sequence[np.ndarray], output: np.ndarray) -> Shares | None:
 
 
 def dependent(inputs: Sequence[np.ndarray]) -> list[tuple[int, int, float]]:
-    """Pairs of inputs that do not vary independently of each other, with the correlation of their ranks: beyond what
-    chance makes of one in 15,000 pairs, and a twentieth besides."""
+    """Pairs of inputs that do not vary independently of each other, with the correlation of their ranks: it exceeds one
+    that occurs by chance in one of 15,000 pairs, and a twentieth."""
     ranks = [_ranks(values[:: max(1, len(values) // 20_000)]) for values in inputs]
     found = []
     for i, j in combinations(range(len(inputs)), 2):
@@ -172,8 +173,8 @@ def dependent(inputs: Sequence[np.ndarray]) -> list[tuple[int, int, float]]:
 
 
 def _additive(alone: Sequence[np.ndarray], y: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-    """The effect of each input's cells, and what no input explains alone: an additive model, fitted by turns
-    (backfitting), so that chance dependence of the inputs is in no input twice."""
+    """The effect of each input's cells, and the residual that no input explains alone: an additive model, fitted in
+    turns (backfitting), so that chance dependence between inputs is not counted twice."""
     left, effects = y.copy(), [np.zeros(_count(cell)) for cell in alone]
     for _ in range(SWEEPS):
         for cell, effect in zip(alone, effects, strict=True):
@@ -197,13 +198,13 @@ class _Variance:
         self.spread = _less_each(squares[None, :])[0] - self._cases * self._mean**2
 
     def sums(self, cell: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """The number of cases in so many cells, and the sum of their values: [cell, 1 + GROUPS] each."""
+        """The number of cases in each of `count` cells, and the sum of their values: [cell, 1 + GROUPS] each."""
         key, shape = cell * np.int64(GROUPS) + self._part, (count, GROUPS)
         n = _less_each(_sums(key, count * GROUPS).reshape(shape))
         return n, _less_each(_sums(key, count * GROUPS, self._y).reshape(shape))
 
     def between(self, n: np.ndarray, sums: np.ndarray, fitted: int = 0) -> np.ndarray:
-        """The sum of squares between the means of cells, less what as many cells explain by chance.
+        """The sum of squares between the means of cells, less the part that as many cells explain by chance.
 
         fitted  degrees of freedom of the cells that were taken out before
         """
@@ -217,7 +218,8 @@ class _Variance:
 def _halved(
     sums: tuple[np.ndarray, np.ndarray], a: int, b: int, cut_a: bool, cut_b: bool
 ) -> tuple[tuple[np.ndarray, np.ndarray], int, int]:
-    """Sums of a by b cells in cells twice as wide, along the inputs that were cut, and how many these are."""
+    """Sums of a by b cells, merged into cells twice as wide along the inputs that were cut, and the new numbers of
+    cells."""
     at_a, at_b = np.arange(0, a, 2 if cut_a else 1), np.arange(0, b, 2 if cut_b else 1)
     n, found = (np.add.reduceat(np.add.reduceat(each.reshape(a, b, -1), at_a, axis=0), at_b, axis=1) for each in sums)
     cells = len(at_a) * len(at_b)

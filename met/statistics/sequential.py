@@ -1,7 +1,7 @@
 """A test of a share of cases that may be looked at after every case: it stops as soon as the cases decide.
 
-A bound for a fixed number of cases does not hold for who looks as they come in and stops when it is reached: at 90 %
-confidence more than one campaign in three would say "demonstrated" of a requirement that is not met. What holds is a
+A bound for a fixed number of cases is wrong if one watches cases come in and stops when it is reached: at 90 %
+confidence more than one campaign in three would say "demonstrated" of a requirement that is not met. A valid test is a
 process that is a nonnegative supermartingale where the requirement is not met, so that it ever exceeds 1 / (1 -
 confidence) with a probability of at most 1 - confidence (J. Ville, 1939): an e-process (A. Ramdas, P. Grunwald, V. Vovk
 and G. Shafer, Statistical Science 38 (2023) 576-601). Here it is the likelihood of the cases under shares of misses
@@ -43,7 +43,7 @@ def evidence_against(cases: np.ndarray, missed: np.ndarray, share: float) -> np.
 
 
 def _mixture(cases: np.ndarray, counted: np.ndarray, allowed: float) -> np.ndarray:
-    """ln of the average likelihood under shares below `allowed` of what is counted, over the likelihood at it."""
+    """ln of the average likelihood of the counts under shares below `allowed`, over their likelihood at `allowed`."""
     from scipy.special import betainc, betaln
 
     a, b = WEIGHT, WEIGHT * max(1.0, 4.0 / allowed - 1.0)
@@ -55,7 +55,7 @@ def _mixture(cases: np.ndarray, counted: np.ndarray, allowed: float) -> np.ndarr
 
 
 SMALLEST = 2.0**-50
-"""Where looking for a share ends."""
+"""Resolution of the search for a share."""
 
 
 @frozen
@@ -70,7 +70,7 @@ class DecisionLimits:
     refutes: np.ndarray
 
     def verdicts(self, cases: np.ndarray, missed: np.ndarray) -> np.ndarray:
-        """1 where so many cases with so many misses demonstrate it, -1 where they refute it, else 0."""
+        """1 where so many cases with so many misses demonstrate the requirement, -1 where they refute it, else 0."""
         misses = np.minimum(missed, len(self.refutes) - 1)
         return (cases >= self.demonstrates[misses]).astype(np.int8) - (cases <= self.refutes[misses])
 
@@ -93,7 +93,8 @@ def limits(share: float, confidence: float, at_most: int) -> DecisionLimits:
 
 
 def _first(misses: np.ndarray, at_most: int, holds: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
-    """For each number of misses, the fewest cases from that number on for which it holds; `at_most` + 1 for none."""
+    """For each number of misses, the fewest cases from that number on for which `holds` is true; `at_most` + 1 for
+    none."""
     low, high = misses.copy(), np.full(len(misses), at_most + 1)
     while (low < high).any():
         middle = (low + high) // 2
@@ -113,7 +114,8 @@ def _reached(
 
 
 def decided(missed: np.ndarray, share: float, confidence: float) -> tuple[int, Verdict]:
-    """The number of cases after which a requirement is decided, and how; all, and "not shown", where they do not do it.
+    """The number of cases after which a requirement is decided, and the verdict; all cases and "not shown" where they
+    do not decide it.
 
     missed  for each case, in the order in which they were drawn, whether it missed the requirement
     """
@@ -125,7 +127,7 @@ def decided(missed: np.ndarray, share: float, confidence: float) -> tuple[int, V
 
 
 def cases_needed(share: float, confidence: float, missed: int = 0) -> int:
-    """The fewest cases that demonstrate the share if so many of them miss the requirement. Raises ValueError where
+    """The fewest cases that demonstrate the share if `missed` of them miss the requirement. Raises ValueError where
     more than `MOST_CASES` were needed."""
     low, high = missed, max(1, 2 * missed)
     while not _reached(evidence_for, np.array(high), np.array(missed), share, confidence):
@@ -142,20 +144,21 @@ def cases_needed(share: float, confidence: float, missed: int = 0) -> int:
 
 
 def lower_bound(cases: int, missed: int, confidence: float) -> float:
-    """The share of all cases that meet it at least, with this confidence however often the cases were looked at; 0
-    where no share is shown."""
+    """The smallest share of all cases that meet the requirement, with this confidence however often the cases were
+    looked at; 0 where no share is shown."""
     return _bisected(lambda share: not _reached(evidence_for, np.array(cases), np.array(missed), share, confidence))[0]
 
 
 def upper_bound(cases: int, missed: int, confidence: float) -> float:
-    """The share of all cases that meet it at most, with this confidence however often the cases were looked at."""
+    """The largest share of all cases that meet the requirement, with this confidence however often the cases were
+    looked at."""
     return _bisected(
         lambda share: bool(_reached(evidence_against, np.array(cases), np.array(missed), share, confidence))
     )[1]
 
 
 def _bisected(above: Callable[[float], bool]) -> tuple[float, float]:
-    """Two neighbouring shares, of which what holds above some share holds for the second, or that is 1."""
+    """Two neighbouring shares: `above` is false for the first and true for the second, or the second is 1."""
     low, high = 0.0, 1.0
     while low < (middle := 0.5 * (low + high)) < high and high - low > SMALLEST:
         low, high = (low, middle) if above(middle) else (middle, high)

@@ -1,4 +1,4 @@
-"""Probabilities by which a difference comes about by chance: of one test, and corrected for the number of tests."""
+"""Probabilities that a difference arises by chance: of one test, and corrected for the number of tests."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 
 def sign_test(higher: int, lower: int) -> float:
-    """The probability that pairs differ at least so one-sidedly by chance, if either direction were as likely.
+    """The probability that pairs differ at least as one-sidedly by chance, if both directions were equally likely.
 
     higher, lower  pairs whose second value is larger, and smaller; pairs of equal values are left out. Two-sided and
-                   exact. Of a requirement that is met in one of two versions this is McNemar's exact test. 1 where no
+                   exact. For a requirement that is met in one of two versions, this is McNemar's exact test. 1 where no
                    pair differs.
     Q. McNemar, Psychometrika 12 (1947) 153-157; W. J. Conover, Practical Nonparametric Statistics, 3rd ed., 3.4, 3.5.
     """
@@ -23,7 +23,7 @@ def sign_test(higher: int, lower: int) -> float:
 
 
 def holm(chances: Sequence[float]) -> list[float]:
-    """Probabilities of several tests, each as if it were the only one, corrected for their number.
+    """Probabilities of several tests, each computed as if it were the only one, corrected for their number.
 
     S. Holm, Scandinavian Journal of Statistics 6 (1979) 65-70.
     """
