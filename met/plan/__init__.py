@@ -1,4 +1,4 @@
-"""The run plan: what a deck means, in SI, with the origin of every value; what the engine is given.
+"""The run plan: the resolved contents of a deck, in SI, with the origin of every value; the input of the engine.
 
 A plan is a portable file (`plan_file`): it holds everything that the engine needs and nothing of the deck's syntax.
 One plan holds one or more experiments (the runs and sweeps that were asked for); the cases of one experiment share
@@ -107,7 +107,7 @@ class Quantity:
 
 @frozen
 class Link:
-    """A rigid body; its numbers are parameters. `shape` is what to draw, in words of `ic` (kind, numbers in SI)."""
+    """A rigid body; its numbers are parameters. `shape` is its picture, in words of `ic` (kind, numbers in SI)."""
 
     name: str
     place: Place | None = keyed("never", default=None)
@@ -116,8 +116,8 @@ class Link:
 
 @frozen
 class Joint:
-    """Connects `parent` (a link, the base too) to `child`, along or about its axis. limits: that it has, of `q_min`,
-    `q_max`, `qd_max` and `tau_max`."""
+    """Connects `parent` (a link or the base) to `child`, along or about its axis. limits: those of `q_min`, `q_max`,
+    `qd_max` and `tau_max` that the joint has."""
 
     name: str
     kind: JointKind
@@ -137,7 +137,7 @@ class Course:
 
 @frozen
 class Base:
-    """A base that moves: as its courses say, component by component (those left out stay 0), or freely."""
+    """A base that moves: by courses, component by component (those left out stay 0), or freely."""
 
     kind: Literal["prescribed", "free"]
     courses: tuple[Course, ...] = ()
@@ -145,7 +145,7 @@ class Base:
 
     @property
     def turns(self) -> bool:
-        """True where the base may turn: it is free, or one of its angles is no constant."""
+        """True where the base may turn: it is free, or one of its angles is not constant."""
         return self.kind == "free" or any(
             course.component in COMPONENTS[3:] and course.model != "constant" for course in self.courses
         )
@@ -229,7 +229,7 @@ class LinkSensor:
 
 @frozen
 class Substitution:
-    """A joint whose motor is on a bed: the models of bed and law. Its servo stays what it is.
+    """A joint whose motor is on a bed: the models of bed and law. Its servo stays the same.
 
     All substituted joints of a structure have one law, and servos that tick together.
 
@@ -271,20 +271,20 @@ class Payload:
 
     @property
     def flies(self) -> bool:
-        """True where the payload moves freely for a time; otherwise it is a part of its link."""
+        """True where the payload moves freely for a time; otherwise it is always part of its link."""
         return self.grappled or self.released
 
 
 @frozen
 class Allowance:
-    """A warning that a run allows, by its code, and why, in one line."""
+    """A warning that a run allows, by its code, with the reason in one line."""
 
     code: str
     because: str
     place: Place | None = None
 
     def __str__(self) -> str:
-        """`D105, because the report's own rates`."""
+        """The allowance as messages print it: `D105, because the report's own rates`."""
         return f"{self.code}, because {self.because}"
 
 
@@ -369,11 +369,7 @@ BALANCED = RunKey(
 
 @frozen
 class Structure:
-    """All that decides which program is compiled, values apart.
-
-    base      None: it is fixed. A base that moves is among the links
-    balanced  whether servos begin with what keeps their joints from accelerating
-    """
+    """Everything that determines the compiled program, apart from values."""
 
     arm: str
     links: tuple[Link, ...]
@@ -400,7 +396,7 @@ class Structure:
 
     @property
     def ground(self) -> tuple[str, ...]:
-        """The links that do not move against the base: itself, where it is one, and what fixed joints hold on it."""
+        """The links that do not move against the base: the base, where it is a link, and all links fixed to it."""
         return ground(self.links, self.joints)
 
     @property
@@ -410,7 +406,7 @@ class Structure:
 
     @property
     def moving(self) -> tuple[Joint, ...]:
-        """The joints that have a coordinate, in the order of `joints`: the order of every `joint` dimension."""
+        """The moving joints, in the order of `joints`: the order of every `joint` dimension."""
         return tuple(joint for joint in self.joints if joint.kind != "fixed")
 
 
@@ -429,13 +425,9 @@ Design = Literal["", "random", "lhs", "sobol", "saltelli"]
 
 @frozen
 class Coordinate:
-    """One varied parameter of a sweep, as the deck wrote its path; values are in SI, one a case, and computed where
-    they are asked for in a long table.
-
-    sets: paths of the parameters that follow it directly. unit, scale: as the deck wrote it, for display;
-    shown = value / scale.
-    design: of the sample that drew it; "" where its values were chosen
-    """
+    """One varied parameter of a sweep, by the path that the deck wrote; values are in SI, one a case, and in a long
+    table computed on demand. sets: paths of the parameters that follow it directly. unit, scale: as the deck wrote it,
+    for display; shown = value / scale. design: of the sample that drew it; "" where its values were chosen."""
 
     path: str
     unit: str
@@ -483,7 +475,7 @@ class Cases:
 
     @property
     def noise(self) -> tuple[str, ...]:
-        """Inputs of the program that make a case's noise its own; they follow the coordinates."""
+        """Inputs of the program that give a case its own noise; they follow the coordinates."""
         return (*([REPEAT] if self.repeats is not None else []), *([SEED] if self.seeds == "independent" else []))
 
     @property
@@ -526,11 +518,11 @@ class Experiment:
 
     @property
     def metrics(self) -> tuple[MetricUse, ...]:
-        """All its metrics: those that its program gathers, then those of linear answers."""
+        """All its metrics: those that its program computes, then those of linear answers."""
         return (*self.structure.metrics, *self.linear_metrics)
 
     def allows(self, code: str) -> bool:
-        """Return True if a warning with this code is not to be given of this experiment, at a check or at a run."""
+        """Return True if warnings with this code are suppressed for this experiment, at a check or at a run."""
         return any(each.code == code for each in self.allowances)
 
     def column(self, formula: Formula) -> CaseValues:
@@ -552,8 +544,8 @@ class Experiment:
 
 @frozen
 class Source:
-    """A deck file as it was read: name as messages print it, whole text, SHA-256 of its bytes, and the edition of the
-    deck language that it is written in, which no result depends on."""
+    """A deck file: its name in messages, its text, the SHA-256 of its bytes, and its edition of the deck language, on
+    which no result depends."""
 
     name: str
     text: str
@@ -563,11 +555,11 @@ class Source:
 
 @frozen
 class Plan:
-    """A deck resolved. `deck` names the root file; `sources` holds every file that was read.
+    """A resolved deck. `deck` names the root file; `sources` holds every file that was read.
 
-    selected: how the runs and sweeps were asked for, by name or `all`; none where the deck's own choice was taken.
-    An archive is called after it.
-    settings: what was set from outside of the deck, `PATH=VALUE`, as if it had said so.
+    selected: how the runs and sweeps were asked for, by name or `all`; none where the deck's own choice was taken. It
+    gives an archive its name. settings: values set from outside of the deck, `PATH=VALUE`, as if the deck contained
+    them.
     """
 
     deck: str

@@ -18,7 +18,7 @@
     sensors.<sensor>                what a sensor of a link reads
     sensors.<sensor>.<name>         its states
 
-Derived, that is computed from the state only where a record or a metric asks for them (docs/physics.md, section 1):
+Derived channels, computed from the state only where a record or a metric asks for them (docs/physics.md, section 1):
 
     <joint>.tau_load .J_eff .b      what the arm takes, tau_load = J_eff qdd + b, all other joints in their modes
     <joint>.mode                    1 in torque mode, 0 in acceleration mode
@@ -112,7 +112,7 @@ LIMIT_MARGIN = (
     (),
     "",
 )
-"""As `OF_JOINT` has it: of joints with limits alone."""
+"""The `limit_margin` channel of joints with limits, as an entry of `OF_JOINT`."""
 
 JACOBIAN = (
     ("jacobian.angular", "angular", "angular velocity of the link per unit of the joint's rate"),
@@ -141,7 +141,7 @@ POWER = re.compile(r"/s(?:\^(\d))?")
 
 TURNING = {"joint": "rad", "effort": "N*m", "inertia": "kg*m^2", "angular": "1", "linear": "m/rad"}
 SLIDING = {"joint": "m", "effort": "N", "inertia": "kg", "angular": "rad/m", "linear": "1"}
-"""Words of declared units, as they are for a revolute and for a prismatic joint."""
+"""Words of declared units, with their meanings for a revolute and for a prismatic joint."""
 
 
 @frozen
@@ -166,7 +166,7 @@ class Channel:
 
 
 def joint_unit(unit: str, joint: Joint, command: str | None = None) -> str:
-    """A declared unit with `joint`, `effort` and `command` put in words: `joint/s` -> `rad/s`, or `m/s`."""
+    """A declared unit with `joint`, `effort` and `command` replaced: `joint/s` -> `rad/s`, or `m/s`."""
     return _unit_of(unit, joint.kind == "prismatic", command)
 
 
@@ -186,26 +186,26 @@ def _unit_of(unit: str, slides: bool, command: str | None) -> str:
 
 
 def watched_unit(declared: str, of: str) -> str:
-    """A metric's declared unit with `of`, the unit of what it watches, put in: of `rad/s`, `of*s` is `rad`."""
+    """A metric's declared unit with `of` replaced by the unit of the watched channel: for `rad/s`, `of*s` is `rad`."""
     if declared == "of" or "of" not in re.findall(r"[A-Za-z_]+", declared):
         return of if declared == "of" else declared
     return units.text(parse_unit(declared, {"of": parse_unit(of)}).dimension)
 
 
 def _per_time(repeated: re.Match[str]) -> str:
-    """`rad/s/s` is `rad/s^2`."""
+    """A repeated division combined: `rad/s/s` is `rad/s^2`."""
     return f"/s^{sum(int(power or 1) for power in POWER.findall(repeated[0]))}"
 
 
 def _factor(unit: str, before: str) -> str:
-    """A product or quotient in a denominator needs its brackets."""
+    """A unit as a factor; a product or quotient in a denominator gets its brackets."""
     return f"({unit})" if before.endswith("/") and ("*" in unit or "/" in unit) else unit
 
 
 def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Channel]:
     """Every channel of the structure, by path: joint by joint, then the links', then the arm's.
 
-    Jacobians, which are as many as links times joints, are there of the first link and of links that are mentioned: in
+    Jacobians, whose number is links times joints, are listed for the first link and for links that are mentioned: in
     these names, or by the structure's own record and metrics.
     """
     own = [*(recorded.name for recorded in structure.record), *(use.of for use in structure.metrics)]
@@ -213,12 +213,13 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
 
 
 def channels_beside(structure: Structure, paths: Iterable[str]) -> dict[str, Channel]:
-    """The channels of these paths that there are, with all others of the same joints and links, and of the arm."""
+    """The existing channels among these paths, with all others of the same joints and links, and of the arm."""
     return _channels(structure, list(paths), all_owners=False)
 
 
 def _channels(structure: Structure, names: list[str], *, all_owners: bool) -> dict[str, Channel]:
-    """all_owners: of every joint and link; else of those which the names, and expressions of the structure, are of."""
+    """The channels of a structure. all_owners: those of every joint and link; else those of joints and links in the
+    names and in the structure's expressions."""
     servos = {use.joint: use for use in structure.servos}
     on_beds = {use.joint: use for use in structure.substitutions}
     dynamics = structure.schedule.dynamics
@@ -303,7 +304,7 @@ def _carrying(structure: Structure, link: str) -> list[Joint]:
     """The moving joints between a link and the base, in the order of `moving`."""
     holds = {joint.child: joint for joint in structure.joints}
     chain: set[str] = set()
-    while link in holds and holds[link].name not in chain:  # a tree that does not stand is told elsewhere
+    while link in holds and holds[link].name not in chain:  # a broken tree is reported elsewhere
         chain.add(holds[link].name)
         link = holds[link].parent
     return [joint for joint in structure.moving if joint.name in chain]
@@ -322,7 +323,7 @@ def channel_paths(name: str, joints: tuple[str, ...], components: tuple[str, ...
 
 
 def joint_of(name: str) -> str:
-    """The joint that a variable of one thing belongs to, by its name; none where that is no joint."""
+    """The joint in the name of a variable; none where the variable belongs to no joint."""
     if name.startswith(("links.", "payloads.", "guides.", "sensors.", "signals.", *(own for own, *_ in OF_ARM))):
         return ""
     return name.partition(".")[0]
@@ -340,9 +341,9 @@ def recordable(
     names   as of `channels`;  known: what that comes to, where it is at hand
     wanted  those names alone, as far as there are such; None: all
 
-    A name stands for one number (`elbow.q`, `elbow.reaction.force.x`), for a vector (`links.tip.position`), for that of
-    all joints that have it (`q`, `reaction.force`), or for several variables (`reaction`, `energy`; `sensors`: what
-    those of links read).
+    A name stands for one number (`elbow.q`, `elbow.reaction.force.x`), for a vector (`links.tip.position`), for the
+    values of all joints that have it (`q`, `reaction.force`), or for several variables (`reaction`, `energy`;
+    `sensors`: readings of those of links).
     """
     known = channels(structure, names) if known is None else known
     own: dict[str, Channel] = {}  # numbers and vectors, a vector before its components
@@ -373,7 +374,8 @@ def recordable(
 
 
 def _of_all(name: str, channel: Channel) -> str:
-    """The name of a channel of one joint among all joints' signals; "" for a single component of a jacobian."""
+    """The name of the variable of all joints to which a joint's channel belongs; "" for a single component of a
+    jacobian."""
     if not channel.path.startswith("links."):
         return name.removeprefix(channel.joint + ".")
     return name.removesuffix("." + channel.joint) if name != channel.path else ""
@@ -386,7 +388,7 @@ def _enter(
     joints: tuple[str, ...],
     components: tuple[str, ...],
 ) -> None:
-    """Take a variable in, and into its family, which is told before its members."""
+    """Enter a variable, and add it to its family, which comes before its members."""
     scalars = channel_paths(name, joints, components)
     units = tuple(known[path].unit for path in scalars) if joints else (known[scalars[0]].unit,)
     made = Recorded(name, scalars, joints, units, known[scalars[0]].doc, components)

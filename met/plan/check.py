@@ -1,7 +1,7 @@
 """Checks of a plan that its types cannot make: that its parts fit together, and that its numbers are possible.
 
-Whoever writes a plan by hand, or with another program, is told where it is wrong, by the path in the JSON; what gets
-past here runs. Everything raises `Damaged`.
+A mistake in a plan that was written by hand, or by another program, is reported with its path in the JSON; a plan that
+passes here runs. All checks raise `Damaged`.
 """
 
 from __future__ import annotations
@@ -36,25 +36,26 @@ from met.trace.nodes import TRUTHS
 from met.unit_parser import parse_unit
 
 GROUP = re.compile(r"[\w+-]+(\.[\w+-]+)*")
-"""The name of a group of a sweep, behind the sweep's name."""
+"""The name of a group of a sweep, which follows the sweep's name."""
 
 TABLES = {"table": 1, "trajectory": 2}
-"""Profiles of points, and how many points each needs."""
+"""Profiles of points, with the number of points that each needs at least."""
 
 MOST_SEED = 2**63 - 1
 
 ROUNDING = 1e-9
-"""For rounding alone: an axis' length may be off by this, and a moment of inertia below zero by this share."""
+"""Allowance for rounding: the error of an axis' length, and the share by which a moment of inertia may be below
+zero."""
 
 CODE = re.compile(r"[A-Z]\d{3}", re.ASCII)
 """The code of a diagnostic."""
 
 CHUNK = 1 << 14
-"""Cases whose varied numbers are tested at a time."""
+"""Number of cases whose varied numbers are tested at a time."""
 
 
 def check(experiments: Iterable[Experiment]) -> None:
-    """All experiments of a plan."""
+    """Check all experiments of a plan."""
     names: list[str] = []
     for index, experiment in enumerate(experiments):
         where = f"experiments[{index}]"
@@ -76,7 +77,7 @@ def check(experiments: Iterable[Experiment]) -> None:
 
 
 def check_text(document: Any, where: str = "") -> None:
-    """No text but that of a source holds a null character, or half of a character."""
+    """Check that no text except a source's holds a null character, or half of a surrogate pair."""
     if isinstance(document, str):
         if "\0" in document:
             raise Damaged(where, "a null character is in it")
@@ -93,7 +94,7 @@ def check_text(document: Any, where: str = "") -> None:
 
 
 def _group_name(experiment: Experiment, where: str, before: Collection[str]) -> None:
-    """A run's or sweep's name; behind it, for a group of a sweep, what tells it from the others."""
+    """The name of a run or sweep, or the part after it that tells a group of a sweep from the others."""
     head, _, rest = experiment.name.partition(".")
     plan_structure.check_name(head, where)
     if experiment.name in before:
@@ -181,7 +182,8 @@ def _check_cases(experiment: Experiment, where: str) -> None:
 
 
 def _check_until_shown(experiment: Experiment, where: str) -> None:
-    """Cases that are run until something is shown are draws of their own, and something is to be shown."""
+    """Check that cases which are run until something is shown are independent draws, and that a requirement has a
+    confidence to show."""
     cases = experiment.cases
     plan_structure.check_whole(cases.until_shown, 1, 2**53, where)
     designs = {coordinate.design for coordinate in cases.coordinates} - {""}
@@ -239,11 +241,12 @@ def _check_formulas(experiment: Experiment, where: str) -> None:
 
 
 def _check_parameters(experiment: Experiment, where: str) -> None:
-    """Every parameter is one of the arm's or a model's, of its unit, and within its bounds. (Missing ones: E304.)"""
+    """Check that every parameter belongs to the arm or a model, has its unit, and is within its bounds. (Missing ones:
+    E304.)"""
     structure, parameters = experiment.structure, experiment.parameters
     known: set[str] = set()
     models_of = heads_of_models(structure)
-    relations.check_uses(experiment, related(structure), where)  # first, for units go by a model's joint
+    relations.check_uses(experiment, related(structure), where)  # first, since units depend on a model's joint
     for path, unit, _, parameter in declared(experiment):
         if path in known:
             raise Damaged(where, f"two things are called `{path}`")
@@ -253,7 +256,7 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
             _check_quantity(quantity, unit, parameter, f"{where}.{path}")
     known |= _check_pivots(experiment, where)
     for path in parameters:
-        if path not in known and not path.startswith(models_of):  # those of a model: `plan_defaults`
+        if path not in known and not path.startswith(models_of):  # a model's own: `plan_defaults`
             raise Damaged(f"{where}.{path}", "nothing in this run has this parameter")
     for use in structure.servos:
         if use.command is not None and use.command.model in TABLES:
@@ -278,7 +281,7 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
 
 
 def _words(model: Any, chosen: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
-    """Every word of a model that a structure decides: those chosen, else the defaults."""
+    """Every word of a model that a structure decides: the chosen one, else the default."""
     deciding = getattr(model, "deciding", [each.name for each in model.parameters if each.shape == "word"])
     given = dict(chosen)
     for each in model.parameters:
@@ -292,7 +295,7 @@ def _is_word(parameters: Mapping[str, Quantity], path: str, word: str, where: st
 
 
 def _check_pivots(experiment: Experiment, where: str) -> set[str]:
-    """Paths of the pivots that revolute joints have, all three numbers of one or none."""
+    """Paths of the pivots of revolute joints, each with all three numbers or none."""
     found: set[str] = set()
     for joint in experiment.structure.joints:
         paths = [f"{joint.name}.pivot.{axis}" for axis in "xyz"] if joint.kind == "revolute" else []
@@ -306,7 +309,7 @@ def _check_pivots(experiment: Experiment, where: str) -> set[str]:
 
 
 def _check_quantity(quantity: Quantity, unit: str, parameter: Parameter | None, where: str) -> None:
-    is_word = parameter is not None and parameter.shape == "word"  # which has no unit, however it is written
+    is_word = parameter is not None and parameter.shape == "word"  # a word has no unit, however it is written
     if not is_word and quantity.unit != unit and not _same_unit(quantity.unit, unit):
         raise Damaged(f"{where}.unit", f"it should be {unit}")
     value, shape = quantity.value, parameter.shape if parameter is not None else "number"
@@ -338,7 +341,7 @@ def _check_bounds(values: tuple[float, ...], parameter: Parameter, where: str, h
 
 
 def _bounds(parameter: Parameter) -> list[tuple[Callable[[np.ndarray], np.ndarray], str]]:
-    """Tests of values [case, 1] against each bound of a declaration, and how to say the bound."""
+    """Tests of values [case, 1] against each bound of a declaration, with the bound in words."""
     written: tuple[tuple[float | None, str, np.ufunc], ...] = (
         (parameter.above, "above", np.greater),
         (parameter.at_least, "at least", np.greater_equal),
@@ -362,7 +365,8 @@ def _within(holds: np.ufunc, limit: float, values: np.ndarray) -> np.ndarray:
 
 
 def _is_finite(default: object, values: np.ndarray) -> np.ndarray:
-    """Infinite is possible too as a model's own default, or a part of it, that stands for never or none."""
+    """Check that values are finite; infinite is allowed as a model's own default, or a part of it, that stands for
+    never or none."""
     numbers = [x for x in (default if isinstance(default, tuple) else (default,)) if isinstance(x, float)]
     return np.asarray(np.isfinite(values[:, 0]) | np.isin(values[:, 0], [x for x in numbers if math.isinf(x)]))
 
@@ -380,7 +384,7 @@ def _same_unit(one: str, other: str) -> bool:
 
 
 def _check_table(experiment: Experiment, prefix: str, fewest: int, where: str) -> None:
-    """Times rise, and there are as many values, `fewest` or more."""
+    """Check that times rise, and that there are as many values, at least `fewest`."""
     found = [experiment.parameters.get(f"{prefix}.{name}") for name in ("times", "values")]
     times, values = (quantity.value if quantity is not None else () for quantity in found)
     if not isinstance(times, tuple) or not isinstance(values, tuple) or None in found:
@@ -393,7 +397,7 @@ def _check_table(experiment: Experiment, prefix: str, fewest: int, where: str) -
 
 
 def _check_bodies(experiment: Experiment, where: str) -> None:
-    """Masses are not below zero, inertias are possible, axes have length 1: as written, or in every case."""
+    """Check that masses are not negative, inertias are possible and axes have length 1, as written or in every case."""
     structure = experiment.structure
     tests: list[tuple[str, list[str], Callable[[np.ndarray], np.ndarray], str]] = []
     for link in structure.links:
@@ -479,7 +483,8 @@ def _in_order(values: np.ndarray) -> np.ndarray:
 
 
 def _is_solid(values: np.ndarray) -> np.ndarray:
-    """Positive definite beyond rounding, by the pivots of the matrix scaled to its largest entry."""
+    """True for matrices that are positive definite beyond rounding, by the pivots of the matrix scaled to its largest
+    entry."""
     with np.errstate(all="ignore"):
         xx, yy, zz, xy, xz, yz = values.T / np.abs(values).max(axis=1)
         second, side = yy - xy * xy / xx, yz - xy * xz / xx
@@ -488,7 +493,8 @@ def _is_solid(values: np.ndarray) -> np.ndarray:
 
 
 def _is_inertia(values: np.ndarray) -> np.ndarray:
-    """Positive semidefinite, by the principal minors of the matrix scaled to its largest entry."""
+    """True for matrices that are positive semidefinite, by the principal minors of the matrix scaled to its largest
+    entry."""
     finite = np.isfinite(values).all(axis=1)
     size = np.abs(np.where(finite[:, None], values, 0.0)).max(axis=1)
     xx, yy, zz, xy, xz, yz = np.where(finite[:, None], values, 0.0).T / np.where(size > 0.0, size, 1.0)

@@ -1,4 +1,4 @@
-"""Checks of the linear answers of a plan, and of metrics of them, that its types cannot make. Raise `Damaged`."""
+"""Checks of a plan's linear answers, and of metrics of them, that its types cannot make. All raise `Damaged`."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from met.plan.linear_uses import FIGURES
 from met.plan.structure import check_name
 
 MOST_SIGNALS = 1000
-"""Inputs, outputs and opened places of one answer, of each kind at most."""
+"""Largest number of inputs, outputs and opened places of one answer, of each kind."""
 
 
 def check_linear(experiment: Experiment, where: str) -> None:
-    """Every answer is of signals of the run, at an instant of it; every metric is a figure of one of them."""
+    """Check that every answer is about signals of the run, at an instant of it, and that every metric is a figure of
+    one."""
     structure, names = experiment.structure, list[str]()
     known = {each.path: each for each in input_signals(structure)} if experiment.linear else {}
     for index, use in enumerate(experiment.linear):

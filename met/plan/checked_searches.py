@@ -1,4 +1,4 @@
-"""Checks of the search in a plan that its types cannot make. Everything raises `Damaged`."""
+"""Checks of a plan's search that its types cannot make. All raise `Damaged`."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ MOST_SEED = 2**53
 
 
 def check_search(experiment: Experiment, search: Search, where: str) -> None:
-    """A search fits its run: its goal is a metric, what it chooses and what it is against are the coordinates, and its
-    generations are the case table."""
+    """Check that a search fits its run: its goal is a metric, its parameters and its plants are the coordinates, and
+    its generations make up the case table."""
     if search.metric not in {use.name for use in experiment.metrics}:
         raise Damaged(f"{where}.metric", f"there is no metric `{search.metric}`")
     check_whole(search.at_most, 1, MOST_SEARCHED, f"{where}.at_most")

@@ -1,4 +1,4 @@
-"""Between the dataclasses of a plan and plain JSON data, by the types of their fields.
+"""Conversion between the dataclasses of a plan and plain JSON data, by the types of their fields.
 
 Encoding leaves out fields that equal their default; decoding checks every value against its type and says where in
 the document it is wrong (`experiments[0].structure.joints[2].kind`).
@@ -25,7 +25,7 @@ NOT_FINITE = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 
 class Damaged(Exception):
-    """A document that is not what its types say: where, and why."""
+    """A document that does not match its types: the place and the reason."""
 
     def __init__(self, where: str, why: str) -> None:
         super().__init__(f"{where}: {why}" if where else why)
@@ -88,7 +88,7 @@ def _encode_quantity(value: Any) -> Any:
 
 
 def _chosen(arguments: tuple[Any, ...]) -> Any:
-    """The one type of an optional field that is not None; of a column of a case table, that of an array."""
+    """The type of an optional field besides None; for a column of a case table, that of an array."""
     return next(argument for argument in arguments if argument is not type(None))
 
 
@@ -156,7 +156,7 @@ def _quantity(data: Any, where: str) -> Any:
 
 
 def _check_formulas(values: dict[str, Any], where: str) -> None:
-    """Formulas are replayed, so a reference that points nowhere must not get that far."""
+    """Check that references in formulas point to earlier nodes, since formulas are replayed."""
     from met.trace.nodes import OPERANDS, TRUTHS
 
     nodes = values.get("nodes", ())
@@ -176,7 +176,7 @@ def _check_formulas(values: dict[str, Any], where: str) -> None:
 
 
 def _is_rest(op: str, rest: tuple[Any, ...]) -> bool:
-    """True for what stands behind a node's operands: a constant's number, an input's name, a bit's place, a table."""
+    """True for valid data after a node's operands: a constant's number, an input's name, a bit's place, or a table."""
     if op == "const":
         return len(rest) == 1 and _is_number(rest[0])
     if op == "input":

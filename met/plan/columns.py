@@ -1,8 +1,8 @@
-"""Columns of a case table: arrays, or numbers that are computed where they are asked for.
+"""Columns of a case table: arrays, or numbers that are computed on demand.
 
-A sweep of a hundred million cases takes no memory: whoever runs cases `first` to `last` computes their values alone,
-the same bits each time. A computed column is used as an array is: `column[rows]`, `len(column)`; numpy takes it for
-one, and then it is all in memory.
+A sweep of a hundred million cases takes no memory: a task that runs cases `first` to `last` computes only their values,
+the same bits each time. A computed column is used like an array: `column[rows]`, `len(column)`; numpy can convert it to
+one, which puts all of it in memory.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from met.plan.swept import RowBits, SweptRows, blocks
 from met.trace.graph import Formulas
 
 LISTED_ROWS = 10_000
-"""Rows up to which a table's columns are arrays."""
+"""Largest number of rows of a table whose columns are arrays."""
 
 MOST_SWEPT = 100_000_000
-"""Cases of a sweep at most: as many were run (docs/cluster.md)."""
+"""Largest number of cases of a sweep: as many were run (docs/cluster.md)."""
 
 
 class ComputedColumn:
-    """Numbers that are computed where they are asked for, by `at`; to be used as an array of one dimension is."""
+    """Numbers that are computed on demand, by `at`, and can be indexed like an array of one dimension."""
 
     ndim = 1
 
@@ -34,7 +34,7 @@ class ComputedColumn:
         self.size, self.dtype = count, np.dtype(dtype)
 
     def at(self, rows: np.ndarray) -> np.ndarray:
-        """The numbers of these rows, which are in the column."""
+        """The numbers of these rows, which must be in the column."""
         raise NotImplementedError
 
     @property
@@ -85,7 +85,7 @@ CaseValues = np.ndarray | ComputedColumn
 
 
 class CountedRows(ComputedColumn):
-    """Whole numbers one after the other from 0, or another `first`: all rows of a table."""
+    """Consecutive whole numbers from 0, or from `first`: all rows of a table."""
 
     def __init__(self, count: int, first: int = 0) -> None:
         super().__init__(count, np.int64)
@@ -96,7 +96,7 @@ class CountedRows(ComputedColumn):
 
 
 class AxisColumn(ComputedColumn):
-    """A coordinate of a sweep: of each case, one of the values of an axis."""
+    """A coordinate of a sweep: for each case, one of the values of an axis."""
 
     def __init__(self, rows: SweptRows, axis: int, values: CaseValues) -> None:
         super().__init__(rows.count)
@@ -115,7 +115,7 @@ class AxisColumn(ComputedColumn):
 
 
 class PositionColumn(ComputedColumn):
-    """Positions of the cases of one structure in the table of their sweep, which has other structures besides.
+    """Positions of the cases of one structure in the table of their sweep, which has other structures too.
 
     among  rows of the product of all axes that are cases of any structure; None: all of them
     """
@@ -130,7 +130,7 @@ class PositionColumn(ComputedColumn):
 
 
 class ShiftedColumn(ComputedColumn):
-    """Numbers of another column, and a number more; as whole numbers where `dtype` says so."""
+    """The numbers of another column plus a constant; as whole numbers where `dtype` says so."""
 
     def __init__(self, of: CaseValues, by: int, dtype: Any = np.float64) -> None:
         super().__init__(len(of), dtype)
@@ -141,7 +141,7 @@ class ShiftedColumn(ComputedColumn):
 
 
 class FormulaColumn(ComputedColumn):
-    """The values of a formula of one output in each case. values: of its inputs, by name."""
+    """The values of one output of a formula in each case. values: of its inputs, by name."""
 
     def __init__(self, formula: Formulas, values: Mapping[str, CaseValues], count: int) -> None:
         super().__init__(count)
@@ -153,31 +153,31 @@ class FormulaColumn(ComputedColumn):
 
 
 def listed(column: ComputedColumn) -> CaseValues:
-    """The column as an array where it is short."""
+    """The column as an array if it is short, else unchanged."""
     return np.asarray(column) if column.size <= LISTED_ROWS else column
 
 
 def all_rows(count: int) -> CaseValues:
-    """The rows of a table of so many, each once and in order."""
+    """The rows of a table with `count` rows, each once and in order."""
     return np.arange(count) if count <= LISTED_ROWS else CountedRows(count)
 
 
 def places_among(rows: CaseValues, wanted: np.ndarray) -> np.ndarray:
-    """The places in `rows`, which rise, at which these rows would be put in."""
+    """The places at which the wanted rows would be inserted into the ascending `rows`."""
     if isinstance(rows, CountedRows):
         return np.clip(wanted - rows.first, 0, rows.size)
     return np.searchsorted(rows, wanted)
 
 
 def are_among(rows: CaseValues, wanted: np.ndarray) -> np.ndarray:
-    """True for each of these rows that is one of `rows`, which rise."""
+    """True for each wanted row that is in the ascending `rows`."""
     if isinstance(rows, CountedRows):
         return np.asarray((wanted >= rows.first) & (wanted < rows.first + rows.size))
     return np.isin(wanted, rows)
 
 
 def row_at(column: CaseValues, number: int) -> int | None:
-    """The row with this number in a column whose numbers rise; None where it has none."""
+    """The row with this number in a column of ascending numbers; None where there is none."""
     row = bisect_left(column, number)
     return row if row < len(column) and column[row] == number else None
 
@@ -194,7 +194,7 @@ def span(column: CaseValues) -> tuple[float, float]:
 
 
 def different(column: CaseValues) -> np.ndarray:
-    """The different values of a column, rising."""
+    """The distinct values of a column, ascending."""
     if isinstance(column, AxisColumn):
         return distinct(np.asarray(column.values[column.rows.present(column.axis)]))
     return distinct(np.asarray(column))

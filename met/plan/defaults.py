@@ -1,4 +1,4 @@
-"""Parameters that an experiment must have, by the declarations of its models, and the defaults of those it lacks."""
+"""Parameters that an experiment needs, by the declarations of its models, and the defaults of missing ones."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ OF_FLIGHT = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("rate
 
 
 def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity | None]]:
-    """Paths that the experiment lacks, each with its model's default or the servo's value, None where neither is. A bed
-    that is scaled has none of its servo's."""
+    """Paths that the experiment lacks, each with its model's default or the servo's value, None where there is neither.
+    A scaled bed takes no values of its servo."""
     defaults: dict[str, Quantity] = {}
     scaled = {use.joint for use in experiment.structure.substitutions if use.scaled}
     for path, unit, default, parameter in declared(experiment):
@@ -40,7 +40,7 @@ def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity |
 
 
 def unknown_parameters(experiment: Experiment) -> Iterator[tuple[str, str | None]]:
-    """Paths under a model of the experiment that its declaration does not have, with the nearest that it has."""
+    """Paths under a model of the experiment that are not in its declaration, with the nearest declared one."""
     structure = experiment.structure
     known = {path for path, *_ in declared(experiment)}
     heads = heads_of_models(structure)
@@ -67,14 +67,14 @@ Declared = tuple[str, str, float | tuple[float, ...] | str | None, Parameter | N
 
 
 def of_environment(structure: Structure) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
-    """The prefix of the paths of each environment model's parameters, and their declarations."""
+    """The prefix of the paths of each environment model's parameters, with their declarations."""
     for use in structure.environment:
         yield f"environment.{use.name}", models.find("environment", use.model, use.place).parameters
 
 
 def related(structure: Structure) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
-    """`of_environment`, and the same of guides and links' sensors: parameters that may name parts of the arm, or go
-    together."""
+    """`of_environment`, with the same for guides and links' sensors: parameters that may name parts of the arm, or
+    belong together."""
     yield from of_environment(structure)
     for sensor in structure.sensors:
         yield f"sensors.{sensor.name}", sensor_parts(sensor, "parameters")
@@ -192,13 +192,13 @@ def _of_courses(head: str, courses: Iterable[Course], place: Place | None) -> It
 
 
 def component(name: str) -> Joint:
-    """A component of a pose as the joint that would move so: for its units."""
+    """A joint that moves along or about a component of a pose, by which its units are found."""
     kind = "prismatic" if COMPONENTS.index(name) < 3 else "revolute"
     return Joint(name, kind, "", "")  # type: ignore[arg-type]
 
 
 def _numbers(prefix: str, parameter: Parameter, unit: str) -> Iterator[Declared]:
-    """A vector is three numbers, `.x .y .z`; everything else is one."""
+    """The scalar parameters of a declaration: a vector has three, `.x .y .z`, everything else one."""
     path = f"{prefix}.{parameter.name}"
     if parameter.shape != "vector":
         yield path, unit, parameter.default, parameter

@@ -1,7 +1,7 @@
 """Values drawn from distributions: the quantiles of points of (0, 1), rounded to 12 digits in the deck's unit.
 
-So a table that is printed and read back is the same table, and a last place in which versions of a library differ makes
-no other case. Independent draws come from a counter-based generator, Philox 4x64-10 as numpy has it: value k of a
+So a table that is printed and read back is the same table, and last digits in which versions of a library differ do not
+change a case. Independent draws come from a counter-based generator, Philox 4x64-10 as numpy has it: value k of a
 parameter follows from the seed, the parameter's path and k, so any of them is computed without those before it.
 """
 
@@ -22,23 +22,24 @@ from met.unit_parser import parse_unit
 DIGITS = 12
 
 CHUNK = 1 << 12
-"""Points of a stream that are drawn together where some between the first and the last are not wanted."""
+"""Points of a stream that are drawn together where the wanted ones are not consecutive."""
 
 KEPT_BLOCKS = 16
-"""Blocks of a column that are kept, half a megabyte each: the cases of the longest tasks that are merged together."""
+"""Number of blocks of a column that are kept, half a megabyte each: enough for the cases of the longest tasks that are
+merged together."""
 
 A_COUNT = 4
-"""Numbers that the generator gives at each count."""
+"""Number of random numbers that the generator gives at each count."""
 
 TENS = np.cumprod(np.concatenate([[1], np.full(27, 10)]).astype(np.longdouble))
-"""Powers of ten that are exact with 64 bits: 10^27 has 63 besides its twos."""
+"""Powers of ten that are exact with 64 bits: 10^27 has 63 bits without its factors of two."""
 
 SURE = np.longdouble(2.0) ** -61
-"""Relative: more than what the extended arithmetic below is off."""
+"""Relative error bound of the extended arithmetic below."""
 
 
 def points(seed: int, path: str, number: int, first: int, last: int) -> np.ndarray:
-    """Points `first` to `last` (not itself) of a parameter's stream, independent and even in the open unit interval.
+    """Points `first` to `last` (exclusive) of a parameter's stream, independent and uniform in the open unit interval.
 
     number  of the sample in its sweep, from 1: each has streams of its own
     """
@@ -78,7 +79,8 @@ def is_sound(distribution: str, arguments: tuple[float, ...]) -> bool:
 
 
 class DrawnColumn(ComputedColumn):
-    """Independent draws of one parameter. unit: in which they are rounded, as text; "": none. The rest as above."""
+    """Independent draws of one parameter. unit: in which they are rounded, as text; "": none. Other fields as for
+    `points` and `drawn_values`."""
 
     def __init__(
         self, count: int, seed: int, path: str, number: int, distribution: str, arguments: tuple[float, ...], unit: str
@@ -103,8 +105,8 @@ class DrawnColumn(ComputedColumn):
 
     @cached_property
     def ends(self) -> tuple[int, int]:
-        """A row with the least value, and one with the largest: values rise with the points. Of equal ones it is the
-        first, where these are not more than are looked at."""
+        """A row with the least value, and one with the largest, as values rise with the points. Among equal values it
+        is the first, unless there are too many to compare."""
         low, high = _Nearest(), _Nearest()
         for rows in blocks(self.size):
             at = points(self.seed, self.path, self.number, rows.start, rows.stop)
@@ -115,8 +117,8 @@ class DrawnColumn(ComputedColumn):
         return int(np.sort(low.rows)[first]), int(np.sort(high.rows)[last])
 
     def _between(self, first: int, last: int) -> np.ndarray:
-        """Draws `first` to `last`, not itself. Those of many are asked for again, by what names their cases, sums their
-        inputs and compares them: the last few blocks are kept."""
+        """Draws `first` to `last` (exclusive). The last few blocks are kept, since names of cases, inputs and
+        comparisons ask for the same draws again."""
         if last - first < CHUNK:
             return self._made(first, last)
         parts = []
@@ -124,7 +126,7 @@ class DrawnColumn(ComputedColumn):
             block = self._drawn.get(number)
             if block is None:
                 block = self._made(number * BLOCK, min((number + 1) * BLOCK, self.size))
-                self._drawn[number] = block  # of threads that draw it at once, each draws the same
+                self._drawn[number] = block  # threads that draw it at once all draw the same
                 for old in list(self._drawn)[:-KEPT_BLOCKS]:
                     self._drawn.pop(old, None)
             parts.append(block[max(0, first - number * BLOCK) : last - number * BLOCK])
@@ -136,7 +138,7 @@ class DrawnColumn(ComputedColumn):
 
 
 class _Nearest:
-    """Rows of the smallest points so far: more than are rounded to one value."""
+    """Rows of the smallest points so far: more than can be rounded to one value."""
 
     MOST = 64
 
@@ -157,11 +159,11 @@ class _Nearest:
 def rounded(exact: np.ndarray, measure: units.Measure) -> np.ndarray:
     """Numbers of a unit rounded to 12 digits, then in SI rounded once more: `measure.to_si(float(f"{x:.12g}"))`.
 
-    It is done with 64 bits for all at once, and number by number where these cannot tell which of two doubles is the
-    nearest: of 1 % of them, or of all on a machine that has no more than 53 bits.
+    All numbers are rounded at once in 64-bit arithmetic; those where it cannot tell which of two doubles is nearest are
+    done one by one: 1 % of them, or all on a machine with only 53 bits.
     """
     found, extended, scale = np.empty(len(exact)), np.finfo(np.longdouble).nmant >= 63, _scale(measure)
-    for first in range(0, len(exact), CHUNK):  # what fits into the processor's cache takes a tenth of the time
+    for first in range(0, len(exact), CHUNK):  # chunks that fit into the processor's cache take a tenth of the time
         some, left = exact[first : first + CHUNK], list(range(min(CHUNK, len(exact) - first)))
         if extended:
             made, sure = _in_extended(some, scale)
@@ -172,7 +174,8 @@ def rounded(exact: np.ndarray, measure: units.Measure) -> np.ndarray:
 
 
 def _in_extended(exact: np.ndarray, scale: np.longdouble) -> tuple[np.ndarray, np.ndarray]:
-    """The same, and of which numbers it is sure. scale: SI units in one of the unit."""
+    """The numbers rounded in extended arithmetic, and a truth for each that is certain. scale: SI units in one of the
+    unit."""
     with np.errstate(all="ignore"):
         size = np.abs(exact)
         shift = (DIGITS - 1) - np.floor(np.log10(size))
@@ -192,7 +195,7 @@ def _in_extended(exact: np.ndarray, scale: np.longdouble) -> tuple[np.ndarray, n
 
 
 def _scale(measure: units.Measure) -> np.longdouble:
-    """SI units in one of a unit, with as many bits as there are."""
+    """SI units in one of a unit, in extended precision."""
     whole = measure.exact
     high = float(whole)
     return np.longdouble(high) + np.longdouble(float(whole - Fraction(high)))
@@ -212,7 +215,8 @@ def _normal(at: np.ndarray, mean: float, deviation: float) -> np.ndarray:
 
 
 def _loguniform(at: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Quantiles by equal ratios, of ends on one side of 0; by their logarithms where no double holds their ratio."""
+    """Quantiles by equal ratios, with both ends on one side of 0; by their logarithms where no double holds their
+    ratio."""
     with np.errstate(over="ignore", under="ignore"):
         ratio = np.float64(high) / low
     if np.finfo(float).tiny <= ratio < np.inf:
@@ -222,7 +226,7 @@ def _loguniform(at: np.ndarray, low: float, high: float) -> np.ndarray:
 
 
 ARGUMENTS: Mapping[str, int] = {"uniform": 2, "loguniform": 2, "normal": 2, "truncated": 4}
-"""How many arguments each distribution has."""
+"""Number of arguments of each distribution."""
 
 QUANTILES: Mapping[str, Callable[..., np.ndarray]] = {
     "uniform": lambda at, low, high: low + (high - low) * at,

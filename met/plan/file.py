@@ -8,12 +8,11 @@ list, {"word": ...} or {"formula": output}.
 
 A case table of more than `LISTED_ROWS` rows lies beside the plan, one binary file an experiment
 (`plan.gains.cases.npy`: coordinate by case, little-endian doubles), named in the plan with its SHA-256. One of more
-than `TABLE_ROWS` is kept as what it is computed from (met/plan/recipes.py): sizes of axes, seeds; long lists lie beside
+than `TABLE_ROWS` is kept as a recipe (met/plan/recipes.py): sizes of axes, seeds; long lists lie beside
 (`plan.gains.0.npy`). A plan that is written for workers keeps every long table so.
 
 Version 1 is the first; a plan with a table that is computed is of version 2. A plan of a newer version is refused. In
-an older one, parameters that its models have got
-since take their defaults, and the experiment's notes list them.
+an older one, parameters that were added to its models since take their defaults, and the experiment's notes list them.
 """
 
 from __future__ import annotations
@@ -40,17 +39,17 @@ from met.plan.swept import blocks
 SCHEMA = "met.plan"
 VERSION = 2
 TABLE_ROWS = 10_000_000
-"""Rows up to which a plan or an archive holds a case table as numbers."""
+"""Largest number of rows of a case table that a plan or an archive holds as numbers."""
 
 PIECE = 1 << 18
-"""Rows of a table that are written together."""
+"""Number of rows of a table that are written together."""
 
 Refer = Callable[[Experiment, int], Any]
 Fetch = Callable[[dict[str, Any]], CaseValues]
 
 
 def write(plan: Plan, path: str | os.PathLike[str], *, computed: bool = False) -> tuple[Path, ...]:
-    """Write a plan, and its large case tables beside it; the files written.
+    """Write a plan, and its large case tables beside it; returns the written files.
 
     computed  whether all tables that are not listed are kept as what they are computed from, not the longest alone
 
@@ -79,7 +78,7 @@ def write(plan: Plan, path: str | os.PathLike[str], *, computed: bool = False) -
             keepers[name] = recipes.ArrayKeeper(lambda n, array: beside(experiment, str(n), array_bytes(array)))
         return recipes.encoded(columns(experiment)[index], keepers[name].keep)
 
-    files[path] = dumps(plan, refer).encode()  # last, so that a plan never names a table that is not there yet
+    files[path] = dumps(plan, refer).encode()  # last, so that a plan never names a table that does not exist yet
     _check_targets(path, files)
     for target, data in files.items():
         _replace_file(target, data)
@@ -87,8 +86,8 @@ def write(plan: Plan, path: str | os.PathLike[str], *, computed: bool = False) -
 
 
 def read(path: str | os.PathLike[str], *, every_case: bool = True) -> Plan:
-    """The plan in a file. every_case: whether all cases of a long table are checked, or the first alone, as where that
-    was done before. Raises Problem E301 (no file), E302 (damaged), E303 (newer), E304 (a model's parameter)."""
+    """The plan in a file. every_case: check all cases of a long table; False checks the first only, where the rest was
+    checked before. Raises Problem E301 (no file), E302 (damaged), E303 (newer), E304 (a model's parameter)."""
     path = Path(path)
     try:
         text = read_regular(path).decode("utf-8")
@@ -111,7 +110,8 @@ def read(path: str | os.PathLike[str], *, every_case: bool = True) -> Plan:
 
 
 def fetcher(find: recipes.Find) -> Fetch:
-    """Give what reads a column that a plan refers to: a row of a table that `find` gives, or what computes it."""
+    """Return a function that reads a column to which a plan refers: a row of a table that `find` gives, or its
+    recipe."""
     reader = recipes.RecipeReader(find)
 
     def fetch(reference: dict[str, Any]) -> CaseValues:
@@ -131,7 +131,7 @@ def fetcher(find: recipes.Find) -> Fetch:
 
 
 def dumps(plan: Plan, refer: Refer | None = None) -> str:
-    """A plan as canonical JSON. refer: what to write in place of a large table's coordinate; None: all values."""
+    """A plan as canonical JSON. refer: gives the text in place of a large table's coordinate; None: all values."""
     kept_elsewhere = [refer is not None and experiment.cases.count > LISTED_ROWS for experiment in plan.experiments]
     bare = [
         _without_values(e) if elsewhere else e for e, elsewhere in zip(plan.experiments, kept_elsewhere, strict=True)
@@ -158,9 +158,7 @@ def loads(
     every_case: bool = True,
 ) -> Plan:
     """A plan from its JSON. name: for messages. fetch: gives the values of a coordinate that are kept elsewhere.
-    as_written: to be looked at, not run: whatever models there are here, and without what they have got since.
-    every_case: as `read`.
-    """
+    as_written: for display only, without checking its models or adding newer parameters. every_case: as in `read`."""
     from met.plan.check import check, check_text
 
     try:
@@ -178,7 +176,7 @@ def loads(
         message = f"{name} was written by a newer MET: plan schema {version}, and this one reads up to {VERSION}"
         raise Problem(error("E303", message, help="update MET, or make the plan again from its deck"))
     try:
-        if "\\u" in text:  # what cannot stand in a file as it is; see `dumps`
+        if "\\u" in text:  # characters that cannot stand in a file unescaped; see `dumps`
             check_text(document)
         plan: Plan = decode(Plan, document, "", fetch)
         if as_written:
@@ -192,7 +190,7 @@ def loads(
 
 
 def completed(plan: Plan, name: str = "plan", version: int = VERSION) -> Plan:
-    """The plan with the defaults of parameters that it does not have, each listed in its experiment's notes."""
+    """The plan with the defaults of its missing parameters, each listed in its experiment's notes."""
     from met.plan.defaults import missing_parameters, unknown_parameters
 
     problems, experiments = [], []
@@ -234,7 +232,7 @@ def array_bytes(array: np.ndarray) -> bytes:
 
 
 def columns(experiment: Experiment) -> list[CaseValues]:
-    """The values of all coordinates, SI, then repeats and positions where there are any."""
+    """The values of all coordinates, SI, then repeats and positions if there are any."""
     cases = experiment.cases
     found = [coordinate.values for coordinate in cases.coordinates]
     return found + [column for column in (cases.repeats, cases.positions) if column is not None]
@@ -248,7 +246,7 @@ def table_pieces(experiment: Experiment) -> Iterator[tuple[int, slice, np.ndarra
 
 
 def _beginning(experiment: Experiment) -> Experiment:
-    """The experiment with the first rows alone of a long case table."""
+    """The experiment with only the first rows of a long case table."""
     cases = experiment.cases
     if cases.count <= LISTED_ROWS or any(column.size != cases.count for column in columns(experiment)):
         return experiment
@@ -284,7 +282,7 @@ def _read_array(plan: Path, name: str) -> tuple[np.ndarray, str]:
 
 
 def _check_targets(path: Path, files: dict[Path, bytes]) -> None:
-    """Nothing is written over but a plan of MET's, and the tables that it names."""
+    """Check that nothing is overwritten except a plan of MET's, and the tables that it names."""
     before = _plan_there(path)
     for target, data in files.items():
         check_regular(target, code="E300")
@@ -295,7 +293,7 @@ def _check_targets(path: Path, files: dict[Path, bytes]) -> None:
 
 
 def _plan_there(path: Path) -> str:
-    """The text of the plan that is there now; empty where nothing is. Raises Problem E300 for anything else."""
+    """The text of the existing plan; empty where there is no file. Raises Problem E300 for anything else."""
     text = ""
     try:
         if not path.is_dir():

@@ -12,7 +12,8 @@ from met.plan.codec import Damaged
 
 
 def check(structure: Structure, where: str) -> None:
-    """Guides and servos name each other, ticks are at instants, courses are those of components. Raises Damaged."""
+    """Check that guides and servos name each other, ticks are at instants, and courses are those of components. Raises
+    Damaged."""
     for index, use in enumerate(structure.guides):
         path = f"{where}.guides[{index}]"
         guide = models.find("guide", use.model, use.place)
@@ -52,7 +53,8 @@ def check(structure: Structure, where: str) -> None:
 
 
 def check_paths(experiment: Experiment, where: str) -> None:
-    """Raise Damaged unless the joints of each guide carry its link, and are as many as the guided components."""
+    """Raise Damaged unless the joints of each guide carry its link, and are at least as many as the guided
+    components."""
     structure = experiment.structure
     for use in structure.guides:
         found = guided_components(experiment, use)
@@ -71,7 +73,7 @@ def check_paths(experiment: Experiment, where: str) -> None:
 
 
 def guided_components(experiment: Experiment, use: GuideUse) -> tuple[str, tuple[str, ...]] | None:
-    """The link and the components that a guide with a path guides; None of another, and where words are missing."""
+    """The link and the components of a guide with a path; None for a guide without one, and where words are missing."""
     guide = models.find("guide", use.model, use.place)
     words: dict[str, Any] = {}
     for parameter in guide.parameters:

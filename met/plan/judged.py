@@ -1,4 +1,4 @@
-"""What a plan computes of a run's channels, and the conditions that judge its cases."""
+"""Numbers that a plan computes from a run's channels, and the conditions that judge its cases."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from met.trace.graph import Formulas
 
 @frozen
 class SignalExpression:
-    """A number that a run computes of its channels at their samples; it is a channel of its own.
+    """A number that a run computes from its channels at their samples, which is a channel too.
 
     name     path of that channel: `signals.NAME`, or the expression as the deck wrote it
     unit     of its value, SI; of a condition that of its margin, by which it holds (at least 0) or does not
@@ -27,7 +27,7 @@ class SignalExpression:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Paths of the channels that it is computed of."""
+        """Paths of the channels that it is computed from."""
         return tuple(name.removeprefix(CHANNEL_INPUT) for name in self.formula.inputs if name.startswith(CHANNEL_INPUT))
 
 
@@ -37,7 +37,7 @@ CHANNEL_INPUT = "channel:"
 
 @frozen
 class MetricUse:
-    """A metric under a name of the deck's, watching one channel (`Channel.path`), or one of linear answers."""
+    """A metric under a name of the deck's, of one channel (`Channel.path`) or of one linear answer."""
 
     name: str
     model: str
@@ -66,8 +66,8 @@ class Requirement:
 
 @frozen
 class StepErrorLimit:
-    """A condition on a metric's error by the step, in each case that is run with shorter steps; `text` as the deck
-    wrote it. limit: SI, or where it is a `share`, of the size of the metric's value."""
+    """A condition on the error of a metric due to the step, for each case that is also run with shorter steps; `text`
+    as the deck wrote it. limit: SI, or where it is a `share`, relative to the metric's value."""
 
     text: str
     metric: str
@@ -79,7 +79,7 @@ class StepErrorLimit:
 
 @frozen
 class Tolerance:
-    """By how much another version may differ before a diff calls it different; `text` as the deck wrote it.
+    """The difference up to which a diff calls two versions equal; `text` as the deck wrote it.
 
     of     a signal, `q`; a joint's part of one, `elbow.q`; a metric; `rel`: of all, a share; `time`: of all, s
     value  in SI

@@ -1,13 +1,13 @@
-"""Names that cases and structures keep: what may be compared with what, and what names a case.
+"""Keys of structures and cases: they identify programs and cases, and say which results are comparable.
 
     structure_key   the program: topology, models, schedule, and which parameters are inputs. Bits are comparable
                     only between runs whose structure keys are equal
     case_key        the coordinates of a case: path, SI value, repeat. Matches cases between archives; orders nothing
     case_id         all resolved parameters of a case, and its case_key. Names a case; replay checks it
 
-All are hexadecimal digests of 16 characters (64 bits: among a million cases two share a name with odds of 3e-8, among
-a hundred million of 3e-4), made from the shortest exact spelling of every number, so they are the same in every process
-and on every platform. Where a deck was written, what it calls its definitions and what a link looks like change no key.
+All are hexadecimal digests of 16 characters (64 bits: among a million cases two share a name with odds of 3e-8, among a
+hundred million of 3e-4), made from the shortest exact spelling of every number, so they are the same in every process
+and on every platform. A deck's place, its names of definitions and the looks of links change no key.
 """
 
 from __future__ import annotations
@@ -30,21 +30,22 @@ from met.plan.swept import blocks
 DIGEST_BYTES = 8
 
 MARSHAL = 2
-"""Version of Python's marshal that writes equal values alike: later ones go by which objects are the same."""
+"""Version of Python's marshal that writes equal values alike: later ones depend on the identity of objects."""
 
 
 def in_key(field: dataclasses.Field[Any]) -> str:
-    """When a field of a structure is in its key: "always", "where set" or "never" (`met.frozen.keyed`)."""
+    """The part of a structure's field in its key: "always", "where set" or "never" (`met.frozen.keyed`)."""
     return str(field.metadata.get(IN_KEY, "always"))
 
 
 def structure_key(structure: Structure, inputs: Iterable[str] = ()) -> str:
-    """Key of the program that a structure makes. inputs: what each case brings instead of being folded in."""
+    """The key of the program that a structure makes. inputs: the numbers that each case provides instead of being
+    folded in."""
     return _digest(["structure", _described(structure), list(inputs)])
 
 
 def inputs(experiment: Experiment) -> tuple[str, ...]:
-    """Numbers that each case brings: coordinates, and the parameters that follow from them by formulas."""
+    """Numbers that each case provides: coordinates, and the parameters that follow from them by formulas."""
     coordinates = [coordinate.path for coordinate in experiment.cases.coordinates]
     followers = sorted(path for path, q in experiment.parameters.items() if isinstance(q.value, Formula))
     return (*coordinates, *followers, *experiment.cases.noise)
@@ -59,7 +60,7 @@ def case_keys(experiment: Experiment, rows: Sequence[int] | np.ndarray | None = 
 
 def case_names(experiment: Experiment, rows: np.ndarray, head: bytes | None = None) -> tuple[np.ndarray, np.ndarray]:
     """case_key and case_id of some rows of the case table, as arrays of bytes, `|S16`. head: `id_head` of the
-    experiment, where known."""
+    experiment, if known."""
     own = _case_key_digests(experiment, rows)
     return own, _case_id_digests(experiment, own, head)
 
@@ -83,7 +84,7 @@ def _row_table(experiment: Experiment, rows: np.ndarray) -> tuple[bytes, np.ndar
     if cases.repeats is not None:
         table[:, -1] = cases.repeats[rows]
     table += 0.0  # -0 and 0 are one value
-    table[np.isnan(table)] = np.nan  # and so are all that are not numbers
+    table[np.isnan(table)] = np.nan  # and so are all NaNs
     chosen = [[[choice.path, choice.value] for choice in sorted(cases.choices, key=lambda choice: choice.path)]]
     head = _bytes(["case_key", [coordinate.path for coordinate in coordinates], *(chosen if chosen[0] else [])])
     return head, table
@@ -97,13 +98,13 @@ def case_ids(experiment: Experiment, rows: Sequence[int] | np.ndarray | None = N
 
 
 def _case_id_digests(experiment: Experiment, names: np.ndarray, head: bytes | None = None) -> np.ndarray:
-    """case_id of the cases with these case_keys. head: `id_head` of the experiment, where known."""
+    """case_id of the cases with these case_keys. head: `id_head` of the experiment, if known."""
     head = id_head(experiment) if head is None else head
     return _row_digests(head, names.view(np.uint8).reshape(len(names), 2 * DIGEST_BYTES))
 
 
 def id_head(experiment: Experiment) -> bytes:
-    """The part of case_ids that all cases share: parameters, formulas and seed, whatever values the cases have."""
+    """The part of case_ids that all cases share: parameters, formulas and seed, without the cases' values."""
     parameters = {path: _value(quantity.value) for path, quantity in experiment.parameters.items()}
     formulas = experiment.formulas
     own = [experiment.cases.seeds] if experiment.cases.seeds != "common" else []
@@ -114,7 +115,7 @@ def id_head(experiment: Experiment) -> bytes:
 
 def content_digest(question: str, experiment: Experiment, rows: Sequence[int] = ()) -> bytes:
     """Digest of a question about an experiment, with all that decides its numbers: structure, inputs, parameters, and
-    the coordinates of some rows of the case table. Of 32 bytes, for what must not be taken for another's.
+    the coordinates of some rows of the case table. It has 32 bytes, so that collisions can be neglected.
 
     It is the same in every process of one version of Python, and never written down: numbers go in as they are.
     """
@@ -134,7 +135,7 @@ def content_digest(question: str, experiment: Experiment, rows: Sequence[int] = 
 
 
 def id_numbers(experiment: Experiment) -> np.ndarray:
-    """case_id of every case as a whole number, in the order of the table: as many bits in a tenth of the memory."""
+    """case_id of every case as a whole number, in the order of the table: the same bits in a tenth of the memory."""
     found = np.empty(experiment.cases.count, ">u8")
     for piece in blocks(experiment.cases.count):
         ids = _case_id_digests(experiment, _case_key_digests(experiment, _rows(piece)))
@@ -157,7 +158,7 @@ def _rows(piece: slice) -> np.ndarray:
 
 
 def _row_digests(head: bytes, rows: np.ndarray) -> np.ndarray:
-    """One digest a row of bytes, each begun with the same head, as bytes of text; half a microsecond a row."""
+    """One digest for each row of bytes, each begun with the same head, as bytes of text; half a microsecond a row."""
     if not len(rows):
         return np.zeros(0, f"S{2 * DIGEST_BYTES}")
     begun = hashlib.blake2b(hashlib.sha256(head).digest(), digest_size=DIGEST_BYTES).copy
@@ -174,7 +175,7 @@ def _value(value: Any) -> Any:
 
 
 def _described(value: Any) -> Any:
-    """Plain data of a structure, without what changes no number."""
+    """Plain data of a structure, without fields that change no number."""
     kind: Any = type(value)
     if kind is str or kind is int:
         return value
@@ -190,8 +191,8 @@ def _described(value: Any) -> Any:
 
 @lru_cache(maxsize=256)
 def _fields_in_key(kind: type) -> tuple[tuple[str, bool, Any], ...] | None:
-    """The fields of a dataclass that may be in a key: name, whether always, and the default with which it is not; None
-    of what is no dataclass."""
+    """The fields of a dataclass that may be in a key: name, whether always, and the default with which it is left out;
+    None for other types."""
     if not dataclasses.is_dataclass(kind):
         return None
     fields = ((field, in_key(field)) for field in dataclasses.fields(kind))

@@ -1,4 +1,4 @@
-"""Limits that the models of a structure come to, each by the path of the parameter that sets it.
+"""Limits that the models of a structure may reach, each by the path of the parameter that sets it.
 
     shoulder.servo.tau_max          of a servo: a memory or signal whose declaration names the parameter as its limit
     environment.end.upper           of an environment model, by its declaration (`Environment.limits`)
@@ -6,7 +6,7 @@
 
     shoulder.q_max                  of a joint, by the deck: it is watched, and keeps the joint from nothing
 
-A limit that is infinite in every case is none, and neither are the ends of a table of one row.
+A limit that is infinite in every case is not listed, and neither are the ends of a table of one row.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ def limits(structure: Structure, parameters: Mapping[str, Quantity]) -> tuple[Li
 
 
 def extremes(experiment: Experiment) -> dict[str, tuple[LimitUse, ...]]:
-    """The required metrics that say an extreme, by name, each with the limits of machines that may have cut it: those
-    of its channel's joint; all, where the channel is of no joint."""
+    """The required metrics that state an extreme, by name, each with the machines' limits that may have cut it: those
+    of its channel's joint, or all where the channel belongs to no joint."""
     required = {each.metric for each in experiment.requirements}
     known, found = channels(experiment.structure), limits(experiment.structure, experiment.parameters)
     out = {}

@@ -1,4 +1,4 @@
-"""Signals of which linear answers are made, by the structure alone: what may be an input, and where a loop opens."""
+"""Signals for linear answers, from the structure alone: possible inputs, and places where a loop opens."""
 
 from __future__ import annotations
 

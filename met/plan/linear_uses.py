@@ -1,10 +1,10 @@
-"""Linear answers that a run asks for by name, and the figures of them that are metrics.
+"""Linear answers that a run asks for by name, and their figures that are metrics.
 
     linear hand_loop { at = 2 s; open = pan.servo.voltage; }
     require phase_margin(hand_loop) > 30 deg;
 
-They are computed of each case after it has run (`met.analysis.linear.metrics`). They are in no program, so they move no
-bit of a run and are in no key of a structure.
+They are computed for each case after it has run (`met.analysis.linear.metrics`). They are part of no program, so they
+change no bit of a run and no structure key.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class LinearUse:
 
     @property
     def where(self) -> str:
-        """Where the answers are, in words: `at 2 s`, `at equilibrium`."""
+        """The place of the answers in words: `at 2 s`, `at equilibrium`."""
         return f"at {self.at:.9g} s" if self.pose is None else "at equilibrium"
 
 
@@ -87,8 +87,8 @@ FIGURES: Mapping[str, LinearFigure] = {
 """Figures of linear answers, by name."""
 
 WHY_ANSWER = "linear:"
-"""Before the name of a `LinearUse`: the output that says why a case has no answer, a key of `WHY_NONE`; 0 where it
-has one."""
+"""Prefix of a `LinearUse`'s name: the output that says why a case has no answer, a key of `WHY_NONE`; 0 where it has
+one."""
 
 ANSWERED, NOT_ASKED, EVENT, OPEN, SEVERAL_TICKS, NO_EQUILIBRIUM, AT_LIMIT, NOTHING_DECAYS = range(8)
 
@@ -101,4 +101,4 @@ WHY_NONE: Mapping[int, str] = {
     NOTHING_DECAYS: "nothing decays or grows there: all of it stays, or is held",
     NO_EQUILIBRIUM: "its servos cannot hold it there, or something moves that no servo holds",
 }
-"""Reasons for which a case has no answer, in words."""
+"""Reasons why a case has no answer, in words."""

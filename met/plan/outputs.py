@@ -11,7 +11,7 @@ from met.plan.judged import MetricUse
 from met.plan.linear_uses import FIGURES
 
 OF_ALL = {"rel": "1", "time": "s"}
-"""Tolerances of everything, with units: a share of the value; how much earlier or later."""
+"""Tolerances that apply to everything, with units: a share of the value; how much earlier or later."""
 
 GRAPPLE_FIGURES: Mapping[str, tuple[str, str]] = {
     "distance": ("m", "how far it was from its place as it was grappled"),
@@ -20,7 +20,7 @@ GRAPPLE_FIGURES: Mapping[str, tuple[str, str]] = {
     "rate": ("rad/s", "how fast it turned against the link then"),
     "energy": ("J", "kinetic energy that its grapple cost"),
 }
-"""Figures that are kept of each grapple (`met.program.grappled`): units, and what they are in words."""
+"""Figures that are recorded of each grapple (`met.program.grappled`): units, and their meanings in words."""
 
 
 def grappled_payloads(structure: Structure) -> tuple[str, ...]:
@@ -29,8 +29,8 @@ def grappled_payloads(structure: Structure) -> tuple[str, ...]:
 
 
 def metric_units(structure: Structure, linear: Sequence[MetricUse] = ()) -> dict[str, str]:
-    """SI unit of each metric's result; `of` in its declaration stands for the channel's unit. linear: those
-    of linear answers."""
+    """The SI unit of each metric's result; `of` in its declaration stands for the channel's unit. linear: metrics of
+    linear answers."""
     watched = channels_beside(structure, [use.of for use in structure.metrics])
     own = {use.name: _metric_unit(use, watched[use.of].unit) for use in structure.metrics}
     return own | {use.name: FIGURES[use.model].unit for use in linear}
@@ -46,8 +46,8 @@ def joint_parts(name: str, joints: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def tolerable(structure: Structure, linear: Sequence[MetricUse] = ()) -> dict[str, tuple[str, ...]]:
-    """Names that a tolerance may have, with the unit, or units where a signal's joints have several: signals, a joint's
-    part of one, metrics (`metrics.<name>` where a signal has the name too), `rel` and `time`."""
+    """The names that a tolerance may have, with the unit, or units where a signal's joints have several: signals, a
+    joint's part of one, metrics (`metrics.<name>` where a signal has the name too), `rel` and `time`."""
     out = {name: units for recorded in structure.record for name, units in _signal(recorded)}
     for name, unit in metric_units(structure, linear).items():
         out[f"metrics.{name}" if name in out else name] = (unit,)

@@ -1,11 +1,11 @@
-"""Computed columns of a case table as plain JSON data: what they are computed from, with arrays kept elsewhere.
+"""Recipes of computed columns of a case table, as plain JSON data, with arrays kept elsewhere.
 
     {"axis": 0, "of": {"sizes": [1000, 10000, 1], "chosen": [...], "kept": ...}, "values": ...}     a coordinate
     {"seed": 0, "path": "gearbox.kp", "sample": 1, "count": ..., "distribution": "uniform", ...}    its draws
     {"first": 0, "count": ...}                                                                      whole numbers
     {"positions": {...}, "among": ...}, {"shifted": {...}, "by": ...}                               positions of groups
 
-What comes from a file is checked here, so that a column that was read gives a number for each of its rows.
+Data from a file is checked here, so that a column that was read gives a number for each of its rows.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from met.plan.columns import MOST_SWEPT, CaseValues, ComputedColumn
 from met.plan.swept import RowBits, SweptRows
 
 Keep = Callable[[np.ndarray], Any]
-"""Keeps an array elsewhere, and says where, in JSON data."""
+"""A function that stores an array elsewhere, and returns its place as JSON data."""
 
 Find = Callable[[Any], np.ndarray]
-"""Gives an array back from where it is kept. Raises ValueError and its like where it is not there."""
+"""A function that returns an array from its place. Raises ValueError and the like where it is not there."""
 
 
 class ArrayKeeper:
-    """Keeps each array once, by a function of its number and itself that says where it is."""
+    """Storage that keeps each array once, by a function of its number and the array that returns its place."""
 
     def __init__(self, put: Callable[[int, np.ndarray], Any]) -> None:
         self._put, self._kept = put, list[tuple[np.ndarray, Any]]()
@@ -45,11 +45,11 @@ class ArrayKeeper:
 
 MOST_AXES = 10_000
 MOST_ROWS = 10 * MOST_SWEPT
-"""Rows of a product that is read, at most, of which a sweep keeps fewer; a column has as many as a sweep."""
+"""Largest number of rows of a product that is read, of which a sweep keeps fewer; a column has as many as a sweep."""
 
 
 def encoded(column: CaseValues, keep: Keep) -> Any:
-    """A column as JSON data. An array is kept elsewhere, but for a short one."""
+    """A column as JSON data. An array is stored elsewhere, unless it is short."""
     match column:
         case np.ndarray():
             return column.tolist() if len(column) <= columns.LISTED_ROWS and np.isfinite(column).all() else keep(column)
@@ -81,7 +81,7 @@ def _rows(rows: SweptRows, keep: Keep) -> dict[str, Any]:
 
 
 class RecipeReader:
-    """Reads columns back; those of one table share their rows, and arrays are found once.
+    """Reader of recipes; columns of one table share their rows, and arrays are found once.
 
     find  gives what `Keep` kept
     """
@@ -90,7 +90,7 @@ class RecipeReader:
         self._find, self._rows_read = find, dict[str, SweptRows]()
 
     def column(self, data: Mapping[str, Any]) -> CaseValues:
-        """The column behind JSON data. Raises ValueError, LookupError or TypeError where that is none."""
+        """The column of a recipe. Raises ValueError, LookupError or TypeError for invalid data."""
         if "file" in data:
             return self._values(data)
         if "axis" in data:

@@ -1,4 +1,4 @@
-"""Checks of parameters against each other, as declarations ask; the compiler makes the same ones for decks."""
+"""Checks of parameters against each other, as declarations require; the compiler makes the same ones for decks."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from met.plan import Experiment, Formula, Structure
 from met.plan.codec import Damaged
 
 Holds = Callable[[np.ndarray], np.ndarray]
-"""Values [case, k] -> which are good [case]."""
+"""A test of values [case, k] that returns a truth for each case, [case]."""
 
 
 def check_uses(experiment: Experiment, uses: Iterable[tuple[str, tuple[Parameter, ...]]], where: str) -> None:
-    """Raises Damaged where words name nothing of the arm, where lists do not match, or what decides varies.
+    """Raise Damaged where words name no part of the arm, where lists do not match, or where a parameter that decides
+    the program varies.
 
     uses  what paths begin with, and the declarations
     """
@@ -40,7 +41,7 @@ def check_uses(experiment: Experiment, uses: Iterable[tuple[str, tuple[Parameter
 
 
 def named(structure: Structure, parameter: Parameter) -> tuple[str, ...]:
-    """The words that a parameter which names something of the arm may be."""
+    """The words that are allowed for a parameter which names a part of the arm."""
     bodies = (*(link.name for link in structure.links), *(payload.name for payload in structure.payloads))
     of_arm = bodies if parameter.names == "link" else tuple(joint.name for joint in structure.moving)
     return (*of_arm, *parameter.words)
@@ -49,7 +50,7 @@ def named(structure: Structure, parameter: Parameter) -> tuple[str, ...]:
 def tests(
     experiment: Experiment, uses: Iterable[tuple[str, tuple[Parameter, ...]]]
 ) -> Iterator[tuple[str, list[str], Holds, str]]:
-    """Conditions on numbers in every case: path, the numbers' paths, the test, and what to say where it fails."""
+    """Conditions on numbers in every case: path, the numbers' paths, the test, and the message where it fails."""
     for prefix, parameters in uses:
         for parameter in parameters:
             path = f"{prefix}.{parameter.name}"

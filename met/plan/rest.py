@@ -11,12 +11,12 @@ from met import models
 from met.plan import Experiment, ServoUse
 
 Test = tuple[str, list[str], Callable[[np.ndarray], np.ndarray], str]
-"""Path that is at fault, paths of the numbers to test, whether they hold (values [case, path] -> [case]), and how to
-say it where they do not."""
+"""Path at fault, paths of the numbers to test, the test (values [case, path] -> [case]), and the message where it
+fails."""
 
 
 def tests(experiment: Experiment) -> list[Test]:
-    """One test a joint that its servo may want at rest."""
+    """One test for each joint that its servo may require at rest."""
     return [
         _test(experiment, use)
         for use in experiment.structure.servos

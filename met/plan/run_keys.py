@@ -1,8 +1,8 @@
 """Keys of a run that a plan keeps as one word or number each, declared once: at the field that keeps them.
 
-From the declaration follow how a deck may write the key (its type, unit, bounds and default), what `met explain` and
-`met plan` say of it, and what an older plan means that lacks it. The deck language refers to it, and adds how it is
-written and whether a sweep may choose it (`ic.language.runs`).
+The declaration determines the key in decks (its type, unit, bounds and default), the output of `met explain` and `met
+plan`, and the meaning of an older plan that lacks it. The deck language refers to it, and adds its syntax and whether a
+sweep may choose it (`ic.language.runs`).
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ class RunKey:
     listed: bool = True
 
     def in_plan(self, written: str | float) -> Any:
-        """The plan's value for what the deck says, in SI."""
+        """The plan's value for the deck's value, in SI."""
         if self.true:
             return written == self.true
         return int(written) if self.parameter.whole else written
 
     def in_deck(self, kept: Any) -> str | float:
-        """Return the value that a deck writes, in SI, for the plan's value."""
+        """Return the deck's value, in SI, for the plan's value."""
         if self.true:
             return next(word for word in self.parameter.words if (word == self.true) is kept)
         return kept if isinstance(kept, str) else float(kept)
 
 
 def run_key(key: RunKey) -> Any:
-    """A field of a plan's dataclass that keeps this key. A plan without it means the default, and keys of structures
-    are then what they were."""
+    """A field of a plan's dataclass that keeps this key. In a plan without it the default holds, and the keys of
+    structures do not change."""
     default = key.parameter.default
-    assert isinstance(default, str | float | int)  # else nothing could be said of plans that lack it
+    assert isinstance(default, str | float | int)  # older plans without the key need a default
     return keyed("where set", default=key.in_plan(default), run_key=key)
 
 

@@ -1,7 +1,7 @@
-"""A search or a tuning as a plan holds it: which parameters it may choose, between which ends, and for which goal.
+"""A search or a tuning in a plan: the parameters that it may choose, their bounds, and its goal.
 
-Which cases it consists of is not known before it has run: each generation follows from what the ones before gave
-(met/searches). Before that its case table is its first generation.
+Its cases are not known before it has run: each generation follows from the results of the ones before (met/searches).
+Until then its case table is its first generation.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from met.plan.drawing import drawn_values
 from met.unit_parser import parse_unit
 
 MOST_SEARCHED = 1_000_000
-"""Cases of a search at most."""
+"""Largest number of cases of a search."""
 
 MOST_PLANTS = 10_000
-"""Cases of a sweep at most that a tuning is held against."""
+"""Largest number of cases of a sweep against which a tuning is judged."""
 
 SHORTEST = 10
-"""A tuning has room for so many candidates at least."""
+"""Smallest number of candidates of a tuning."""
 
 
 @frozen
 class SearchedParameter:
-    """A parameter that is chosen, by its path: its ends in SI, and the unit in which values are rounded, "" for 1.
+    """A chosen parameter, by its path: its bounds in SI, and the unit in which values are rounded, "" for 1.
 
     logarithmic  whether equal ratios are equal steps, rather than equal differences
     """
@@ -47,7 +47,7 @@ class SearchedParameter:
 
 @frozen
 class Search:
-    """A search or a tuning: its goal, and the bounds of what it chooses.
+    """A search or a tuning: its goal, and the bounds of the chosen parameters.
 
     kind         "search": the case that hurts most; "tune": the parameters that serve best;  of: the run's name
     metric       the goal, and `largest`: whether it is to be that
@@ -83,7 +83,7 @@ class Search:
 
     @property
     def complete(self) -> bool:
-        """True where the case table holds all of its cases, and not its first generation alone."""
+        """True where the case table holds all of its cases, and not only its first generation."""
         return bool(self.generations)
 
     @property
@@ -92,7 +92,7 @@ class Search:
         return f"{'maximise' if self.largest else 'minimise'} {self.metric}"
 
     def values(self, points: np.ndarray) -> np.ndarray:
-        """Values of the parameters that are chosen, [candidate, parameter], SI, at these points of the unit cube."""
+        """Values of the chosen parameters, [candidate, parameter], SI, at these points of the unit cube."""
         columns = [each.values(points[:, number]) for number, each in enumerate(self.parameters)]
         return np.stack(columns, axis=1) if len(points) else np.empty((0, len(self.parameters)))
 

@@ -17,14 +17,14 @@ from met.plan.uses import quantities
 from met.trace.nodes import TRUTHS
 
 NAME = re.compile(r"[^\W\d]\w*")
-"""A name in a deck: it is part of paths, of messages, of files' names."""
+"""A name in a deck: part of paths, messages and file names."""
 
 MOST_TICKS = 10**12
-"""The most ticks of a run: thirty years at a kilohertz. A divisor may not be larger either."""
+"""Largest number of ticks of a run: thirty years at a kilohertz. It bounds divisors too."""
 
 
 def check(structure: Structure, where: str) -> None:
-    """All of a structure."""
+    """Check all parts of a structure."""
     _check_arm(structure, where)
     _check_base(structure, where)
     _check_payloads(structure, f"{where}.payloads")
@@ -47,7 +47,7 @@ def check_whole(number: int | None, low: int, high: int, where: str) -> None:
 
 
 def _check_arm(structure: Structure, where: str) -> None:
-    """Links and joints are a tree that stands on the base."""
+    """Check that links and joints form a tree that stands on the base."""
     links: list[str] = []
     for index, link in enumerate(structure.links):
         check_name(link.name, f"{where}.links[{index}].name", links)
@@ -82,7 +82,8 @@ def _check_arm(structure: Structure, where: str) -> None:
 
 
 def _check_base(structure: Structure, where: str) -> None:
-    """A base that moves is a link; its courses are those of components, and its turns keep the velocity products."""
+    """Check that a moving base is a link, that its courses are those of components, and that a turning one keeps the
+    velocity products."""
     base, links = structure.base, [link.name for link in structure.links]
     if base is None:
         return
@@ -102,7 +103,8 @@ def _check_base(structure: Structure, where: str) -> None:
 
 
 def _check_payloads(structure: Structure, where: str) -> None:
-    """Payloads have names of their own, and links that carry them; their flight keeps the velocity products."""
+    """Check that payloads have names of their own and links that carry them; their flight keeps the velocity
+    products."""
     names = [BASE, WORLD, *(link.name for link in structure.links)]
     links = (BASE, *(link.name for link in structure.links))
     for index, payload in enumerate(structure.payloads):
@@ -128,7 +130,8 @@ def _check_schedule(structure: Structure, where: str) -> None:
 
 
 def _check_uses(structure: Structure, where: str) -> None:
-    """Servos on moving joints, one each; commands that they take; metrics of channels that are there."""
+    """Check that servos are on moving joints, one each, with commands that they take, and that metrics are of existing
+    channels."""
     kinds = {joint.name: joint.kind for joint in structure.joints}
     driven: set[str] = set()
     for index, use in enumerate(structure.servos):
@@ -174,7 +177,7 @@ def _check_uses(structure: Structure, where: str) -> None:
 
 
 def _check_expressions(structure: Structure, where: str) -> None:
-    """Expressions are each computed of channels that are there, and have names of their own and one output."""
+    """Check that expressions are computed from existing channels, and have names of their own and one output."""
     known = channels(replace(structure, expressions=())) if structure.expressions else {}
     names: list[str] = []
     for index, each in enumerate(structure.expressions):
@@ -192,7 +195,7 @@ def _check_expressions(structure: Structure, where: str) -> None:
 
 
 def _check_sensors(use: ServoUse, path: str) -> None:
-    """Sensors of quantities that there are, once each, which the law can see."""
+    """Check that sensors are of existing quantities that the law can see, one each."""
     if use.sensors and models.find("servo", use.model, use.place).control is None:
         raise Damaged(f"{path}.sensors", f"a {use.model} has no law that would see them")
     seen: set[str] = set()
@@ -208,7 +211,8 @@ def _check_sensors(use: ServoUse, path: str) -> None:
 
 
 def _check_link_sensors(structure: Structure, where: str) -> None:
-    """Sensors of links have names of their own, models that measure something of a link, and tick at instants."""
+    """Check that sensors of links have names of their own, models that measure a quantity of a link, and ticks at
+    instants."""
     names: list[str] = []
     for index, use in enumerate(structure.sensors):
         path = f"{where}[{index}]"
@@ -227,7 +231,7 @@ def _check_link_sensors(structure: Structure, where: str) -> None:
 
 
 def _moves(kinds: Mapping[str, str], joint: str, path: str) -> None:
-    """The joint that something is on is there, and no fixed one."""
+    """Check that a joint exists and moves."""
     if joint not in kinds:
         raise Damaged(f"{path}.joint", f"there is no joint `{joint}`")
     if kinds[joint] == "fixed":
@@ -235,7 +239,7 @@ def _moves(kinds: Mapping[str, str], joint: str, path: str) -> None:
 
 
 def _check_substitutions(structure: Structure, where: str) -> None:
-    """Motors on beds are there, once each; one law for all, and servos that tick together."""
+    """Check that joints on beds exist, once each, and have one law and servos that tick together."""
     kinds = {joint.name: joint.kind for joint in structure.joints}
     servos = {use.joint: use for use in structure.servos}
     on_beds: set[str] = set()

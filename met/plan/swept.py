@@ -1,7 +1,8 @@
-"""Rows of a sweep's product that are cases, told by a few numbers instead of listed: which values each row has.
+"""Rows of a sweep's product that are cases, given by a few numbers instead of a list, and the values of each row.
 
 The cases of a sweep are the product of its axes, the last of which varies fastest, as digits of a number do. So the
-values of a row follow by dividing its number. What `exclude when` drops is kept as a bit a row of the product.
+values of a row follow by dividing its number. Rows that `exclude when` drops are kept as one bit for each row of the
+product.
 """
 
 from __future__ import annotations
@@ -16,17 +17,17 @@ import numpy as np
 from met.frozen import frozen
 
 BLOCK = 1 << 16
-"""Rows that are looked at together: so much of a table is in memory, however long it is."""
+"""Number of rows that are processed together, which bounds memory however long a table is."""
 
 
 def blocks(count: int, size: int | None = None) -> Iterator[slice]:
-    """Stretches of so many rows, one after the other; None: `BLOCK`."""
+    """Consecutive ranges of `size` rows; None: `BLOCK`."""
     size = size or BLOCK
     return (slice(first, min(first + size, count)) for first in range(0, count, size))
 
 
 class RowBits:
-    """A bit a row, set where the row counts. packed: eight to a byte, the first row in the highest bit."""
+    """One bit for each row, set where the row counts. packed: eight to a byte, the first row in the highest bit."""
 
     def __init__(self, packed: np.ndarray, count: int) -> None:
         self.packed, self.count = packed, count
@@ -36,12 +37,12 @@ class RowBits:
         return RowBits(np.packbits(flags), len(flags))
 
     def __getitem__(self, rows: slice) -> np.ndarray:
-        """Whether each of these rows counts, as truths; they begin at a multiple of 8."""
+        """A truth for each of these rows that says whether it counts; they begin at a multiple of 8."""
         return np.unpackbits(self.packed[rows.start // 8 : -(-rows.stop // 8)], count=rows.stop - rows.start).view(bool)
 
     @cached_property
     def _before(self) -> np.ndarray:
-        """The number of rows that count before each block, then of all."""
+        """The number of rows that count before each block, and then the total."""
         counts = [int(np.count_nonzero(self[rows])) for rows in blocks(self.count)]
         return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
 
@@ -51,7 +52,7 @@ class RowBits:
         return int(self._before[-1])
 
     def select(self, places: np.ndarray) -> np.ndarray:
-        """The rows that count at these places among those that do."""
+        """The rows at these places among the counting ones."""
         block = np.searchsorted(self._before, places, side="right") - 1
         found = np.empty(len(places), np.int64)
         for number, here in _alike(block):
@@ -61,7 +62,7 @@ class RowBits:
         return found
 
     def rank(self, rows: np.ndarray) -> np.ndarray:
-        """The number of rows that count before each of these."""
+        """The number of counting rows before each of these."""
         found = np.empty(len(rows), np.int64)
         for number, here in _alike(rows // BLOCK):
             first = number * BLOCK
@@ -72,7 +73,7 @@ class RowBits:
 
 
 def _alike(numbers: np.ndarray) -> Iterator[tuple[int, np.ndarray | slice]]:
-    """Each different number, with the places that have it."""
+    """Each distinct number, with the places that have it."""
     if len(numbers) and (np.diff(numbers) >= 0).all():
         edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist(), len(numbers)]
         for first, last in itertools.pairwise(edges):
@@ -84,7 +85,7 @@ def _alike(numbers: np.ndarray) -> Iterator[tuple[int, np.ndarray | slice]]:
 
 @frozen
 class SweptRows:
-    """Rows of the product of a sweep's axes, rising: the cases of one of its structures.
+    """Rows of the product of a sweep's axes, ascending: the cases of one of its structures.
 
     sizes   the number of values of each axis, the outermost first
     chosen  of each axis, the values that these cases have by their places, rising; None: all
@@ -111,16 +112,16 @@ class SweptRows:
         return self.product if self.kept is None else self.kept.set
 
     def only(self, kept: RowBits) -> SweptRows:
-        """Those of these rows, of which none is left out yet, that are kept."""
+        """These rows, of which none is left out yet, restricted to the kept ones."""
         return SweptRows(self.sizes, self.chosen, kept)
 
     def index(self, axis: int, rows: np.ndarray) -> np.ndarray:
-        """Which value of an axis each of these rows has, by its place."""
+        """The value of an axis in each of these rows, by its place."""
         inner = rows if self.kept is None else self.kept.select(rows)
         return self._index(axis, inner)
 
     def first_with(self, axis: int, place: int) -> int:
-        """The first row of the product with the value of an axis at this place among those that these cases have."""
+        """The first row of the product with the axis' value at this place among those that these cases have."""
         return place * math.prod(self.lengths[axis + 1 :])
 
     def number(self, rows: np.ndarray) -> np.ndarray:
@@ -134,7 +135,7 @@ class SweptRows:
         return found
 
     def present(self, axis: int) -> np.ndarray:
-        """The places of the values of an axis that some of these rows have, rising."""
+        """The places of the axis' values that occur in these rows, ascending."""
         size, chosen = self.sizes[axis], self.chosen[axis]
         if self.kept is None:
             return np.arange(size) if chosen is None else chosen

@@ -1,4 +1,4 @@
-"""The models that an experiment uses, as it uses them: their parts under its words, and the packages they are from."""
+"""The models of an experiment as it uses them: the parts present under its words, and their packages."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def servo_parts(use: ServoUse) -> Parts:
 
 
 def packages(structures: Iterable[Structure]) -> tuple[str, ...]:
-    """The other packages whose models structures use, by name."""
+    """The other packages whose models these structures use, by name."""
     used: dict[models.Kind, set[str]] = {kind: set() for kind in models.GROUPS}
     for each in structures:
         used["servo"] |= {servo.model for servo in each.servos}
