@@ -1,4 +1,4 @@
-"""Plan -> program: what an experiment's models compute, phase by phase, and when."""
+"""Programs from plans: the computations of an experiment's models, phase by phase, and their order."""
 
 from met.program.build import build
 from met.program.system import System

@@ -1,7 +1,7 @@
-"""An integrator's `advance`, run up to the first question that has no answer yet, or to its end.
+"""Runs of an integrator's `advance` up to its first unanswered question, or to its end.
 
 A question is a call of `slope`. `advance` runs anew for each piece of the program, so it must ask the same questions
-every time. What it catches does not matter: once a question is open, nothing that it does is looked at.
+every time. Exceptions that it catches do not matter: once a question is open, everything that it does is ignored.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from met.trace import Graph, Real, Scalar
 
 @frozen
 class Question:
-    """An integrator asks for the slope at `there`, the share `share` of its step on."""
+    """The question of an integrator for the slope at `there`, at the share `share` of its step."""
 
     share: Real
     there: Motion
@@ -26,7 +26,7 @@ class Question:
 def advance_with(integrator: Integrator, settled: Sequence[Slope], h: Real, y: Motion, k1: Slope) -> Motion | Question:
     """The state at the end of a step of h s from y, or the first question beyond the answers `settled`.
 
-    Raises Problem E213 where `advance` raises anything, E214 where it gives back what is no state of the arm.
+    Raises Problem E213 where `advance` raises anything, E214 where its result is not a state of the arm.
     """
     questions: list[Question] = []
 
@@ -80,11 +80,11 @@ def question_count(integrator: Integrator, joints: int, states: int, h: float) -
 
 
 MOST = 100
-"""Slopes that an integrator asks for at most: one that asks for more each time would never end."""
+"""Largest number of slopes that an integrator may ask for: one that asks for more each time would never end."""
 
 
 def changed_count(integrator: Integrator) -> Problem:
-    """It asked for another number of slopes than before."""
+    """The error that an integrator asked for another number of slopes than before."""
     message = f"integrator `{integrator.name}`: `advance` asks for more slopes at one time than at another"
     return Problem(
         error(
@@ -110,4 +110,5 @@ def _wrong(y: object, like: Motion) -> str:
 
 
 class _Unanswered(Passing):
-    """A question has no answer yet. No Exception: a model that catches those is not to catch this."""
+    """Raised for a question without an answer. It is not an Exception, so that a model that catches those does not
+    catch it."""

@@ -1,4 +1,4 @@
-"""Servos that begin balanced: what keeps their joints from accelerating at the start is there (docs/physics.md)."""
+"""Servos that begin balanced: their states keep their joints from accelerating at the start (docs/physics.md)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from met.trace.program import Tape
 
 @frozen
 class Demand:
-    """The demand of the run's start on a servo that can be balanced.
+    """The demand of a balanced start on a servo.
 
     torque  that keeps its joint from accelerating, N m (N)
     seen    what its law sees there: a command that the joint be as it is, and the states that `starts` has
@@ -32,8 +32,8 @@ class Demand:
     starts: Mapping[str, Real]
 
     def states(self, torque: Real) -> Mapping[str, Real]:
-        """States and integrals, by name, with which the servo gives its joint this torque, N m (N), as far as it
-        can."""
+        """States and integrals, by name, with which the servo gives its joint this torque, N m (N), or as much of it as
+        it can."""
         servo, parts, owner = self.actuator.servo, self.actuator.parts, self.actuator.owner
         assert servo.balance is not None
         new = answer(owner, servo.balance, self.p, torque, self.seen)
@@ -41,7 +41,8 @@ class Demand:
 
 
 def balance(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[str, Real]]) -> list[Demand]:
-    """Writes states and integrals of the servos that can be balanced, for the arm at state y; returns what each meets.
+    """Write states and integrals of the servos that can be balanced, for the arm at state y; returns the demand on
+    each.
 
     begun  by joint, what its servo holds, and its states, as they begin where it is not balanced
     """
@@ -54,7 +55,7 @@ def balance(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[s
 
 
 def demands(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[str, Real]]) -> Iterator[Demand]:
-    """The demands of the start on each servo that can be balanced; y, begun: as of `balance`.
+    """The demands of the start on each servo that can be balanced; y, begun: as for `balance`.
 
     The torques are those with which none of their joints accelerates. Other joints move as their servos let them; one
     at rest stays where its dry friction holds it while all of them do, and moves where it does not.

@@ -1,4 +1,4 @@
-"""An experiment's program: which phase runs when (docs/physics.md, "An instant").
+"""The program of an experiment: its phases in the order in which they run (docs/physics.md, "An instant").
 
 At an instant t_k, in this order: the step that ends there is finished; payloads are grappled and released; sensors of
 links read; guides tick; servos tick (their commands first); friction modes are decided; derivatives are taken, which is
@@ -35,12 +35,12 @@ UNHELD = "unheld"
 """Output of a run that begins balanced: the first joint whose servo cannot hold it, by number from 1; 0: all do."""
 
 COORDINATE, METRIC = "coordinate:", "metric:"
-"""Prefixes of the outputs, and cells, that are named by a deck: no name of a deck's is one of the engine's."""
+"""Prefixes of outputs, and cells, that a deck names: so no name of a deck's clashes with one of the engine's."""
 
 
 def build(experiment: Experiment, *, wire: bool = False, late: int = 0) -> Program:
-    """The program of an experiment: inputs are its coordinates and what noise is a case's own, columns its recorded
-    channels.
+    """The program of an experiment: inputs are its coordinates and the seeds of a case's own noise, columns its
+    recorded channels.
 
     wire  for real beds: no bed is in the program. The filtered rate that each has read is an input of every tick,
           `wire:<joint>.rate` (rad/s); what its amplifiers are told are outputs, `wire:<joint>.voltage` (V) and
@@ -105,14 +105,14 @@ class Builder:
 
     @property
     def watched(self) -> tuple[str, ...]:
-        """Outputs that say what became of a run without being part of its state."""
+        """Outputs that describe a run without being part of its state."""
         found = (*self.limits.outputs, *self.step.grapple.watch.outputs)
         if self.step.beds.wire:
             return found
         return (*plausible.OUTPUTS, *([UNHELD] if self.system.structure.balanced else []), *found)
 
     def computers(self) -> list[Control]:
-        """The parts that tick by clocks of their own, in this order: sensors of links, guides, servos."""
+        """The parts with clocks of their own, in this order: sensors of links, guides, servos."""
         found: list[Control] = []
         for divisor in sorted({use.divisor for use in self.system.structure.sensors}):
             found.append(Every(divisor, (RunPhase(Phase(f"sensors_{divisor}", self._sensors(divisor))),)))
@@ -125,7 +125,7 @@ class Builder:
     # The run's two ends.
 
     def start(self, tape: Tape) -> None:
-        """Parameters that vary, then the state at t = 0, memory of sensors and metrics."""
+        """Write varied parameters, then the state at t = 0, and the memory of sensors and metrics."""
         begun = self.begin(tape)
         if self.system.structure.balanced:
             y = self.step.state(tape)
@@ -140,8 +140,8 @@ class Builder:
                 tape.write(f"{METRIC}{name}.{memory.name}", memory.start)
 
     def begin(self, tape: Tape) -> dict[str, dict[str, Real]]:
-        """Writes parameters that vary, then the state at t = 0 with servos unbalanced; returns what each of these
-        holds, and its states, by joint and name."""
+        """Write varied parameters, then the state at t = 0 with servos unbalanced; returns each servo's memory and
+        states, by joint and name."""
         experiment = self.system.experiment
         inputs = {coordinate.path: tape.input(coordinate.path) for coordinate in experiment.cases.coordinates}
         values = experiment.formulas.replay(inputs)
@@ -170,7 +170,7 @@ class Builder:
         return starts
 
     def _begin_sensors(self, tape: Tape, actuator: Actuator) -> None:
-        """Write the memory of the servo's sensors, and what was seen, where a run begins."""
+        """Write the memory of the servo's sensors, and the seen quantities, where a run begins."""
         natural = {state.name: tape.read(f"{actuator.path}.{state.name}") for state in actuator.parts.natural}
         states = NamedValues(actuator.owner, natural)
         p, state = self.system.servo_values(actuator, tape.read), self._state_of(tape, self.joints[actuator.index])
@@ -256,12 +256,12 @@ class Builder:
         time: Real,
         states: Mapping[str, Real] | None = None,
     ) -> Seen:
-        """The quantities of a servo's joint at a tick, not yet through its sensors."""
+        """The quantities of a servo's joint at a tick, before its sensors."""
         period = actuator.use.divisor / self.schedule.base_hz
         return Seen(q, qd, setpoint, period, time, NamedValues(actuator.owner, states or {}))
 
     def compute(self, tape: Tape, actuator: Actuator, seen: Seen) -> None:
-        """Run the servo's computer once on what it sees: new outputs, integrals a tick on."""
+        """Run the servo's computer once on its inputs: new outputs, and integrals one tick on."""
         parts, period = actuator.parts, seen.period
         held = NamedValues(
             actuator.owner, {part.name: tape.read(f"{actuator.path}.{part.name}") for part in parts.memory}
@@ -275,7 +275,7 @@ class Builder:
             tape.write(f"{actuator.path}.{name}", value)
 
     def _carried(self, tape: Tape, actuator: Actuator) -> tuple[Real, Real]:
-        """Joint position and rate between instants: carried forward with the acceleration of the step just done."""
+        """Joint position and rate between instants, extrapolated with the acceleration of the step just done."""
         joint = self.joints[actuator.index]
         q, qd = self._state_of(tape, joint)
         a, s = tape.read(cell_names.CARRY(joint)), self._since(tape)
@@ -284,7 +284,7 @@ class Builder:
         return q + s * qd + 0.5 * s * s * a, rate
 
     def _carried_state(self, tape: Tape, state: str) -> Real:
-        """A servo's state between instants, carried forward as it changed over the step just done."""
+        """A servo's state between instants, extrapolated by its change over the step just done."""
         x = tape.read(state)
         carried = x + self._since(tape) * tape.read(cell_names.CARRY(state))
         return where(both(self.step.has_dry_friction(tape, state), x * carried < 0.0), 0.0, carried)
@@ -298,7 +298,7 @@ class Builder:
     def _state_of(tape: Tape, joint: str) -> tuple[Real, Real]:
         return tape.read(f"{joint}.q"), tape.read(f"{joint}.qd")
 
-    # What is watched, metrics and the recorder.
+    # Watched channels, metrics and the recorder.
 
     def _watch(self, tape: Tape) -> None:
         joints, names = len(self.joints), self.step.coordinates
@@ -328,13 +328,13 @@ class Builder:
                         is_new[name] = new[metric.extreme] != getattr(held, metric.extreme)
                     for memory, value in new.items():
                         tape.write(f"{METRIC}{name}.{memory}", value)
-            for name, new_extreme in is_new.items():  # last, so that the metrics' own code is what it is without
+            for name, new_extreme in is_new.items():  # last, so that the metrics' own code is the same as without it
                 self.limits.at_extreme(tape, name, new_extreme)
 
         return body
 
     def _expressions(self, divisor: int) -> Body:
-        """Signals that are computed of channels, which are as they were last sampled."""
+        """Signals that are computed from channels, as these were last sampled."""
 
         def body(tape: Tape) -> None:
             for each in self.system.structure.expressions:
@@ -359,8 +359,8 @@ class Builder:
         return body
 
     def _recorder(self, columns: list[str], held: list[Channel], at_rows: list[Channel]) -> Body:
-        """held: derived channels that are computed at every instant.
-        at_rows: those that nobody but the recorder needs, computed where a row is kept."""
+        """The recorder. held: derived channels that are computed at every instant. at_rows: those that only the
+        recorder needs, computed where a row is kept."""
         seen = [channel for channel in held if channel.path in columns]
 
         def body(tape: Tape) -> None:

@@ -1,4 +1,4 @@
-"""The memory of a case: families of cells, each declared once by the pattern of its names, what it holds and its unit.
+"""The memory of a case: families of cells, each declared once by the pattern of its names, its contents and its unit.
 
 Channels are cells under their own paths (`shoulder.q`, `shoulder.servo.voltage`; `met.plan.channel`). The families
 here are the engine's own: a colon keeps their names apart from paths.
@@ -13,7 +13,7 @@ from met.frozen import frozen
 
 @frozen
 class CellFamily:
-    """Cells of one kind: called with what distinguishes one of them, it gives that cell's name.
+    """Cells of one kind; called with the joint, state or index of one of them, it gives that cell's name.
 
     pattern  of the names, `{}` where a joint, a state, a payload or an index stands
     holds    what such a cell holds
@@ -93,10 +93,10 @@ RATE_WANTED = CellFamily("{}:rate_wanted", "rate of the joint that a drive's own
 LOOP_INTEGRAL = CellFamily("{}:loop.integral", "integral of a drive's own rate loop, as it is believed", "rad")
 
 FAMILIES = tuple(each for each in list(globals().values()) if isinstance(each, CellFamily))
-"""All families, as they stand above."""
+"""All families, in the order above."""
 
 
 def family_of(name: str) -> CellFamily | None:
-    """The family of a cell: of those whose pattern matches its name, the one that spells most of it."""
+    """The family of a cell: among those whose pattern matches its name, the most specific."""
     found = [family for family in FAMILIES if family.matches(name)]
     return max(found, key=lambda family: len(family.pattern.replace("{}", "")), default=None)

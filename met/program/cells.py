@@ -1,4 +1,4 @@
-"""The cells that hold an arm's motion in a case's memory, and the few ways in which phases read and write them."""
+"""The cells of an arm's motion in a case's memory, and the functions by which phases read and write them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from met.trace.program import Tape
 
 
 def state(tape: Tape, joints: Sequence[str], states: Sequence[str], copy: str = "") -> Motion:
-    """The arm's state, or the copy of it under this prefix."""
+    """The arm's state, or its copy under this prefix."""
     return Motion(
         tuple(tape.read(f"{copy}{joint}.q") for joint in joints),
         tuple(tape.read(f"{copy}{joint}.qd") for joint in joints),
@@ -19,7 +19,7 @@ def state(tape: Tape, joints: Sequence[str], states: Sequence[str], copy: str = 
 
 
 def store(tape: Tape, active: Truth, joints: Sequence[str], states: Sequence[str], y: Motion, copy: str = "") -> None:
-    """Makes y the state, or the copy of it under this prefix, where active."""
+    """Write y as the state, or as its copy under this prefix, where active."""
     for joint, q, qd in zip(joints, y.q, y.qd, strict=True):
         keep(tape, active, f"{copy}{joint}.q", q)
         keep(tape, active, f"{copy}{joint}.qd", qd)
@@ -28,10 +28,10 @@ def store(tape: Tape, active: Truth, joints: Sequence[str], states: Sequence[str
 
 
 def keep(tape: Tape, active: Truth, name: str, value: Real) -> None:
-    """Writes where active; other cases of the block keep what they have."""
+    """Write where active; other cases of the block keep their value."""
     tape.write(name, value if active is True else where(active, value, tape.read(name)))
 
 
 def count(tape: Tape, event: Truth, name: str) -> None:
-    """One more of an event, where it happens."""
+    """Increment a counter of an event where it happens."""
     keep(tape, event, name, tape.read(name) + 1.0)

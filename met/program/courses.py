@@ -1,8 +1,8 @@
-"""A base that moves as it is told: pose, velocity and acceleration as formulas of time, recorded once.
+"""The motion of a prescribed base: pose, velocity and acceleration as formulas of time, recorded once.
 
 A course gives a value and its slope (`Profile.course`). The acceleration is the derivative of the recorded slope, and
-that of the turn the derivative of the angular velocity, so no profile says anything twice. Where a slope has a kink,
-the acceleration is that of the piece which the profile takes there.
+that of the turn the derivative of the angular velocity, so no profile declares anything twice. Where a slope has a
+kink, the acceleration is that of the piece which the profile takes there.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The derivative: what every model does at a state, and the motion of the arm that follows (docs/physics.md)."""
+"""The derivative: the outputs of every model at a state, and the resulting motion of the arm (docs/physics.md)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from met.vectors import Vector
 
 @frozen
 class Derivative:
-    """The derivative at one stage, and what goes with it.
+    """The derivative at one stage, with quantities computed along with it.
 
     slope    derivative of the state
     tau      torque of the servo on each moving joint, its rotor's share included (N m; N); of dry friction that a brake
@@ -178,7 +178,7 @@ def derivative(
 
 @frozen
 class ServoResponse:
-    """A servo at a stage: its physics, the slopes of its states, law and sensors, and what it shows, by channel."""
+    """A servo at a stage: its physics, the slopes of its states, law and sensors, and its signals, by channel."""
 
     drive: Drive
     slopes: Mapping[str, Real]
@@ -190,7 +190,7 @@ def servo_response(
 ) -> ServoResponse:
     """A servo's physics at state y with this memory, its answers checked against its declaration.
 
-    A continuous law is asked here, for this stage; `held` is then not read.
+    A continuous law is evaluated here, for this stage; `held` is then not read.
     """
     servo, parts, owner = actuator.servo, actuator.parts, actuator.owner
     own = {name: y.x[system.states.index(name)] for name in actuator.states}
@@ -243,7 +243,7 @@ def law(actuator: Actuator, p: NamedValues, held: NamedValues, seen: Seen) -> Co
 def _slopes(
     system: System, driven: Sequence[ServoResponse | None], friction: Mapping[str, Real]
 ) -> tuple[tuple[Real, ...], dict[str, Real]]:
-    """Slopes of the servos' states, and those of states with dry friction as they are without."""
+    """Slopes of the servos' states, and frictionless slopes of those with dry friction."""
     slopes: list[Real] = []
     needs: dict[str, Real] = {}
     for actuator in system.working:
@@ -318,7 +318,7 @@ def _environment(
     begin: Real,
     models: Sequence[tuple[str, Environment]] | None = None,
 ) -> _Loads:
-    """Sum of the loads of these models; of all, where None. Wrenches are on links and payloads."""
+    """The sum of the loads of these models; of all, where None. Wrenches are on links and payloads."""
     world = ArmWorld(system, read, tree, y, base, time, begin)
     gravity: list[Real] = [0.0, 0.0, 0.0]
     torques: list[Real] = [0.0 for _ in system.joints]

@@ -1,4 +1,4 @@
-"""Dry friction that truly sticks: modes decided at rest, a step split where a rate comes to zero.
+"""Dry friction that truly sticks: modes are decided at rest, and a step is split where a rate comes to zero.
 
 Each joint with dry friction, and each rate on the motor's side with some, has s in {0, +1, -1}: stuck, sliding forward,
 sliding backward, fixed during a (sub)step. Stuck is acceleration mode with qdd = 0, so a stuck joint does not creep,
@@ -14,19 +14,20 @@ from met.integrators.integrator import Motion, Slope, ahead
 from met.trace import Real, Truth, absolute, both, either, minimum, not_, sign, sqrt, where
 
 SPLITS = 2
-"""A step is split at most this often; a crossing after that is clamped to the step's end, and counted."""
+"""Largest number of splits of a step; a later crossing is clamped to the step's end, and counted."""
 
 
 def decision_passes(count: int) -> int:
-    """Decision passes at rest, at most, for this many things with dry friction: two each.
+    """Largest number of decision passes at rest for this many things with dry friction: two each.
 
-    A pass changes modes of all violators at once. Where many interact that may go round in a circle: then one by one.
+    A pass changes the modes of all violators at once. Where many interact that may go round in a circle: then they are
+    changed one by one.
     """
     return max(3, 2 * count)
 
 
 def sequential_passes(count: int) -> int:
-    """Passes, at most, that change the mode of the first violator alone, in a fixed order.
+    """Largest number of passes that change only the mode of the first violator, in a fixed order.
 
     Modes at rest are a linear complementarity problem with bounds, and its matrix, of the inertia of what is at rest,
     is positive definite: so the least-index rule ends (J. J. Judice, F. M. Pires, Basic-set algorithm for a generalized
@@ -70,8 +71,8 @@ class Split:
 def split_at_rest(y: Motion, k1: Slope, y_new: Motion, h: Real, s: Sequence[Real | None], *, may_split: Truth) -> Split:
     """Find the first instant in the step at which something that slides comes to rest, and stop there.
 
-    Between its ends the step is the parabola through y with slope k1 and through y_new. Where `may_split` is false
-    the step is kept whole and what crosses is put to rest at its end. s: as `crossings` has it
+    Between its ends the step is the parabola through y with slope k1 and through y_new. Where `may_split` is false the
+    step is kept whole and everything that crosses is put to rest at its end. s: as `crossings` has it
     """
     crossed = crossings(s, y_new)
     shares = [

@@ -1,4 +1,4 @@
-"""Grapples and releases: what happens to payloads at instants, before anything else does there (docs/physics.md).
+"""Grapples and releases of payloads, the first events at an instant (docs/physics.md).
 
 Each at the first instant of the dynamics that is not before its time. All grapples of an instant are one impact, and
 releases follow it. Joints that are told their acceleration do not jump, nor do those whose motors are on a bed; dry
@@ -50,7 +50,7 @@ class Grapple:
         parts: list[Control] = [RunPhase(Phase("payloads", self.due))]
         if any(payload.grappled for payload in self.system.flying):
             before, after = (
-                CallPhase(Phase(f"grapple_{name}", look))  # pieces of their own: the impact's code is as without them
+                CallPhase(Phase(f"grapple_{name}", look))  # of their own: the impact's code is as without them
                 for name, look in (("before", self.watch.before), ("after", self.watch.after))
             )
             parts.append(WhileAny("grappling", 1, (before, RunPhase(Phase("grapple", self.grapple)), after)))
@@ -78,7 +78,7 @@ class Grapple:
         tape.write_mask("releasing", any_of(releasing))
 
     def grapple(self, tape: Tape) -> None:
-        """The impact of all payloads that are grappled at this instant, and their being held from now on."""
+        """Compute the impact of all payloads that are grappled at this instant, and attach them from now on."""
         system, y = self.system, self._state(tape)
         base, tree = base_of(system, tape.read, y, tape.time), system.tree(tape.read)
         links = motions(tree, y.q[: len(system.joints)], y.qd[: len(system.joints)], base)
@@ -101,7 +101,7 @@ class Grapple:
         self._jump(tape, y, blows)
 
     def release(self, tape: Tape) -> None:
-        """Payloads that are released at this instant go on as their link moves them."""
+        """Release payloads at this instant, with the motion of their links."""
         system, y = self.system, self._state(tape)
         base, n = base_of(system, tape.read, y, tape.time), len(system.joints)
         links = motions(system.tree(tape.read), y.q[:n], y.qd[:n], base)
@@ -114,7 +114,7 @@ class Grapple:
                 payloads.detach(tape, gone, payload)
 
     def _jump(self, tape: Tape, y: Motion, blows: dict[str, Wrench]) -> None:
-        """Rates after the impact; by link, the momentum that comes to it, about its origin and in its axes."""
+        """Rates after the impact; by link, the momentum transferred to it, about its origin and in its axes."""
         system, n = self.system, len(self.system.joints)
         drives = [self._drive(tape, actuator, y) for actuator in system.actuators]
         on_beds = {actuator.index for actuator, _, _ in system.mounted}

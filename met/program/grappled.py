@@ -1,7 +1,7 @@
-"""Grapples as they went: how far a payload was from its place, how it moved against its link, what energy was lost.
+"""Figures of grapples: the distance of a payload from its place, its motion against its link, and the lost energy.
 
-All of it is outside of the state: no bit of a run depends on it. It is looked at just before the impact and just after
-it, so it costs a run nothing but at the instants of its grapples. With I_p the payload's spatial inertia, dV its
+All of it is outside of the state: no bit of a run depends on it. The figures are computed just before and after the
+impact, so a run has a cost only at the instants of its grapples. With I_p the payload's spatial inertia, dV its
 velocity against the link where it is caught (`met.dynamics.payload`), and dV_L what the impact adds to that of the link
 
     lost = 1/2 dV' I_p (dV - dV_L)
@@ -27,10 +27,10 @@ from met.trace import Real, maximum, sqrt, where
 from met.trace.program import Tape
 
 PAYLOADS, LINKS, REACHES = 1.5, 0.2, 0.05
-"""Shares of a payload's size, a link's size and an arm's length that a payload may be away from its place."""
+"""Shares of a payload's size, a link's size and an arm's length up to which a payload counts as near its place."""
 
 SMALLEST = 1e-6
-"""m: the least distance that a payload may be away; 0 stands for a grapple that never came."""
+"""m: the smallest recorded distance of a payload; 0 stands for a grapple that never came."""
 
 HALF_A_ROD = 3.0
 """A uniform rod reaches sqrt(3) times its radius of gyration from its centre, other uniform solids less."""
@@ -49,7 +49,7 @@ class GrappleWatch:
         return tuple(cell_names.GRAPPLED(each.name, name) for each in self.payloads for name in GRAPPLE_FIGURES)
 
     def before(self, tape: Tape) -> None:
-        """Keep where the payloads that are grappled at this instant are, and how they move."""
+        """Keep the poses and velocities of payloads that are grappled at this instant."""
         links, y = self._links(tape), self._state(tape)
         for payload in self.payloads:
             own, link = payloads.flying_motion(self.system, payload, tape.read, y), links[payload.link]
@@ -70,7 +70,7 @@ class GrappleWatch:
                 cells.keep(tape, caught, cell_names.AGAINST(payload.name, i), x)
 
     def after(self, tape: Tape) -> None:
-        """Keep the energy that the impact at this instant has cost."""
+        """Keep the energy that the impact at this instant has lost."""
         links = self._links(tape)
         for payload in self.payloads:
             x = [tape.read(cell_names.AGAINST(payload.name, i)) for i in range(12)]
@@ -92,8 +92,8 @@ class GrappleWatch:
         return fixed_motion((link.w, link.v), compose(inverse(link.pose), own.pose))
 
     def _near(self, payload: Payload, tape: Tape) -> Real:
-        """The distance from its place up to which a payload is near, m. Where no place is written, which is the link's
-        origin then, near is what touches the link."""
+        """The distance from its place up to which a payload is near, m. Without a written place, which is the link's
+        origin then, a payload is near if it touches the link."""
         system, place = self.system, self.system.vector(f"payloads.{payload.name}.at", tape.read)
         has_body = f"links.{payload.link}.mass" in system.experiment.parameters
         of_link = self._size(payload.link, tape) if has_body else 0.0
@@ -115,7 +115,7 @@ class GrappleWatch:
         return found
 
     def _size(self, body: str, tape: Tape) -> Real:
-        """The furthest that a body reaches from its centre of mass, of usual shapes, m."""
+        """The largest distance of a body's matter from its centre of mass, for usual shapes, m."""
         mass, (xx, yy, zz, *_) = self.system.mass(body, tape.read), self.system.inertia(body, tape.read)
         largest = maximum(xx, maximum(yy, zz))
         return where(mass > 0.0, sqrt(HALF_A_ROD * largest / where(mass > 0.0, mass, 1.0)), 0.0)

@@ -1,9 +1,8 @@
-"""Whether a servo that begins balanced holds its joint: its torque is what the joint takes, and lasts.
+"""A test of servos that begin balanced: their torque must be the one that the joint takes, and must last.
 
-A limit of voltage, current or torque, or an integral that nothing feeds, makes a servo give less than `balance` is
-asked for; behind a gear its states then change at once. Nothing here knows of a particular limit: the servo's own law
-and physics are evaluated where it begins. Dry friction that would hold the rest counts as holding, at the joint and at
-what turns behind a gear.
+A limit of voltage, current or torque, or an integral that nothing feeds, makes a servo give less torque than `balance`
+needs; behind a gear its states then change at once. No particular limit is assumed: the servo's own law and physics are
+evaluated at its start. Dry friction that would hold the rest counts as holding, at the joint and behind a gear.
 """
 
 from __future__ import annotations
@@ -21,10 +20,10 @@ from met.trace import Real, Truth, absolute, all_of, either, maximum, sign, wher
 from met.trace.program import Tape
 
 SHARE = 1e-6
-"""Share of the torque, and of what a slope depends on, that counts as nothing: far above rounding."""
+"""Share of the torque, and of the numbers on which a slope depends, that counts as zero: far above rounding."""
 
 LEAST = 1e-9
-"""N m (N) that count as nothing: what rounding leaves where no load is."""
+"""Torque, N m (N), that counts as zero: rounding leaves as much where there is no load."""
 
 
 def first_unheld(system: System, tape: Tape, y: Motion, demands: Sequence[Demand]) -> Real:
@@ -39,7 +38,8 @@ def first_unheld(system: System, tape: Tape, y: Motion, demands: Sequence[Demand
 
 
 def holds(demand: Demand, torque: Real, brake: Real, *, commanded: bool = False) -> Truth:
-    """True where the servo, as it begins with what gives its joint this torque (N m; N), gives it and goes on to.
+    """True where the servo, begun with states for this torque (N m; N) on its joint, gives the torque and keeps giving
+    it.
 
     brake      dry friction of brakes on the joint, N m (N)
     commanded  whether a servo that is commanded a torque is commanded this one, and not what its deck says
@@ -47,7 +47,7 @@ def holds(demand: Demand, torque: Real, brake: Real, *, commanded: bool = False)
     own = {**demand.starts, **demand.states(torque)}
     if demand.seen.setpoint.kind == "torque":
         if not commanded:
-            return True  # the command decides what it gives
+            return True  # the command decides the torque
         demand = replace(demand, seen=replace(demand.seen, setpoint=Setpoint("torque", torque, 0.0)))
     outputs = _outputs(demand, own)
     drive = _drive(demand, own, outputs)
@@ -82,8 +82,8 @@ def _drive(demand: Demand, own: Mapping[str, Real], outputs: Mapping[str, Real])
 
 
 def _slack(demand: Demand, own: Mapping[str, Real], outputs: Mapping[str, Real], drive: Drive) -> dict[str, Real]:
-    """Slopes of the servo's states that count as none, by name: what a `SHARE` of each of the numbers that they depend
-    on would change."""
+    """Slopes of the servo's states that count as zero, by name: their change if each number that they depend on changed
+    by `SHARE`."""
     names = [state.name for state in demand.actuator.parts.natural]
     slack: dict[str, Real] = dict.fromkeys(names, 0.0)
     moved = [({**own, name: (1.0 + SHARE) * own[name]}, outputs) for name in names]

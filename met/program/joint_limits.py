@@ -1,4 +1,4 @@
-"""Limits of joints: how far a joint is beyond one. They are watched, and do nothing to the motion."""
+"""Limits of joints: the distance of a joint beyond a limit. Limits are watched, and do not affect the motion."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from met.trace import Real, absolute
 
 
 def excess(joint: str, limit: str, value: Real, read: ReadCell) -> Real:
-    """How far a joint is beyond a limit of this name and value, in the limit's unit; below 0 within.
+    """The distance of a joint beyond a limit of this name and value, in the limit's unit; below 0 within the limit.
 
     Its position and rate are those of the state, its torque that of the derivative taken last.
     """

@@ -1,4 +1,5 @@
-"""Limits that a run reaches: how many of its steps begin at each, and at which the extreme of a required metric fell.
+"""Limits that a run reaches: the number of steps that begin at each, and those at which a required metric took its
+extreme.
 
 A motor's limit is read off the channel that never exceeds it; an environment model or a command's course is asked for
 its own (`met.plan.limits`). All of it is outside of the state: no bit of a run depends on it.
@@ -25,7 +26,7 @@ ANY = "at_any_limit"
 
 
 class LimitPhases:
-    """The limits of one system, counted at each step and asked where a metric takes a new extreme."""
+    """The limits of one system, counted at each step and examined where a metric takes a new extreme."""
 
     def __init__(self, system: System, step: StepPhases) -> None:
         self.system, self.step = system, step
@@ -34,8 +35,8 @@ class LimitPhases:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Outputs: steps that began at each limit; largest excesses over joints' own; of each metric that is judged the
-        limit at its extreme."""
+        """Outputs: steps that began at each limit; largest excesses over joints' own; for each judged metric, the limit
+        at its extreme."""
         counts = (cell_names.AT_LIMIT(use.path) for use in self.uses)
         most = (cell_names.EXCESS(use.path) for use in self.uses if use.bound)
         return (*counts, *most, *(cell_names.EXTREME_AT(name) for name in self.extremes))
@@ -45,11 +46,11 @@ class LimitPhases:
         if not self.uses:
             return ()
         count = WhileAny(ANY, 1, (RunPhase(Phase("count_limits", self._count)),))
-        # a piece of its own, so that the code of the motion is what it is without
+        # a piece of its own, so that the code of the motion is the same as without it
         return (CallPhase(Phase("limits", self._look)), count)
 
     def _look(self, tape: Tape) -> None:
-        """Whether any limit is reached, which few steps are: then counting costs next to nothing."""
+        """Note whether any limit is reached, which is rare: so counting costs next to nothing."""
         tape.write_mask(ANY, any_of([each for _, each in self._at_begin(tape)]))
 
     def _count(self, tape: Tape) -> None:
@@ -58,7 +59,7 @@ class LimitPhases:
         self.keep_excess(tape)
 
     def keep_excess(self, tape: Tape) -> None:
-        """Keep the largest excess over each limit of a joint, this instant's too."""
+        """Keep the largest excess over each limit of a joint, including this instant."""
         for use in self.uses:
             if use.bound:
                 cell = cell_names.EXCESS(use.path)
@@ -73,8 +74,8 @@ class LimitPhases:
         return [(use.path, self._reached(tape, use, began)) for use in self.uses]
 
     def at_extreme(self, tape: Tape, name: str, is_new: Truth) -> None:
-        """Keep the limit, by its number from 1, that is reached where the metric of this name has a new extreme: of
-        several the last, which is the nearest to the joint."""
+        """Keep the number, from 1, of the limit that is reached where this metric has a new extreme: among several the
+        last, which is nearest to the joint."""
         at: Real = 0.0
         for number, use in enumerate(self.extremes[name], 1):
             at = where(self._reached(tape, use, tape.time), float(number), at)

@@ -1,7 +1,7 @@
-"""Derived channels: what a record or a metric asks of the arm at an instant (docs/physics.md, section 1).
+"""Derived channels: quantities that a record or a metric needs from the arm at an instant (docs/physics.md, section 1).
 
-They follow from the state at the instant, in the modes in which its derivative was taken. They are pieces of the
-program by themselves, which take the derivative anew: so no bit of another channel depends on what is asked for here.
+They follow from the state at the instant, in the modes in which its derivative was taken. They are separate pieces of
+the program, which compute the derivative anew: so no bit of another channel depends on them.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from met.vectors import Quaternion, quaternion
 
 
 def derived(system: System) -> tuple[list[Channel], list[Channel]]:
-    """The derived channels that are asked for: those computed at every instant, and those at recorded rows alone.
+    """The requested derived channels: those computed at every instant, and those computed only at recorded rows.
 
     A metric and an expression see every instant. So does a record whose rows lie between instants, for they show the
     last one's value.
@@ -45,7 +45,7 @@ def derived(system: System) -> tuple[list[Channel], list[Channel]]:
 
 
 class Observed:
-    """The arm at one instant. What no channel needs is not computed.
+    """The arm at one instant. Quantities that no channel needs are not computed.
 
     y      the state, and base, where it stands;  found  gives its derivative
     """
@@ -61,7 +61,7 @@ class Observed:
         self._jacobians: dict[str, tuple[tuple[Vector, Vector], ...]] = {}
 
     def value(self, channel: Channel) -> Real:
-        """A derived channel, in its unit; none of an orientation, whose sign depends on what was before."""
+        """The value of a derived channel, in its unit; not for orientations, whose sign depends on former instants."""
         parts = channel.path.split(".")
         if parts[0] == "links":
             return self._of_link(channel, parts[1:])
@@ -166,7 +166,7 @@ class Observed:
 
     @cached_property
     def energy(self) -> Energy:
-        """Energy and momentum of the arm, and of each payload that flies for a time, whoever carries it."""
+        """Energy and momentum of the arm, and of each payload that flies for a time, carried or not."""
         found, base = self.derivative, self.base
         total = energy(
             self.tree,
@@ -191,6 +191,6 @@ class Observed:
 
 
 def _of_frame(motion: LinkMotion, kind: str, part: str) -> Real:
-    """A component of where a frame's origin is in the world, or of how the frame moves."""
+    """A component of a frame's position in the world, or of its motion."""
     vectors = {"position": motion.position, "velocity": motion.velocity, "rate": motion.rate}
     return vectors[kind]()[XYZ.index(part)]

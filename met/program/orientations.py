@@ -1,8 +1,8 @@
-"""Orientations as a record or a metric sees them: of the two unit quaternions of a rotation, the one without a jump.
+"""Orientations for records and metrics: of the two unit quaternions of a rotation, the one without a jump.
 
 The first that is asked for has w >= 0; each one after it has the sign by which it lies nearer the one before. A record
-compares a row with the row before it, a metric an instant with the instant before it, each in cells of its own: what a
-metric watches changes no row. So the signs are a part of the case, whatever runs beside it.
+compares a row with the row before it, a metric an instant with the instant before it, each in cells of its own, so that
+a metric changes no row. The signs depend on the case alone, not on cases beside it.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from met.trace.program import Tape
 from met.vectors import Quaternion, dot
 
 INSTANT, ROW = "instant:", "row:"
-"""Prefixes of the cells that hold the last quaternion that was seen, at an instant and in a row. Before the first one
-they are zeros, which are as near to one sign as to the other: so it keeps w >= 0."""
+"""Prefixes of the cells that hold the last quaternion seen, at an instant and in a row. They start as zeros, which are
+as near to one sign as to the other: so the first quaternion keeps w >= 0."""
 
 
 def vector(channel: Channel) -> str:
@@ -24,7 +24,7 @@ def vector(channel: Channel) -> str:
 
 
 def values(tape: Tape, arm: Observed, channels: list[Channel], last: str) -> dict[str, Real]:
-    """Derived channels at this instant, by path. last: INSTANT or ROW, whoever asks for them."""
+    """Derived channels at this instant, by path. last: INSTANT or ROW, for the part that asks."""
     found = {channel.path: arm.value(channel) for channel in channels if not vector(channel)}
     for name in dict.fromkeys(map(vector, channels)):
         found |= _components(name, nearest(tape, name, arm.orientation(name), last)) if name else {}
@@ -41,7 +41,7 @@ def held(tape: Tape, channels: list[Channel]) -> dict[str, Real]:
 
 
 def nearest(tape: Tape, name: str, q: Quaternion, last: str) -> Quaternion:
-    """The one of q and -q that is nearer the last one, which it is from now on."""
+    """The one of q and -q that is nearer the last one; it becomes the last one."""
     near = dot(q, [tape.read(cell) for cell in _cells(name, last)])
     sign = where(near < 0.0, -1.0, 1.0)
     w, x, y, z = (sign * part for part in q)

@@ -1,10 +1,10 @@
-"""Rates that no arm has: a case whose motion has run away numerically has failed, though its numbers are still numbers.
+"""Implausible rates: a case whose motion has run away numerically has failed, though its numbers are still finite.
 
 The measure is a case's own, made when it starts: the fastest rate with which a joint or free body begins, or `FAST`
 where all begin slower. Motors, gravity and springs do not add three orders of magnitude to it, which is doubtful, and
-still less six, which is a failure; what a step that is too long blows up passes both within some dozen steps. It bounds
-energy as well, which goes with the square of the rates. One number serves rad/s and m/s alike: the links of an arm are
-some metres long.
+still less six, which is a failure; a motion that diverges because of a too long step passes both within some dozen
+steps. It bounds energy as well, which goes with the square of the rates. One number serves rad/s and m/s alike: the
+links of an arm are some metres long.
 
 Rates are looked at every few steps, outside of the state: no bit of a run depends on it.
 """
@@ -19,28 +19,28 @@ from met.trace import Real, absolute, both, maximum, where
 from met.trace.program import Tape
 
 FAST = 1e3
-"""rad/s, m/s: faster than a joint of an arm turns or slides, and than what it carries flies off."""
+"""rad/s, m/s: faster than a joint of an arm turns or slides, and than its payload flies off."""
 
 DOUBTFUL, FAILED = 1e3, 1e6
-"""Times the measure from which a rate is doubtful, and from which the case has failed."""
+"""Factors over the measure from which a rate is doubtful, and from which the case has failed."""
 
 MEASURE, DOUBTFUL_TICK, FAILED_TICK, OF = "fast.measure", "fast.doubtful", "fast.failed", "fast.of"
 OUTPUTS = (MEASURE, DOUBTFUL_TICK, FAILED_TICK, OF)
-"""Outputs: the measure, rad/s (m/s); the first ticks at which a rate was seen to be doubtful, and a failure (0: none);
-the number of the joint or body whose was doubtful first, as the output `failure.joint` has it."""
+"""Outputs: the measure, rad/s (m/s); the first ticks at which a doubtful and a failed rate were seen (0: none); and the
+number of the first joint or body with a doubtful rate, numbered as in the output `failure.joint`."""
 
 SPARSE = range(32, 15, -1)
-"""Steps of the dynamics from one look to the next; the first that the run's last step is a multiple of."""
+"""Candidates for the number of dynamics steps between checks; the first that divides the run's steps is used."""
 
 
 def divisor(schedule: Schedule) -> int:
-    """Base ticks between two looks: the last is at the run's end, where that fits."""
+    """Base ticks between two checks: the last is at the run's end, where that fits."""
     steps = schedule.ticks // schedule.dynamics
     return schedule.dynamics * next((n for n in SPARSE if steps % n == 0), SPARSE[-1])
 
 
 def start(tape: Tape, coordinates: Sequence[str]) -> None:
-    """Write a case's measure, from the rates with which joints and free bodies begin."""
+    """Write a case's measure, from the initial rates of joints and free bodies."""
     fastest: Real = FAST
     for name in coordinates:
         fastest = maximum(fastest, absolute(tape.read(f"{name}.qd")))
@@ -48,7 +48,7 @@ def start(tape: Tape, coordinates: Sequence[str]) -> None:
 
 
 def watch(tape: Tape, coordinates: Sequence[str], numbers: Sequence[int]) -> None:
-    """Look at the rates of these coordinates. numbers: of the joint or body that each is of."""
+    """Check the rates of these coordinates. numbers: those of their joints or bodies"""
     fastest: Real = 0.0
     of: Real = 0.0
     for name, number in zip(coordinates, numbers, strict=True):

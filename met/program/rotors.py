@@ -1,7 +1,7 @@
-"""Rotors that turn in the links of an arm on a free base, which feels them (docs/physics.md, section 1).
+"""Rotors in the links of an arm on a free base, which reacts to their spin (docs/physics.md, section 1).
 
-On a base that is fixed or prescribed they are left out: what they give the links of an arm is smaller by the gear's
-ratio than what they are at their joints.
+On a fixed or prescribed base they are left out: their reaction on the links is smaller by the gear's ratio than their
+effect at the joints.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def of(
     friction: Mapping[str, Real],
     on_beds: Collection[int] = (),
 ) -> Rotors:
-    """The rotors that a free base feels.
+    """The rotors that act on a free base.
 
     slopes    of the servos' states, as if the links that carry the rotors did not turn
     friction  s in {0, +1, -1}, by channel: a rotor that sticks turns with its link
@@ -74,8 +74,8 @@ def against_their_links(
     needs: Mapping[str, Real],
     friction: Mapping[str, Real],
 ) -> tuple[tuple[Real, ...], dict[str, Real]]:
-    """The slopes of the servos' states, and what friction must hold of them, where a free rotor's rate counts from its
-    link, which turns too."""
+    """The slopes of the servos' states, and the friction that must hold them, where a free rotor's rate is relative to
+    its link, which turns too."""
     slopes, needs = list(slopes), dict(needs)
     for i, channel in rotors.states.items():
         number, about = system.states.index(channel), solved.about[i]

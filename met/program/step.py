@@ -1,9 +1,9 @@
-"""One step of the dynamics: friction's modes, derivatives, the integrator's stages, and what friction does on the way.
+"""One step of the dynamics: friction's modes, derivatives, the integrator's stages, and splits by friction.
 
-The derivative is most of a program, so its code is there twice, however often a step calls it: `derive`, of the state
-at hand with all that is recorded of it, and `slope`, of a stage on the way, with nothing but the slopes. Both read and
-write cells. What they leave for a case that did not ask (another one of the block did) is overwritten, before anything
-reads it, by `derive` at the next instant.
+The derivative is most of a program, so its code is there twice, however often a step calls it: `derive`, for the
+present state with all recorded quantities, and `slope`, for a stage within the step, with slopes alone. Both read and
+write cells. Results for a case that did not need them (another one of the block did) are overwritten, before anything
+reads them, by `derive` at the next instant.
 
 An integrator's `advance` is one function that asks for slopes on its way. It is recorded in pieces, one to each
 question and one to the end: each piece runs `advance` anew, answers the questions that are settled from cells, and
@@ -29,17 +29,18 @@ from met.trace import Real, Truth, any_of, both, either, isfinite, not_, sign, w
 from met.trace.program import CallPhase, Control, Every, Phase, RunPhase, Tape, WhileAny
 
 SINGULAR, NOT_FINITE, OUT_OF_RANGE, UNBALANCED, TOO_FAST = 1.0, 2.0, 4.0, 5.0, 6.0
-"""Causes of a failed case (output `failure`); 0 is none, 3 what ended it from outside (met/run.py). UNBALANCED
-and TOO_FAST are judged when the run is over, from other outputs (met/judging.py)."""
+"""Causes of a failed case (output `failure`); 0 is none, and 3 an end from outside (met/run.py). UNBALANCED and
+TOO_FAST are judged after the run, from other outputs (met/judging.py)."""
 
 FAILURE = ("failure", "failure.joint", "failure.tick")
 """Outputs of a failed case: its cause, the number of the joint, body or sensor, and the tick."""
 
 EVENTS = ("friction.splits", "friction.clamped", "friction.undecided")
-"""Counts a case: steps split where a joint came to rest, crossings clamped, decisions at rest left open."""
+"""Outputs that count, for each case: steps split where a joint came to rest, crossings clamped, decisions at rest left
+open."""
 
 FROM, STAGE = "from:", "stage:"
-"""Prefixes of copies of the state: at the start of the (sub)step that was just done, and at a stage on the way."""
+"""Prefixes of copies of the state: at the start of the (sub)step just done, and at a stage within a step."""
 
 
 class StepPhases:
@@ -66,7 +67,7 @@ class StepPhases:
             *([WhileAny("undecided", friction.sequential_passes(count), (self._derive, one_by_one))] * (count > 1)),
             WhileAny("undecided", 1, (RunPhase(Phase("left_open", self.left_open)),)),
         )
-        # what may hide that a number is none: joints whose acceleration may be given, and all that may stick
+        # what may hide a non-finite number: joints whose acceleration may be given, and all that may stick
         gives = [a.use.joint for a in system.working if a.gives or a.level != 0.0]
         self._needs = tuple(dict.fromkeys((*gives, *(each.name for each in self.sticking))))
         self._may_leave_range = [actuator for actuator in self.system.working if actuator.may_leave_range]
@@ -113,7 +114,7 @@ class StepPhases:
         self._modes(tape, tape.read_mask("again"))
 
     def _modes(self, tape: Tape, active: Truth) -> None:
-        """s = sign(qd), and whether any joint is at rest so that its mode must be decided."""
+        """The modes s = sign(qd), and whether any joint is at rest so that its mode must be decided."""
         any_at_rest: Truth = False
         for each, level in zip(self.sticking, self._levels(tape), strict=True):
             rate = tape.read(each.cell)
@@ -131,7 +132,8 @@ class StepPhases:
         tape.write_mask("undecided", both(active, any_at_rest))
 
     def _levels(self, tape: Tape) -> list[Real]:
-        """The levels of dry friction at the state, where a step or substep begins, in the units of what they hold."""
+        """The levels of dry friction at the state where a step or substep begins, in the units of the quantities that
+        they hold."""
         fraction, y = tape.read("fraction"), self.state(tape)
         time, begin = self._time(tape, fraction), tape.read("instant")
         on_joints = brake_levels(self.system, tape.read, y, time, begin)
@@ -155,11 +157,11 @@ class StepPhases:
         return True if found.level is not None else tape.read_mask(cell_names.HAS_FRICTION(name))
 
     def decide(self, tape: Tape) -> None:
-        """One decision at rest, on the derivative just taken: who breaks away, who turns back."""
+        """Decide modes at rest once, from the derivative just taken: breaking away, and turning back."""
         self._decided(tape, one=False)
 
     def decide_one(self, tape: Tape) -> None:
-        """The same of the first alone whose mode is not what it should be."""
+        """Change only the first mode that is wrong, as `decide` does for all."""
         self._decided(tape, one=True)
 
     def _decided(self, tape: Tape, *, one: bool) -> None:
@@ -176,13 +178,13 @@ class StepPhases:
         tape.write_mask("undecided", both(active, changed))
 
     def left_open(self, tape: Tape) -> None:
-        """Counts decisions that did not settle."""
+        """Count decisions that did not settle."""
         cells.count(tape, tape.read_mask("undecided"), "friction.undecided")
 
     # Derivatives.
 
     def derive(self, tape: Tape) -> None:
-        """The derivative at the state, with everything that is recorded of it, and whether all is well with it."""
+        """Compute the derivative at the state, with all recorded quantities, and check it."""
         y = self.state(tape)
         found = self._derivative(tape, y, tape.read("fraction"))
         for i, name in enumerate(self.coordinates):
@@ -204,7 +206,7 @@ class StepPhases:
             out_of_range = where(found.out_of_range[actuator.index], float(actuator.index + 1), out_of_range)
         if self._may_leave_range:
             tape.write("astray", out_of_range)
-        # Infinities that cancel leave not a number, so a plain sum misses none; a sum of numbers that is none only
+        # Infinities that cancel leave a NaN, so a plain sum misses none; an overflowing sum of finite numbers only
         # makes `judge` look.
         parts = (*found.slope.qdd, *found.slope.xd, *y.q, *y.qd, *(found.need[name] for name in self._needs))
         total: Real = sum((*parts, *bodies.orientation(self.system, tape)), 0.0)
@@ -212,12 +214,12 @@ class StepPhases:
         tape.write_mask("suspect", either(wrong, out_of_range != 0.0) if self._may_leave_range else wrong)
 
     def slope(self, tape: Tape) -> None:
-        """The derivative at a stage on the way, its slopes alone."""
+        """Compute the derivative at a stage within the step: slopes alone."""
         found = self._derivative(tape, self.state(tape, STAGE), tape.read(f"{STAGE}fraction"))
         for joint, qdd in zip(self.coordinates, found.slope.qdd, strict=True):
             tape.write(f"{STAGE}{joint}.qdd", qdd)
         for joint, qd in zip(self.coordinates[len(self.joints) :], found.slope.qd[len(self.joints) :], strict=True):
-            tape.write(f"{STAGE}{joint}.qd", qd)  # of a turn no rate of the state
+            tape.write(f"{STAGE}{joint}.qd", qd)  # a turn's rate is not a rate of the state
         for name, slope in zip(self.states, found.slope.xd, strict=True):
             tape.write(STAGE + cell_names.SLOPE(name), slope)
 
@@ -255,7 +257,7 @@ class StepPhases:
             ]
             watched += [cell_names.SLOPE(name) for name in self.states if name.startswith(f"{joint}.servo.")]
             bad = not_(isfinite(sum((tape.read(name) for name in watched), 0.0)))
-            if bodies.bodies(self.system):  # a joint that moves well, and only bears what a body does, is not named
+            if bodies.bodies(self.system):  # a sound joint that only bears a body's load is not named
                 bad = both(bad, either(not_(moves), not_(elsewhere)))
             cause, number = where(bad, NOT_FINITE, cause), where(bad, float(i), number)
         singular = tape.read("singular")
@@ -266,7 +268,8 @@ class StepPhases:
         cells.keep(tape, news, "failure", cause)
 
     def loads(self, tape: Tape) -> tuple[list[list[Real]], list[Real]]:
-        """The arm's load on the substituted joints: tau_load = Lambda qdd + b_0, all other joints in their modes."""
+        """Compute the arm's load on the substituted joints: tau_load = Lambda qdd + b_0, all other joints in their
+        modes."""
         y, numbers = self.state(tape), [each.index for each in self.beds.mounted]
         at_rest = self._derivative(tape, y, 0.0, dict.fromkeys(numbers, 0.0)).solved.tau_load
         columns = []
@@ -276,7 +279,7 @@ class StepPhases:
         return [[column[i] for column in columns] for i in range(len(numbers))], [at_rest[i] for i in numbers]
 
     def observed(self, tape: Tape) -> Observed:
-        """The arm at an instant, with the derivative that `derive` took of it."""
+        """The arm at an instant, with the derivative from `derive`."""
         y = self.state(tape)
         stands = base.base_of(self.system, tape.read, y, tape.read("instant"))
         return Observed(self.system, tape.read, y, stands, lambda: self._derivative(tape, y, 0.0))
@@ -330,7 +333,7 @@ class StepPhases:
         return (*parts, RunPhase(Phase(name, self._arrival(self._questions, again))))
 
     def _towards(self, settled: int, again: bool) -> Callable[[Tape], None]:
-        """The body of the piece that ends at a question, `settled` of them being answered before."""
+        """The body of the piece that ends at a question, after `settled` answered ones."""
 
         def body(tape: Tape) -> None:
             fraction = tape.read("fraction") if again else 0.0
@@ -343,7 +346,7 @@ class StepPhases:
         return body
 
     def _arrival(self, settled: int, again: bool) -> Callable[[Tape], None]:
-        """The body of the last piece: the state at the end, and whether a rate came to zero on the way."""
+        """The body of the last piece: the state at the end, and whether a rate came to zero in between."""
 
         def body(tape: Tape) -> None:
             active: Truth = tape.read_mask("again") if again else True
@@ -363,7 +366,7 @@ class StepPhases:
         return body
 
     def _integrate(self, tape: Tape, settled: int, fraction: Real) -> Motion | Question:
-        """Runs the integrator with the first `settled` slopes from cells, up to the next question or to its end."""
+        """Run the integrator with the first `settled` slopes from cells, up to the next question or to its end."""
         y = self.state(tape)
         if settled:
             for joint in self.coordinates:
@@ -383,7 +386,7 @@ class StepPhases:
         return advance_with(self.system.integrator, answers, h, y, self._first_slope(tape, y.qd))
 
     def _first_slope(self, tape: Tape, qd: tuple[Real, ...]) -> Slope:
-        """The first stage's slope, as `derive` left it; qd are the rates then."""
+        """The first stage's slope from `derive`; qd are the rates then."""
         return Slope(
             qd,
             tuple(tape.read(f"{joint}.qdd") for joint in self.coordinates),
@@ -415,7 +418,8 @@ class StepPhases:
         bodies.turn(self.system, tape, active, reached.y, FROM)
 
     def carry(self, tape: Tape) -> None:
-        """The slope of the step just done, for servos that tick before the next; none for what is at rest and rubs."""
+        """Keep the slope of the step just done, for servos that tick before the next; 0 for parts at rest with
+        friction."""
         for actuator in self.system.ticking_between:
             for name, cell in self._carried(actuator):
                 now = tape.read(cell)
@@ -425,14 +429,14 @@ class StepPhases:
                 )
 
     def _carried(self, actuator: Actuator) -> list[tuple[str, str]]:
-        """Rates that are carried forward between instants, and their cells: the joint's rate, the servo's states."""
+        """Rates that are extrapolated between instants, and their cells: the joint's rate, the servo's states."""
         joint = self.joints[actuator.index]
         return [(joint, f"{joint}.qd"), *((name, name) for name in actuator.states)]
 
     # What the phases share.
 
     def state(self, tape: Tape, copy: str = "") -> Motion:
-        """The state, or a copy of it: a stage's as it is, another where a (sub)step begins."""
+        """The state, or a copy of it: with its turns at a stage, without them where a (sub)step begins."""
         y = cells.state(tape, self.coordinates, self.states, copy)
         return y if copy == STAGE else bodies.with_zero_turn(self.system, y)
 
@@ -440,7 +444,7 @@ class StepPhases:
         return {each.name: tape.read(cell_names.FRICTION_MODE(each.name)) for each in self.sticking}
 
     def _sliding(self, tape: Tape) -> list[Real | None]:
-        """Friction modes as crossings count them: zero, so that it never crosses, where a case has no friction."""
+        """Friction modes for crossings: zero, so that it never crosses, where a case has no friction."""
         modes: list[Real | None] = [None] * (len(self.coordinates) + len(self.states))
         for each in self.sticking:
             mode = tape.read(cell_names.FRICTION_MODE(each.name))

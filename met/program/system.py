@@ -33,15 +33,15 @@ from met.trace import Formulas, Graph, Real, Scalar
 from met.vectors import Vector
 
 PARAMETER, TREE = "parameter:", "tree:"
-"""Prefixes of the cells that hold a case's own parameters, and what of the tree follows from them."""
+"""Prefixes of the cells that hold a case's own parameters, and the parts of the tree that depend on them."""
 
 ReadCell = Callable[[str], Real]
 
 
 @frozen
 class Fitted:
-    """A sensor in use, of a joint or of a link: its declaration, what there is of it here, and what its cells' names
-    begin with."""
+    """A sensor in use, of a joint or of a link: its declaration, its present parts, and the prefix of its cells'
+    names."""
 
     use: SensorUse | LinkSensor
     sensor: Sensor
@@ -52,12 +52,12 @@ class Fitted:
 
     @property
     def owner(self) -> str:
-        """Name for messages."""
+        """The sensor's name for messages."""
         return f"sensor `{self.path}` (model {self.sensor.name})"
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Channels of its states."""
+        """Channels of the sensor's states."""
         return tuple(f"{self.path}.{state.name}" for state in self.states)
 
 
@@ -95,7 +95,7 @@ class Actuator:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Channels of its states: the servo's, then its sensors'."""
+        """Channels of the servo's states, then those of its sensors."""
         own = [f"{self.path}.{state.name}" for state in self.parts.states]
         return (*own, *(name for each in self.sensors for name in each.channels))
 
@@ -106,7 +106,7 @@ class Actuator:
 
     @property
     def owner(self) -> str:
-        """Name for messages."""
+        """The servo's name for messages."""
         return f"servo `{self.use.definition}` of joint `{self.use.joint}` (model {self.use.model})"
 
 
@@ -170,7 +170,7 @@ class System:
 
     @cached_property
     def actuators(self) -> tuple[Actuator | None, ...]:
-        """One a moving joint, in order; None for a passive joint."""
+        """One actuator for each moving joint, in order; None for a passive joint."""
         uses = {use.joint: use for use in self.structure.servos}
         return tuple(
             self._actuator(index, uses[joint.name]) if joint.name in uses else None
@@ -259,13 +259,13 @@ class System:
         return parameters(actuator.owner, actuator.path, actuator.parts.parameters, lambda path: self.value(path, read))
 
     def tree(self, read: ReadCell) -> Tree:
-        """The arm as the dynamics see it: built once where no case varies it, else kept in the case's memory."""
+        """The arm for the dynamics: built once where no case varies it, else kept in the case's memory."""
         if self._fixed_tree is not None:
             return self._fixed_tree
         return self._tree(read).each(lambda name, _: read(TREE + name))
 
     def keep_tree(self, read: ReadCell, write: Callable[[str, Real], None]) -> None:
-        """Compute what of the tree varies with the case, and keep it for `tree`."""
+        """Compute the parts of the tree that vary with the case, and keep them for `tree`."""
 
         def keep(name: str, value: Real) -> Real:
             write(TREE + name, value)
@@ -341,7 +341,7 @@ class System:
             help = "a joint that is told its acceleration has no use for friction"
             raise Problem(error("E219", message, use.place, help=help))
         if level != 0.0 and any(model.decoupling is not None for _, model in self.failing.get(use.joint, ())):
-            level = None  # it comes and goes
+            level = None  # brakes come and go
         return replace(
             bare,
             level=level,
@@ -355,7 +355,8 @@ class System:
         return Fitted(use, models.find("sensor", use.model, use.place), declared, states, memory, path)
 
     def _probe(self, actuator: Actuator) -> tuple[Drive, float | None, dict[str, float | None]]:
-        """The servo's physics recorded once, to see what it uses; and its levels of dry friction, where known now."""
+        """The servo's physics recorded once, to find its parts in use; and its levels of dry friction, where known
+        beforehand."""
         graph, parts = Graph(), actuator.parts
         named = [*(output.name for output in parts.outputs), *(state.name for state in parts.integrals)]
         held = NamedValues(actuator.owner, {name: graph.input(name) for name in named})

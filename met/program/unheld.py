@@ -1,4 +1,4 @@
-"""Servos that are to begin balanced and cannot hold their joints: what these take, what they get, what limits it."""
+"""Servos that are to begin balanced and cannot hold their joints: the torques needed and available, and the limits."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from met.program.values import parameters
 from met.trace import Real
 
 HALVINGS = 20
-"""Of the interval in which the share that a servo holds is sought: to a millionth."""
+"""Number of halvings of the interval in which the share that a servo holds is sought: to a millionth."""
 
 
 @frozen
@@ -59,7 +59,7 @@ class Unheld:
 
 def unheld(experiment: Experiment, values: np.ndarray, *, commanded: bool = False) -> list[tuple[Unheld, ...]]:
     """For each case of these inputs, [case, input], the joints that are to begin balanced and cannot be held, in the
-    arm's order. commanded: as `holding.holds` has it."""
+    arm's order. commanded: as for `holding.holds`."""
     found: list[tuple[Unheld, ...]] = [()] * len(values)
     if not experiment.structure.balanced or not len(values):
         return found
@@ -86,7 +86,7 @@ def holding_torques(experiment: Experiment, inputs: Mapping[str, float]) -> dict
 
 @frozen
 class _Begun:
-    """A run of one case, or of several side by side, as it begins while its servos are unbalanced."""
+    """The start of a run of one case, or of several side by side, while its servos are unbalanced."""
 
     system: System
     tape: PlainTape
@@ -95,7 +95,7 @@ class _Begun:
 
     @classmethod
     def of(cls, experiment: Experiment, values: Iterable[Any], names: Sequence[str] | None = None) -> _Begun:
-        """values: of the program's inputs, in the order of these names, or in its own."""
+        """The start from values of the program's inputs, in the order of these names, or in the program's own."""
         system = System(experiment)
         builder = Builder(system)
         program = builder.program()
@@ -121,8 +121,8 @@ class _Judged:
         self.held = self._over_cases(self._holds(demand, demand.torque))
 
     def of(self, case: int) -> tuple[float, float, tuple[tuple[str, str], ...]]:
-        """The torque that its joint takes in this case, what it can hold, and the limits that stop it, as `Unheld`
-        has them."""
+        """The result for this case: the torque that its joint takes, the part that it can hold, and the limits that
+        stop it."""
         finite = [name for name, values in self.limits.items() if np.isfinite(values[case])]
         alone = [name for name in finite if self.without_one[name][case]]
         binding = alone or (finite if self.without_any[case] else [])
@@ -149,12 +149,12 @@ class _Judged:
 
     @cached_property
     def without_one(self) -> dict[str, np.ndarray]:
-        """The cases in which the servo would hold its joint had it not the limit, by its name."""
+        """The cases in which the servo would hold its joint without the limit, by the limit's name."""
         return {name: self._without(name) for name in self.limits}
 
     @cached_property
     def without_any(self) -> np.ndarray:
-        """The cases in which the servo would hold its joint had it no limit."""
+        """The cases in which the servo would hold its joint without any limit."""
         return self._without(*self.limits)
 
     def _without(self, *names: str) -> np.ndarray:

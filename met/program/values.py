@@ -1,4 +1,4 @@
-"""Values between the engine and a model's functions: numbers by name, `p.kp`, `held.voltage`; their answers."""
+"""Values exchanged with a model's functions: numbers by name, `p.kp`, `held.voltage`; and the functions' answers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ Read = Callable[[str], Any]
 
 
 class NamedValues:
-    """Numbers by name. Reading a name that the model does not declare is a placed mistake of the model's author."""
+    """Numbers by name. Reading a name that the model does not declare is reported as a mistake of the model's author,
+    with its place."""
 
     __slots__ = ("_numbers", "_owner")
 
@@ -54,18 +55,18 @@ def parameters(owner: str, prefix: str, declared: Iterable[Parameter], read: Rea
 
 
 class Passing(BaseException):
-    """Raised by the engine in the midst of a model's function, to leave it: no mistake of the model's."""
+    """Raised by the engine to leave a model's function before its end: no mistake of the model's."""
 
 
 def answer(owner: str, function: Callable[..., T], *arguments: Any) -> T:
-    """The answer of a model's function. Whatever it raises is said at the model's own line, Problem E213: `sys.exit`
-    too, but for an interrupt, which is the user's."""
+    """The answer of a model's function. Whatever it raises is reported at the model's own line, Problem E213,
+    `sys.exit` too; only an interrupt, which comes from the user, passes."""
     try:
-        with np.errstate(all="ignore"):  # what comes of constants is in the program, as what comes of a run is
+        with np.errstate(all="ignore"):  # constants may give NaN or infinity, as runs may: they go into the program
             return function(*arguments)
     except (Problem, Passing, KeyboardInterrupt):
         raise
-    except BaseException as reason:  # a model is its author's code: whatever it raises is for the author to read
+    except BaseException as reason:  # a model's errors, of whatever kind, are for its author to read
         frames = traceback.extract_tb(reason.__traceback__)
         # the first frame is this function's own, the next one the model's, unless it called nothing written in Python
         own = [frame for frame in frames[1:] if frame.filename == frames[1].filename] or frames
@@ -82,7 +83,7 @@ def answer(owner: str, function: Callable[..., T], *arguments: Any) -> T:
 def returned(
     owner: str, what: str, given: Mapping[str, Real], declared: Iterable[str], *, all_of_them: bool = True
 ) -> Mapping[str, Real]:
-    """The answer of a model's function, checked to hold just the names that the model declares, or some of them."""
+    """The answer of a model's function, checked to hold exactly the names that the model declares, or some of them."""
     names = list(declared)
     missing = [name for name in names if name not in given] if all_of_them else []
     unknown = [name for name in given if name not in names]

@@ -1,1 +1,1 @@
-"""Sensors, guides, failures of servos, and motors on beds: whatever works upon the joints' servos."""
+"""Sensors, guides, failures of servos, and motors on beds: everything that acts on the joints' servos."""

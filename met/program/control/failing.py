@@ -1,4 +1,4 @@
-"""Failures of a servo by environment models: they let its joint go, replace its outputs or its readings."""
+"""Failures of servos by environment models: they release a joint, or replace the servo's outputs or readings."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from met.trace import Real
 
 @frozen
 class StepTimes:
-    """When a step of the dynamics began, and its length, s: `met.environments.window.Step`."""
+    """The begin of a step of the dynamics, and its length, s: a `met.environments.window.Step`."""
 
     begin: Real
     step: float
@@ -38,7 +38,7 @@ def coupled(system: System, actuator: Actuator, read: ReadCell, begin: Real) -> 
 def law_outputs(
     system: System, actuator: Actuator, read: ReadCell, p: NamedValues, time: Real, found: Control
 ) -> Control:
-    """Outputs of the servo's law, after environment models have replaced some."""
+    """Outputs of the servo's law, some replaced by environment models."""
     for owner, model, own in _about(system, actuator, read):
         if model.replaced_outputs is None:
             continue
@@ -52,7 +52,7 @@ def law_outputs(
 
 
 def seen(system: System, actuator: Actuator, read: ReadCell, seen: Seen, last: str | None) -> Seen:
-    """Inputs of the law, after environment models have replaced some.
+    """Inputs of the law, some replaced by environment models.
 
     last  prefix of the cells that hold what it saw at its last tick; None: there is none
     """
@@ -76,7 +76,7 @@ def quantities(actuator: Actuator) -> tuple[str, ...]:
 
 
 def _about(system: System, actuator: Actuator, read: ReadCell) -> Iterator[tuple[str, Environment, NamedValues]]:
-    """The models that are about this servo: what to call each, its declaration, its parameters."""
+    """The models about this servo: each with its name in messages, its declaration and its parameters."""
     for name, model in system.failing.get(actuator.use.joint, ()):
         owner = f"environment model `{model.name}` (as `{name}`)"
         p = parameters(owner, f"environment.{name}", model.parameters, lambda path: system.value(path, read))

@@ -1,7 +1,7 @@
-"""The computers of guides: what they see of the arm at their ticks, and what they ask of their joints.
+"""The computers of guides: their inputs from the arm at their ticks, and their setpoints for the joints.
 
-A guide ticks at instants, before the servos, so that what these ask of it is of this instant. Of its rates it keeps the
-integral, which begins where the joints do.
+A guide ticks at instants, before the servos, so that their setpoints are of this instant. It keeps the integral of its
+rates, which starts at the joints' positions.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def ticking(system: System) -> Iterator[GuideUse]:
 
 
 def start(system: System, tape: Tape) -> None:
-    """Write where guides begin: their joints' positions, rates of 0, and the guided frames, where paths begin."""
+    """Write the start of guides: their joints' positions, rates of 0, and the guided frames where paths begin."""
     for use in ticking(system):
         tape.write(cell_names.GUIDE_TIME(use.name), 0.0)
         for joint in use.joints:
@@ -92,7 +92,7 @@ def way_along(system: System, tape: Tape, use: GuideUse) -> Real:
 
 
 class _ArmAt:
-    """A `met.guides.guide.Arm`: the arm with its joints at y.q, and what else is known of its motion at this time."""
+    """A `met.guides.guide.Arm`: the arm with its joints at y.q, and the known parts of its motion at this time."""
 
     def __init__(self, system: System, use: GuideUse, read: ReadCell, y: Motion, stands: BaseMotion) -> None:
         n = len(system.joints)
@@ -110,7 +110,7 @@ class _ArmAt:
         self._R, self._p = frame.pose.R, frame.position(point)
 
     def stance(self, *, answers: bool) -> Stance:
-        """The guided frame. Its joints' own rates count only in what a free base does about them."""
+        """The guided frame. Its joints' own rates count only through a free base's reaction to them."""
         w, v = turn_vector(self._base.pose.R, self._base.w), turn_vector(self._base.pose.R, self._base.v)
         if self._free and not answers:
             w, v = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -132,8 +132,8 @@ class _ArmAt:
 
     @cached_property
     def _answers(self) -> list[tuple[Vector, Vector]]:
-        """A free base's answer to joint rates: the frame's angular velocity and velocity for each unit of each rate;
-        with the payloads that the links carry at this time."""
+        """The reaction of a free base to joint rates: the frame's angular velocity and velocity for each unit of each
+        rate; with the payloads that the links carry at this time."""
         arm = sub(self._p, self._base.pose.p)
         found = base_answers(self._loaded_tree, self._q, self._base.pose)
         return [(w, add(v, cross(w, arm))) for w, v in found]
@@ -146,14 +146,14 @@ def _state(system: System, tape: Tape, time: Real) -> tuple[Motion, BaseMotion]:
 
 
 def _begun(use: GuideUse) -> list[str]:
-    """The cells that hold where a guided frame began: the rows of its axes, and its origin."""
+    """The cells of the initial guided frame: the rows of its axes, and its origin."""
     return [
         cell_names.GUIDE_FRAME(use.name, name) for name in (*(f"R{i}{j}" for i in range(3) for j in range(3)), *"xyz")
     ]
 
 
 def _wanted(system: System, tape: Tape, use: GuideUse) -> Stance:
-    """The path at this time: its courses, counted from where the guided frame began."""
+    """The path at this time: its courses, counted from the initial guided frame."""
     begun = [tape.read(name) for name in _begun(use)]
     R: Matrix = tuple(tuple(begun[i : i + 3]) for i in (0, 3, 6))  # type: ignore[assignment]
     values, rates = values_and_rates(

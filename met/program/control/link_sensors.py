@@ -1,7 +1,7 @@
-"""Sensors of links: what they feel at a stage, where a run begins, and what they read at their ticks.
+"""Sensors of links: their inputs at a stage and where a run begins, and their readings at ticks.
 
-An acceleration follows from the derivative, so it is there for circuits, at stages. A tick is an instant before the
-servos, whose answers are not yet known: what is read there is of the state.
+An acceleration follows from the derivative, so circuits have it at stages. A tick comes before the servos, whose
+outputs are not yet known: its readings are of the state.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from met.vectors import ZERO, Vector, add, cross, sub, turn_vector_back
 
 @frozen
 class Accelerations:
-    """Accelerations at a stage, as the derivative has them.
+    """Accelerations at a stage, from the derivative.
 
     qdd      slopes of all rates, those of bodies too, as in `Slope`
     base     angular acceleration of the base frame, and that of its origin, base axes, rad/s^2, m/s^2
@@ -129,7 +129,7 @@ class Aboard(ArmWorld):
 def free_fall(
     system: System, read: ReadCell, world: World, gravity: Vector, motion: LinkMotion, point: Vector = ZERO
 ) -> Vector:
-    """Acceleration of a body that falls freely where a point of a frame is, and moves so; world axes, m/s^2."""
+    """Acceleration of a freely falling body at a point of a frame, with the point's velocity; world axes, m/s^2."""
     found = gravity
     for name, model in system.environment:
         if model.free_fall is not None:
@@ -140,7 +140,7 @@ def free_fall(
 
 
 def start(system: System, tape: Tape, gravity: Callable[[Motion], Vector]) -> None:
-    """Write sensors where a run begins: settled on joints that do not accelerate, and bodies that fall freely.
+    """Write sensors where a run begins: settled with joints that do not accelerate, and bodies that fall freely.
 
     gravity  at a state where a run begins, as in `Accelerations`
     """
@@ -173,7 +173,7 @@ def slopes(system: System, read: ReadCell, felt: Aboard, own: Mapping[str, Real]
 
 
 def tick(system: System, tape: Tape, divisor: int) -> None:
-    """A tick of the sensors of this divisor, on the state at this time."""
+    """A tick of the sensors with this divisor, on the state at this time."""
     y, stands = _state(system, tape, tape.time)
     tree, period = system.tree(tape.read), divisor / system.structure.schedule.base_hz
     for fitted, use in zip(system.sensors, system.structure.sensors, strict=True):
@@ -184,7 +184,7 @@ def tick(system: System, tape: Tape, divisor: int) -> None:
 
 
 def measured(system: System, fitted: Fitted, read: ReadCell, felt: Aboard) -> Real:
-    """The quantity that a sensor is of."""
+    """The quantity that a sensor measures."""
     assert fitted.sensor.measures is not None
     return answer(fitted.owner, fitted.sensor.measures, sensing.values(system, fitted, read), felt)
 

@@ -1,7 +1,7 @@
-"""Joints whose drive on a bed closes the rate loop: what it is told at a tick of the servo, and what is believed of it.
+"""Joints whose drive on a bed closes the rate loop: its command at a tick of the servo, and the model of its loop.
 
-The drive is told the rate that the servo's law gives its rate loop. The torque that it then makes it need not say: the
-servo's own loop, on the shaft's rate that the law believes and with an integral of its own, is taken for the drive's
+The command is the rate that the servo's law gives its rate loop. The drive need not report its torque: the servo's own
+loop, with the law's estimate of the shaft's rate and an integral of its own, serves as the drive's model
 (met/substitution/drive.py). Rates and torques are of the joint's size, on the motor's side of the gearbox.
 """
 
@@ -32,24 +32,24 @@ class Mounted:
 
     @property
     def index(self) -> int:
-        """Number of the joint among those that move."""
+        """Number of the joint among the moving ones."""
         return self.actuator.index
 
     @property
     def closes_rate_loop(self) -> bool:
-        """True where the rate loop is the drive's: it is told a rate."""
+        """True where the drive closes the rate loop: its command is a rate."""
         return self.bed.drive == "rate"
 
 
 @frozen
 class RateDrives:
-    """The rate loops of drives on beds as they are believed to be. period: of the servos' ticks, s"""
+    """Models of the rate loops of drives on beds. period: of the servos' ticks, s"""
 
     system: System
     period: float
 
     def begin(self, tape: Tape, each: Mounted) -> None:
-        """A drive that is armed has no integral yet."""
+        """Start the loop of an armed drive with an integral of 0."""
         tape.write(cell_names.LOOP_INTEGRAL(each.joint), 0.0)
 
     def integral(self, tape: Tape, each: Mounted) -> Real:
@@ -64,7 +64,7 @@ class RateDrives:
         tape.write(cell_names.RATE_WANTED(each.joint), wanted)
 
     def told(self, tape: Tape, each: Mounted, motor: Motor) -> Real:
-        """The rate of the shaft that the drive is told at this tick, rad/s."""
+        """The rate of the shaft that the drive is commanded at this tick, rad/s."""
         return motor.ratio * tape.read(cell_names.RATE_WANTED(each.joint))
 
     def torque(self, tape: Tape, each: Mounted, motor: Motor, told: Real, integral: Real, w: Real) -> drive.LoopTorque:
@@ -72,11 +72,12 @@ class RateDrives:
         return drive.loop_torque(motor, self.loop(tape, each), integral, told, w, self.period)
 
     def wound(self, tape: Tape, each: Mounted, told: Real, integral: Real, w: Real, after: Real) -> Real:
-        """The integral a tick on, rad, under a rate that is told, while the shaft's goes from w to `after`, rad/s."""
+        """The integral one tick on, rad, under a commanded rate, while the shaft's rate goes from w to `after`,
+        rad/s."""
         return drive.wound(self.loop(tape, each), integral, told - 0.5 * (w + after), self.period)
 
     def wind(self, tape: Tape, each: Mounted, told: Real, w: Real, after: Real) -> None:
-        """Let the integral that is kept go on to the next tick, as `wound` has it."""
+        """Advance the kept integral to the next tick, as `wound` does."""
         found = self.wound(tape, each, told, self.integral(tape, each), w, after)
         tape.write(cell_names.LOOP_INTEGRAL(each.joint), found)
 

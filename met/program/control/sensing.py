@@ -1,4 +1,4 @@
-"""Sensors at work: their states, what they read at ticks; of joints, what a law sees in the stead of how things are."""
+"""Sensors at work: their states and their readings at ticks; those of joints give a law its inputs."""
 
 from __future__ import annotations
 
@@ -18,24 +18,25 @@ from met.trace.noise import Stream, normal
 from met.trace.program import Tape
 
 READING = "sensors"
-"""Name of the part of a tick in which a sensor reads, or a bed's converters work (`met.trace.program.Tape.part`)."""
+"""The name of the part of a tick in which a sensor reads, or a bed's converters work
+(`met.trace.program.Tape.part`)."""
 
 
 def measured(actuator: Actuator, p: NamedValues, q: Real, qd: Real, states: NamedValues) -> tuple[Real, Real]:
-    """Position and rate where the servo's encoder and tachometer sit, of a joint that moves so."""
+    """Position and rate at the servo's encoder and tachometer, for a joint with this motion."""
     if actuator.servo.measured is None:
         return q, qd
     return answer(actuator.owner, actuator.servo.measured, p, q, qd, states)
 
 
 def true_value(seen: Seen, of: str) -> Real:
-    """The quantity itself."""
+    """The true value of a quantity."""
     found: Real = getattr(seen, of) if of in ("q", "qd") else getattr(seen.states, of)
     return found
 
 
 def start(system: System, tape: Tape, actuator: Actuator, seen: Seen) -> None:
-    """States, memory and reading where a run begins."""
+    """Write states, memory and reading where a run begins."""
     for fitted in actuator.sensors:
         value = true_value(seen, quantity(fitted))
         begin(system, tape, fitted, value)
@@ -79,7 +80,7 @@ def seen_at_tick(system: System, tape: Tape, actuator: Actuator, seen: Seen, sta
 
 
 def begin(system: System, tape: Tape, fitted: Fitted, value: Real) -> None:
-    """States, memory and reading where a run begins, the quantity having been at this value."""
+    """Write states, memory and reading where a run begins, after the quantity has been at this value."""
     found = answer(fitted.owner, fitted.sensor.begin, values(system, fitted, tape.read), value)
     names = [*(state.name for state in fitted.states), *(memory.name for memory in fitted.memory)]
     returned(fitted.owner, "begin", found, names)
@@ -108,7 +109,7 @@ def tick(
     period: float,
     state: Callable[[str], Real],
 ) -> Real:
-    """The reading of a sensor at a tick of its computer; its memory goes a tick on.
+    """The reading of a sensor at a tick of its computer; its memory advances by a tick.
 
     find   gives the quantity;  state  its states, by channel
     """
@@ -144,7 +145,7 @@ def _states(fitted: Fitted, state: Callable[[str], Real]) -> NamedValues:
 
 
 def with_value(actuator: Actuator, seen: Seen, of: str, value: Real) -> Seen:
-    """The same inputs of a law, with this quantity replaced."""
+    """The inputs of a law with this quantity replaced."""
     if of in ("q", "qd"):
         return replace(seen, q=value) if of == "q" else replace(seen, qd=value)
     numbers: dict[str, Any] = {part.name: getattr(seen.states, part.name) for part in actuator.parts.natural}

@@ -1,4 +1,4 @@
-"""The setpoints that servos follow: of their own commands, or of the guides that command their joints."""
+"""The setpoints of servos, from their own commands or from the guides that command their joints."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def course_values(system: System, actuator: Actuator, read: ReadCell) -> NamedVa
 
 
 def owner(use: GuideUse) -> str:
-    """Name for messages."""
+    """The guide's name for messages."""
     return f"guide `{use.name}` (model {use.model})"
 
 
@@ -53,7 +53,8 @@ def own(system: System, use: GuideUse, read: ReadCell) -> tuple[NamedValues, lis
 
 
 def _of_guide(system: System, joint: str, kind: str, use: GuideUse, read: ReadCell, time: Real) -> Setpoint:
-    """The guide's setpoint of a joint at a time: between its ticks, the rate of the last one and where that leads."""
+    """The guide's setpoint of a joint at a time: between its ticks, the last rate, and the position to which that
+    leads."""
     guide = models.find("guide", use.model, use.place)
     if guide.course is None:
         rate = read(cell_names.GUIDE_RATE(joint))

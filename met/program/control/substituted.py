@@ -1,4 +1,5 @@
-"""Joints whose motors are on a bed: what happens at each tick of their servos (docs/physics.md, motor substitution).
+"""Joints whose motors are on a bed: their computations at each tick of their servos (docs/physics.md, motor
+substitution).
 
 Rates, torques, voltages and inertias here are those of the joint's motor; a bed of another size (`scale`) has its own
 in its memory, its parameters and on its wire (met/substitution/bed_scale.py).
@@ -37,10 +38,10 @@ from met.trace.noise import Stream, normal
 from met.trace.program import Control, Every, Phase, RunPhase, Tape, Unless0, WhileAny
 
 QUEUE = 3
-"""Ticks of delay that there is room for (parameter `delay` of a bed)."""
+"""Largest delay in ticks (parameter `delay` of a bed)."""
 
 LIMITED = "bed.limited"
-"""Counts a case: ticks at which a bed's load motor was at its limit."""
+"""Output that counts, for each case, the ticks at which a bed's load motor was at its limit."""
 
 SETTLING = 0.25
 """Time in which the observer's covariance settles, s: some thirty of its slowest time constants."""
@@ -51,8 +52,8 @@ _UNKNOWN = (1e4, 1e4, 1e8, 1e-2)
 
 @frozen
 class _Ahead:
-    """A joint's shaft when an output computed now begins to act. w: rad/s;  integral: of a drive's own rate loop, as it
-    is believed, rad, 0 of other drives"""
+    """A joint's shaft at the time when the present output begins to act. w: rad/s; integral: that of a drive's own rate
+    loop as modelled, rad, 0 for other drives."""
 
     w: Real
     integral: Real
@@ -63,8 +64,8 @@ Loads = Callable[[Tape], tuple[list[list[Real]], list[Real]]]
 
 
 class Substituted:
-    """The phases of a system's substituted joints, which tick together. wire: a real bed is at the wire, which takes
-    `late` of the bed's ticks of delay by itself."""
+    """The phases of a system's substituted joints, which tick together. wire: a real bed is at the wire, which accounts
+    for `late` of the bed's ticks of delay."""
 
     def __init__(self, system: System, loads: Loads, *, wire: bool = False, late: int = 0) -> None:
         self.system = system
@@ -83,7 +84,7 @@ class Substituted:
         self.rate_drives = RateDrives(system, self.period)
 
     def alone(self, each: Mounted) -> Substituted:
-        """The same for one joint by itself."""
+        """The phases of one joint alone."""
         found = copy.copy(self)
         found.mounted = (each,)
         return found
@@ -120,7 +121,7 @@ class Substituted:
         return parts
 
     def before_servos(self) -> tuple[Control, ...]:
-        """At the servos' ticks, before they see anything."""
+        """Phases at the servos' ticks, before they see anything."""
         if not self.mounted:
             return ()
         moved: tuple[Control, ...] = ()
@@ -131,7 +132,7 @@ class Substituted:
         return (*moved, Every(self.divisor, (RunPhase(Phase("read", self.read)),)), follow)
 
     def after_modes(self) -> tuple[Control, ...]:
-        """At an instant, once modes are decided, and at the servos' ticks after that."""
+        """Phases at an instant once modes are decided, and at the servos' ticks after that."""
         if not self.mounted:
             return ()
         arm, law, first = (
@@ -147,13 +148,13 @@ class Substituted:
     # The run's start.
 
     def start(self, tape: Tape) -> None:
-        """Each shaft turns with its joint, and has done so; the observer knows that, and nothing else."""
+        """Start each shaft turning with its joint, as if for long; the observer knows that, and nothing else."""
         tape.write("always", 1.0)
         for each in self.mounted:
             motor = self.motor(tape, each)
             w = motor.ratio * tape.read(f"{each.joint}.qd")
             self.begin_bed(tape, each, w / self.scale(tape, each).rate)
-            if self.wire:  # what is inside a real one nobody knows
+            if self.wire:  # the inner state of a real bed is unknown
                 for memory in each.bed.memory:
                     tape.write(f"{each.joint}.bed.{memory.name}", math.nan)
             for cell in (cell_names.READ, cell_names.READ_BEFORE, cell_names.SHAFT_RATE, cell_names.REFERENCE_RATE):
@@ -168,14 +169,14 @@ class Substituted:
                     tape.write(cell_names.COVARIANCE(each.joint, i, j), _UNKNOWN[i] if i == j else 0.0)
 
     def begin_bed(self, tape: Tape, each: Mounted, w: Real) -> None:
-        """The emulated bed of a shaft, its own, that has turned at w rad/s for long."""
+        """Start the emulated bed of a shaft, its own, which has turned at w rad/s for long."""
         begun = answer(self._owner(each), each.bed.begin, self._bed_values(tape, each), w)
         returned(self._owner(each), "begin", begun, (memory.name for memory in each.bed.memory))
         for name, value in begun.items():
             tape.write(f"{each.joint}.bed.{name}", value)
 
     def covariance(self, tape: Tape) -> None:
-        """One turn of the Riccati recursion."""
+        """Run one turn of the Riccati recursion."""
         for each in self.mounted:
             P = observer.next_covariance(self._model(tape, each), self._covariance(tape, each), self._noise(tape, each))
             for i in range(4):
@@ -191,7 +192,7 @@ class Substituted:
     # A tick.
 
     def advance(self, tape: Tape) -> None:
-        """The emulated beds, from the last tick to this one."""
+        """Advance the emulated beds from the last tick to this one."""
         tick = tape.tick / float(self.divisor) - 1.0
         cases = self.system.experiment.cases
         seed = tape.input(SEED) if SEED in cases.noise else float(cases.seed)
@@ -200,7 +201,8 @@ class Substituted:
             self.advance_bed(tape, each, self.period, seed=seed, repeat=repeat, tick=tick)
 
     def advance_bed(self, tape: Tape, each: Mounted, period: float, *, seed: Real, repeat: Real, tick: Real) -> None:
-        """One emulated bed, by period s under what its amplifiers hold; its noise is that of the number `tick`."""
+        """Advance one emulated bed by period s with its amplifiers' held outputs; its noise is that of the number
+        `tick`."""
         p = self._bed_values(tape, each)
         held = (f"drive_{each.bed.drive}", "load_current")
         wire = Wire(*(tape.read(f"{each.joint}.bed.{name}") for name in held))
@@ -220,7 +222,7 @@ class Substituted:
             return answer(self._owner(each), each.bed.read, p, held)
 
     def read(self, tape: Tape) -> None:
-        """The filtered rate, the observer's correction, and the shaft's angle."""
+        """Read the filtered rate, correct the observer, and read the shaft's angle."""
         for each in self.mounted:
             name = each.joint
             read = tape.input(f"wire:{name}.rate") if self.wire else self.reading(tape, each)
@@ -243,7 +245,7 @@ class Substituted:
             tape.write(f"{name}.law.rate", w)
 
     def follow(self, tape: Tape) -> None:
-        """The arm's joints are where the shafts are."""
+        """Set the arm's joints to the shafts' positions and rates."""
         for each in self.mounted:
             ratio = self.motor(tape, each).ratio
             tape.write(f"{each.joint}.q", tape.read(cell_names.SHAFT_ANGLE(each.joint)) / ratio)
@@ -251,7 +253,7 @@ class Substituted:
 
     def seen(self, tape: Tape, actuator: Actuator) -> tuple[Real, Real] | None:
         """Position and filtered rate of a substituted joint, as its servo's computer sees them; None for others. Where
-        the drive closes the rate loop the rate is not filtered: the drive sees its shaft by itself."""
+        the drive closes the rate loop the rate is not filtered: the drive measures its shaft itself."""
         for each in self.mounted:
             if each.actuator is actuator:
                 ratio = self.motor(tape, each).ratio
@@ -261,7 +263,7 @@ class Substituted:
         return None
 
     def want(self, tape: Tape, actuator: Actuator, seen: Seen) -> None:
-        """Keep what a drive with a rate loop of its own is told, once its servo has seen its joint at this tick."""
+        """Keep the command of a drive with a rate loop of its own, once its servo has seen its joint at this tick."""
         for each in self.mounted:
             if each.actuator is actuator and each.closes_rate_loop:
                 self.rate_drives.want(tape, each, seen)
@@ -275,7 +277,7 @@ class Substituted:
                 tape.write(cell_names.ARM_INERTIA(each.joint, other.joint), entry)
 
     def act(self, tape: Tape) -> None:
-        """The law: load torque, what goes over the wire, the joint's acceleration; the observer looks ahead."""
+        """Run the law: load torque, commands over the wire, the joint's acceleration; the observer looks ahead."""
         assert self.law is not None
         Lambda = [[tape.read(cell_names.ARM_INERTIA(a.joint, b.joint)) for b in self.mounted] for a in self.mounted]
         b_0 = [tape.read(cell_names.ARM_TORQUE(each.joint)) for each in self.mounted]
@@ -314,7 +316,7 @@ class Substituted:
                 self._wind(tape, each, wire, motion)
 
     def first(self, tape: Tape) -> None:
-        """The acceleration with which the step begins; a servo faster than the dynamics changes it on the way."""
+        """The acceleration with which the step begins; a servo faster than the dynamics changes it during the step."""
         for each in self.mounted:
             tape.write(cell_names.GIVEN_FIRST(each.joint), tape.read(cell_names.GIVEN(each.joint)))
 
@@ -332,7 +334,7 @@ class Substituted:
     # Parts of a tick.
 
     def _ahead(self, tape: Tape, each: Mounted) -> _Ahead:
-        """The shaft that the output computed now will meet: the observer's, over the delay; else the one just read."""
+        """The shaft when the present output acts: the observer's, over the delay; else the one just read."""
         integral = self.rate_drives.integral(tape, each)
         if not each.law.observer:
             return _Ahead(tape.read(cell_names.READ(each.joint)), integral)
@@ -349,7 +351,7 @@ class Substituted:
         return _Ahead(x[0], integral)
 
     def _queued(self, tape: Tape, each: Mounted, ago: Real) -> Wire:
-        """The pair that was asked for this many ticks ago, from 1 to `QUEUE`."""
+        """The pair that was commanded this many ticks ago, from 1 to `QUEUE`."""
         told: Real = 0.0
         current: Real = 0.0
         for i in range(QUEUE):
@@ -364,15 +366,15 @@ class Substituted:
         return torque(motor.kt, motor.resistance, motor.tau_max, self._voltage(tape, each), w)
 
     def _own_side(self, tape: Tape, each: Mounted, ahead: _Ahead) -> balance.JointSide:
-        """A joint's side of the balance, with its own motor; under its drive's rate loop where the drive has one."""
+        """A joint's side of the balance with its own motor, under its drive's rate loop where the drive has one."""
         if each.closes_rate_loop:
             driving, falls = self._under_loop(tape, each, ahead)
             return self._side(tape, each, ahead.w, driving, self._band(tape, each), falls=falls)
         return self._side(tape, each, ahead.w, self._own_torque(tape, each, ahead.w), self._band(tape, each))
 
     def _command(self, tape: Tape, each: Mounted, ahead: _Ahead, found: balance.Balanced | None) -> Real | None:
-        """The torque or rate that the bed's drive is told at this tick, of the joint's size; None where it is told the
-        servo's voltage."""
+        """The torque or rate that the bed's drive is commanded at this tick, of the joint's size; None where it is
+        commanded the servo's voltage."""
         if each.bed.drive == "voltage":
             return None
         if each.closes_rate_loop:
@@ -381,15 +383,15 @@ class Substituted:
         return drive.mean_torque(self.motor(tape, each), self._own_torque(tape, each, ahead.w), found, mean)
 
     def _under_loop(self, tape: Tape, each: Mounted, at: _Ahead, told: Real | None = None) -> tuple[Real, Real]:
-        """Torque of a motor under its drive's rate loop, N m, and what it and viscous friction fall by as the shaft
-        gains speed, N m s/rad. told: rate of the shaft, rad/s; None: the one of this tick"""
+        """Torque of a motor under its drive's rate loop, N m, and its decrease, with viscous friction, by the shaft's
+        rate, N m s/rad. told: commanded rate of the shaft, rad/s; None: the one of this tick."""
         motor = self.motor(tape, each)
         told = self.rate_drives.told(tape, each, motor) if told is None else told
         of = self.rate_drives.torque(tape, each, motor, told, at.integral, at.w)
         return of.torque, motor.f_v + of.brakes
 
     def _wind(self, tape: Tape, each: Mounted, wire: Wire, found: balance.Balanced | None) -> None:
-        """Let the integral that the drive's rate loop is believed to have go on to the next tick."""
+        """Advance the modelled integral of the drive's rate loop to the next tick."""
         w: Real = tape.read(cell_names.SHAFT_RATE(each.joint))
         after = w if found is None else w + self.period * self.motor(tape, each).ratio * found.qdd
         if each.law.observer:
@@ -399,15 +401,16 @@ class Substituted:
     def _on_bed(
         self, tape: Tape, each: Mounted, told: Real | None, ahead: _Ahead, found: balance.Balanced | None
     ) -> balance.Balanced | None:
-        """The joint's motion, with the torque that the bed's motor is told for the coming tick in place of its own."""
+        """The joint's motion, with the torque that the bed's motor is commanded for the coming tick in place of its
+        own."""
         if found is None or told is None or each.closes_rate_loop:
             return found
         net = found.net - self._own_torque(tape, each, ahead.w) + told
         return balance.Balanced(found.qdd, found.friction, found.s, net)
 
     def _send(self, tape: Tape, each: Mounted, command: Real | None, given: LawOutput) -> Wire:
-        """Puts a command on the wire, and gives back what the amplifiers hold from now on: an older one, if delayed.
-        command: to the drive, of the joint's size; None: the servo's voltage."""
+        """Put a command on the wire; returns the pair that the amplifiers hold from now on, which is an older one if
+        delayed. command: to the drive, of the joint's size; None: the servo's voltage."""
         name, tells = each.joint, each.bed.drive
         p = self._bed_values(tape, each)
         scale = self.scale(tape, each)
@@ -450,8 +453,8 @@ class Substituted:
             tape.write(f"{each.joint}.law.reference_rate", side.w)
 
     def _bed_torque(self, tape: Tape, each: Mounted, wire: Wire, w: Real, integral: Real) -> tuple[Real, Real | None]:
-        """Torque of a motor as the law believes it, told what the amplifiers hold, at a rate of its shaft, N m; and
-        what it and viscous friction fall by as the shaft gains speed, N m s/rad, None: as at a voltage.
+        """The law's estimate of a motor's torque under the amplifiers' outputs at a rate of its shaft, N m; and its
+        decrease, with viscous friction, by that rate, N m s/rad, None: as at a voltage.
 
         integral  of the drive's rate loop, where it has one, rad
         """
@@ -502,14 +505,15 @@ class Substituted:
         )
 
     def _predicted(self, tape: Tape, each: Mounted, x: observer.Four, wire: Wire, integral: Real) -> observer.Four:
-        """The observer's state a tick on, under what the amplifiers hold. integral: of the drive's rate loop, rad"""
+        """The observer's state one tick on, under the amplifiers' held outputs. integral: of the drive's rate loop,
+        rad"""
         motor, band, scale = self.motor(tape, each), self._band(tape, each), self.scale(tape, each)
         load = self._bed_values(tape, each).kt_load * wire.current * scale.torque
         w, d = x[0], x[3]
         driving, falls = self._bed_torque(tape, each, wire, w, integral)
         rest = clip(driving + d + load - motor.f_v * w, -motor.f_c, motor.f_c)
         dry = where(absolute(w) > band, sign(w) * motor.f_c, rest)
-        # Back-EMF is in the model; where the drive is at its limit this takes it out again.
+        # Back-EMF is in the model; where the drive is at its limit, it is taken out again.
         own = driving + motor.kt * motor.kt / motor.resistance * w if each.bed.drive == "voltage" else driving
         u = own - dry + load
         if falls is not None and each.closes_rate_loop:
@@ -520,10 +524,10 @@ class Substituted:
             u = driving + (slope - motor.f_v) * w + (slope - falls) * (0.5 * gained) - dry + load
         return observer.predicted(self._model(tape, each), x, u)
 
-    # What is known of a joint.
+    # Parameters of a joint.
 
     def motor(self, tape: Tape, each: Mounted) -> Motor:
-        """The joint's motor as its servo believes it."""
+        """The joint's motor with the servo's parameters."""
         assert each.actuator.servo.motor is not None
         p = self.system.servo_values(each.actuator, tape.read)
         return answer(each.actuator.owner, each.actuator.servo.motor, p)
@@ -536,7 +540,7 @@ class Substituted:
         return BedScale(p.torque, p.rate, p.voltage)
 
     def _shaft_inertia(self, tape: Tape, each: Mounted) -> Real:
-        """The inertia of the bed's shaft as the joint's motor would feel it, kg m^2."""
+        """The inertia of the bed's shaft at the joint's motor, kg m^2."""
         inertia: Real = self._bed_values(tape, each).inertia
         return inertia * self.scale(tape, each).inertia
 

@@ -1,1 +1,1 @@
-"""The base, bodies that move freely, payloads; and the world as environment models see it."""
+"""The base, freely moving bodies and payloads; and the view of the world that environment models get."""

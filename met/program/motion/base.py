@@ -1,4 +1,4 @@
-"""The base at an instant: where it is and how it moves, prescribed by its courses or free (docs/physics.md, section 1).
+"""The base at an instant: its pose and motion, prescribed by courses or free (docs/physics.md, section 1).
 
 A free one is the first of the `bodies` that move freely.
 """
@@ -56,12 +56,12 @@ class BaseMotion:
 
 
 def free_base(system: System) -> FreeBody | None:
-    """The base as a body that moves freely; None where it does not."""
+    """The base as a freely moving body; None where it is not free."""
     return bodies(system)[0] if system.structure.free else None
 
 
 def base_of(system: System, read: ReadCell, y: Motion, time: Real) -> BaseMotion:
-    """The base at a state and a time (s); of a free base y has the coordinates, theta included."""
+    """The base at a state and a time (s); y has a free base's coordinates, theta included."""
     if system.structure.base is None:
         return BaseMotion()
     body = free_base(system)
@@ -72,13 +72,13 @@ def base_of(system: System, read: ReadCell, y: Motion, time: Real) -> BaseMotion
 
 
 def motions(tree: Tree, q: Sequence[Real], qd: Sequence[Real], base: BaseMotion) -> dict[str, LinkMotion]:
-    """Every link in the world, by name; the base, where it is one, just where it is."""
+    """The motion of every link in the world, by name; that of the base, where it is a link, is the given one."""
     found = link_motions(tree, q, qd, base.pose, (base.w, base.v))
     return found | ({BASE: LinkMotion(base.pose, base.w, base.v)} if BASE in found else {})
 
 
 def prescribed(system: System, read: ReadCell, time: Real) -> BaseMotion:
-    """The base as its courses have it at a time (`courses`)."""
+    """The motion of the base from its courses at a time (`courses`)."""
     varying = {path: read(PARAMETER + path) for path in system.courses.inputs if path != TIME}
     numbers = system.courses.replay({TIME: time, **varying})
     found = [settled(x) if isinstance(x, Scalar) else np.float64(x) for x in numbers]
@@ -88,7 +88,7 @@ def prescribed(system: System, read: ReadCell, time: Real) -> BaseMotion:
 
 
 def start(system: System, tape: Tape) -> None:
-    """The initial state of a free base: `rate` is given in world axes."""
+    """Write the initial state of a free base, whose `rate` is given in world axes."""
     body = free_base(system)
     if body is None:
         return

@@ -1,4 +1,4 @@
-"""Bodies that move freely: their coordinates, and their orientation from step to step (docs/physics.md, section 1).
+"""Freely moving bodies: their coordinates, and their orientation from step to step (docs/physics.md, section 1).
 
 A free base is one, and each payload that flies for a time. Each has six coordinates, integrated with those of the
 joints: its origin in world axes, and a turn theta since the (sub)step began, whose orientation is kept as a unit
@@ -58,7 +58,7 @@ class FreeBody:
 
     @property
     def orientation(self) -> tuple[str, ...]:
-        """The cells of its quaternion."""
+        """The cells of the body's quaternion."""
         return tuple(cell_names.BODY_ORIENTATION(self.name, part) for part in "wxyz")
 
     def q(self, y: Motion) -> tuple[Real, ...]:
@@ -74,7 +74,7 @@ class FreeBody:
 
 @frozen
 class Flight:
-    """A body that moves freely, at a stage.
+    """A freely moving body at a stage.
 
     pose    R_WB and p_WB, m
     w, v    angular velocity, and velocity of the origin, its own axes, rad/s, m/s
@@ -95,13 +95,13 @@ def bodies(system: System) -> tuple[FreeBody, ...]:
 
 
 def coordinates(system: System) -> tuple[str, ...]:
-    """All that is integrated as positions with rates: the joints' names, then those of the bodies' coordinates."""
+    """The names of everything integrated as positions with rates: joints, then bodies' coordinates."""
     of_bodies = (name for body in bodies(system) for name in body.coordinates)
     return (*(joint.name for joint in system.joints), *of_bodies)
 
 
 def flight(body: FreeBody, read: ReadCell, y: Motion) -> Flight:
-    """Pose and velocities of a body, at a state that has its coordinates, theta included."""
+    """Pose and velocities of a body at a state with its coordinates, theta included."""
     q, qd = body.q(y), body.qd(y)
     theta, v, w = q[3:], qd[:3], qd[3:]
     there = _read(body, read, "")
@@ -121,7 +121,7 @@ def slopes(
 
 
 def place(body: FreeBody, tape: Tape, active: Truth, turn: Quaternion, position: Vector, v: Vector, w: Vector) -> None:
-    """Makes this a body's state, where active: velocity in world axes, angular velocity in its own."""
+    """Set a body's state where active: velocity in world axes, angular velocity in its own."""
     _write(body, tape, active, turn)
     for name, q, qd in zip(body.coordinates, (*position, 0.0, 0.0, 0.0), (*v, *w), strict=True):
         cells.keep(tape, active, f"{name}.q", q)
@@ -129,7 +129,7 @@ def place(body: FreeBody, tape: Tape, active: Truth, turn: Quaternion, position:
 
 
 def with_zero_turn(system: System, y: Motion) -> Motion:
-    """A state at which a (sub)step begins, or is seen: theta is 0 there."""
+    """A state at the start of a (sub)step, or as seen by computers: theta is 0 there."""
     q = list(y.q)
     for body in bodies(system):
         q[body.first + 3 : body.first + SIX] = (0.0, 0.0, 0.0)
@@ -142,20 +142,20 @@ def orientation(system: System, tape: Tape) -> tuple[Real, ...]:
 
 
 def keep_orientation(system: System, tape: Tape, copy: str) -> None:
-    """Keeps a copy of the orientations at which the (sub)step began."""
+    """Keep a copy of the orientations at the start of the (sub)step."""
     for body in bodies(system):
         for name in body.orientation:
             tape.write(f"{copy}{name}", tape.read(name))
 
 
 def turn(system: System, tape: Tape, active: Truth, y: Motion, copy: str = "") -> None:
-    """Takes the turns of a (sub)step that ends at y into the orientations, of which `copy` was their beginning."""
+    """Add the turns of a (sub)step that ends at y to the orientations, which began as `copy`."""
     for body in bodies(system):
         _write(body, tape, active, _turned(_read(body, tape.read, copy), body.q(y)[3:]))
 
 
 def turn_by(body: FreeBody, tape: Tape, theta: tuple[Real, ...]) -> None:
-    """Turns a body by this rotation vector of its own axes, rad."""
+    """Turn a body by this rotation vector in its own axes, rad."""
     _write(body, tape, True, _turned(_read(body, tape.read, ""), theta))
 
 

@@ -1,4 +1,4 @@
-"""Payloads that fly for a time: where they are, what they are to the arm, and what happens as they are grappled.
+"""Payloads that fly for a time: their motion, their part in the arm's dynamics, and their grapples.
 
 In a case's memory, for a payload `box` (`payload:box:...`):
 
@@ -40,7 +40,7 @@ from met.trace.program import Tape
 from met.vectors import ZERO, Vector, quaternion_rpy
 
 FLYING, CARRIED, RELEASED = 0.0, 1.0, 2.0
-"""Stages of a payload: it flies and waits to be grappled; a link carries it; it flies for good."""
+"""Stages of a payload: it flies until it is grappled; a link carries it; it flies for the rest of the run."""
 
 NOTHING: Wrench = (ZERO, ZERO)
 
@@ -52,7 +52,7 @@ def body_of(system: System, payload: Payload, read: ReadCell) -> Rigid:
 
 
 def free_body(system: System, payload: Payload) -> FreeBody:
-    """Its coordinates."""
+    """The body of a payload in flight, with its coordinates."""
     return next(each for each in bodies(system) if each.name == PAYLOAD + payload.name)
 
 
@@ -62,7 +62,7 @@ def carried(payload: Payload, read: ReadCell) -> Truth:
 
 
 def pose_in_link(payload: Payload, read: ReadCell) -> Pose:
-    """Its pose in the link's frame, while the link carries it."""
+    """The payload's pose in the link's frame, while the link carries it."""
     x = [read(cell_names.PAYLOAD_POSE(payload.name, i)) for i in range(12)]
     return Pose(((x[0], x[1], x[2]), (x[3], x[4], x[5]), (x[6], x[7], x[8])), (x[9], x[10], x[11]))
 
@@ -104,9 +104,9 @@ def carried_motion(payload: Payload, read: ReadCell, links: Mapping[str, LinkMot
 
 
 def split_wrenches(system: System, read: ReadCell, wrenches: Mapping[str, Wrench]) -> tuple[dict[str, Wrench], ...]:
-    """Wrenches on links, those on payloads among them that a link carries; and those on payloads that fly.
+    """Wrenches on links, including those on payloads that a link carries; and wrenches on flying payloads.
 
-    wrenches  on links and payloads by name, about their frames' origins and in their axes
+    wrenches on links and payloads by name, about their frames' origins and in their axes
     """
     names = {payload.name: payload for payload in system.flying}
     links = {name: wrench for name, wrench in wrenches.items() if name not in names}
@@ -143,11 +143,11 @@ def slopes_of_payloads(
     return tuple(qd), tuple(qdd)
 
 
-# What becomes of them
+# Changes of stage
 
 
 def start(system: System, tape: Tape) -> None:
-    """Write where payloads are when a run begins."""
+    """Write the payloads' state at the start of a run."""
     for payload in system.flying:
         head = f"payloads.{payload.name}"
 
@@ -166,7 +166,7 @@ def start(system: System, tape: Tape) -> None:
 
 
 def attach(system: System, tape: Tape, active: Truth, payload: Payload, pose: Pose) -> None:
-    """Makes a payload a part of its link, at this pose in its frame, where active."""
+    """Attach a payload to its link, at this pose in its frame, where active."""
     for i, x in enumerate((*pose.R[0], *pose.R[1], *pose.R[2], *pose.p)):
         cells.keep(tape, active, cell_names.PAYLOAD_POSE(payload.name, i), x)
     body = in_tree(system.tree(tape.read), payload.link, body_of(system, payload, tape.read), pose)
@@ -175,13 +175,13 @@ def attach(system: System, tape: Tape, active: Truth, payload: Payload, pose: Po
 
 
 def detach(tape: Tape, active: Truth, payload: Payload) -> None:
-    """Takes a payload off its link, where active."""
+    """Detach a payload from its link, where active."""
     _keep_body(tape, active, payload, NO_INERTIA)
     cells.keep(tape, active, cell_names.PAYLOAD_STAGE(payload.name), RELEASED)
 
 
 def gap(system: System, payload: Payload, read: ReadCell, motion: LinkMotion, link: LinkMotion) -> Vector:
-    """The vector from the link's point that the payload's frame is to come to, to that frame; world axes, m."""
+    """The vector from the link's point to which the payload's frame should come, to that frame; world axes, m."""
     x, y, z = motion.pose.p
     a, b, c = link.position(system.vector(f"payloads.{payload.name}.at", read))
     return x - a, y - b, z - c

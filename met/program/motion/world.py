@@ -1,4 +1,4 @@
-"""The arm as environment models see it: positions and velocities in the world, computed only where asked."""
+"""The view of the arm that environment models get: positions and velocities in the world, computed only on request."""
 
 from __future__ import annotations
 
@@ -76,7 +76,8 @@ class ArmWorld:
         return self._system.inertia(self._own(link), self._read)
 
     def is_ground(self, link: str) -> bool:
-        """True for the ground's name. Where the arm has a link of that name, no model's parameter is that word."""
+        """True for the ground's name. Where a link of the arm has that name, no model's parameter means the ground by
+        it."""
         return link == WORLD and link not in self.links
 
     def link(self, link: str) -> LinkMotion:
